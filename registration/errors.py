@@ -1,0 +1,35 @@
+"""What registration refuses.
+
+::
+
+    RegistrationError (ValueError)
+    ├── InvalidSegmentsError     a segment that no line can be put through
+    └── InvalidArgumentError     everything else that is wrong with an argument
+"""
+
+
+class RegistrationError(ValueError):
+    """Root of this package's errors: the input is wrong, and says where.
+
+    Attributes
+    ----------
+    argument : str
+        Which argument, a path in the caller's terms such as ``scan.segments``.
+    index : int or None
+        The row that is at fault, where there is one.
+    """
+
+    def __init__(self, message: str, *, argument: str, index: int | None = None) -> None:
+        where = argument if index is None else f"{argument}[{index}]"
+        super().__init__(f"{where}: {message}")
+        self.message = message
+        self.argument = argument
+        self.index = index
+
+
+class InvalidSegmentsError(RegistrationError):
+    """A segment is not finite, too short, too long or too far out."""
+
+
+class InvalidArgumentError(RegistrationError):
+    """An argument other than a segment is wrong."""

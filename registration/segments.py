@@ -1,0 +1,201 @@
+"""Validated sets of directed line segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InvalidArgumentError, InvalidSegmentsError
+
+Floats = NDArray[np.float64]
+
+MIN_LENGTH = 1e-6  # m; shorter ones have no direction worth the name
+MAX_LENGTH = 1e4  # m
+MAX_COORDINATE = 1e9  # m; beyond it float64 resolves less than a micrometre
+DEFAULT_POINT_SPACING = 0.05  # m, what a segment without a count of points is taken to have
+
+
+def _frozen(array: Floats) -> Floats:
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """n directed segments ``[x1, y1, x2, y2]`` with free space on their left.
+
+    Build with :meth:`from_array`, which validates; the arrays are read-only float64.
+
+    Attributes
+    ----------
+    endpoints : (n, 4) metres
+    directions : (n, 2) unit vectors from begin to end
+    normals : (n, 2) left normals, ``(-d_y, d_x)``
+    offsets : (n,) signed distance of the line from the origin, ``normal . begin``, metres
+    lengths : (n,) metres
+    midpoints : (n, 2) metres
+    """
+
+    endpoints: Floats
+    directions: Floats
+    normals: Floats
+    offsets: Floats
+    lengths: Floats
+    midpoints: Floats
+
+    @classmethod
+    def from_array(cls, endpoints: ArrayLike, *, argument: str = "segments") -> Segments:
+        """Validate endpoints and derive lines from them.
+
+        Parameters
+        ----------
+        endpoints : array-like of shape (n, 4)
+            Metres, n may be 0.
+        argument : str
+            What an error calls the argument.
+
+        Raises
+        ------
+        InvalidArgumentError
+            When it is not an (n, 4) array of numbers.
+        InvalidSegmentsError
+            When a segment is not finite, has a coordinate beyond 1e9 m, or is not between 1e-6 m and 10 km long; with
+            the index of the first one.
+        """
+        try:
+            raw = np.asarray(endpoints)
+        except ValueError as error:
+            raise InvalidArgumentError(
+                "expected an array of [x1, y1, x2, y2]", argument=argument
+            ) from error
+        if raw.size == 0:
+            raw = np.zeros((0, 4))
+        if raw.dtype.kind not in "fiu" or raw.ndim != 2 or raw.shape[1] != 4:
+            raise InvalidArgumentError(
+                f"expected numbers of shape (n, 4), got {raw.dtype} of shape {raw.shape}", argument=argument
+            )
+        e = np.array(raw, dtype=np.float64, order="C")
+        _refuse(e, ~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
+        _refuse(
+            e,
+            (np.abs(e) > MAX_COORDINATE).any(axis=1),
+            f"has a coordinate beyond {MAX_COORDINATE:g} m",
+            argument,
+        )
+        span = e[:, 2:] - e[:, :2]
+        lengths = np.hypot(span[:, 0], span[:, 1])
+        _refuse(e, lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
+        _refuse(e, lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
+        d = span / lengths[:, None]
+        n = np.stack([-d[:, 1], d[:, 0]], axis=1)
+        middles = e[:, :2] + 0.5 * span
+        # The offset at the midpoint: endpoints far from the origin round least there.
+        offsets = np.einsum("ij,ij->i", n, middles)
+        return cls(*(_frozen(np.ascontiguousarray(a)) for a in (e, d, n, offsets, lengths, middles)))
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    def take(self, indices: ArrayLike) -> Segments:
+        """Return the segments at `indices`, in that order."""
+        i = np.asarray(indices, dtype=np.intp)
+        arrays = (self.endpoints, self.directions, self.normals, self.offsets, self.lengths, self.midpoints)
+        return Segments(*(_frozen(a[i]) for a in arrays))
+
+    def reversed(self) -> Segments:
+        """Return the same segments with begin and end exchanged."""
+        return Segments.from_array(self.endpoints[:, [2, 3, 0, 1]])
+
+    def shifted(self, by: ArrayLike) -> Segments:
+        """Return the segments moved by a vector of 2 metres, to work near the origin."""
+        offset = np.asarray(by, dtype=np.float64)
+        return Segments.from_array(self.endpoints + np.tile(offset, 2))
+
+
+def _refuse(endpoints: Floats, bad: NDArray[np.bool_], what: str, argument: str) -> None:
+    if bad.any():
+        raise InvalidSegmentsError(what, argument=argument, index=int(np.argmax(bad)))
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredSegments:
+    """Segments with what is known of the points behind them.
+
+    Attributes
+    ----------
+    segments : Segments
+    sigma : (n,) standard deviation of single points normal to the wall, metres
+    points : (n,) number of points behind each segment
+    centroids : (n, 2) mean of those points, metres
+    spreads : (n,) their second moment along the segment, m^2
+    """
+
+    segments: Segments
+    sigma: Floats
+    points: Floats
+    centroids: Floats = field(repr=False)
+    spreads: Floats = field(repr=False)
+
+    @classmethod
+    def from_segments(
+        cls,
+        segments: Segments,
+        sigma: ArrayLike = 0.02,
+        points: ArrayLike | None = None,
+        moments: tuple[ArrayLike, ArrayLike] | None = None,
+        *,
+        argument: str = "scan",
+    ) -> MeasuredSegments:
+        """Fill in what the caller does not know.
+
+        Parameters
+        ----------
+        segments : Segments
+        sigma : float or (n,)
+            Standard deviation of single points normal to the wall, metres, 0 to 1e3.
+        points : (n,), optional
+            Number of points behind each segment, at least 1; default ``max(2, length / 0.05)``.
+        moments : ((n, 2) centroids, (n,) spreads), optional
+            Mean of the points and their second moment along the segment; default midpoint and ``length^2 / 12``, that
+            of points spread evenly.
+        argument : str
+            What an error calls the argument.
+
+        Raises
+        ------
+        InvalidArgumentError
+            When a number is out of range or an array has another length than `segments`.
+        """
+        n = len(segments)
+        default_points = np.maximum(2.0, segments.lengths / DEFAULT_POINT_SPACING)
+        centroids, spreads = moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
+        ranges: list[tuple[str, Any, tuple[int, ...], float, float]] = [
+            ("sigma", np.broadcast_to(np.asarray(sigma, dtype=np.float64), (n,)) if np.ndim(sigma) == 0 else sigma,
+             (n,), 0.0, 1e3),
+            ("points", default_points if points is None else points, (n,), 1.0, 1e9),
+            ("centroids", centroids, (n, 2), -MAX_COORDINATE, MAX_COORDINATE),
+            ("spreads", spreads, (n,), 0.0, MAX_LENGTH**2),
+        ]  # fmt: skip
+        arrays = [
+            _checked(values, shape, low, high, f"{argument}.{name}") for name, values, shape, low, high in ranges
+        ]
+        return cls(segments, *arrays)
+
+    def __len__(self) -> int:
+        return len(self.segments)
+
+
+def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argument: str) -> Floats:
+    array = np.array(values, dtype=np.float64)
+    if array.size == 0 and shape[0] == 0:
+        array = array.reshape(shape)
+    if array.shape != shape:
+        raise InvalidArgumentError(f"expected shape {shape}, got {array.shape}", argument=argument)
+    bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
+    if bad.any():
+        index = int(np.argmax(bad.reshape(len(array), -1).any(axis=1)))
+        raise InvalidArgumentError(f"expected a number from {low:g} to {high:g}", argument=argument, index=index)
+    return _frozen(array)

@@ -1,0 +1,68 @@
+"""Rigid transforms of the plane, and the one place where angles are wrapped."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def wrap_angle(angle: float) -> float:
+    """Return the same angle in (-pi, pi].
+
+    Parameters
+    ----------
+    angle : float
+        Radians, any finite value.
+    """
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped <= -math.pi else wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class RigidTransform:
+    """The pose of frame b in frame a: ``p_a = R(theta) p_b + [x, y]``.
+
+    Name instances ``a_from_b``; then ``a_from_b.compose(b_from_c)`` is ``a_from_c``.
+
+    Attributes
+    ----------
+    x, y : float
+        Metres.
+    theta : float
+        Radians, counter-clockwise, in (-pi, pi].
+    """
+
+    x: float
+    y: float
+    theta: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.x) and math.isfinite(self.y) and math.isfinite(self.theta)):
+            raise ValueError("a rigid transform takes finite x, y and theta")
+        object.__setattr__(self, "theta", wrap_angle(self.theta))
+
+    def compose(self, other: RigidTransform) -> RigidTransform:
+        """Return the transform that applies `other` first, then this one."""
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        return RigidTransform(
+            self.x + c * other.x - s * other.y,
+            self.y + s * other.x + c * other.y,
+            self.theta + other.theta,
+        )
+
+    def inverse(self) -> RigidTransform:
+        """Return the transform that undoes this one."""
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        return RigidTransform(-c * self.x - s * self.y, s * self.x - c * self.y, -self.theta)
+
+    def apply(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Transform points, shape (..., 2), metres."""
+        p = np.asarray(points, dtype=np.float64)
+        c, s = math.cos(self.theta), math.sin(self.theta)
+        moved = np.empty_like(p)
+        moved[..., 0] = c * p[..., 0] - s * p[..., 1] + self.x
+        moved[..., 1] = s * p[..., 0] + c * p[..., 1] + self.y
+        return moved
