@@ -1,1 +1,39 @@
-"""association."""
+"""Unknown correspondences: where in a map of segments was this scan taken?"""
+
+from .options import (
+    AssociationOptions,
+    Beams,
+    CancelledError,
+    Deadline,
+    HardPrior,
+    Prior,
+    Scan,
+    SoftPrior,
+)
+from .result import (
+    Alternative,
+    AssociationDiagnostics,
+    AssociationResult,
+    AssociationWarning,
+    Correspondence,
+    SearchReport,
+    Status,
+)
+
+__all__ = [
+    "Alternative",
+    "AssociationDiagnostics",
+    "AssociationOptions",
+    "AssociationResult",
+    "AssociationWarning",
+    "Beams",
+    "CancelledError",
+    "Correspondence",
+    "Deadline",
+    "HardPrior",
+    "Prior",
+    "Scan",
+    "SearchReport",
+    "SoftPrior",
+    "Status",
+]

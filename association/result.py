@@ -1,0 +1,169 @@
+"""What a search answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import RegistrationDiagnostics, RigidTransform
+
+Floats = NDArray[np.float64]
+
+
+class Status(StrEnum):
+    """The verdict, in order of precedence."""
+
+    NO_MATCH = "no_match"
+    DEGENERATE = "degenerate"
+    AMBIGUOUS = "ambiguous"
+    OK = "ok"
+
+
+@dataclass(frozen=True, slots=True)
+class Correspondence:
+    """A scan segment found on a map segment.
+
+    Attributes
+    ----------
+    scan, map : int
+        Indices as sent.
+    overlap : float
+        Share of the scan segment's length that lies on the map, 0 to 1.
+    offset : float
+        Metres, signed: ``n_map . (R m_scan + t) - p_map`` at the midpoint of the scan segment.
+    angle : float
+        Radians: ``wrap(angle(d_map) - angle(d_scan) - theta)``.
+    weight : float
+        1 / m^2, the information of the pair.
+    alternatives : tuple of int
+        Other map indices that pass the gates.
+    """
+
+    scan: int
+    map: int
+    overlap: float
+    offset: float
+    angle: float
+    weight: float
+    alternatives: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AssociationDiagnostics:
+    """Numbers beside the pose.
+
+    Attributes
+    ----------
+    registration : RegistrationDiagnostics
+        Of the accepted pairs at the answered pose.
+    inlier_fraction : float
+        Share of the scan's length that is matched.
+    score : float
+        Log-likelihood over that of a scan that is all clutter, nats.
+    runner_up : float or None
+        Score of the best other pose over `score`, never below 0; None when there is no other.
+    margin : float or None
+        `score` minus that of the best other pose, nats.
+    significance : float
+        Probability that chance scores as high; small is good.
+    """
+
+    registration: RegistrationDiagnostics
+    inlier_fraction: float
+    score: float
+    runner_up: float | None
+    margin: float | None
+    significance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Alternative:
+    """Another pose that explains part of the scan."""
+
+    pose: RigidTransform
+    covariance: Floats | None
+    score: float
+    reliability: float
+    inlier_fraction: float
+
+
+@dataclass(frozen=True, slots=True)
+class SearchReport:
+    """How the search went.
+
+    Attributes
+    ----------
+    complete : bool
+        False when the deadline or the budget ended it before the confidence was reached.
+    exhaustive : bool
+        Whether every base was gone through.
+    confidence : float
+        Reached chance of not having missed a better consensus set.
+    bases, hypotheses, verified : int
+        Bases drawn, poses they gave, poses that were scored to the end.
+    seed : int
+    """
+
+    complete: bool
+    exhaustive: bool
+    confidence: float
+    bases: int
+    hypotheses: int
+    verified: int
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class AssociationWarning:
+    """Something that the caller should know, as a stable code and a sentence."""
+
+    code: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class AssociationResult:
+    """The answer of `associate`; lengths in metres, angles in radians, poses map_from_scan.
+
+    Attributes
+    ----------
+    status : Status
+    usable : bool
+        The one flag to gate on.
+    probability : float
+        Calibrated chance that the pose is right, 0 to 1.
+    pose : RigidTransform or None
+        None for `no_match`.
+    covariance : (3, 3) or None
+        Of additive (x, y, theta) in the map frame; None for `no_match` and `degenerate`.
+    unobservable : (float, float) or None
+        Unit vector in the map frame along which the position is not fixed.
+    correspondences : tuple of Correspondence
+        By scan index.
+    unmatched_scan : tuple of int
+    missing_map : tuple of int
+        Map segments that rays to matched segments pass through.
+    diagnostics : AssociationDiagnostics or None
+        None when nothing was matched.
+    alternatives : tuple of Alternative
+        Distinct from the pose and from each other, best first.
+    search : SearchReport
+    warnings : tuple of AssociationWarning
+    """
+
+    status: Status
+    usable: bool
+    probability: float
+    pose: RigidTransform | None
+    covariance: Floats | None
+    unobservable: tuple[float, float] | None
+    correspondences: tuple[Correspondence, ...]
+    unmatched_scan: tuple[int, ...]
+    missing_map: tuple[int, ...]
+    diagnostics: AssociationDiagnostics | None
+    alternatives: tuple[Alternative, ...]
+    search: SearchReport
+    warnings: tuple[AssociationWarning, ...]

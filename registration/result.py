@@ -1,0 +1,102 @@
+"""What a registration answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .transform import RigidTransform
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Ambiguity:
+    """The paper's ambiguity, its translation and rotation parts and their sum (Eqs. 17 to 20)."""
+
+    translation: float
+    rotation: float
+
+    @property
+    def total(self) -> float:
+        """Eq. (20)."""
+        return self.translation + self.rotation
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationDiagnostics:
+    """Numbers beside the pose, with the weights that were used.
+
+    Attributes
+    ----------
+    ambiguity, ambiguity_before : Ambiguity
+        At the answered pose and at T = 0.
+    ambiguity_at : Ambiguity or None
+        At the transform that the caller asked for.
+    similarity : float or None
+        1 / total ambiguity; None where that is 0.
+    reliability : float
+        Eq. (28), 0 to 1.
+    determinant : float
+        Eq. (8)'s D.
+    chi2 : float
+        Joint cost at the answered pose.
+    dof : int
+        2 n - 3, or 2 n - 2 when all lines are parallel.
+    rms_offset : float
+        Metres.
+    rms_angle : float
+        Radians.
+    n : int
+        Number of pairs.
+    """
+
+    ambiguity: Ambiguity
+    ambiguity_before: Ambiguity
+    ambiguity_at: Ambiguity | None
+    similarity: float | None
+    reliability: float
+    determinant: float
+    chi2: float
+    dof: int
+    rms_offset: float
+    rms_angle: float
+    n: int
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationResult:
+    """The answer of `register`.
+
+    Attributes
+    ----------
+    degenerate : bool
+        No unique transform fits: all pairs are parallel, or there is none.
+    usable : bool
+        Not degenerate, and chi2 below its 99.9 % quantile.
+    pose : RigidTransform or None
+        map_from_scan; for parallel pairs the one that moves least along the free direction; None without pairs.
+    covariance : (3, 3) or None
+        Of additive (x, y, theta) in the map frame; None when degenerate and for the one-step estimator.
+    unobservable : (float, float) or None
+        Unit vector in the map frame along which the translation is free.
+    offsets : (n,)
+        ``n_map . (R m_scan + t) - p_map`` at the midpoints, metres.
+    angles : (n,)
+        ``wrap(angle(d_map) - angle(d_scan) - theta)``, radians.
+    weights : (n,)
+        As used.
+    diagnostics : RegistrationDiagnostics
+    """
+
+    degenerate: bool
+    usable: bool
+    pose: RigidTransform | None
+    covariance: Floats | None
+    unobservable: tuple[float, float] | None
+    offsets: Floats
+    angles: Floats
+    weights: Floats
+    diagnostics: RegistrationDiagnostics
