@@ -169,9 +169,7 @@ class MeasuredSegments:
         """
         n = len(segments)
         default_points = np.maximum(2.0, segments.lengths / DEFAULT_POINT_SPACING)
-        centroids, spreads = (
-            moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
-        )
+        centroids, spreads = moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
         ranges: list[tuple[str, Any, tuple[int, ...], float, float]] = [
             ("sigma", np.broadcast_to(np.asarray(sigma, dtype=np.float64), (n,)) if np.ndim(sigma) == 0 else sigma,
              (n,), 0.0, 1e3),
@@ -179,10 +177,7 @@ class MeasuredSegments:
             ("centroids", centroids, (n, 2), -MAX_COORDINATE, MAX_COORDINATE),
             ("spreads", spreads, (n,), 0.0, MAX_LENGTH**2),
         ]  # fmt: skip
-        arrays = [
-            _checked(values, shape, low, high, f"{argument}.{name}")
-            for name, values, shape, low, high in ranges
-        ]
+        arrays = [_checked(values, shape, low, high, f"{argument}.{name}") for name, values, shape, low, high in ranges]
         return cls(segments, *arrays)
 
     def __len__(self) -> int:
@@ -198,7 +193,5 @@ def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argum
     bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
     if bad.any():
         index = int(np.argmax(bad.reshape(len(array), -1).any(axis=1)))
-        raise InvalidArgumentError(
-            f"expected a number from {low:g} to {high:g}", argument=argument, index=index
-        )
+        raise InvalidArgumentError(f"expected a number from {low:g} to {high:g}", argument=argument, index=index)
     return _frozen(array)
