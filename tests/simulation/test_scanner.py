@@ -1,0 +1,156 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from registration import RigidTransform, Segments
+from simulation import Scanner, SimulationError, scan
+from simulation._kernels import cast
+
+from . import reference
+
+ORIGIN = RigidTransform(0.0, 0.0, 0.0)
+QUIET = Scanner(sigma=0.0)
+# Counter-clockwise: free space inside, on the left.
+SQUARE = Segments.from_array([[-1, -1, 1, -1], [1, -1, 1, 1], [1, 1, -1, 1], [-1, 1, -1, -1]])
+
+
+def test_a_square_room_has_the_ranges_of_its_closed_form():
+    seen = scan(SQUARE, ORIGIN, QUIET)
+    expected = 1.0 / np.maximum(abs(np.cos(seen.angles)), abs(np.sin(seen.angles)))
+    np.testing.assert_allclose(seen.ranges, expected, rtol=1e-12)
+    assert seen.facing.all()
+    assert np.unique(seen.hits).tolist() == [0, 1, 2, 3]
+
+
+def test_the_hits_name_the_wall_that_each_beam_looks_at():
+    seen = scan(SQUARE, ORIGIN, Scanner(beams=4, angle_min=0.0, angle_increment=math.pi / 2, sigma=0.0))
+    assert seen.hits.tolist() == [1, 2, 3, 0]
+    np.testing.assert_allclose(seen.points, [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)
+
+
+def test_a_pose_turns_and_moves_what_is_seen():
+    seen = scan(SQUARE, RigidTransform(0.5, 0.25, math.pi / 2), Scanner.over(math.pi, 3, sigma=0.0))
+    np.testing.assert_allclose(seen.ranges, [0.5, 0.75, 1.5])
+    assert seen.hits.tolist() == [1, 2, 3]
+
+
+def test_nothing_within_the_limit_is_no_return():
+    seen = scan(SQUARE, ORIGIN, Scanner(range_max=1.2, sigma=0.0))
+    far = seen.true_ranges > 1.2
+    assert far.any()
+    assert np.isinf(seen.ranges[far]).all()
+    assert (seen.hits[far] == -1).all()
+    assert not seen.facing[far].any()
+    assert (seen.ranges[~far] <= 1.2).all()
+
+
+def test_an_empty_map_gives_no_returns():
+    seen = scan(Segments.from_array([]), ORIGIN, QUIET)
+    assert np.isinf(seen.ranges).all()
+    assert (seen.hits == -1).all()
+    assert not seen.facing.any()
+    assert seen.points.shape == (0, 2)
+
+
+def test_what_is_too_near_is_unknown():
+    seen = scan(SQUARE, RigidTransform(0.95, 0.0, 0.0), Scanner(range_min=0.1, sigma=0.0))
+    near = seen.true_ranges < 0.1
+    assert near.any()
+    assert np.isnan(seen.ranges[near]).all()
+    assert (seen.hits[near] == -1).all()
+
+
+@pytest.mark.parametrize(("one_sided", "expected"), [(False, [0.5, 0]), (True, [1.0, 1])])
+def test_a_wall_seen_from_behind_stops_a_beam_unless_it_is_one_sided(one_sided, expected):
+    walls = Segments.from_array([[0.5, 1, 0.5, -1], [1, -1, 1, 1]])
+    seen = scan(walls, ORIGIN, Scanner(1, 0.0, 0.1, sigma=0.0, one_sided=one_sided))
+    assert [seen.ranges[0], seen.hits[0]] == pytest.approx(expected)
+    assert seen.facing.tolist() == [one_sided]
+
+
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_of_a_thin_wall_drawn_both_ways_the_facing_one_is_hit(order):
+    walls = Segments.from_array([[2, 1, 2, -1], [2, -1, 2, 1]]).take(order)
+    seen = scan(walls, ORIGIN, Scanner.over(0.5, 21, sigma=0.0))
+    assert seen.facing.all()
+    assert (seen.hits == order.index(1)).all()
+
+
+def test_no_beam_slips_through_a_joint():
+    turns = np.linspace(0, math.tau, 361)[:-1]
+    ring = np.stack([3 * np.cos(turns), 3 * np.sin(turns)], axis=1)
+    map = Segments.from_array(np.hstack([ring, np.roll(ring, -1, axis=0)]))
+    seen = scan(map, ORIGIN, Scanner(360, 0.0, math.tau / 360, sigma=0.0))
+    np.testing.assert_allclose(seen.ranges, 3.0)
+
+
+def test_noise_dropouts_and_quantisation_are_as_asked():
+    scanner = Scanner(20_000, -1.0, 1e-4, sigma=0.03, dropout=0.1)
+    seen = scan(SQUARE, ORIGIN, scanner, np.random.default_rng(3))
+    kept = np.isfinite(seen.ranges)
+    noise = (seen.ranges - seen.true_ranges)[kept]
+    assert 1 - kept.mean() == pytest.approx(0.1, abs=0.01)
+    assert noise.std() == pytest.approx(0.03, rel=0.03)
+    assert abs(noise.mean()) < 1e-3
+    assert (seen.hits[~kept] == -1).all()
+    again = scan(SQUARE, ORIGIN, scanner, np.random.default_rng(3))
+    np.testing.assert_array_equal(seen.ranges, again.ranges)
+    stepped = scan(SQUARE, ORIGIN, Scanner(sigma=0.0, quantum=0.05)).ranges
+    np.testing.assert_allclose(stepped / 0.05, np.round(stepped / 0.05), atol=1e-9)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 10_000),
+    beams=st.integers(1, 40),
+    start=st.floats(-7, 7),
+    turn=st.floats(0.05, 1.0),
+    clockwise=st.booleans(),
+    one_sided=st.booleans(),
+)
+def test_the_kernel_agrees_with_its_twin(seed, beams, start, turn, clockwise, one_sided):
+    rng = np.random.default_rng(seed)
+    endpoints = rng.uniform(-5, 5, (12, 4))
+    x, y = rng.uniform(-2, 2, 2)
+    increment = (-1 if clockwise else 1) * turn * math.tau / beams
+    angles = start + increment * np.arange(beams)
+    arguments = endpoints, x, y, start, increment, np.cos(angles), np.sin(angles), one_sided
+    ranges, hits = cast(*arguments)
+    expected_ranges, expected_hits = reference.cast(*arguments)
+    np.testing.assert_array_equal(hits, expected_hits)
+    np.testing.assert_allclose(ranges, expected_ranges, rtol=1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(theta=st.floats(-3, 3), dx=st.floats(-50, 50), dy=st.floats(-50, 50))
+def test_moving_map_and_scanner_together_changes_nothing(theta, dx, dy):
+    motion = RigidTransform(dx, dy, theta)
+    moved = Segments.from_array(motion.apply(SQUARE.endpoints.reshape(-1, 2)).reshape(-1, 4))
+    pose = RigidTransform(0.1, -0.2, 0.3)
+    here = scan(SQUARE, pose, Scanner(99, 0.01, 0.06, sigma=0.0))
+    there = scan(moved, motion.compose(pose), Scanner(99, 0.01, 0.06, sigma=0.0))
+    np.testing.assert_allclose(there.ranges, here.ranges, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("beams", 0), ("beams", 100_001), ("angle_min", math.nan), ("angle_increment", 0.0), ("angle_increment", 0.1),
+        ("range_min", -1.0), ("range_max", 0.0), ("range_max", math.inf), ("sigma", -0.1), ("sigma", math.nan),
+        ("dropout", 1.1), ("quantum", -0.05),
+    ],
+)  # fmt: skip
+def test_a_scanner_that_cannot_be_is_refused(argument, value):
+    with pytest.raises(SimulationError) as caught:
+        Scanner(**{argument: value})
+    assert caught.value.argument == argument
+    assert repr(value) in caught.value.message
+
+
+def test_noise_without_a_generator_is_refused():
+    with pytest.raises(SimulationError) as caught:
+        scan(SQUARE, ORIGIN)
+    assert caught.value.argument == "rng"
