@@ -1,19 +1,29 @@
 """Known correspondences: the rigid transform that fits paired line segments, and how far to trust it."""
 
+from .correspondences import Correspondences
 from .errors import InvalidArgumentError, InvalidSegmentsError, RegistrationError
+from .joint import JointSums
+from .one_step import OneStepSums
+from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .segments import MeasuredSegments, Segments
+from .solve import register
 from .transform import RigidTransform, wrap_angle
 
 __all__ = [
     "Ambiguity",
+    "Correspondences",
     "InvalidArgumentError",
     "InvalidSegmentsError",
+    "JointSums",
     "MeasuredSegments",
+    "OneStepSums",
     "RegistrationDiagnostics",
     "RegistrationError",
+    "RegistrationOptions",
     "RegistrationResult",
     "RigidTransform",
     "Segments",
+    "register",
     "wrap_angle",
 ]

@@ -22,10 +22,13 @@ CC, CS, CX, CY, C1, SS, SX, SY, S1, XX, XY, X1, YY, Y1, ONE, WAHBA_COS, WAHBA_SI
 # Below this ratio of the smaller to the larger eigenvalue of the translation block, rounding alone decides the slide.
 PARALLEL_RATIO = 1e-12
 
+MAX_STEPS = 16
+MAX_STEP = 0.3  # rad
+
 
 @njit(cache=True, nogil=True)
 def joint_add(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign):
-    """Add (``sign`` 1) or remove (-1) one pair: map line ``(nx, ny, p)``, scan centroid, direction and second moment."""
+    """Add (`sign` 1) or remove (-1) one pair: map line ``(nx, ny, p)``, scan centroid, direction, second moment."""
     f0 = nx * mx + ny * my
     f1 = ny * mx - nx * my
     g0 = nx * dx + ny * dy
@@ -108,15 +111,18 @@ def joint_solve(sums, theta0, use_wahba):
     m11 = sums[14] - (x1 * kx1 + y1 * ky1)
     c = math.cos(theta)
     s = math.sin(theta)
-    for _ in range(8):
+    for _ in range(MAX_STEPS):
         uc = mcc * c + mcs * s + mc1
         us = mcs * c + mss * s + ms1
         slope = c * us - s * uc
         curve = s * s * mcc - 2.0 * s * c * mcs + c * c * mss - c * uc - s * us
-        if curve <= 0.0:
+        if curve > 0.0:
+            step = min(MAX_STEP, max(-MAX_STEP, -slope / curve))
+        elif slope == 0.0:
             break
-        step = -slope / curve
-        step = min(0.3, max(-0.3, step))
+        else:
+            # Near a maximum Newton would climb: walk down until the curve turns.
+            step = -math.copysign(MAX_STEP, slope)
         theta += step
         c = math.cos(theta)
         s = math.sin(theta)
@@ -166,6 +172,58 @@ def joint_sums(normals, offsets, centroids, directions, spreads, weights):
     sums = np.zeros(JOINT_SIZE)
     for i in range(len(weights)):
         joint_add(
+            sums,
+            normals[i, 0],
+            normals[i, 1],
+            offsets[i],
+            centroids[i, 0],
+            centroids[i, 1],
+            directions[i, 0],
+            directions[i, 1],
+            spreads[i],
+            weights[i],
+            1.0,
+        )
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def accumulate(sums, k, high, low):
+    """Add ``high + low`` to entry k of compensated sums, rows value and error, in double-double arithmetic.
+
+    What is lost is 2^-104 of the largest number that ever stood there.
+    """
+    old = sums[0, k]
+    total = old + high
+    back = total - old
+    error = (old - (total - back)) + (high - back) + (sums[1, k] + low)
+    value = total + error
+    sums[1, k] = error - (value - total)
+    sums[0, k] = value
+
+
+@njit(cache=True, nogil=True)
+def compensated_add(sums, other, sign):
+    """Add (`sign` 1) or remove (-1) whole compensated sums, both (2, k)."""
+    for k in range(sums.shape[1]):
+        accumulate(sums, k, sign * other[0, k], sign * other[1, k])
+
+
+@njit(cache=True, nogil=True)
+def joint_add_compensated(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign):
+    """Do as `joint_add` on (2, `JOINT_SIZE`) compensated sums."""
+    terms = np.zeros(JOINT_SIZE)
+    joint_add(terms, nx, ny, p, mx, my, dx, dy, spread, weight, 1.0)
+    for k in range(JOINT_SIZE):
+        accumulate(sums, k, sign * terms[k], 0.0)
+
+
+@njit(cache=True, nogil=True)
+def joint_sums_compensated(normals, offsets, centroids, directions, spreads, weights):
+    """Return the compensated joint sums of n pairs, (2, `JOINT_SIZE`)."""
+    sums = np.zeros((2, JOINT_SIZE))
+    for i in range(len(weights)):
+        joint_add_compensated(
             sums,
             normals[i, 0],
             normals[i, 1],

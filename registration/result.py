@@ -42,15 +42,14 @@ class RegistrationDiagnostics:
     determinant : float
         Eq. (8)'s D.
     chi2 : float
-        Joint cost at the answered pose.
+        Joint cost at the answered pose, weighted with the caller's weights, or else with 1 / variance by the sigmas;
+        where those are all 0, with the weights used.
     dof : int
         2 n - 3, or 2 n - 2 when all lines are parallel.
-    rms_offset : float
-        Metres.
-    rms_angle : float
-        Radians.
+    rms_offset, rms_angle : float
+        Root mean squares over those n pairs of the offsets, metres, and angles, radians.
     n : int
-        Number of pairs.
+        Number of pairs with a weight over 0.
     """
 
     ambiguity: Ambiguity
@@ -73,21 +72,26 @@ class RegistrationResult:
     Attributes
     ----------
     degenerate : bool
-        No unique transform fits: all pairs are parallel, or there is none.
+        No unique transform fits: all pairs are parallel to rounding or to three standard deviations, or leave the
+        translation in some direction a standard deviation over 0.5 m; or the segments have no directions and the half
+        turn fits as well; or there is no pair.
     usable : bool
         Not degenerate, and chi2 below its 99.9 % quantile.
     pose : RigidTransform or None
-        map_from_scan; for parallel pairs the one that moves least along the free direction; None without pairs.
+        map_from_scan; when degenerate, of those that fit the one that moves least along the free direction; None
+        without pairs.
     covariance : (3, 3) or None
-        Of additive (x, y, theta) in the map frame; None when degenerate and for the one-step estimator.
+        Of additive (x, y, theta) in the map frame; m^2, m rad, rad^2; None when degenerate and for the one-step
+        estimator.
     unobservable : (float, float) or None
-        Unit vector in the map frame along which the translation is free.
+        Unit vector in the map frame along which the translation is free, pointing right (or straight up); None when it
+        is fixed, also when it is the half turn that is not.
     offsets : (n,)
         ``n_map . (R m_scan + t) - p_map`` at the midpoints, metres.
     angles : (n,)
         ``wrap(angle(d_map) - angle(d_scan) - theta)``, radians.
     weights : (n,)
-        As used.
+        As used by the estimator and the ambiguities.
     diagnostics : RegistrationDiagnostics
     """
 

@@ -76,17 +76,16 @@ class Segments:
                 f"expected numbers of shape (n, 4), got {raw.dtype} of shape {raw.shape}", argument=argument
             )
         e = np.array(raw, dtype=np.float64, order="C")
-        _refuse(e, ~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
+        _refuse(~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
         _refuse(
-            e,
             (np.abs(e) > MAX_COORDINATE).any(axis=1),
             f"has a coordinate beyond {MAX_COORDINATE:g} m",
             argument,
         )
         span = e[:, 2:] - e[:, :2]
         lengths = np.hypot(span[:, 0], span[:, 1])
-        _refuse(e, lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
-        _refuse(e, lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
+        _refuse(lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
+        _refuse(lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
         d = span / lengths[:, None]
         n = np.stack([-d[:, 1], d[:, 0]], axis=1)
         middles = e[:, :2] + 0.5 * span
@@ -113,7 +112,7 @@ class Segments:
         return Segments.from_array(self.endpoints + np.tile(offset, 2))
 
 
-def _refuse(endpoints: Floats, bad: NDArray[np.bool_], what: str, argument: str) -> None:
+def _refuse(bad: NDArray[np.bool_] | np.bool_, what: str, argument: str) -> None:
     if bad.any():
         raise InvalidSegmentsError(what, argument=argument, index=int(np.argmax(bad)))
 

@@ -1,0 +1,139 @@
+"""The joint estimator: rotation and translation together by weighted least squares, from additive sums."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _kernels as kernels
+from .correspondences import Correspondences
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSums:
+    """All that the joint estimator needs of a set of pairs; adding or removing takes constant time whatever its size.
+
+    For a pair, with the map line's normal ``n`` and offset ``p`` and the scan segment's centroid ``m``, direction ``d``
+    and spread ``s``, the cost is ``w ((n . (R m + t) - p)^2 + s (n . R d)^2)``: for points that a segment was fitted to
+    by least squares it is, to first order, the sum of their squared distances from the map line. Over a set it is
+    ``x' Q x`` with ``x = [cos, sin, t_x, t_y, 1]``; the sums are the upper triangle of ``Q``, two sums of Wahba's angle
+    (Eq. 15, weighted ``w s``), and the number of pairs.
+
+    Additions and removals are compensated (double-double): after any number of them the sums are those of what
+    remains. A solution is as good as ``Q`` in plain doubles, so keep the coordinates near the origin
+    (`Correspondences.about`).
+
+    Attributes
+    ----------
+    compensated : (2, 18)
+        Values and their errors, read-only.
+    """
+
+    compensated: Floats
+
+    def __post_init__(self) -> None:
+        self.compensated.setflags(write=False)
+
+    @classmethod
+    def of_set(cls, pairs: Correspondences, weights: ArrayLike) -> JointSums:
+        """Sum over all pairs, `weights` (n,) in 1/m^2."""
+        return cls(
+            kernels.joint_sums_compensated(
+                pairs.map_normals,
+                pairs.map_offsets,
+                pairs.centroids,
+                pairs.directions,
+                pairs.spreads,
+                np.asarray(weights, dtype=np.float64),
+            )
+        )
+
+    @classmethod
+    def of_pair(cls, pairs: Correspondences, index: int, weight: float) -> JointSums:
+        """Sum over pair `index` alone, in constant time."""
+        return cls.of_set(pairs.take(slice(index, index + 1)), [weight])
+
+    def add(self, pairs: Correspondences, index: int, weight: float) -> JointSums:
+        """Return the sums with one pair more."""
+        return self + self.of_pair(pairs, index, weight)
+
+    def remove(self, pairs: Correspondences, index: int, weight: float) -> JointSums:
+        """Return the sums with one pair less; `weight` is the one that it was added with."""
+        return self - self.of_pair(pairs, index, weight)
+
+    def __add__(self, other: JointSums) -> JointSums:
+        return self._combined(other, 1.0)
+
+    def __sub__(self, other: JointSums) -> JointSums:
+        return self._combined(other, -1.0)
+
+    def _combined(self, other: JointSums, sign: float) -> JointSums:
+        total = self.compensated.copy()
+        kernels.compensated_add(total, other.compensated, sign)
+        return JointSums(total)
+
+    @property
+    def values(self) -> Floats:
+        """The sums in plain doubles, (18,), as the kernels take them."""
+        values: Floats = self.compensated[0]
+        return values
+
+    @property
+    def count(self) -> int:
+        """Number of pairs."""
+        return round(float(self.values[kernels.COUNT]))
+
+    @property
+    def normal_matrix(self) -> Floats:
+        """``sum w n n'`` of the map normals, (2, 2): the information of a translation when the rotation is known."""
+        xx, xy, yy = self.values[[kernels.XX, kernels.XY, kernels.YY]]
+        return np.array([[xx, xy], [xy, yy]])
+
+    @property
+    def parallel(self) -> bool:
+        """Whether all directions are parallel within three standard deviations.
+
+        The mean squared sine between the map lines and their common direction is the smaller eigenvalue of
+        `normal_matrix` over its trace; the mean variance of a measured direction is the number of pairs over the sum of
+        ``w s``, which the length of Wahba's resultant stands for. Weights must be 1 / variance.
+        """
+        small = float(np.linalg.eigvalsh(self.normal_matrix)[0])
+        resultant = math.hypot(self.values[kernels.WAHBA_COS], self.values[kernels.WAHBA_SIN])
+        trace = float(np.trace(self.normal_matrix))
+        return small * resultant <= 9.0 * self.count * trace
+
+    def solve(self, start: float) -> tuple[float, Floats, bool]:
+        """Minimise the cost.
+
+        Parameters
+        ----------
+        start : float
+            Radians. `Q` cannot tell a direction from its opposite: the minimum near this angle is taken.
+
+        Returns
+        -------
+        theta : float
+            Radians in (-pi, pi].
+        translation : (2,) metres
+            Where all lines are parallel, the shortest.
+        observable : bool
+            False where all lines are parallel to rounding.
+        """
+        theta, x, y, _, observable = kernels.joint_solve(self.values, float(start), False)
+        return float(theta), np.array([x, y]), bool(observable)
+
+    def cost(self, theta: float, translation: ArrayLike) -> float:
+        """Return ``x' Q x`` at any transform: chi-square when the weights are 1 / variance."""
+        x, y = np.asarray(translation, dtype=np.float64)
+        return float(kernels.joint_cost(self.values, float(theta), x, y))
+
+    def information(self, theta: float) -> Floats:
+        """Return the information of additive (x, y, theta) in the map frame at rotation `theta`, (3, 3)."""
+        out = np.empty((3, 3))
+        kernels.joint_information(self.values, float(theta), out)
+        return out

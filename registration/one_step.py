@@ -1,0 +1,143 @@
+"""The paper's estimator: rotation first, then translation, from additive sums."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _one_step_kernels as kernels
+from ._kernels import compensated_add
+from .correspondences import Correspondences
+from .options import Rotation
+from .transform import RigidTransform, wrap_angle
+
+Floats = NDArray[np.float64]
+
+IDENTITY = RigidTransform(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OneStepSums:
+    """All that the paper's estimator needs of a set of pairs; adding or removing takes constant time.
+
+    They are taken about one reference transform, which changes nothing but rounding and the point where angles wrap.
+    The paper's Alg. 1 wraps each angle next to the one before (and as printed adds the differences in place of the
+    angles): its sums then depend on the order, and an angle cannot be taken out again. With one reference angle for the
+    whole set they do not, and it can. Where angles spread over less than a half turn the mean is the same; pairs far
+    off the reference should not be in the set.
+
+    Additions and removals are compensated (double-double); moving the reference is done in plain doubles.
+
+    Attributes
+    ----------
+    compensated : (2, 12)
+        Values and their errors, read-only; see `_one_step_kernels` for what they are.
+    reference : RigidTransform
+    """
+
+    compensated: Floats
+    reference: RigidTransform = IDENTITY
+
+    def __post_init__(self) -> None:
+        self.compensated.setflags(write=False)
+
+    @classmethod
+    def of_set(cls, pairs: Correspondences, weights: ArrayLike, reference: RigidTransform = IDENTITY) -> OneStepSums:
+        """Sum over all pairs, `weights` (n,)."""
+        # Eq. (1), sign corrected: p_S - p_D; the printed p_D - p_S returns exactly -T.
+        to_map = pairs.map_midpoints - [reference.x, reference.y]
+        gaps = np.einsum("ij,ij->i", pairs.map_normals, to_map) - pairs.offsets
+        sums = kernels.one_step_sums(
+            pairs.map_directions, gaps, pairs.directions, reference.theta, np.asarray(weights, dtype=np.float64)
+        )
+        return cls(sums, reference)
+
+    @classmethod
+    def of_pair(
+        cls, pairs: Correspondences, index: int, weight: float, reference: RigidTransform = IDENTITY
+    ) -> OneStepSums:
+        """Sum over pair `index` alone, in constant time."""
+        return cls.of_set(pairs.take(slice(index, index + 1)), [weight], reference)
+
+    def add(self, pairs: Correspondences, index: int, weight: float) -> OneStepSums:
+        """Return the sums with one pair more."""
+        return self + self.of_pair(pairs, index, weight, self.reference)
+
+    def remove(self, pairs: Correspondences, index: int, weight: float) -> OneStepSums:
+        """Return the sums with one pair less; `weight` is the one that it was added with."""
+        return self - self.of_pair(pairs, index, weight, self.reference)
+
+    def __add__(self, other: OneStepSums) -> OneStepSums:
+        return self._combined(other, 1.0)
+
+    def __sub__(self, other: OneStepSums) -> OneStepSums:
+        return self._combined(other, -1.0)
+
+    def _combined(self, other: OneStepSums, sign: float) -> OneStepSums:
+        total = self.compensated.copy()
+        compensated_add(total, other.about(self.reference).compensated, sign)
+        return OneStepSums(total, self.reference)
+
+    def about(self, reference: RigidTransform) -> OneStepSums:
+        """Return the sums about another reference, without wrapping any angle anew."""
+        old = self.reference
+        if reference == old:
+            return self
+        turn = wrap_angle(reference.theta - old.theta)
+        return OneStepSums(
+            kernels.one_step_moved(self.compensated, reference.x - old.x, reference.y - old.y, turn), reference
+        )
+
+    @property
+    def values(self) -> Floats:
+        """The sums in plain doubles, (12,)."""
+        values: Floats = self.compensated[0]
+        return values
+
+    @property
+    def count(self) -> int:
+        """Number of pairs."""
+        return round(float(self.values[kernels.SCOUNT]))
+
+    @property
+    def determinant(self) -> float:
+        """Eq. (8)'s D, 0 for parallel lines (the paper calls it discriminant, and the lines collinear)."""
+        v = self.values
+        return max(0.0, float(v[kernels.SX2] * v[kernels.SY2] - v[kernels.SXY] ** 2))
+
+    @property
+    def reliability(self) -> float:
+        """Eq. (28) from 0 to 1; ``2 sqrt(D) / S_w``. Knows the directions of the map lines and nothing of noise."""
+        total = float(self.values[kernels.SW])
+        return min(1.0, 2.0 * math.sqrt(self.determinant) / total) if total > 0.0 else 0.0
+
+    def solve(self, rotation: Rotation) -> tuple[RigidTransform, bool]:
+        """Return the paper's transform, map_from_scan, and whether the lines fix it.
+
+        Mitsuta's mean angle is Eq. (9), Wahba's Eq. (15) with the right-hand normal ``(d_y, -d_x)``, for which alone it
+        holds. The translation is Eqs. (7) and (8), with plus signs in D1 and D2 where minus is printed. For parallel
+        lines it is the nearest to the reference.
+        """
+        angle, x, y, observable = kernels.one_step_solve(self.values, rotation == "wahba")
+        at = self.reference
+        return RigidTransform(at.x + float(x), at.y + float(y), at.theta + float(angle)), bool(observable)
+
+    def translation_cost(self, at: RigidTransform) -> float:
+        """Return ``A_t / k_t`` at any transform.
+
+        Eq. (19) as printed holds at the optimum and at T = 0 only; this form holds everywhere.
+        """
+        return max(0.0, float(self.about(at).values[kernels.SC]))
+
+    def rotation_cost(self, at: RigidTransform, rotation: Rotation) -> float:
+        """Return ``A_alpha / k_alpha`` at any transform.
+
+        For Mitsuta the form of Eq. (17) that holds everywhere and not at the optimum alone; for Wahba Eqs. (13), (18).
+        """
+        moved = self.about(RigidTransform(self.reference.x, self.reference.y, at.theta)).values
+        if rotation == "wahba":
+            return max(0.0, 2.0 * float(moved[kernels.SVERSINE]))
+        return max(0.0, float(moved[kernels.SA2]))

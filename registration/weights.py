@@ -1,0 +1,97 @@
+"""How much each pair counts, and what is known of its noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .correspondences import Correspondences, floored_sigma
+from .errors import InvalidArgumentError
+from .options import RegistrationOptions
+
+Floats = NDArray[np.float64]
+
+MIN_WEIGHT, MAX_WEIGHT = 1e-100, 1e100  # squares and products with 1e9 m squared stay finite
+MAX_SIGMA = 1e3  # m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairWeights:
+    """Weights of n pairs.
+
+    Attributes
+    ----------
+    used : (n,)
+        What the estimator and the ambiguities weigh with.
+    information : (n,) 1/m^2
+        What chi2 and the covariance take for 1 / variance: the caller's own weights, or else the noise, or else `used`.
+    noise : (n,) 1/m^2, or None
+        1 / variance by the sigmas; None where a pair has none. Whether a set is degenerate is a question of noise, and
+        not of how a caller weighs.
+    """
+
+    used: Floats
+    information: Floats
+    noise: Floats | None
+
+    def take(self, rows: NDArray[np.bool_]) -> PairWeights:
+        """Return those of some pairs."""
+        used = self.used[rows]
+        information = used if self.information is self.used else self.information[rows]
+        noise = used if self.noise is self.used else None if self.noise is None else self.noise[rows]
+        return PairWeights(used, information, noise)
+
+
+def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions) -> PairWeights:
+    """Weigh pairs as `options` say.
+
+    Raises
+    ------
+    InvalidArgumentError
+        ``map.sigma`` out of range; ``weights`` of a wrong length, negative, not finite, beyond 1e-100 to 1e100, or all
+        zero; ``scan.sigma`` when information weighting meets a pair without any noise.
+    """
+    if not (math.isfinite(map_sigma) and 0.0 <= map_sigma <= MAX_SIGMA):
+        raise InvalidArgumentError(f"expected a number from 0 to {MAX_SIGMA:g}", argument="map.sigma")
+    variances = pairs.variances + floored_sigma(map_sigma) ** 2
+    noise = 1.0 / variances if (variances > 0.0).all() else None
+    if options.weights is not None:
+        given = _checked_weights(options.weights, len(pairs))
+        return PairWeights(given, given, noise)
+    if options.weighting == "information":
+        if noise is None:
+            raise InvalidArgumentError(
+                "sigma of scan and map are both 0: no information weight",
+                argument="scan.sigma",
+            )
+        return PairWeights(noise, noise, noise)
+    used = (
+        np.minimum(pairs.lengths, pairs.map_lengths) if options.weighting == "shorter_length" else np.ones(len(pairs))
+    )
+    return PairWeights(used, used if noise is None else noise, noise)
+
+
+def _checked_weights(weights: ArrayLike, count: int) -> Floats:
+    try:
+        array = np.asarray(weights)
+    except (ValueError, OverflowError) as error:
+        raise InvalidArgumentError("expected one number per correspondence", argument="weights") from error
+    if array.shape != (count,):
+        raise InvalidArgumentError(f"expected shape ({count},), got {array.shape}", argument="weights")
+    if count and array.dtype.kind not in "fiu":
+        raise InvalidArgumentError(f"expected numbers, got {array.dtype}", argument="weights")
+    array = array.astype(np.float64)
+    # Written so that NaN is bad.
+    bad = ~((array == 0.0) | ((array >= MIN_WEIGHT) & (array <= MAX_WEIGHT)))
+    if bad.any():
+        raise InvalidArgumentError(
+            f"expected 0 or a number from {MIN_WEIGHT:g} to {MAX_WEIGHT:g}",
+            argument="weights",
+            index=int(np.argmax(bad)),
+        )
+    if count and not array.any():
+        raise InvalidArgumentError("all weights are 0", argument="weights")
+    return array
