@@ -1,1 +1,16 @@
-"""vectorization."""
+"""Laser ranges and ordered points to directed line segments."""
+
+from .errors import InvalidOptionError, InvalidScanError, VectorizationError
+from .laser import LaserScan
+from .options import VectorizationOptions
+from .vectorize import Vectorization, vectorize
+
+__all__ = [
+    "InvalidOptionError",
+    "InvalidScanError",
+    "LaserScan",
+    "Vectorization",
+    "VectorizationError",
+    "VectorizationOptions",
+    "vectorize",
+]

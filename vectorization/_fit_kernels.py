@@ -1,0 +1,176 @@
+# mypy: disable-error-code="no-untyped-def"
+"""Compiled final fit of segments: maximum likelihood lines, their extension past gaps, and their ends.
+
+Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in
+``tests/vectorization/reference.py``.
+
+A line is a row of `LINE` doubles: outward unit normal (away from the sensor), its distance, the weighted mean and
+second moment of the points' abscissae along the line (counted along ``(-n_y, n_x)`` from the foot of the normal), the
+points' total weight, their number, their chi-square, and the abscissae of the two ends.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ._kernels import BREAK_PENALTY, MISSING_STEPS, SUMS, sums_cost
+
+LINE = 10
+NX, NY, P, MEAN, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END = range(LINE)
+
+# Standard deviations within which a point is taken for the line's own.
+POINT_GATE = 3.5
+
+# Cosine of incidence below which a ray says too little of where it meets the line.
+LEAST_COSINE = 0.03
+
+# Points that may lie between two pieces of one line, and metres that a line is extended over at a time.
+SKIPPED = 3
+LONGEST_STEP = 1.5
+
+
+@njit(cache=True, nogil=True)
+def bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance, floor):
+    """Join pieces of one line with a few points in front of it between them.
+
+    Pieces of fewer than three points are left out. Returns ``(m, 2)`` first and one-past-last points and the
+    ``(m, SUMS)`` sums of the points that are the pieces' own.
+    """
+    bounds = np.empty_like(pieces)
+    totals = np.empty((len(pieces), SUMS))
+    own = np.empty(SUMS)
+    joint = np.empty(SUMS)
+    count = 0
+    for k in range(len(pieces)):
+        a = pieces[k, 0]
+        b = pieces[k, 1]
+        if b - a < 3:
+            continue
+        own[:] = sums[b] - sums[a]
+        if count > 0 and a - bounds[count - 1, 1] <= SKIPPED and max(b - a, totals[count - 1, 0]) >= min_points:
+            z = bounds[count - 1, 1] - 1
+            joint[:] = totals[count - 1] + own
+            step = math.hypot(x[a] - x[z], y[a] - y[z])
+            turn = math.atan2(abs(ux[z] * uy[a] - uy[z] * ux[a]), ux[z] * ux[a] + uy[z] * uy[a])
+            near = step <= longest and turn <= MISSING_STEPS * increment + 1e-9
+            growth = math.inf
+            if near:
+                apart = sums_cost(totals[count - 1], variance, floor) + sums_cost(own, variance, floor)
+                growth = sums_cost(joint, variance, floor) - apart
+            if growth < BREAK_PENALTY and not seen_through(joint, z + 1, a, x, y, ux, uy, variance, floor):
+                bounds[count - 1, 1] = b
+                totals[count - 1] = joint
+                continue
+        bounds[count, 0] = a
+        bounds[count, 1] = b
+        totals[count] = own
+        count += 1
+    return bounds[:count].copy(), totals[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def seen_through(total, a, b, x, y, ux, uy, variance, floor):
+    """Tell whether a point from a to b - 1 lies behind the line of the sums, as seen from the sensor."""
+    nx, ny, p = line_of(total)
+    for i in range(a, b):
+        cosine = nx * ux[i] + ny * uy[i]
+        off = nx * x[i] + ny * y[i] - p
+        if off * cosine > 0.0 and off * off > POINT_GATE * POINT_GATE * (variance * cosine * cosine + floor):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def line_of(total):
+    """Return unit normal and distance (not negative) of the total least squares line of sums."""
+    n = total[0]
+    mx = total[1] / n
+    my = total[2] / n
+    cxx = total[3] - n * mx * mx
+    cxy = total[4] - n * mx * my
+    cyy = total[5] - n * my * my
+    angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
+    nx = -math.sin(angle)
+    ny = math.cos(angle)
+    p = nx * mx + ny * my
+    if p < 0.0:
+        return -nx, -ny, -p
+    return nx, ny, p
+
+
+@njit(cache=True, nogil=True)
+def fit_line(x, y, ux, uy, a, b, variance, floor, line, own):
+    """Move `line` to the maximum likelihood one of the points a to b - 1 that lie within the gate.
+
+    Range noise acts along the ray: with the wall at distance p, minimise ``sum (r - p / (n.u))^2 / v`` by Gauss-Newton,
+    whose abscissae are where the rays meet the line. Points without ray count with their distance from the line.
+    Marks the points used in `own`; returns whether there are any two apart.
+    """
+    scale = 1.0
+    for turn in range(5):
+        w_sum = 0.0
+        t_sum = 0.0
+        e_sum = 0.0
+        tt = 0.0
+        te = 0.0
+        ee = 0.0
+        count = 0
+        gate = POINT_GATE * POINT_GATE * scale * (2.0 if turn == 0 else 1.0)
+        low = math.inf
+        high = -math.inf
+        reference = line[MEAN]
+        for i in range(a, b):
+            e = line[NX] * x[i] + line[NY] * y[i] - line[P]
+            t = line[NX] * y[i] - line[NY] * x[i]
+            cosine = 1.0
+            if ux[i] != 0.0 or uy[i] != 0.0:
+                cosine = line[NX] * ux[i] + line[NY] * uy[i]
+                if cosine > LEAST_COSINE:
+                    t = line[P] * (line[NX] * uy[i] - line[NY] * ux[i]) / cosine
+            v = variance * cosine * cosine + floor
+            own[i] = e * e <= gate * v
+            if not own[i]:
+                continue
+            w = 1.0 / v
+            low = min(low, t)
+            high = max(high, t)
+            t -= reference
+            w_sum += w
+            t_sum += w * t
+            e_sum += w * e
+            tt += w * t * t
+            te += w * t * e
+            ee += w * e * e
+            count += 1
+        if count < 2:
+            return False
+        t_mean = t_sum / w_sum
+        e_mean = e_sum / w_sum
+        tt -= w_sum * t_mean * t_mean
+        te -= w_sum * t_mean * e_mean
+        if not tt > 0.0:
+            return False
+        line[MEAN] = reference + t_mean
+        line[SPREAD] = tt / w_sum
+        line[WEIGHT] = w_sum
+        line[COUNT] = count
+        line[CHI2] = ee
+        line[BEGIN] = low
+        line[END] = high
+        slope = te / tt
+        offset = line[P] + e_mean
+        scale = max(1.0, ee / max(1, count - 2)) if turn == 0 else scale
+        # Turn about the mean: the normal by -slope, the mean point moves along the normal alone.
+        c = 1.0 / math.sqrt(1.0 + slope * slope)
+        s = slope * c
+        nx = c * line[NX] + s * line[NY]
+        ny = c * line[NY] - s * line[NX]
+        p = c * offset - s * line[MEAN]
+        line[MEAN] = c * line[MEAN] + s * offset
+        line[NX] = nx
+        line[NY] = ny
+        line[P] = p
+        if turn > 1 and abs(slope) < 1e-14 and abs(e_mean) < 1e-13:
+            break
+    return True

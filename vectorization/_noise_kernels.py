@@ -1,0 +1,75 @@
+# mypy: disable-error-code="no-untyped-def"
+"""Compiled estimate of range noise from a scan itself.
+
+Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in
+``tests/vectorization/reference.py``.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+# Share of the triples of points that are trusted to lie on straight walls, and that quantile of |z| of a Gaussian.
+TRUSTED = 0.4
+GAUSSIAN_QUANTILE = 0.5244005127080407
+
+# Points in a window where noise has no direction, and the median of chi-square of its five degrees of freedom over 5.
+WINDOW = 7
+MEDIAN_CHI = 0.8703
+
+LEAST_TRIPLES = 10
+
+
+@njit(cache=True, nogil=True)
+def ray_noise(ranges, ux, uy, increment):
+    """Return the standard deviation of the ranges, or 0 where there are too few neighbours to tell.
+
+    On a wall ``1 / r = (n.u) / p`` is linear in the ray's direction, so for any three rays
+    ``sin(c - b) / r_a + sin(b - a) / r_c = sin(c - a) / r_b`` whatever the wall; what is missing is noise.
+    """
+    n = len(ranges)
+    z = np.empty(max(0, n - 2))
+    count = 0
+    for i in range(1, n - 1):
+        before = ux[i - 1] * uy[i] - uy[i - 1] * ux[i]
+        after = ux[i] * uy[i + 1] - uy[i] * ux[i + 1]
+        if not (0.0 < before < 1.6 * increment and 0.0 < after < 1.6 * increment):
+            continue
+        both = ux[i - 1] * uy[i + 1] - uy[i - 1] * ux[i + 1]
+        qa = after / ranges[i - 1]
+        qb = both / ranges[i]
+        qc = before / ranges[i + 1]
+        va = qa / ranges[i - 1]
+        vb = qb / ranges[i]
+        vc = qc / ranges[i + 1]
+        z[count] = abs(qa + qc - qb) / math.sqrt(va * va + vb * vb + vc * vc)
+        count += 1
+    if count < LEAST_TRIPLES:
+        return 0.0
+    k = int(TRUSTED * count)
+    return np.partition(z[:count], k)[k] / GAUSSIAN_QUANTILE
+
+
+@njit(cache=True, nogil=True)
+def window_noise(x, y):
+    """Return the standard deviation of points normal to the walls, from small windows, or 0 where there are too few."""
+    n = len(x)
+    windows = n - WINDOW + 1
+    if windows < LEAST_TRIPLES:
+        return 0.0
+    squares = np.empty(windows)
+    for a in range(windows):
+        mx = np.mean(x[a : a + WINDOW])
+        my = np.mean(y[a : a + WINDOW])
+        cxx = 0.0
+        cxy = 0.0
+        cyy = 0.0
+        for i in range(a, a + WINDOW):
+            cxx += (x[i] - mx) * (x[i] - mx)
+            cxy += (x[i] - mx) * (y[i] - my)
+            cyy += (y[i] - my) * (y[i] - my)
+        root = math.hypot(cxx - cyy, 2.0 * cxy)
+        squares[a] = max(0.0, 0.5 * (cxx + cyy - root)) / (WINDOW - 2)
+    k = windows // 2
+    return math.sqrt(np.partition(squares, k)[k] / MEDIAN_CHI)

@@ -1,0 +1,111 @@
+"""Scans as range finders give them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InvalidScanError
+
+Floats = NDArray[np.float64]
+
+MAX_BEAMS = 100_000
+MAX_RANGE = 1e4  # m, as long as a segment can be
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class LaserScan:
+    """Ranges over evenly spaced angles, as REP-117 has them.
+
+    Attributes
+    ----------
+    angle_min : float
+        Of the first beam, radians, counter-clockwise from the scan frame's x axis.
+    angle_increment : float
+        From beam to beam, radians, not 0; negative for a scanner that turns clockwise. All beams make at most a turn.
+    ranges : (m,) metres
+        inf where nothing came back; nan, or None in a list, where nothing is known; -inf where something was too near.
+    range_min, range_max : float
+        Metres. Ranges above `range_max` mean that nothing came back, those below `range_min` and those not above 0 that
+        nothing is known; a `range_max` of inf lets any range up to 10 km stand.
+
+    Raises
+    ------
+    InvalidScanError
+        When there are no numbers, too many, or the angles are no scan's.
+    """
+
+    angle_min: float
+    angle_increment: float
+    ranges: Floats = field(repr=False)
+    range_min: float = 0.0
+    range_max: float = math.inf
+
+    def __init__(
+        self,
+        angle_min: float,
+        angle_increment: float,
+        ranges: ArrayLike,
+        range_min: float = 0.0,
+        range_max: float = math.inf,
+    ) -> None:
+        values = _numbers(ranges)
+        m = len(values)
+        if not abs(angle_min) <= 1e3:
+            raise InvalidScanError(f"expected at most 1000 rad, got {angle_min!r}", argument="angle_min")
+        turn = abs(angle_increment) * max(1, m - 1)
+        if not (angle_increment != 0.0 and turn <= math.tau * (1.0 + 1e-3)):
+            raise InvalidScanError(
+                f"expected a step other than 0 of which {m} beams make at most one turn, got {angle_increment!r}",
+                argument="angle_increment",
+            )
+        if not 0.0 <= range_min < math.inf:
+            raise InvalidScanError(f"expected from 0 up, got {range_min!r}", argument="range_min")
+        if not range_max > range_min:
+            raise InvalidScanError(f"expected above range_min, got {range_max!r}", argument="range_max")
+        object.__setattr__(self, "angle_min", float(angle_min))
+        object.__setattr__(self, "angle_increment", float(angle_increment))
+        object.__setattr__(self, "ranges", values)
+        object.__setattr__(self, "range_min", float(range_min))
+        object.__setattr__(self, "range_max", float(range_max))
+
+    @property
+    def angles(self) -> Floats:
+        """The beams' angles, ``(m,)`` radians, not wrapped."""
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
+
+    @property
+    def cleaned(self) -> Floats:
+        """The ranges with every beam without return at inf and every beam of which nothing is known at nan."""
+        with np.errstate(invalid="ignore"):
+            known = np.where((self.ranges < self.range_min) | (self.ranges <= 0.0), np.nan, self.ranges)
+            cleaned: Floats = np.where(known > min(self.range_max, MAX_RANGE), np.inf, known)
+        return cleaned
+
+    def points(self) -> Floats:
+        """Return the measured points in the scan frame, ``(k, 2)`` metres, beams without a range left out."""
+        r = self.cleaned
+        seen = np.isfinite(r)
+        a = self.angles[seen]
+        return np.stack([r[seen] * np.cos(a), r[seen] * np.sin(a)], axis=1)
+
+
+def _numbers(ranges: ArrayLike) -> Floats:
+    try:
+        # float64 turns None into nan, which is what it means.
+        raw = np.asarray(ranges)
+        values = np.array(raw, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidScanError("expected an array of numbers", argument="ranges") from error
+    strange = raw.dtype.kind == "O" and any(v is not None and type(v) not in (int, float) for v in raw.flat)
+    if raw.dtype.kind not in "fiuO" or strange or values.ndim != 1:
+        raise InvalidScanError(
+            f"expected numbers of shape (m,), got {raw.dtype} of shape {raw.shape}", argument="ranges"
+        )
+    if len(values) > MAX_BEAMS:
+        raise InvalidScanError(f"expected at most {MAX_BEAMS} beams, got {len(values)}", argument="ranges")
+    values.setflags(write=False)
+    return values

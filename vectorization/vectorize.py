@@ -1,0 +1,260 @@
+"""Ranges or ordered points in, directed segments out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from registration import MeasuredSegments, Segments
+
+from ._fit_kernels import BEGIN, CHI2, COUNT, END, LINE, MEAN, NX, NY, SPREAD, WEIGHT, P
+from ._noise_kernels import ray_noise, window_noise
+from ._trace_kernels import trace
+from .errors import InvalidScanError
+from .laser import MAX_RANGE, LaserScan
+from .options import VectorizationOptions
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# Standard deviations in metres: taken where the scan is too short to tell, the least that an estimate is believed,
+# and how far a wall itself is from straight (also as a share of sigma: beams have a width).
+UNKNOWN_SIGMA = 0.02
+LEAST_SIGMA = 1e-3
+ROUGHNESS = 3e-3
+RELATIVE_ROUGHNESS = 0.1
+
+# Ranges are taken for quantised when all are multiples of a step of at least this many units.
+QUANTUM_UNIT = 1e-4
+LEAST_QUANTUM = 10
+
+# Points without rays are neighbours up to this many median spacings.
+SPACINGS = 6.0
+
+LEAST_INCREMENT = 1e-6  # rad
+
+# Signs of a line's numbers when its direction is turned about.
+BACKWARD = np.ones(LINE)
+BACKWARD[[NX, NY, P, MEAN, BEGIN, END]] = -1.0
+
+MAX_POINTS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Vectorization:
+    """Segments and what they were made of.
+
+    Attributes
+    ----------
+    measured : MeasuredSegments
+        k segments in scanning order, counter-clockwise, free space on the left. `sigma` is normal to each wall: range
+        noise counts only with the cosine of incidence. As that differs along a wall, `centroids` and `spreads` are
+        the means weighted by each point's information and `sigma` is such that ``points / sigma^2`` is the sum of
+        the weights; so they hold all that the points say of the line. A segment whose points lie worse than the noise
+        explains has its sigma widened to what they show.
+    rms : (k,) root of the (weighted) mean square distance of the points from their line, metres
+    sigma : float
+        Standard deviation of the ranges, given or estimated, metres.
+    beams : (k, 2)
+        Index of the beam or point at the begin and at the end of each segment. Counter-clockwise, so a clockwise scan
+        counts down, and a segment across the seam of a full turn wraps.
+    angles : (m,) radians
+        Of the beams; empty where the scan came as points.
+    ranges : (m,) metres
+        inf where a beam brought no return, nan where nothing is known of it; empty where the scan came as points.
+    range_max : float
+        Metres; how far a beam without return is known to be free; inf where the scanner does not say.
+    """
+
+    measured: MeasuredSegments
+    rms: Floats = field(repr=False)
+    sigma: float
+    beams: Indices = field(repr=False)
+    angles: Floats = field(repr=False)
+    ranges: Floats = field(repr=False)
+    range_max: float
+
+
+def vectorize(
+    scan: LaserScan | ArrayLike,
+    options: VectorizationOptions | None = None,
+    viewpoint: tuple[float, float] | None = (0.0, 0.0),
+) -> Vectorization:
+    """Find the straight walls in a scan.
+
+    Stretches without a gap are split where the points leave the chord or two lines fit far better than one, pieces that
+    one line explains are joined again, and each break is moved to its best place, all by total least squares from
+    running sums. The lines are then fitted by maximum likelihood under noise along the rays, extended over the points
+    that lie on them, and cut at the corner with their neighbour where it lies between the two's nearest rays.
+
+    The scan is taken to come from one place at one time: skew by the robot's motion during a sweep is not undone, and
+    is the caller's to undo.
+
+    Parameters
+    ----------
+    scan : LaserScan or array-like of shape (m, 2)
+        Ranges, or points in scanning order, metres.
+    options : VectorizationOptions, optional
+    viewpoint : (float, float) or None
+        Where the sensor stood, metres, for points only. Segments have it on their left, and noise acts along the rays
+        from it. None: not seen from one place; segments run as the points do, and noise has no direction.
+
+    Returns
+    -------
+    Vectorization
+
+    Raises
+    ------
+    InvalidScanError
+        When points are not finite numbers of shape (m, 2) within 10 km of each other.
+    """
+    options = options or VectorizationOptions()
+    if isinstance(scan, LaserScan):
+        return _from_laser(scan, options)
+    points = _checked_points(scan)
+    if viewpoint is None:
+        return _from_bare_points(points, options)
+    return _from_viewed_points(points, np.asarray(viewpoint, dtype=np.float64), options)
+
+
+def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization:
+    angles = scan.angles
+    ranges = scan.cleaned
+    order = np.flatnonzero(np.isfinite(ranges))
+    increment = abs(scan.angle_increment)
+    if scan.angle_increment < 0.0:
+        order = order[::-1]
+    closed = increment * len(angles) > math.tau - 0.5 * increment
+    if closed:
+        order = _from_a_break(order, ranges)
+    r = ranges[order]
+    rays = np.stack([np.cos(angles[order]), np.sin(angles[order])])
+    sigma = options.sigma or _estimated(ray_noise(r, rays[0], rays[1], increment), r)
+    lines, spans = _trace(r * rays, rays, increment, closed, sigma, options)
+    measured, rms = _measured(lines, sigma, np.zeros(2))
+    return Vectorization(measured, rms, sigma, order[spans], angles, ranges, scan.range_max)
+
+
+def _from_viewed_points(points: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:
+    seen = points - viewpoint
+    r = np.hypot(seen[:, 0], seen[:, 1])
+    order = np.flatnonzero(r > 0.0)
+    directions = seen[order] / r[order, None]
+    turns = directions[:-1, 0] * directions[1:, 1] - directions[:-1, 1] * directions[1:, 0]
+    if np.sum(np.sign(turns)) < 0.0:
+        order = order[::-1]
+    r = r[order]
+    xy = np.ascontiguousarray(seen[order].T)
+    rays = xy / r
+    increment = max(LEAST_INCREMENT, float(np.median(np.abs(turns)))) if len(turns) else LEAST_INCREMENT
+    sigma = options.sigma or _estimated(ray_noise(r, rays[0], rays[1], increment), r)
+    lines, spans = _trace(xy, rays, increment, False, sigma, options)
+    # The viewpoint is on the left whatever way the points run.
+    backward = _runs_backward(lines, spans, xy)
+    spans[backward] = spans[backward, ::-1]
+    measured, rms = _measured(lines, sigma, viewpoint)
+    return Vectorization(measured, rms, sigma, order[spans], np.zeros(0), np.zeros(0), math.inf)
+
+
+def _from_bare_points(points: Floats, options: VectorizationOptions) -> Vectorization:
+    origin = points.mean(axis=0) if len(points) else np.zeros(2)
+    xy = np.ascontiguousarray((points - origin).T)
+    sigma = options.sigma or _estimated(window_noise(xy[0], xy[1]), np.zeros(0))
+    lines, spans = _trace(xy, np.zeros_like(xy), 0.0, False, sigma, options)
+    backward = _runs_backward(lines, spans, xy)
+    lines[backward] *= BACKWARD
+    lines[backward, BEGIN], lines[backward, END] = lines[backward, END], lines[backward, BEGIN]
+    measured, rms = _measured(lines, sigma, origin)
+    return Vectorization(measured, rms, sigma, spans, np.zeros(0), np.zeros(0), math.inf)
+
+
+def _runs_backward(lines: Floats, spans: Indices, xy: Floats) -> NDArray[np.bool_]:
+    """Whether the points of each line run against its direction ``(-n_y, n_x)``."""
+    run = xy[:, spans[:, 1]] - xy[:, spans[:, 0]]
+    backward: NDArray[np.bool_] = lines[:, NX] * run[1] < lines[:, NY] * run[0]
+    return backward
+
+
+def _checked_points(points: ArrayLike) -> Floats:
+    try:
+        raw = np.asarray(points)
+    except ValueError as error:
+        raise InvalidScanError("expected an array of [x, y]", argument="points") from error
+    if raw.size == 0:
+        raw = np.zeros((0, 2))
+    if raw.dtype.kind not in "fiu" or raw.ndim != 2 or raw.shape[1] != 2:
+        raise InvalidScanError(
+            f"expected numbers of shape (m, 2), got {raw.dtype} of shape {raw.shape}", argument="points"
+        )
+    if len(raw) > MAX_POINTS:
+        raise InvalidScanError(f"expected at most {MAX_POINTS} points, got {len(raw)}", argument="points")
+    values = np.array(raw, dtype=np.float64)
+    bad = ~np.isfinite(values).all(axis=1)
+    if len(values) and not bad.any():
+        bad = (np.abs(values - values[0]) > MAX_RANGE).any(axis=1) | (np.abs(values) > 1e9).any(axis=1)
+    if bad.any():
+        raise InvalidScanError(
+            f"expected finite numbers within {MAX_RANGE:g} m of the first", argument="points", index=int(np.argmax(bad))
+        )
+    return values
+
+
+def _from_a_break(order: Indices, ranges: Floats) -> Indices:
+    """Turn the order of a closed scan so that no wall lies across its seam.
+
+    The farthest point is an end of its wall: distance from a point grows along a line in both directions.
+    """
+    if len(order) == 0:
+        return order
+    return np.roll(order, -int(np.argmax(ranges[order])))
+
+
+def _estimated(noise: float, ranges: Floats) -> float:
+    """Return the noise, but no less than what the quantisation of the ranges lets it be."""
+    noise = noise or UNKNOWN_SIGMA
+    return max(noise, LEAST_SIGMA, _quantum(ranges) / math.sqrt(12.0))
+
+
+def _quantum(ranges: Floats) -> float:
+    """Return the step that all ranges are multiples of, metres, 0 for none."""
+    units = np.round(ranges / QUANTUM_UNIT)
+    if len(units) < 2 or (np.abs(ranges / QUANTUM_UNIT - units) > 0.1).any():
+        return 0.0
+    step = int(np.gcd.reduce(units.astype(np.int64)))
+    return step * QUANTUM_UNIT if step >= LEAST_QUANTUM else 0.0
+
+
+def _trace(
+    points: Floats, rays: Floats, increment: float, closed: bool, sigma: float, options: VectorizationOptions
+) -> tuple[Floats, Indices]:
+    if points.shape[1] < options.min_points:
+        return np.zeros((0, LINE)), np.zeros((0, 2), dtype=np.int64)
+    floor = max(ROUGHNESS, RELATIVE_ROUGHNESS * sigma) ** 2
+    spacing = 0.0
+    if increment == 0.0:
+        spacing = SPACINGS * float(np.median(np.hypot(*np.diff(points, axis=1)))) + 4.0 * sigma
+    max_gap = math.inf if options.max_gap is None else options.max_gap
+    lines, spans = trace(
+        points[0], points[1], rays[0], rays[1], increment, closed, sigma, floor, spacing, max_gap,
+        options.min_points, options.min_length,
+    )  # fmt: skip
+    return lines, spans
+
+
+def _measured(lines: Floats, sigma: float, origin: Floats) -> tuple[MeasuredSegments, Floats]:
+    normals = lines[:, [NX, NY]]
+    along = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    feet = lines[:, P, None] * normals + origin
+    ends = [feet + lines[:, t, None] * along for t in (BEGIN, END)]
+    segments = Segments.from_array(np.hstack(ends))
+    count = lines[:, COUNT]
+    chi2 = lines[:, CHI2]
+    dof = np.maximum(1.0, count - 2.0)
+    widened = np.where(chi2 > dof + 3.0 * np.sqrt(2.0 * dof), np.sqrt(chi2 / dof), 1.0)
+    sigmas = widened * np.sqrt(count / lines[:, WEIGHT])
+    centroids = feet + lines[:, MEAN, None] * along
+    measured = MeasuredSegments.from_segments(segments, sigmas, count, (centroids, lines[:, SPREAD]))
+    return measured, np.sqrt(chi2 / lines[:, WEIGHT])
