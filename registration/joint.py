@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtri
 
 from . import _kernels as kernels
 from .correspondences import Correspondences
 
 Floats = NDArray[np.float64]
+
+THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,14 +101,17 @@ class JointSums:
     def parallel(self) -> bool:
         """Whether all directions are parallel within three standard deviations.
 
-        The mean squared sine between the map lines and their common direction is the smaller eigenvalue of
-        `normal_matrix` over its trace; the mean variance of a measured direction is the number of pairs over the sum of
+        For two lines that is what it says; for more, whether their spread is one that the noise gives parallel lines in
+        99.73 % of cases. The mean squared sine between the map lines and their common direction is the smaller
+        eigenvalue of `normal_matrix` over its trace; the information that the pairs have of angles is the sum of
         ``w s``, which the length of Wahba's resultant stands for. Weights must be 1 / variance.
         """
+        if self.count < 2:
+            return True
         small = float(np.linalg.eigvalsh(self.normal_matrix)[0])
         resultant = math.hypot(self.values[kernels.WAHBA_COS], self.values[kernels.WAHBA_SIN])
-        trace = float(np.trace(self.normal_matrix))
-        return small * resultant <= 9.0 * self.count * trace
+        spread = small * resultant / float(np.trace(self.normal_matrix))
+        return spread <= float(chdtri(self.count - 1, THREE_SIGMA_TAIL))
 
     def solve(self, start: float) -> tuple[float, Floats, bool]:
         """Minimise the cost.

@@ -27,7 +27,8 @@ class Freedom:
     parallel : bool
         All directions are the same to within rounding or noise, and a degree of freedom is lost.
     direction : (2,) unit vector in the map frame, or None
-        Along which the translation is free; None when nothing is, or when it is the rotation.
+        Along which the translation is free; None when nothing is, or when it is the rotation (segments that are taken
+        to have no spread, all through one point).
     slack : float
         How far in metres the translation may move along `direction` and fit no worse by three standard deviations;
         inf for lines that are parallel to rounding.
@@ -58,23 +59,29 @@ def find_freedom(used: JointSums, noise: JointSums | None, theta: float) -> Free
     small, axes = np.linalg.eigh(used.normal_matrix)
     if small[0] <= PARALLEL_RATIO * small[1]:
         return Freedom(True, True, _signed(axes[:, 0]), math.inf)
-    sums = used if noise is None else noise
     if noise is not None and noise.parallel:
         axis = _signed(np.linalg.eigh(noise.normal_matrix)[1][:, 0])
         return Freedom(True, True, axis, _slack(noise, axis))
-    information = sums.information(theta)
-    if information[2, 2] <= 0.0:
+    if _singular(used.information(theta)):
         return Freedom(True)
-    # What is known of the translation when the rotation is not: the Schur complement.
-    coupling = information[:2, 2]
-    marginal, axes = np.linalg.eigh(information[:2, :2] - np.outer(coupling, coupling) / information[2, 2])
-    limit = PARALLEL_RATIO * float(np.trace(information[:2, :2]))
     if noise is not None:
-        limit = max(limit, MAX_DEVIATION**-2)
-    if marginal[0] < limit:
-        axis = _signed(axes[:, 0])
-        return Freedom(True, False, axis, _slack(sums, axis))
+        # What is known of the translation when the rotation is not: the Schur complement.
+        information = noise.information(theta)
+        coupling = information[:2, 2]
+        marginal, axes = np.linalg.eigh(information[:2, :2] - np.outer(coupling, coupling) / information[2, 2])
+        if marginal[0] < MAX_DEVIATION**-2:
+            axis = _signed(axes[:, 0])
+            return Freedom(True, False, axis, _slack(noise, axis))
     return Freedom(False)
+
+
+def _singular(information: Floats) -> bool:
+    """Tell whether a direction of (x, y, theta) is free, whatever the units."""
+    diagonal = np.diag(information)
+    if diagonal.min() <= 0.0:
+        return True
+    scale = 1.0 / np.sqrt(diagonal)
+    return float(np.linalg.eigvalsh(information * np.outer(scale, scale))[0]) <= PARALLEL_RATIO
 
 
 def _slack(sums: JointSums, axis: Floats) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2 as chi_square
+from scipy.special import chdtri
 
 from .correspondences import Correspondences
 from .diagnostics import NO_ANSWER, covariance_of, diagnose, residuals
@@ -19,7 +19,7 @@ from .weights import PairWeights, weigh
 
 Floats = NDArray[np.float64]
 
-QUANTILE = 0.999  # of chi2, beyond which an answer is not usable
+TAIL = 0.001  # chance that chi2 of right pairs is larger; an answer beyond it is not usable
 DEFAULT_OPTIONS = RegistrationOptions()
 
 
@@ -72,7 +72,7 @@ def register(
     direction = fit.freedom.direction
     return RegistrationResult(
         degenerate=degenerate,
-        usable=not degenerate and diagnostics.chi2 <= float(chi_square.ppf(QUANTILE, diagnostics.dof)),
+        usable=not degenerate and diagnostics.chi2 <= float(chdtri(diagnostics.dof, TAIL)),
         pose=RigidTransform(float(x), float(y), fit.theta),
         covariance=covariance_of(problem, fit) if has_covariance else None,
         unobservable=None if direction is None else (float(direction[0]), float(direction[1])),

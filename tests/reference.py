@@ -1,0 +1,175 @@
+"""Slow and obviously right twins of the kernels: one pair at a time, straight from the definitions."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+def rotation(theta):
+    return np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+
+
+# Joint estimator -----------------------------------------------------------------------------------------------------
+
+
+def joint_sums(normals, offsets, centroids, directions, spreads, weights):
+    """Upper triangle of Q = sum w (phi phi' + s psi psi'), Wahba's two sums, and the count."""
+    q = np.zeros((5, 5))
+    resultant = 0.0
+    for n, p, m, d, s, w in zip(normals, offsets, centroids, directions, spreads, weights, strict=True):
+        phi = np.array([n @ m, n @ TURN @ m, n[0], n[1], -p])
+        psi = np.array([n @ d, n @ TURN @ d, 0.0, 0.0, 0.0])
+        q += w * (np.outer(phi, phi) + s * np.outer(psi, psi))
+        map_direction = TURN.T @ n
+        resultant += w * s * complex(*map_direction) * complex(*d).conjugate()
+    return np.concatenate([q[np.triu_indices(5)], [resultant.real, resultant.imag, len(weights)]])
+
+
+def joint_cost(theta, t, normals, offsets, centroids, directions, spreads, weights):
+    """Sum of squared distances of the centroids and of the points that the spreads stand for."""
+    r = rotation(theta)
+    total = 0.0
+    for n, p, m, d, s, w in zip(normals, offsets, centroids, directions, spreads, weights, strict=True):
+        # Two points with that centroid and second moment.
+        for end in (m + math.sqrt(s) * d, m - math.sqrt(s) * d):
+            total += 0.5 * w * (n @ (r @ end + t) - p) ** 2
+    return total
+
+
+def joint_solve(start, *pairs):
+    """Minimise the cost: at each angle near `start` the best translation by least squares; the best angle by search."""
+    normals, offsets, centroids, _, _, weights = pairs
+    root = np.sqrt(weights)
+
+    def translation(theta):
+        gaps = offsets - np.array([n @ rotation(theta) @ m for n, m in zip(normals, centroids, strict=True)])
+        return np.linalg.lstsq(root[:, None] * normals, root * gaps, rcond=1e-9)[0]
+
+    def cost(theta):
+        return joint_cost(theta, translation(theta), *pairs)
+
+    grid = start + np.linspace(-0.5, 0.5, 501)
+    centre = min(grid, key=cost)
+    low, high = centre - 0.002, centre + 0.002
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    for _ in range(60):
+        left, right = high - golden * (high - low), low + golden * (high - low)
+        low, high = (low, right) if cost(left) < cost(right) else (left, high)
+    theta = 0.5 * (low + high)
+    # A golden section stops at the root of the rounding; one Gauss-Newton step from there is exact.
+    jacobian, residuals = _jacobian(theta, translation(theta), *pairs)
+    step = np.linalg.lstsq(jacobian, -residuals, rcond=1e-9)[0]
+    theta += step[2]
+    return theta, translation(theta)
+
+
+def _jacobian(theta, t, normals, offsets, centroids, directions, spreads, weights):
+    rows, residuals = [], []
+    r = rotation(theta)
+    for n, p, m, d, s, w in zip(normals, offsets, centroids, directions, spreads, weights, strict=True):
+        for end in (m + math.sqrt(s) * d, m - math.sqrt(s) * d):
+            rows.append(math.sqrt(0.5 * w) * np.array([n[0], n[1], n @ r @ TURN @ end]))
+            residuals.append(math.sqrt(0.5 * w) * (n @ (r @ end + t) - p))
+    return np.array(rows), np.array(residuals)
+
+
+def joint_information(theta, *pairs):
+    """J'J of the residuals of the two points of each pair."""
+    jacobian, _ = _jacobian(theta, np.zeros(2), *pairs)
+    return jacobian.T @ jacobian
+
+
+def exact_sums(terms):
+    """Add rows of doubles without any rounding but the last."""
+    return np.array([float(sum(map(Fraction, map(float, column)))) for column in np.asarray(terms).T])
+
+
+# The paper's estimator -----------------------------------------------------------------------------------------------
+
+
+def transformation_line(map_direction, map_midpoint, direction, midpoint):
+    """Eq. (1), sign corrected: the point P and direction v of the ideal translations, and the angle alpha."""
+    n_s, n_d = TURN @ map_direction, TURN @ direction
+    point = (map_midpoint @ n_s - midpoint @ n_d) * n_s
+    alpha = math.atan2(map_direction[1], map_direction[0]) - math.atan2(direction[1], direction[0])
+    return point, map_direction, math.remainder(alpha, math.tau)
+
+
+def one_step_translation(lines, weights):
+    """Minimise sum w (|T - P|^2 - ((T - P) . v)^2) as least squares of the distances along the normals."""
+    a = np.array([math.sqrt(w) * (TURN @ v) for (_, v, _), w in zip(lines, weights, strict=True)])
+    b = np.array([math.sqrt(w) * (TURN @ v) @ p for (p, v, _), w in zip(lines, weights, strict=True)])
+    return np.linalg.lstsq(a, b, rcond=1e-9)[0]
+
+
+def translation_ambiguity(at, lines, weights):
+    """Eq. (2) squared and summed: distances of a translation from the lines."""
+    return sum(w * ((at - p)[0] * v[1] - (at - p)[1] * v[0]) ** 2 for (p, v, _), w in zip(lines, weights, strict=True))
+
+
+def mitsuta(angles, weights):
+    """Alg. 1, lines 15 and 16 corrected: the weighted sums of the unwrapped angles and of their squares."""
+    old = angles[0]
+    total, squares = weights[0] * old, weights[0] * old**2
+    for angle, weight in zip(angles[1:], weights[1:], strict=True):
+        delta = angle - old
+        if delta < -math.pi:
+            delta += math.tau
+        elif delta > math.pi:
+            delta -= math.tau
+        old += delta
+        total += weight * old
+        squares += weight * old**2
+    return total, squares
+
+
+def wahba_error(theta, map_directions, directions, weights):
+    """Eq. (11)."""
+    return sum(
+        w * float(np.sum((s - rotation(theta) @ d) ** 2))
+        for s, d, w in zip(map_directions, directions, weights, strict=True)
+    )
+
+
+def wahba(map_directions, directions, weights):
+    """Minimise Eq. (11) by singular values, as for any dimension."""
+    b = sum(w * np.outer(s, d) for s, d, w in zip(map_directions, directions, weights, strict=True))
+    u, _, v = np.linalg.svd(b)
+    r = u @ np.diag([1.0, np.linalg.det(u) * np.linalg.det(v)]) @ v
+    return math.atan2(r[1, 0], r[0, 0])
+
+
+def one_step_sums(map_directions, map_midpoints, directions, midpoints, weights, reference):
+    """The sums of Eqs. (5), (17), (19) and (15) about a reference ``(x, y, alpha)``."""
+    total = np.zeros(12)
+    for row in zip(map_directions, map_midpoints, directions, midpoints, weights, strict=True):
+        v, m, d, q, w = row
+        point, _, alpha = transformation_line(v, m - np.array(reference[:2]), d, q)
+        a = math.remainder(alpha - reference[2], math.tau)
+        c = point[0] * v[1] - point[1] * v[0]
+        total += [
+            w,
+            w * v[0] ** 2,
+            w * v[1] ** 2,
+            w * v[0] * v[1],
+            w * point[0],
+            w * point[1],
+            w * c**2,
+            w * a,
+            w * a**2,
+            w * (1.0 - math.cos(a)),
+            w * math.sin(a),
+            1.0,
+        ]
+    return total
+
+
+def reliability(map_directions, weights):
+    """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E."""
+    e = sum(w * np.outer(v, v) for v, w in zip(map_directions, weights, strict=True)) / sum(weights)
+    return 2.0 * math.sqrt(max(0.0, float(np.prod(np.linalg.eigvalsh(e)))))

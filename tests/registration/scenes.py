@@ -1,0 +1,88 @@
+"""Scenes with known answers for the tests of registration."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from registration import Correspondences, MeasuredSegments, RigidTransform, Segments
+
+ROOM = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0], [3, 3, 4, 5], [7, 2, 5, 1]]
+POSE = RigidTransform(3.0, 2.0, 0.4)
+
+
+def diagonal(n):
+    """Pair i with i."""
+    return np.repeat(np.arange(n)[:, None], 2, axis=1)
+
+
+def seen_from(pose, segments):
+    """Return map segments as a perfect scan from `pose` sees them."""
+    ends = pose.inverse().apply(segments.endpoints.reshape(-1, 2, 2))
+    return Segments.from_array(ends.reshape(-1, 4))
+
+
+def moved(pose, segments):
+    """Return segments carried along by a transform."""
+    return Segments.from_array(pose.apply(segments.endpoints.reshape(-1, 2, 2)).reshape(-1, 4))
+
+
+def random_segments(rng, n, extent=10.0):
+    """Return n segments of 1 to 6 m in all directions."""
+    begin = rng.uniform(-extent, extent, (n, 2))
+    angle = rng.uniform(-math.pi, math.pi, n)
+    length = rng.uniform(1.0, 6.0, n)
+    return Segments.from_array(
+        np.hstack([begin, begin + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)])
+    )
+
+
+def directed(degrees, length=1.0):
+    """Return segments from the origin at these angles."""
+    a = np.radians(np.asarray(degrees, dtype=float))
+    ends = length * np.stack([np.cos(a), np.sin(a)], axis=1)
+    return Segments.from_array(np.hstack([np.zeros_like(ends), ends]))
+
+
+def noisy_pairs(rng, n, noise=0.02, pose=POSE):
+    """Return a map and a scan of it whose endpoints have noise."""
+    map_segments = random_segments(rng, n)
+    clean = seen_from(pose, map_segments).endpoints
+    return map_segments, MeasuredSegments.from_segments(
+        Segments.from_array(clean + rng.normal(0.0, noise, clean.shape)), max(noise, 1e-3)
+    )
+
+
+def correspondences(map_segments, scan):
+    """Pair row by row."""
+    return Correspondences.of(map_segments, scan, diagonal(len(scan)))
+
+
+def scanned_points(rng, map_segments, pose, sigma, count):
+    """Return, per segment, `count` evenly spread points with normal noise across the wall, in the scan frame."""
+    clean = seen_from(pose, map_segments)
+    along = (np.arange(count) + 0.5) / count
+    points = clean.endpoints[:, None, :2] + along[:, None] * (clean.directions * clean.lengths[:, None])[:, None]
+    return points + rng.normal(0.0, sigma, points.shape[:2])[..., None] * clean.normals[:, None]
+
+
+def fitted(points, sigma):
+    """Fit a segment to each row of points by total least squares, with its moments."""
+    rows, centroids, spreads = [], [], []
+    for p in points:
+        centre = p.mean(axis=0)
+        axis = np.linalg.svd(p - centre)[2][0]
+        axis = axis if axis @ (p[-1] - p[0]) > 0.0 else -axis
+        along = (p - centre) @ axis
+        rows.append(np.concatenate([centre + along.min() * axis, centre + along.max() * axis]))
+        centroids.append(centre)
+        spreads.append(float(np.mean(along**2)))
+    return MeasuredSegments.from_segments(
+        Segments.from_array(rows), sigma, np.full(len(points), float(points.shape[1])), (centroids, spreads)
+    )
+
+
+def difference(a, b):
+    """Return pose a minus pose b as (x, y, theta)."""
+    return np.array([a.x - b.x, a.y - b.y, math.remainder(a.theta - b.theta, math.tau)])

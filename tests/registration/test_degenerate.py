@@ -1,0 +1,129 @@
+"""Sets that fix no unique transform, and what is said of them."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
+
+from .scenes import POSE, diagonal, moved, seen_from
+
+ESTIMATORS = ("joint", "one_step")
+
+
+def corridor(theta=0.0, length=8.0):
+    """Two walls 2 m apart that face each other, along `theta`."""
+    walls = Segments.from_array([[0, -1, length, -1], [length, 1, 0, 1]])
+    return moved(RigidTransform(0.0, 0.0, theta), walls)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@given(st.floats(-3.0, 3.0), st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
+@settings(max_examples=25, deadline=None)
+def test_a_corridor_leaves_its_own_direction_free(estimator, theta, x, y):
+    map_segments = corridor(theta)
+    pose = RigidTransform(x, y, 0.4)
+    scan = MeasuredSegments.from_segments(seen_from(pose, map_segments))
+    result = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions(estimator))
+    assert result.degenerate
+    assert not result.usable
+    assert result.covariance is None
+    free = np.array(result.unobservable)
+    assert np.linalg.norm(free) == pytest.approx(1.0)
+    assert abs(free @ [math.cos(theta), math.sin(theta)]) == pytest.approx(1.0)
+    assert free[0] > 0.0 or (abs(free[0]) < 1e-9 and free[1] > 0.0)
+    # Across it is right, and along it stays where it is.
+    np.testing.assert_allclose(result.offsets, 0.0, atol=1e-9)
+    assert result.pose.theta == pytest.approx(0.4)
+    assert free @ [result.pose.x, result.pose.y] == pytest.approx(0.0, abs=1e-9)
+    assert result.diagnostics.dof == 2
+    assert result.diagnostics.reliability == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_one_pair_is_degenerate(estimator):
+    map_segments = corridor()
+    scan = MeasuredSegments.from_segments(seen_from(POSE, map_segments))
+    result = register(map_segments, scan, [[0, 0]], 0.0, RegistrationOptions(estimator))
+    assert result.degenerate
+    assert (result.diagnostics.n, result.diagnostics.dof) == (1, 0)
+    np.testing.assert_allclose(result.offsets, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_no_pair_has_no_pose(estimator):
+    map_segments = corridor()
+    scan = MeasuredSegments.from_segments(map_segments, 0.0)
+    options = RegistrationOptions(estimator, weighting="uniform", weights=[])
+    result = register(map_segments, scan, [], 0.0, options)
+    assert result.degenerate
+    assert not result.usable
+    assert result.pose is None
+    assert result.unobservable is None
+    assert result.diagnostics.similarity is None
+    assert len(result.offsets) == len(result.angles) == len(result.weights) == 0
+
+
+def nearly_parallel(degrees, length=4.0, sigma=0.02):
+    a = math.radians(degrees)
+    ends = [[0, 0, length, 0], [length * math.cos(a), 5 + length * math.sin(a), 0, 5]]
+    map_segments = Segments.from_array(ends)
+    return map_segments, MeasuredSegments.from_segments(seen_from(POSE, map_segments), sigma)
+
+
+def test_parallel_within_the_noise_is_degenerate_and_moves_no_further_than_it_fits():
+    map_segments, scan = nearly_parallel(0.45)
+    result = register(map_segments, scan, diagonal(2))
+    assert result.degenerate
+    assert result.diagnostics.dof == 2
+    assert abs(np.array(result.unobservable) @ [1.0, 0.0]) > 0.999
+    # The walls do say where it is, if not well: the pose stays within three standard deviations of that.
+    assert result.diagnostics.chi2 == pytest.approx(9.0, rel=1e-6)
+    assert 0.0 < result.pose.x < POSE.x
+    assert not register(map_segments, MeasuredSegments.from_segments(scan.segments, 0.001), diagonal(2)).degenerate
+
+
+def test_a_translation_less_certain_than_half_a_metre_is_degenerate():
+    # sqrt(2 * 80) normals at half of two degrees each: 0.02 / (sqrt(160) sin 1 deg) = 0.09 m; a fifth of that for 10
+    # degrees. With 20 times the noise directions still differ, or not.
+    for degrees, sigma, degenerate, dof in [(2, 0.02, False, 1), (10, 0.2, False, 1), (40, 2.0, True, 2)]:
+        map_segments, scan = nearly_parallel(degrees, sigma=sigma)
+        result = register(map_segments, scan, diagonal(2))
+        assert (result.degenerate, result.diagnostics.dof) == (degenerate, dof)
+    # Long walls: the angle is seen, the slide along them is not.
+    map_segments, scan = nearly_parallel(0.15, length=40.0, sigma=0.06)
+    result = register(map_segments, scan, diagonal(2))
+    assert (result.degenerate, result.diagnostics.dof) == (True, 1)
+    assert abs(result.unobservable[0]) > 0.999
+    assert result.covariance is None
+
+
+def test_whether_a_set_is_degenerate_is_no_matter_of_how_it_is_weighted():
+    map_segments, scan = nearly_parallel(90.0)
+    for options in (
+        RegistrationOptions(weighting="uniform"),
+        RegistrationOptions(weights=[1.0, 1.0]),
+        RegistrationOptions(weights=[1e-6, 2e-6]),
+    ):
+        assert not register(map_segments, scan, diagonal(2), 0.0, options).degenerate
+    map_segments, scan = nearly_parallel(0.45)
+    assert register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions(weights=[1e9, 1e9])).degenerate
+
+
+def test_one_step_gives_the_papers_answer_as_long_as_it_has_one():
+    map_segments, scan = nearly_parallel(0.45)
+    result = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions("one_step"))
+    assert result.degenerate
+    np.testing.assert_allclose([result.pose.x, result.pose.y], [POSE.x, POSE.y], atol=1e-9)
+
+
+def test_points_that_fix_no_rotation():
+    # Two points, each on its own wall, say nothing of the angle where both lie in the corner.
+    map_segments = Segments.from_array([[-1, 0, 1, 0], [0, -1, 0, 1]])
+    scan = MeasuredSegments.from_segments(map_segments, 0.02, moments=(np.zeros((2, 2)), np.zeros(2)))
+    result = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions(weighting="uniform"))
+    assert result.degenerate
+    assert result.pose is not None

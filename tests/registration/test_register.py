@@ -1,0 +1,350 @@
+"""The whole of `register`: known answers, equivariance, options and what it refuses."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from registration import (
+    InvalidArgumentError,
+    MeasuredSegments,
+    RegistrationOptions,
+    RigidTransform,
+    Segments,
+    register,
+)
+from tests import reference
+
+from .scenes import (
+    POSE,
+    ROOM,
+    correspondences,
+    diagonal,
+    difference,
+    moved,
+    noisy_pairs,
+    seen_from,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+ESTIMATORS = ("joint", "one_step")
+ROTATIONS = ("wahba", "mitsuta")
+WEIGHTINGS = ("uniform", "shorter_length", "information")
+
+
+def room(pose=POSE, sigma=0.02):
+    map_segments = Segments.from_array(ROOM)
+    return map_segments, MeasuredSegments.from_segments(seen_from(pose, map_segments), sigma)
+
+
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+@pytest.mark.parametrize("rotation", ROTATIONS)
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("theta", [0.4, math.pi, -3.0])
+def test_perfect_data_give_the_pose_and_no_ambiguity(theta, estimator, rotation, weighting):
+    pose = RigidTransform(3.0, -2.0, theta)
+    map_segments, scan = room(pose)
+    options = RegistrationOptions(estimator, rotation, weighting=weighting)
+    result = register(map_segments, scan, diagonal(6), 0.0, options)
+    assert not result.degenerate
+    assert result.usable
+    np.testing.assert_allclose(difference(result.pose, pose), 0.0, atol=1e-12)
+    np.testing.assert_allclose(result.offsets, 0.0, atol=1e-12)
+    np.testing.assert_allclose(result.angles, 0.0, atol=1e-12)
+    d = result.diagnostics
+    assert d.ambiguity.total == pytest.approx(0.0, abs=1e-15 * result.weights.sum())
+    assert d.chi2 == pytest.approx(0.0, abs=1e-15)
+    assert (d.n, d.dof) == (6, 9)
+    assert (result.covariance is None) == (estimator == "one_step")
+    assert result.unobservable is None
+
+
+def test_residuals_weights_and_diagnostics_in_closed_form():
+    # A square of 2 m seen in place, but with its upper wall 0.1 m too high: halfway down, upper and lower are 0.05 off.
+    map_segments = Segments.from_array([[0, 0, 2, 0], [2, 0, 2, 2], [2, 2, 0, 2], [0, 2, 0, 0]])
+    scan = Segments.from_array([[0, 0, 2, 0], [2, 0, 2, 2], [2, 2.1, 0, 2.1], [0, 2, 0, 0]])
+    options = RegistrationOptions(k_translation=3.0, evaluate_at=RigidTransform(0.0, -0.1, 0.0))
+    result = register(map_segments, MeasuredSegments.from_segments(scan, 0.1), diagonal(4), 0.2, options)
+    weight = 1.0 / (0.1**2 / 40 + 0.2**2)
+    np.testing.assert_allclose(difference(result.pose, RigidTransform(0.0, -0.05, 0.0)), 0.0, atol=1e-12)
+    np.testing.assert_allclose(result.weights, weight, rtol=1e-12)
+    np.testing.assert_allclose(result.offsets, [-0.05, 0.0, -0.05, 0.0], atol=1e-12)
+    d = result.diagnostics
+    assert d.chi2 == pytest.approx(weight * 2 * 0.05**2)
+    assert d.ambiguity.translation == pytest.approx(3.0 * weight * 2 * 0.05**2)
+    assert d.ambiguity_before.translation == pytest.approx(3.0 * weight * 0.1**2)
+    assert d.ambiguity_at.translation == pytest.approx(3.0 * weight * 0.1**2)
+    assert d.similarity == pytest.approx(1.0 / d.ambiguity.total)
+    assert d.rms_offset == pytest.approx(0.05 / math.sqrt(2.0))
+    assert d.reliability == pytest.approx(1.0)
+    assert d.determinant == pytest.approx((2.0 * weight) ** 2)
+    # Four walls spread over 2 m each fix theta, two walls each x and y; all of it about (1, 1), which is the lever arm.
+    turn, one = 1.0 / (4.0 * weight * 2.0**2 / 12.0), 1.0 / (2.0 * weight)
+    expected = [[one + turn, -turn, turn], [-turn, one + turn, -turn], [turn, -turn, turn]]
+    np.testing.assert_allclose(result.covariance, expected, rtol=1e-9)
+
+
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_joint_answer_is_the_least_cost(seed):
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 6)
+    result = register(map_segments, scan, diagonal(6))
+    pairs = correspondences(map_segments, scan)
+    rows = (pairs.map_normals, pairs.map_offsets, pairs.centroids, pairs.directions, pairs.spreads, result.weights)
+    theta, translation = reference.joint_solve(0.4, *rows)
+    np.testing.assert_allclose(difference(result.pose, RigidTransform(*translation, theta)), 0.0, atol=1e-9)
+    assert result.diagnostics.chi2 == pytest.approx(reference.joint_cost(theta, translation, *rows), rel=1e-9)
+    lever = np.linalg.inv(reference.joint_information(theta, *rows))
+    np.testing.assert_allclose(result.covariance, lever, rtol=1e-6, atol=1e-15)
+
+
+@pytest.mark.parametrize("rotation", ROTATIONS)
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_one_step_answer_is_the_papers(rotation, seed):
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 6)
+    options = RegistrationOptions("one_step", rotation, weighting="shorter_length", k_rotation=2.0)
+    result = register(map_segments, scan, diagonal(6), 0.0, options)
+    weights = np.minimum(map_segments.lengths, scan.segments.lengths)
+    np.testing.assert_allclose(result.weights, weights)
+    pairs = correspondences(map_segments, scan)
+    rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
+    lines = [reference.transformation_line(*row) for row in rows]
+    total, squares = reference.mitsuta([alpha for *_, alpha in lines], weights)
+    mean = total / weights.sum()
+    wahba = reference.wahba(pairs.map_directions, pairs.directions, weights)
+    translation = reference.one_step_translation(lines, weights)
+    theta = mean if rotation == "mitsuta" else wahba
+    np.testing.assert_allclose(difference(result.pose, RigidTransform(*translation, theta)), 0.0, atol=1e-9)
+    rotation_part = (
+        squares - mean * total
+        if rotation == "mitsuta"
+        else reference.wahba_error(theta, pairs.map_directions, pairs.directions, weights)
+    )
+    ambiguity = result.diagnostics.ambiguity
+    assert ambiguity.rotation == pytest.approx(2.0 * rotation_part, rel=1e-6)
+    assert ambiguity.translation == pytest.approx(
+        reference.translation_ambiguity(translation, lines, weights), rel=1e-9
+    )
+
+
+@given(SEEDS, st.sampled_from([1.0, 1e3, 5e6]))
+@settings(max_examples=20, deadline=None)
+def test_joint_answer_moves_with_either_frame(seed, reach):
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 6)
+    plain = register(map_segments, scan, diagonal(6))
+    by = RigidTransform(*rng.uniform(-reach, reach, 2), rng.uniform(-3.0, 3.0))
+    rounding = 1e-9 * max(1.0, reach / 1e3)
+
+    carried = register(moved(by, map_segments), scan, diagonal(6))
+    np.testing.assert_allclose(difference(carried.pose, by.compose(plain.pose)), 0.0, atol=rounding)
+    np.testing.assert_allclose(carried.offsets, plain.offsets, atol=rounding)
+
+    if reach <= 1e3:
+        turned = replace(scan, segments=moved(by, scan.segments), centroids=by.apply(scan.centroids))
+        answer = register(map_segments, turned, diagonal(6))
+        np.testing.assert_allclose(difference(answer.pose.compose(by), plain.pose), 0.0, atol=1e-9 * reach)
+        assert answer.diagnostics.chi2 == pytest.approx(plain.diagnostics.chi2, rel=1e-6)
+
+
+def test_the_one_step_answer_moves_with_the_map_but_not_with_the_scan():
+    map_segments, scan = noisy_pairs(np.random.default_rng(3), 8)
+    options = RegistrationOptions("one_step")
+    plain = register(map_segments, scan, diagonal(8), 0.0, options).pose
+    by = RigidTransform(5e6, -4e6, 1.0)
+    carried = register(moved(by, map_segments), scan, diagonal(8), 0.0, options).pose
+    np.testing.assert_allclose(difference(carried, by.compose(plain)), 0.0, atol=1e-7)
+    aside = MeasuredSegments.from_segments(scan.segments.shifted([50.0, 0.0]), 0.02)
+    other = register(map_segments, aside, diagonal(8), 0.0, options).pose.compose(RigidTransform(50.0, 0.0, 0.0))
+    assert np.abs(difference(other, plain)).max() > 1e-3
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_far_from_the_origin_no_digit_is_lost(estimator):
+    # Dyadic coordinates are exact at any of these offsets, so near and far must agree to the last digits.
+    map_segments = Segments.from_array(ROOM)
+    rough = np.round(seen_from(POSE, map_segments).endpoints * 1024.0) / 1024.0
+    scan = MeasuredSegments.from_segments(Segments.from_array(rough), 0.02)
+    options = RegistrationOptions(estimator)
+    near = register(map_segments, scan, diagonal(6), 0.0, options)
+    far = register(map_segments.shifted([5e6, 4e6]), scan, diagonal(6), 0.0, options)
+    np.testing.assert_allclose(far.offsets, near.offsets, atol=1e-13)
+    assert far.diagnostics.chi2 == pytest.approx(near.diagnostics.chi2, rel=1e-9)
+    assert far.diagnostics.ambiguity.total == pytest.approx(near.diagnostics.ambiguity.total, rel=1e-9)
+    np.testing.assert_allclose([far.pose.x - 5e6, far.pose.y - 4e6], [near.pose.x, near.pose.y], atol=2e-9)
+    assert far.pose.theta == pytest.approx(near.pose.theta, abs=1e-14)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_order_does_not_matter(estimator, seed):
+    rng = np.random.default_rng(seed)
+    map_segments, scan = noisy_pairs(rng, 7)
+    order = rng.permutation(7)
+    options = RegistrationOptions(estimator, "mitsuta")
+    a = register(map_segments, scan, diagonal(7), 0.0, options)
+    b = register(map_segments, scan, diagonal(7)[order], 0.0, options)
+    np.testing.assert_allclose(difference(a.pose, b.pose), 0.0, atol=1e-12)
+    np.testing.assert_allclose(a.offsets[order], b.offsets, atol=1e-12)
+
+
+def test_pairs_say_which_segment_belongs_to_which():
+    map_segments, scan = room()
+    order = np.array([4, 2, 0, 5, 1, 3])
+    shuffled = map_segments.take(order)
+    pairs = np.stack([order, np.arange(6)], axis=1)
+    np.testing.assert_allclose(difference(register(shuffled, scan, pairs).pose, POSE), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("theta", [0.4, 2.0, -3.0])
+def test_without_directions_segments_are_turned_round(theta, estimator):
+    pose = RigidTransform(1.0, 2.0, theta)
+    map_segments, scan = room(pose)
+    ends = scan.segments.endpoints.copy()
+    ends[[0, 3, 4]] = ends[[0, 3, 4]][:, [2, 3, 0, 1]]
+    mixed = MeasuredSegments.from_segments(Segments.from_array(ends))
+    result = register(map_segments, mixed, diagonal(6), 0.0, RegistrationOptions(estimator, oriented=False))
+    assert not result.degenerate
+    np.testing.assert_allclose(difference(result.pose, pose), 0.0, atol=1e-12)
+    np.testing.assert_allclose(result.angles, 0.0, atol=1e-12)
+
+
+def test_without_directions_a_corner_fits_both_ways():
+    map_segments, scan = room()
+    result = register(map_segments, scan, [[0, 0], [1, 1]], 0.0, RegistrationOptions(oriented=False))
+    assert result.degenerate
+    assert result.covariance is None
+    assert result.unobservable is None
+    np.testing.assert_allclose(difference(result.pose, POSE), 0.0, atol=1e-12)
+    assert not register(map_segments, scan, [[0, 0], [1, 1]]).degenerate
+
+
+def test_a_pair_of_weight_0_has_a_residual_and_no_say():
+    map_segments, scan = room()
+    pairs = [*diagonal(6).tolist(), [0, 2]]
+    result = register(map_segments, scan, pairs, 0.0, RegistrationOptions(weights=[1e4] * 6 + [0.0]))
+    np.testing.assert_allclose(difference(result.pose, POSE), 0.0, atol=1e-12)
+    assert abs(result.offsets[6]) == pytest.approx(6.0)
+    assert (result.diagnostics.n, result.diagnostics.dof) == (6, 9)
+
+
+def test_weights_replace_the_information():
+    map_segments, scan = noisy_pairs(np.random.default_rng(5), 6)
+    plain = register(map_segments, scan, diagonal(6))
+    quarter = register(map_segments, scan, diagonal(6), 0.0, RegistrationOptions(weights=plain.weights / 4.0))
+    np.testing.assert_allclose(difference(quarter.pose, plain.pose), 0.0, atol=1e-12)
+    assert quarter.diagnostics.chi2 == pytest.approx(plain.diagnostics.chi2 / 4.0)
+    np.testing.assert_allclose(quarter.covariance, 4.0 * plain.covariance, rtol=1e-9)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("weights", [[1e-100, 1.0, 1e100, 1.0, 1e-100, 0.0], [1e100] * 6, [1e-100] * 6])
+@pytest.mark.parametrize("sigma", [0.0, 1e-200, 1e-12, 1e3])
+def test_no_weight_and_no_sigma_breaks_a_number(sigma, weights, estimator):
+    map_segments, scan = noisy_pairs(np.random.default_rng(5), 6)
+    scan = MeasuredSegments.from_segments(scan.segments, sigma)
+    options = RegistrationOptions(
+        estimator, weights=weights, k_translation=1e30, evaluate_at=RigidTransform(1e10, -1e10, 3.0)
+    )
+    result = register(map_segments, scan, diagonal(6), sigma, options)
+    d = result.diagnostics
+    numbers = [d.ambiguity.total, d.ambiguity_before.total, d.ambiguity_at.total, d.similarity, d.reliability]
+    numbers += [d.determinant, d.chi2, d.rms_offset, d.rms_angle, result.pose.x, result.pose.y, result.pose.theta]
+    assert np.isfinite(numbers).all()
+    assert np.isfinite(result.offsets).all()
+    assert result.covariance is None or np.isfinite(result.covariance).all()
+
+
+@pytest.mark.parametrize("weighting", WEIGHTINGS)
+def test_wrong_pairs_are_not_usable(weighting):
+    map_segments, scan = room()
+    swapped = [[0, 0], [1, 1], [2, 2], [3, 3], [4, 5], [5, 4]]
+    result = register(map_segments, scan, swapped, 0.0, RegistrationOptions(weighting=weighting))
+    assert not result.degenerate
+    assert not result.usable
+
+
+@pytest.mark.parametrize(
+    ("pairs", "index"),
+    [
+        ([[0, 0], [1, 6]], 1),
+        ([[0, 0], [0, 0], [6, 1]], 2),
+        ([[-1, 0]], 0),
+        ([[0, 0], [0.5, 1]], 1),
+        ([[0.0, 1.0]], None),
+        ([[0, 1, 2]], None),
+        ([0, 1], None),
+        ([[0, 1], [2]], None),
+        ([["0", "1"]], None),
+        ([[True, False]], None),
+        ([[float("nan"), 0]], 0),
+        ([[2**70, 0]], None),
+    ],
+)
+def test_bad_pairs_are_refused(pairs, index):
+    with pytest.raises(InvalidArgumentError) as caught:
+        register(*room(), pairs)
+    assert (caught.value.argument, caught.value.index) == ("correspondences", index)
+
+
+@pytest.mark.parametrize(
+    ("weights", "index"),
+    [
+        ([1, 1, -1, 1, 1, 1], 2),
+        ([1, 1, 1, math.nan, 1, 1], 3),
+        ([math.inf, 1, 1, 1, 1, 1], 0),
+        ([1, 1e-300, 1, 1, 1, 1], 1),
+        ([1, 1, 1, 1, 1, 1e300], 5),
+        ([0, 0, 0, 0, 0, 0], None),
+        ([1, 1, 1], None),
+        (["1"] * 6, None),
+        ([True] * 6, None),
+        ([[1], [1, 2]], None),
+    ],
+)
+def test_bad_weights_are_refused(weights, index):
+    with pytest.raises(InvalidArgumentError) as caught:
+        register(*room(), diagonal(6), 0.0, RegistrationOptions(weights=weights))
+    assert (caught.value.argument, caught.value.index) == ("weights", index)
+
+
+@pytest.mark.parametrize("map_sigma", [-1.0, math.nan, math.inf, 1e4])
+def test_bad_map_sigmas_are_refused(map_sigma):
+    with pytest.raises(InvalidArgumentError) as caught:
+        register(*room(), diagonal(6), map_sigma)
+    assert caught.value.argument == "map.sigma"
+
+
+def test_information_without_noise_is_refused():
+    map_segments, scan = room(sigma=0.0)
+    with pytest.raises(InvalidArgumentError) as caught:
+        register(map_segments, scan, diagonal(6))
+    assert caught.value.argument == "scan.sigma"
+    assert register(map_segments, scan, diagonal(6), 0.01).usable
+    assert register(map_segments, scan, diagonal(6), 0.0, RegistrationOptions(weighting="uniform")).usable
+
+
+@pytest.mark.parametrize(
+    ("changes", "argument"),
+    [
+        ({"k_translation": -1.0}, "options.k_translation"),
+        ({"k_rotation": math.nan}, "options.k_rotation"),
+        ({"k_rotation": math.inf}, "options.k_rotation"),
+        ({"estimator": "best"}, "options.estimator"),
+        ({"rotation": "mean"}, "options.rotation"),
+        ({"weighting": "length"}, "weighting"),
+        ({"evaluate_at": RigidTransform(1e300, 0.0, 0.0)}, "options.evaluate_at"),
+    ],
+)
+def test_bad_options_are_refused(changes, argument):
+    with pytest.raises(InvalidArgumentError) as caught:
+        RegistrationOptions(**changes)
+    assert caught.value.argument == argument

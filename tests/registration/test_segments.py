@@ -1,0 +1,114 @@
+"""Segments, measured segments and transforms."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from registration import (
+    InvalidArgumentError,
+    InvalidSegmentsError,
+    MeasuredSegments,
+    RegistrationError,
+    RigidTransform,
+    Segments,
+    wrap_angle,
+)
+
+POSES = st.builds(RigidTransform, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-10.0, 10.0))
+
+
+def test_a_segment_in_closed_form():
+    s = Segments.from_array([[1, 2, 1, 5]])
+    np.testing.assert_array_equal(s.directions, [[0, 1]])
+    np.testing.assert_array_equal(s.normals, [[-1, 0]])
+    np.testing.assert_array_equal(s.offsets, [-1])
+    np.testing.assert_array_equal(s.lengths, [3])
+    np.testing.assert_array_equal(s.midpoints, [[1, 3.5]])
+    np.testing.assert_array_equal(s.reversed().offsets, [1])
+    np.testing.assert_array_equal(s.shifted([2, 0]).offsets, [-3])
+    assert len(s) == 1
+    assert len(Segments.from_array([])) == 0
+
+
+def test_arrays_are_read_only_and_rows_can_be_taken():
+    s = Segments.from_array([[0, 0, 1, 0], [0, 0, 0, 2]])
+    with pytest.raises(ValueError, match="read-only"):
+        s.endpoints[0, 0] = 7.0
+    np.testing.assert_array_equal(s.take([1, 0]).lengths, [2, 1])
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        ([0, 0, math.nan, 0], "not finite"),
+        ([0, 0, math.inf, 0], "not finite"),
+        ([2e9, 0, 2e9, 1], "beyond"),
+        ([0, 0, 1e-7, 0], "shorter"),
+        ([0, 0, 2e4, 0], "longer"),
+    ],
+)
+def test_bad_segments_are_refused_by_index(row, says):
+    with pytest.raises(InvalidSegmentsError, match=says) as caught:
+        Segments.from_array([[0, 0, 1, 0], row], argument="map.segments")
+    assert (caught.value.argument, caught.value.index) == ("map.segments", 1)
+    assert isinstance(caught.value, RegistrationError)
+
+
+@pytest.mark.parametrize("array", [[[0, 0, 1]], [1, 2, 3, 4], [["0", "0", "1", "0"]], [[0, 0, 1, 0], [1]]])
+def test_what_is_no_array_of_segments_is_refused(array):
+    with pytest.raises(InvalidArgumentError):
+        Segments.from_array(array)
+
+
+def test_what_a_caller_does_not_know_is_filled_in():
+    measured = MeasuredSegments.from_segments(Segments.from_array([[0, 0, 6, 0], [0, 0, 0, 0.03]]))
+    np.testing.assert_allclose(measured.sigma, [0.02, 0.02])
+    np.testing.assert_allclose(measured.points, [120, 2])
+    np.testing.assert_allclose(measured.spreads, [3.0, 0.03**2 / 12])
+    np.testing.assert_allclose(measured.centroids, [[3, 0], [0, 0.015]])
+
+
+@pytest.mark.parametrize(
+    ("changes", "argument", "index"),
+    [
+        ({"sigma": -0.1}, "scan.sigma", 0),
+        ({"sigma": [0.1, math.nan]}, "scan.sigma", 1),
+        ({"sigma": [0.1]}, "scan.sigma", None),
+        ({"points": [5, 0]}, "scan.points", 1),
+        ({"moments": ([[0, 0], [0, math.inf]], [1, 1])}, "scan.centroids", 1),
+        ({"moments": ([[0, 0], [0, 0]], [-1, 1])}, "scan.spreads", 0),
+    ],
+)
+def test_bad_measurements_are_refused(changes, argument, index):
+    with pytest.raises(InvalidArgumentError) as caught:
+        MeasuredSegments.from_segments(Segments.from_array([[0, 0, 1, 0], [0, 0, 0, 1]]), **changes)
+    assert (caught.value.argument, caught.value.index) == (argument, index)
+
+
+@pytest.mark.parametrize(
+    ("angle", "expected"),
+    [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (1.5 * math.pi, -0.5 * math.pi), (7.0, 7.0 - math.tau)],
+)
+def test_wrapped_angles(angle, expected):
+    assert wrap_angle(angle) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_transform_in_closed_form():
+    pose = RigidTransform(1.0, 2.0, math.pi / 2)
+    np.testing.assert_allclose(pose.apply([[1.0, 0.0], [0.0, 1.0]]), [[1.0, 3.0], [0.0, 2.0]], atol=1e-15)
+
+
+@given(POSES, POSES, st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)))
+def test_transforms_are_a_group(a, b, point):
+    np.testing.assert_allclose(a.compose(b).apply(point), a.apply(b.apply(point)), atol=1e-9)
+    np.testing.assert_allclose(a.inverse().apply(a.apply(point)), point, atol=1e-9)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_transform_is_finite(bad):
+    for values in ((bad, 0, 0), (0, bad, 0), (0, 0, bad)):
+        with pytest.raises(ValueError, match="finite"):
+            RigidTransform(*values)

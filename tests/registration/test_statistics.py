@@ -1,0 +1,69 @@
+"""What the joint estimator promises of accuracy and of its own covariance."""
+
+import numpy as np
+import pytest
+
+from registration import RegistrationOptions, RigidTransform, register
+
+from .scenes import POSE, diagonal, difference, fitted, random_segments, scanned_points
+
+SIGMA = 0.02
+COUNT = 25
+
+
+def trials(n, *, segments=8, origin=(0.0, 0.0), options=None):
+    """Register n noisy scans of one scene; yield pose minus truth and the result."""
+    rng = np.random.default_rng(20191)
+    map_segments = random_segments(rng, segments)
+    pose = POSE.compose(RigidTransform(*origin, 0.0))
+    options = options or RegistrationOptions()
+    for _ in range(n):
+        scan = fitted(scanned_points(rng, map_segments, pose, SIGMA, COUNT), SIGMA)
+        result = register(map_segments, scan, diagonal(segments), 0.0, options)
+        yield difference(result.pose, pose), result
+
+
+@pytest.mark.parametrize("origin", [(0.0, 0.0), (50.0, 30.0)], ids=["inside", "58 m away"])
+def test_covariance_and_chi2_are_honest_and_the_bound_is_reached(origin):
+    offs, costs, nees, usable = [], [], [], 0
+    for off, result in trials(2000, origin=origin):
+        offs.append(off)
+        costs.append(result.diagnostics.chi2)
+        nees.append(off @ np.linalg.solve(result.covariance, off))
+        usable += result.usable
+    assert 2.7 <= np.mean(nees) <= 3.3
+    assert np.mean(costs) == pytest.approx(13.0, rel=0.05)
+    assert usable > 0.995 * 2000
+    # The Cramer-Rao bound is the inverse of the information of the raw points at the truth, which noise moves little.
+    bound = np.sqrt(np.diag(result.covariance))
+    rms = np.sqrt(np.mean(np.square(offs), axis=0))
+    assert (rms <= 1.05 * bound).all()
+
+
+@pytest.mark.parametrize("weighting", ["uniform", "shorter_length"])
+def test_covariance_is_honest_whatever_the_weighting(weighting):
+    nees = []
+    for off, result in trials(1000, options=RegistrationOptions(weighting=weighting)):
+        nees.append(off @ np.linalg.solve(result.covariance, off))
+    assert 2.7 <= np.mean(nees) <= 3.3
+
+
+def test_to_first_order_it_is_point_to_line_least_squares():
+    rng = np.random.default_rng(6)
+    map_segments = random_segments(rng, 8)
+    for sigma, tolerance in ((1e-2, 1e-4), (1e-4, 1e-8)):
+        points = scanned_points(rng, map_segments, POSE, sigma, COUNT)
+        pose = register(map_segments, fitted(points, sigma), diagonal(8)).pose
+        # Gauss-Newton on all raw points.
+        direct = POSE
+        for _ in range(6):
+            moved = direct.apply(points)
+            arms = moved - [direct.x, direct.y]
+            n = np.broadcast_to(map_segments.normals[:, None], moved.shape)
+            gaps = np.sum(n * moved, axis=2) - map_segments.offsets[:, None]
+            turn = n[..., 1] * arms[..., 0] - n[..., 0] * arms[..., 1]
+            rows = np.stack([n[..., 0], n[..., 1], turn], axis=2).reshape(-1, 3)
+            step = np.linalg.lstsq(rows, -gaps.ravel(), rcond=None)[0]
+            direct = RigidTransform(direct.x + step[0], direct.y + step[1], direct.theta + step[2])
+        np.testing.assert_allclose(difference(pose, direct), 0.0, atol=tolerance)
+        assert np.abs(difference(direct, POSE)).max() > 10.0 * tolerance
