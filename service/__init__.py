@@ -1,1 +1,1 @@
-"""service."""
+"""The service: registration and association over HTTP."""

@@ -1,0 +1,7 @@
+"""``python -m service`` is ``linefix serve``."""
+
+import sys
+
+from .cli import serve
+
+sys.exit(serve(sys.argv[1:]))

@@ -1,0 +1,128 @@
+"""The application: its parts, its layers, its routes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
+
+from association import AssociationError, CancelledError
+from registration import RegistrationError
+from vectorization import VectorizationError
+
+from .context import RequestContext, request_id_of
+from .keys import KeyGuard
+from .openapi import describe
+from .problems import ProblemError, faults_of, internal, invalid, problem_of
+from .routes import associate, maps, operations, pages, register, vectorize
+from .runtime import HangUpError, Runtime
+from .schemas.strict import TooLargeError
+from .settings import Settings
+from .version import VERSION
+from .warmup import warm_up
+
+logger = logging.getLogger("linefix")
+CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """Return an application that has not started anything yet.
+
+    Parameters
+    ----------
+    settings : Settings
+    """
+    runtime = Runtime(settings)
+    app = FastAPI(
+        title="Linefix",
+        version=VERSION,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=partial(_lifespan, runtime=runtime),
+    )
+    app.state.runtime = runtime
+    for module in (register, associate, vectorize, maps, operations, pages):
+        app.include_router(module.router)
+    for kind in (
+        ProblemError,
+        TooLargeError,
+        RegistrationError,
+        AssociationError,
+        VectorizationError,
+        CancelledError,
+        RequestValidationError,
+        HTTPException,
+    ):
+        app.add_exception_handler(kind, _refuse)
+    for gone in (HangUpError, ClientDisconnect):
+        app.add_exception_handler(gone, _nobody)
+    # The last added is the outermost.
+    app.add_middleware(KeyGuard, keys=settings.keys)
+    app.add_middleware(RequestContext, metrics=runtime.metrics)
+    document: dict[str, Any] = {}
+
+    def openapi() -> dict[str, Any]:
+        if not document:
+            document.update(describe(app))
+        return document
+
+    app.openapi = openapi  # type: ignore[method-assign]
+    return app
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI, runtime: Runtime) -> AsyncIterator[None]:
+    warming = asyncio.create_task(_get_ready(runtime))
+    try:
+        yield
+    finally:
+        warming.cancel()
+        runtime.close()
+
+
+async def _get_ready(runtime: Runtime) -> None:
+    """Open the store and warm the kernels while probes are answered already."""
+    try:
+        await runtime.open_store()
+    except ProblemError as problem:
+        # readyz goes on trying; meanwhile it says what is wrong.
+        logger.error("the store does not open: %s", problem.detail)
+    await runtime.in_parser(warm_up)
+    runtime.warm = True
+    logger.info("ready")
+
+
+async def _refuse(request: Request, error: Exception) -> Response:
+    problem = _of_framework(error) or problem_of(error)
+    if problem is None:
+        logger.error("a defect", exc_info=error, extra={"request_id": request_id_of(request.scope)})
+        problem = internal()
+    return problem.response(request_id_of(request.scope))
+
+
+def _of_framework(error: Exception) -> ProblemError | None:
+    """Return the problem of what FastAPI and Starlette refuse by themselves."""
+    if isinstance(error, RequestValidationError):
+        return invalid(faults_of(error.errors()))
+    if isinstance(error, HTTPException):
+        headers = dict(error.headers or {})
+        if error.status_code == 405:
+            return ProblemError("method_not_allowed", "this path takes other methods; see Allow", headers=headers)
+        if error.status_code == 404:
+            return ProblemError("not_found", "there is nothing under this path", headers=headers)
+        return ProblemError("invalid_request", "the request is wrong", headers=headers)
+    return None
+
+
+async def _nobody(request: Request, error: Exception) -> Response:
+    return Response(status_code=CLIENT_CLOSED_REQUEST)

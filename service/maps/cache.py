@@ -1,0 +1,80 @@
+"""Indexed maps in memory: bounded in bytes, least recently used out first, one build per map at a time."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+from association import MapIndex
+
+from ..metrics import Metrics
+
+
+@dataclass(frozen=True, slots=True)
+class CachedMap:
+    """An indexed map with the frame that its poses are in."""
+
+    index: MapIndex
+    frame_id: str
+    bytes: int
+
+
+class IndexCache:
+    """Builds what it does not have; callers that want the same map wait for one build.
+
+    Keys name content, not maps: a map that changes gets another key, so that nothing stale is ever found.
+    """
+
+    def __init__(self, max_bytes: int, metrics: Metrics) -> None:
+        self._max_bytes = max_bytes
+        self._metrics = metrics
+        self._lock = threading.Lock()
+        self._ready: OrderedDict[Hashable, CachedMap] = OrderedDict()
+        self._building: dict[Hashable, Future[CachedMap]] = {}
+        self.bytes = 0
+
+    def __len__(self) -> int:
+        return len(self._ready)
+
+    def get(self, key: Hashable, build: Callable[[], CachedMap]) -> CachedMap:
+        """Return the map of a key, built by this caller or by the one that asked first."""
+        with self._lock:
+            found = self._ready.get(key)
+            if found is not None:
+                self._ready.move_to_end(key)
+                self._metrics.cache_hits.inc()
+                return found
+            promise = self._building.get(key)
+            mine = promise is None
+            if promise is None:
+                promise = self._building[key] = Future()
+        if not mine:
+            return promise.result()
+        self._metrics.cache_misses.inc()
+        return self._build(key, promise, build)
+
+    def _build(self, key: Hashable, promise: Future[CachedMap], build: Callable[[], CachedMap]) -> CachedMap:
+        try:
+            made = build()
+        except BaseException as error:
+            with self._lock:
+                del self._building[key]
+            promise.set_exception(error)
+            raise
+        with self._lock:
+            del self._building[key]
+            self._keep(key, made)
+        promise.set_result(made)
+        return made
+
+    def _keep(self, key: Hashable, made: CachedMap) -> None:
+        if made.bytes > self._max_bytes:
+            return
+        self._ready[key] = made
+        self.bytes += made.bytes
+        while self.bytes > self._max_bytes:
+            _, dropped = self._ready.popitem(last=False)
+            self.bytes -= dropped.bytes

@@ -1,0 +1,132 @@
+"""What one running application holds, and the way of a request through it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
+from starlette.requests import Request
+
+from association import Deadline
+
+from .bodies import BodyReader, parse, validate, wait_for_hang_up
+from .gate import SearchGate
+from .maps import IndexCache, MapStore
+from .metrics import Metrics
+from .problems import ProblemError
+from .settings import Settings
+from .stopwatch import Stopwatch
+
+T = TypeVar("T")
+M = TypeVar("M", bound=BaseModel)
+SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
+
+
+class HangUpError(Exception):
+    """The client is gone; there is nobody to answer."""
+
+
+class Runtime:
+    """The parts of an application, made by `create_app`, opened and closed with its lifespan."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.limits = settings.limits()
+        self.metrics = Metrics()
+        self.bodies = BodyReader(settings.max_body_bytes, settings.max_bodies_bytes, settings.body_timeout)
+        self.gate = SearchGate(settings.searches, settings.queue)
+        self.store = MapStore(settings.url)
+        self.cache = IndexCache(settings.cache_bytes, self.metrics)
+        self.warm = False
+        self.draining = False
+        self._parsers = ThreadPoolExecutor(2, thread_name_prefix="parse")
+        self._store_threads = ThreadPoolExecutor(4, thread_name_prefix="store")
+        self._probe_thread = ThreadPoolExecutor(1, thread_name_prefix="probe")
+        self._looking: asyncio.Future[None] | None = None
+        self.metrics.watch("linefix_searches_running", "Searches that run", lambda: self.gate.running)
+        self.metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: self.gate.waiting)
+        self.metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: self.bodies.held)
+        self.metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: self.cache.bytes)
+        self.metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(self.cache))
+
+    async def read(self, request: Request, model: type[M]) -> tuple[M, Stopwatch]:
+        """Read a body and check it, off the event loop where that takes long; the watch starts when it is there."""
+        async with self.bodies.reading(request) as body:
+            watch = Stopwatch()
+
+            def parsed() -> M:
+                return validate(model, parse(self.bodies.unpack(body)), self.limits)
+
+            if len(body.data) <= SMALL and not body.gzipped:
+                return parsed(), watch
+            return await self._in(self._parsers, parsed), watch
+
+    async def in_store(self, call: Callable[[], T]) -> T:
+        """Run a call of the store in a thread of its own."""
+        return await self._in(self._store_threads, call)
+
+    async def open_store(self) -> None:
+        """Make sure that the store's tables exist."""
+        await self._in(self._probe_thread, self.store.open)
+
+    async def check_store(self) -> None:
+        """Return when the store answers; probes that come together share one look."""
+        if self._looking is None or self._looking.done():
+            self._looking = asyncio.ensure_future(self.open_store())
+        await asyncio.shield(self._looking)
+
+    async def in_parser(self, call: Callable[[], T]) -> T:
+        """Run something that takes time but is no search."""
+        return await self._in(self._parsers, call)
+
+    def require_ready(self) -> None:
+        """Refuse, before a body is read, what could not be served."""
+        if not self.warm:
+            raise ProblemError("not_ready", "the kernels are being compiled")
+        self.gate.refuse_when_full()
+
+    async def search(self, request: Request, call: Callable[[], T], deadline: Deadline) -> T:
+        """Run a search when its turn comes; give up when the client does."""
+        return await self.unless_hung_up(request, self.gate.run(call, deadline), deadline)
+
+    async def unless_hung_up(self, request: Request, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
+        """Wait for work, or cancel it when the client is gone first.
+
+        Raises
+        ------
+        HangUpError
+            When the client is gone.
+        """
+        task = asyncio.ensure_future(work)
+        gone = asyncio.ensure_future(wait_for_hang_up(request))
+        try:
+            await asyncio.wait({task, gone}, return_when=asyncio.FIRST_COMPLETED)
+            if not task.done():
+                raise HangUpError
+            return task.result()
+        finally:
+            if not task.done():
+                deadline.cancel()
+                task.cancel()
+            gone.cancel()
+
+    def close(self) -> None:
+        """Give up what still runs and give everything back."""
+        self.gate.cancel_all()
+        self.gate.close()
+        for threads in (self._parsers, self._store_threads, self._probe_thread):
+            threads.shutdown(wait=False, cancel_futures=True)
+        self.store.close()
+
+    async def _in(self, threads: ThreadPoolExecutor, call: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(threads, call)
+
+
+def runtime_of(request: Request) -> Runtime:
+    """Return the parts of the application that a request came to."""
+    runtime = request.app.state.runtime
+    assert isinstance(runtime, Runtime)
+    return runtime

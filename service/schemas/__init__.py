@@ -1,0 +1,1 @@
+"""What the HTTP contract takes and gives, as pydantic models."""

@@ -1,0 +1,173 @@
+"""The parts that requests are put together from: maps, scans, priors, options."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+from .arrays import (
+    CentroidRows,
+    Covariance,
+    MapSegmentRows,
+    PointCounts,
+    PointRows,
+    Ranges,
+    ScanSegmentRows,
+    SigmaOrSigmas,
+    Spreads,
+)
+from .strict import Coordinate, FrameId, FreeJson, MapId, Point, Pose, Strict
+
+MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
+RaySigma = Annotated[float, Field(gt=0.0, le=10.0)]
+IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map"]
+EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segments", "missing_map")
+
+# Union tags; in brackets, so that no field of a request is ever taken for one.
+INLINE, STORED = "<inline>", "<stored>"
+BY_SEGMENTS, BY_LASER, BY_POINTS = "<segments>", "<laser>", "<points>"
+SOFT, HARD = "<soft>", "<hard>"
+TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, SOFT, HARD))
+
+
+def _has(value: Any, name: str) -> bool:
+    return isinstance(value, dict) and name in value
+
+
+class InlineMap(Strict):
+    """A map in the request itself."""
+
+    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
+    sigma: MapSigma = Field(0.0, description="standard deviation of the map's lines normal to themselves, metres")
+    frame_id: FrameId = "map"
+
+
+class StoredMap(Strict):
+    """A map that was stored with PUT before."""
+
+    map_id: MapId
+
+
+def _map_kind(value: Any) -> str:
+    return STORED if _has(value, "map_id") else INLINE
+
+
+AnyMap = Annotated[Annotated[InlineMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)], Discriminator(_map_kind)]
+
+
+class _Scan(Strict):
+    frame_id: FrameId = "laser"
+    stamp: FreeJson = Field(None, description="given back as it was sent")
+    viewpoint: Point | None = Field(
+        default_factory=lambda: [0.0, 0.0],
+        description="where the sensor stood, metres; null: not from one place, so lines of sight are no evidence",
+    )
+
+
+class MeasuredFields(Strict):
+    """Segments of a scan with what is known of the points behind them."""
+
+    segments: ScanSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, in the sensor's frame")
+    sigma: SigmaOrSigmas = Field(
+        0.02, description="standard deviation of single points normal to the wall, metres; of all or of each segment"
+    )
+    points: PointCounts | None = Field(None, description="points behind each segment; default max(2, length / 0.05)")
+    centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
+    spreads: Spreads | None = Field(None, description="their second moment along the segment, m^2; with `centroids`")
+
+    @model_validator(mode="after")
+    def _both_moments(self) -> MeasuredFields:
+        if (self.centroids is None) != (self.spreads is None):
+            raise PydanticCustomError("moments", "centroids and spreads come together")
+        return self
+
+
+class SegmentScan(_Scan, MeasuredFields):
+    """A scan as segments."""
+
+
+class Laser(Strict):
+    """One turn of a scanner, as in a LaserScan message."""
+
+    angle_min: Coordinate = Field(description="radians, of the first beam")
+    angle_increment: Annotated[float, Field(ge=-1.0, le=1.0)] = Field(description="radians from beam to beam")
+    ranges: Ranges = Field(description="metres; null or outside [range_min, range_max]: no return")
+    range_min: Annotated[float, Field(ge=0.0, le=1e9)] | None = Field(None, description="metres")
+    range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(None, description="metres")
+
+
+class LaserScan(_Scan):
+    """A scan as ranges."""
+
+    laser: Laser
+    sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+
+    @model_validator(mode="after")
+    def _from_the_sensor(self) -> LaserScan:
+        if self.viewpoint is not None and any(self.viewpoint):
+            raise PydanticCustomError("viewpoint", "beams start at the sensor: viewpoint is [0, 0] or null")
+        return self
+
+
+class PointScan(_Scan):
+    """A scan as points in scanning order."""
+
+    points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
+    sigma: RaySigma | None = Field(None, description="of single points, metres; null: estimated")
+
+
+def _scan_kind(value: Any) -> str:
+    if _has(value, "laser"):
+        return BY_LASER
+    if _has(value, "points") and not _has(value, "segments"):
+        return BY_POINTS
+    return BY_SEGMENTS
+
+
+AnyScan = Annotated[
+    Annotated[SegmentScan, Tag(BY_SEGMENTS)]
+    | Annotated[LaserScan, Tag(BY_LASER)]
+    | Annotated[PointScan, Tag(BY_POINTS)],
+    Discriminator(_scan_kind),
+]
+
+
+class SoftPriorFields(Pose):
+    """A Gaussian over the pose: it scores, and is never fused into pose or covariance."""
+
+    covariance: Covariance = Field(description="of additive (x, y, theta); m^2, m rad, rad^2; positive definite")
+
+
+class HardPriorFields(Pose):
+    """A window that the answer must lie in."""
+
+    radius: Annotated[float, Field(ge=0.0, le=1e9)] = Field(description="metres around (x, y)")
+    angle: Annotated[float, Field(ge=0.0, le=1e9)] = Field(description="radians around theta")
+
+
+def _prior_kind(value: Any) -> str:
+    return SOFT if _has(value, "covariance") else HARD
+
+
+AnyPrior = Annotated[
+    Annotated[SoftPriorFields, Tag(SOFT)] | Annotated[HardPriorFields, Tag(HARD)], Discriminator(_prior_kind)
+]
+
+
+class SearchOptions(Strict):
+    """How to search, and what to put into the answer."""
+
+    max_alternatives: Annotated[int, Field(ge=0, le=100)] = 5
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9999
+    exhaustive: bool = False
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(None, description="milliseconds")
+    oriented: bool = Field(True, description="false: directions of segments mean nothing")
+    offset_tolerance: Annotated[float, Field(gt=0.0, le=1e3)] | None = Field(None, description="metres")
+    angle_tolerance: Annotated[float, Field(gt=0.0, le=3.2)] | None = Field(None, description="radians")
+    min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    estimator: Literal["joint", "one_step"] = "joint"
+    rotation: Literal["wahba", "mitsuta"] = "wahba"
+    include: list[IncludeName] = Field(default_factory=lambda: list(EVERYTHING))

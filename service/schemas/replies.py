@@ -1,0 +1,257 @@
+"""What the routes answer; for the documentation, and what the tests hold the answers to."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from .strict import Answer
+
+Row4 = Annotated[list[float], Field(min_length=4, max_length=4)]
+Row3 = Annotated[list[float], Field(min_length=3, max_length=3)]
+Row2 = Annotated[list[float], Field(min_length=2, max_length=2)]
+Matrix = Annotated[list[Row3], Field(min_length=3, max_length=3)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Index = Annotated[int, Field(ge=0)]
+Milliseconds = dict[str, float]
+
+
+class PoseAnswer(Answer):
+    """The scan frame's pose in the map frame."""
+
+    x: float = Field(description="metres")
+    y: float = Field(description="metres")
+    theta: float = Field(description="radians, counter-clockwise, in (-pi, pi]")
+
+
+class AmbiguityAnswer(Answer):
+    """The paper's ambiguity, with the weights used."""
+
+    translation: float
+    rotation: float
+    total: float
+
+
+class RegistrationDiagnosticsAnswer(Answer):
+    """Numbers beside the pose."""
+
+    ambiguity: AmbiguityAnswer = Field(description="at the answered pose")
+    ambiguity_before: AmbiguityAnswer = Field(description="at T = 0")
+    ambiguity_at: AmbiguityAnswer | None = Field(description="at `evaluate_at`")
+    similarity: float | None = Field(description="1 / total ambiguity; null where that is 0")
+    reliability: float = Field(description="0 to 1: how well the directions fix the translation; scale-free")
+    determinant: float
+    chi2: float = Field(description="joint cost at the answered pose")
+    dof: int
+    rms_offset: float = Field(description="metres")
+    rms_angle: float = Field(description="radians")
+    n: Index = Field(description="pairs")
+
+
+class Residual(Answer):
+    """How far one pair is from fitting."""
+
+    scan: Index
+    map: Index
+    offset: float = Field(description="metres, signed, at the scan segment's midpoint")
+    angle: float = Field(description="radians")
+    weight: float = Field(description="as used; 1/m^2 with information weighting")
+
+
+class RegisterAnswer(Answer):
+    """The pose from known correspondences."""
+
+    status: Literal["ok", "degenerate"]
+    usable: bool = Field(description="ok, and chi2 below its 99.9 % quantile")
+    pose: PoseAnswer | None
+    covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
+    unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
+    residuals: list[Residual]
+    diagnostics: RegistrationDiagnosticsAnswer
+    request_id: str
+    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+
+
+class CorrespondenceAnswer(Residual):
+    """A scan segment found on a map segment."""
+
+    overlap: Share = Field(description="share of the scan segment's length that lies on the map")
+    alternatives: list[Index] = Field(description="other map segments that pass the gates")
+
+
+class AlternativeAnswer(Answer):
+    """Another pose that explains part of the scan."""
+
+    pose: PoseAnswer
+    covariance: Matrix | None
+    score: float
+    reliability: float
+    inlier_fraction: float
+
+
+class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
+    """Numbers beside the pose."""
+
+    inlier_fraction: float = Field(description="share of the scan's length that is matched")
+    score: float = Field(description="log-likelihood over that of a scan that is all clutter, nats")
+    runner_up: float | None = Field(description="score of the best other pose over `score`")
+    margin: float | None = Field(description="`score` minus that of the best other pose, nats")
+    significance: float = Field(description="probability that chance scores as high; small is good")
+
+
+class SearchAnswer(Answer):
+    """How the search went."""
+
+    complete: bool = Field(description="false when deadline or budget ended it early")
+    exhaustive: bool
+    confidence: float
+    bases: Index
+    hypotheses: Index
+    verified: Index
+    seed: int
+
+
+class WarningAnswer(Answer):
+    """Something to know."""
+
+    code: str
+    message: str
+
+
+class MapReference(Answer):
+    """Which stored map was searched."""
+
+    map_id: str
+    revision: int
+
+
+class FoundAnswer(Answer):
+    """Where in a map a scan was taken."""
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    usable: bool = Field(description="the one flag that a robot gates on")
+    probability: Share = Field(description="calibrated chance that the pose is right")
+    pose: PoseAnswer | None
+    covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
+    unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is not fixed")
+    frame_id: str = Field(description="the map's")
+    child_frame_id: str = Field(description="the scan's")
+    stamp: Any = Field(description="as sent")
+    correspondences: list[CorrespondenceAnswer] = Field([], description="where included")
+    unmatched_scan: list[Index]
+    missing_map: list[Index] = Field([], description="where included: map segments that should have been seen")
+    diagnostics: AssociationDiagnosticsAnswer | None
+    alternatives: list[AlternativeAnswer] = Field([], description="where included: distinct poses, best first")
+    search: SearchAnswer
+    segments: list[Row4] | None = Field(None, description="where included, and the scan came as ranges or points")
+    warnings: list[WarningAnswer]
+
+
+class AssociateAnswer(FoundAnswer):
+    """The answer of a search."""
+
+    map: MapReference | None
+    client_ref: Any = Field(description="as sent")
+    request_id: str
+    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+
+
+class Place(Answer):
+    """One wrong place of a request."""
+
+    pointer: str = Field(description="JSON pointer")
+    message: str
+
+
+class Problem(Answer):
+    """An error, RFC 9457."""
+
+    type: str
+    title: str
+    status: Annotated[int, Field(ge=400, le=599)]
+    detail: str
+    code: str = Field(description="stable; what a program should look at")
+    request_id: str
+    errors: Annotated[list[Place], Field(max_length=20)] = Field([])
+
+
+class BatchResult(Answer):
+    """One scan's answer, or why there is none."""
+
+    index: Index
+    status_code: int
+    result: FoundAnswer | None = Field(None, description="with status_code 200")
+    problem: Problem | None = Field(None, description="otherwise")
+
+
+class BatchAnswer(Answer):
+    """The answers in the order of the scans."""
+
+    results: list[BatchResult]
+    map: MapReference | None
+    client_ref: Any = Field(description="as sent")
+    request_id: str
+    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+
+
+class VectorizeAnswer(Answer):
+    """Segments, and what may be sent back with them in a scan."""
+
+    segments: list[Row4] = Field(description="`[x1, y1, x2, y2]`, metres, free space on the left")
+    points: list[int] = Field(description="points behind each")
+    centroids: list[Row2] = Field(description="of those points, metres")
+    spreads: list[float] = Field(description="their second moment along the segment, m^2")
+    sigma: float = Field(description="of single ranges or points, metres; given or estimated")
+    sigmas: list[float] = Field(description="of each segment's points normal to the wall, metres; a scan's `sigma`")
+    rms: list[float] = Field(description="of the points' distances from their segment, metres")
+    request_id: str
+    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+
+
+class MapSummaryAnswer(Answer):
+    """A stored map without its content."""
+
+    map_id: str
+    revision: Annotated[int, Field(ge=1)]
+    segments: Index
+    bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
+
+
+class MapList(Answer):
+    """One page of maps, by id."""
+
+    maps: list[MapSummaryAnswer]
+    next: str | None = Field(description="`cursor` of the next page")
+
+
+class Live(Answer):
+    """A probe's answer."""
+
+    status: Literal["ok"]
+
+
+class Version(Answer):
+    """What runs here."""
+
+    name: str
+    version: str
+    api: str
+
+
+class Limits(Answer):
+    """Beyond these a request is refused."""
+
+    max_body_bytes: int = Field(description="of a request, unpacked")
+    max_map_segments: int
+    max_scan_segments: int
+    max_beams: int = Field(description="ranges or points of one scan")
+    max_correspondences: int
+    max_batch: int = Field(description="scans of one batch")
+    max_deadline_ms: float = Field(description="and the deadline where none is asked for")
+    searches: int = Field(description="that run at once")
+    queue: int = Field(description="requests that may wait for a search")
+    max_magnitude: float = Field(description="of any number")
+    min_segment_length: float = Field(description="metres")
+    max_segment_length: float = Field(description="metres")
+    max_map_extent: float = Field(description="metres")

@@ -1,0 +1,111 @@
+"""The bodies that the routes take."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationInfo, model_validator
+from pydantic_core import PydanticCustomError
+
+from .arrays import MapSegmentRows, PairRows, PointRows, Weights
+from .parts import AnyMap, AnyPrior, AnyScan, Laser, MapSigma, MeasuredFields, RaySigma, SearchOptions
+from .strict import FrameId, FreeJson, Pose, Sigma, Strict, TooLargeError
+
+
+class KnownMap(Strict):
+    """The map side of known correspondences."""
+
+    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres")
+    sigma: Sigma = Field(0.0, description="standard deviation of the map's lines normal to themselves, metres")
+
+
+class EstimatorOptions(Strict):
+    """How to register."""
+
+    estimator: Literal["joint", "one_step"] = "joint"
+    rotation: Literal["wahba", "mitsuta"] = "wahba"
+    k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
+    k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
+    evaluate_at: Pose | None = Field(None, description="also give the ambiguity at this pose")
+    oriented: bool = Field(True, description="false: directions of segments mean nothing")
+
+
+class RegisterRequest(Strict):
+    """Known correspondences."""
+
+    map: KnownMap
+    scan: MeasuredFields
+    correspondences: PairRows | None = Field(None, description="`[scan, map]` indices; default i with i")
+    weights: Weights | None = Field(None, description="one per correspondence; replaces `weighting`")
+    weighting: Literal["uniform", "shorter_length", "information"] = "information"
+    options: EstimatorOptions = EstimatorOptions()
+
+
+class AssociateRequest(Strict):
+    """Unknown correspondences."""
+
+    map: AnyMap
+    scan: AnyScan
+    prior: AnyPrior | None = None
+    options: SearchOptions = SearchOptions()
+    client_ref: FreeJson = Field(None, description="given back as it was sent")
+
+
+class BatchRequest(Strict):
+    """Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else."""
+
+    map: AnyMap
+    scans: list[Any] = Field(min_length=1, description="as `scan` of /v1/associate")
+    priors: list[Any] | None = Field(None, description="as `prior` of /v1/associate or null, one per scan")
+    options: SearchOptions = SearchOptions()
+    client_ref: FreeJson = Field(None, description="given back as it was sent")
+
+    @model_validator(mode="after")
+    def _within_limits(self, info: ValidationInfo) -> BatchRequest:
+        most = info.context.get("batch") if info.context else None
+        if most is not None and len(self.scans) > most:
+            raise TooLargeError("/scans", most, "scans")
+        if self.priors is not None and len(self.priors) != len(self.scans):
+            raise PydanticCustomError("priors", "expected one prior, or null, per scan")
+        return self
+
+
+class BatchItem(Strict):
+    """One scan of a batch and its prior."""
+
+    scan: AnyScan
+    prior: AnyPrior | None = None
+
+
+class VectorizeOptions(Strict):
+    """How to cut points into segments."""
+
+    sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(5, description="least number behind a segment")
+    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.15, description="of a segment, metres")
+    max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(
+        None, description="metres between neighbours on one segment; null: by the angle between the beams"
+    )
+
+
+class VectorizeRequest(Strict):
+    """Ranges or points; exactly one of the two."""
+
+    laser: Laser | None = None
+    points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
+    options: VectorizeOptions = VectorizeOptions()
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> VectorizeRequest:
+        if (self.laser is None) == (self.points is None):
+            raise PydanticCustomError("one_of", "expected either laser or points")
+        return self
+
+
+class MapDocument(Strict):
+    """A map to be stored."""
+
+    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
+    sigma: MapSigma = Field(0.0, description="standard deviation of the map's lines normal to themselves, metres")
+    frame_id: FrameId = "map"
+    meta: FreeJson = Field(None, description="given back as it was sent")

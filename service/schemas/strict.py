@@ -1,0 +1,70 @@
+"""The strictness that every request model shares, and the scalar types of the contract."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import orjson
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+MAX_MAGNITUDE = 1e9
+MAX_FREE_BYTES = 16_384
+MAX_FREE_DEPTH = 32
+
+
+class TooLargeError(Exception):
+    """A part of the request is over one of the limits of ``/v1/limits``."""
+
+    def __init__(self, pointer: str, limit: int, what: str) -> None:
+        super().__init__(f"more than {limit} {what}")
+        self.pointer = pointer
+        self.detail = f"at most {limit} {what} are taken"
+
+
+class Strict(BaseModel):
+    """Takes numbers for numbers only, and no field that it does not know."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class Answer(BaseModel):
+    """What is answered: documents the JSON, is never built while answering."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+def _free_json(value: Any) -> Any:
+    layer, depth = [value], 0
+    while layer:
+        depth += 1
+        if depth > MAX_FREE_DEPTH:
+            raise PydanticCustomError("too_deep", f"nested more than {MAX_FREE_DEPTH} levels deep")
+        inner: list[Any] = []
+        for item in layer:
+            if isinstance(item, dict):
+                inner.extend(item.values())
+            elif isinstance(item, list):
+                inner.extend(item)
+        layer = inner
+    if len(orjson.dumps(value)) > MAX_FREE_BYTES:
+        raise PydanticCustomError("too_long", f"longer than {MAX_FREE_BYTES} bytes of JSON")
+    return value
+
+
+FreeJson = Annotated[Any, PlainValidator(_free_json), WithJsonSchema({})]
+"""Anything, given back as it was sent."""
+
+Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
+Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
+FrameId = Annotated[str, Field(max_length=256)]
+MapId = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)]
+Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+
+
+class Pose(Strict):
+    """The scan frame's pose in the map frame: ``p_map = R(theta) p_scan + [x, y]``."""
+
+    x: Coordinate = Field(description="metres")
+    y: Coordinate = Field(description="metres")
+    theta: Coordinate = Field(description="radians, counter-clockwise")

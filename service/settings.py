@@ -1,0 +1,123 @@
+"""Settings: the command line beats ``LINEFIX_<NAME>`` beats the default."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, SecretStr, ValidationError, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+
+def _data_home() -> Path:
+    return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "linefix"
+
+
+def _cores() -> int:
+    """Return how many cores this process may use, a container's quota included."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        quota, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
+        if quota != "max":
+            cores = min(cores, max(1, int(quota) // int(period)))
+    except (OSError, ValueError):
+        pass
+    return cores
+
+
+class SettingsError(Exception):
+    """The settings contradict each other or are out of range; the message says which."""
+
+
+class Settings(BaseSettings):
+    """How the service runs."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="LINEFIX_",
+        extra="forbid",
+        cli_kebab_case=True,
+        cli_implicit_flags=True,
+        cli_prog_name="linefix serve",
+        frozen=True,
+    )
+
+    host: str = Field("127.0.0.1", description="address to listen on")
+    port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
+    data_dir: Path = Field(default_factory=_data_home, description="where maps are kept")
+    database_url: str | None = Field(None, description="SQLAlchemy URL; default: SQLite in the data directory")
+    keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys, comma separated")
+    allow_anonymous: bool = Field(False, description="without keys, listen on other addresses than loopback")
+
+    searches: int = Field(default_factory=_cores, ge=1, le=1024, description="searches that run at once")
+    queue: int = Field(16, ge=0, le=10_000, description="requests that may wait for a search")
+    max_body_bytes: int = Field(32_000_000, ge=1_000, le=1_000_000_000, description="of a request, unpacked")
+    max_bodies_bytes: int = Field(256_000_000, ge=1_000, description="of all requests being read at once")
+    max_map_segments: int = Field(200_000, ge=1, description="of one map")
+    max_scan_segments: int = Field(2_000, ge=1, description="of one scan")
+    max_beams: int = Field(20_000, ge=1, description="ranges or points of one scan")
+    max_correspondences: int = Field(200_000, ge=1, description="of one registration")
+    max_batch: int = Field(256, ge=1, description="scans of one batch")
+    max_deadline_ms: float = Field(30_000.0, gt=0.0, description="and the deadline where none is asked for")
+    cache_bytes: int = Field(256_000_000, ge=0, description="of indexed maps kept in memory")
+    body_timeout: float = Field(9.0, gt=0.0, description="seconds that a body may take to arrive")
+    head_timeout: float = Field(9.0, gt=0.0, description="seconds that a request's head may take to arrive")
+    drain_seconds: float = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
+    log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
+
+    @field_validator("keys", mode="before")
+    @classmethod
+    def _split(cls, value: Any) -> Any:
+        items = value.split(",") if isinstance(value, str) else value
+        if isinstance(items, list | tuple):
+            parts = [part for item in items for part in (item.split(",") if isinstance(item, str) else [item])]
+            return tuple(part.strip() if isinstance(part, str) else part for part in parts if part not in ("", " "))
+        return items
+
+    @property
+    def url(self) -> str:
+        """Where the store is, as SQLAlchemy wants it."""
+        return self.database_url or f"sqlite:///{self.data_dir / 'maps.sqlite3'}"
+
+    def limits(self) -> dict[str, int]:
+        """Return the limits that arrays are held to, by the names of the validation context."""
+        return {
+            "map_segments": self.max_map_segments,
+            "scan_segments": self.max_scan_segments,
+            "beams": self.max_beams,
+            "pairs": self.max_correspondences,
+            "batch": self.max_batch,
+        }
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether only this machine can reach an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def read_settings(arguments: Sequence[str]) -> Settings:
+    """Read command line and environment.
+
+    Raises
+    ------
+    SettingsError
+        When a value is wrong, or the service would listen to the world without keys.
+    """
+    try:
+        settings = Settings(_cli_parse_args=list(arguments))
+    except ValidationError as error:
+        wrong = (f"{'.'.join(str(part) for part in item['loc'])}: {item['msg']}" for item in error.errors())
+        raise SettingsError("; ".join(wrong)) from error
+    if not settings.keys and not settings.allow_anonymous and not is_loopback(settings.host):
+        raise SettingsError(
+            f"refusing to listen on {settings.host} without keys: set LINEFIX_KEYS, or LINEFIX_ALLOW_ANONYMOUS=1 to "
+            "let anyone who reaches the port use the service"
+        )
+    return settings
