@@ -1,4 +1,4 @@
-"""Unknown correspondences: where in a map of segments was this scan taken?"""
+"""Unknown correspondences: where in a map of segments a scan was taken, and how sure that is."""
 
 from .options import (
     AssociationOptions,

@@ -1,0 +1,129 @@
+"""Compiled parts of building a map index: merging collinear pieces, and the grid over the walls."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def _find(parent, i):
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit(cache=True, nogil=True)
+def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
+    """Label pieces that continue one another: the end of one within `max_gap` of the begin of the other.
+
+    `endpoints` (n, 4) metres, `directions` (n, 2). Returns (n,) labels, the lowest index of each group.
+    """
+    n = len(endpoints)
+    parent = np.arange(n)
+    if n == 0:
+        return parent
+    cell = max(4.0 * max_gap, 0.5)
+    # Begins sorted by a hash of their cell, so that memory does not grow with the extent.
+    buckets = 1
+    while buckets < 2 * n:
+        buckets *= 2
+    heads = np.full(buckets, -1)
+    following = np.full(n, -1)
+    for i in range(n):
+        key = _cell_hash(math.floor(endpoints[i, 0] / cell), math.floor(endpoints[i, 1] / cell), buckets)
+        following[i] = heads[key]
+        heads[key] = i
+    for i in range(n):
+        x = endpoints[i, 2]
+        y = endpoints[i, 3]
+        dx = directions[i, 0]
+        dy = directions[i, 1]
+        column = math.floor(x / cell)
+        row = math.floor(y / cell)
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                j = heads[_cell_hash(column + a, row + b, buckets)]
+                while j >= 0:
+                    gx = endpoints[j, 0] - x
+                    gy = endpoints[j, 1] - y
+                    if (
+                        j != i
+                        and abs(gx * dx + gy * dy) <= max_gap
+                        and abs(gy * dx - gx * dy) <= max_lateral
+                        and directions[j, 0] * dx + directions[j, 1] * dy >= min_cos
+                    ):
+                        one = _find(parent, i)
+                        other = _find(parent, j)
+                        if one < other:
+                            parent[other] = one
+                        else:
+                            parent[one] = other
+                    j = following[j]
+    for i in range(n):
+        parent[i] = _find(parent, i)
+    return parent
+
+
+@njit(cache=True, nogil=True)
+def _cell_hash(column, row, buckets):
+    return (int(column) * 73856093 ^ int(row) * 19349663) & (buckets - 1)
+
+
+@njit(cache=True, nogil=True)
+def _column_span(x1, y1, x2, y2, radius, low, high):
+    """Return the span of y that a segment dilated by `radius` may have between two values of x."""
+    left = max(low - radius, min(x1, x2))
+    right = min(high + radius, max(x1, x2))
+    if left > right:
+        # Beyond the ends: the disc around the nearer one.
+        left = min(max(left, min(x1, x2)), max(x1, x2))
+        right = left
+    if abs(x2 - x1) < 1e-9:
+        ya = min(y1, y2)
+        yb = max(y1, y2)
+    else:
+        ya = y1 + (left - x1) / (x2 - x1) * (y2 - y1)
+        yb = y1 + (right - x1) / (x2 - x1) * (y2 - y1)
+    return min(ya, yb) - radius, max(ya, yb) + radius
+
+
+@njit(cache=True, nogil=True)
+def grid_cells(endpoints, radius, x0, y0, cell, columns, rows):
+    """List for every cell of a uniform grid the walls that come within `radius` of it.
+
+    Returns ``(starts, items)``: cell ``c = row * columns + column`` holds ``items[starts[c]:starts[c + 1]]``.
+    """
+    starts = np.zeros(columns * rows + 1, dtype=np.int64)
+    items = np.zeros(0, dtype=np.int32)
+    for counting in (True, False):
+        if not counting:
+            total = 0
+            for c in range(columns * rows + 1):
+                here = starts[c]
+                starts[c] = total
+                total += here
+            items = np.zeros(total, dtype=np.int32)
+        for i in range(len(endpoints)):
+            x1 = endpoints[i, 0]
+            y1 = endpoints[i, 1]
+            x2 = endpoints[i, 2]
+            y2 = endpoints[i, 3]
+            first = max(0, int((min(x1, x2) - radius - x0) / cell))
+            last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))
+            for column in range(first, last + 1):
+                low = x0 + column * cell
+                ya, yb = _column_span(x1, y1, x2, y2, radius, low, low + cell)
+                bottom = max(0, int((ya - y0) / cell))
+                top = min(rows - 1, int((yb - y0) / cell))
+                for row in range(bottom, top + 1):
+                    c = row * columns + column
+                    if not counting:
+                        items[starts[c]] = i
+                    starts[c] += 1
+    # The second pass moved every start to the next one's place.
+    for c in range(columns * rows, 0, -1):
+        starts[c] = starts[c - 1]
+    starts[0] = 0
+    return starts, items

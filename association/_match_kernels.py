@@ -1,0 +1,238 @@
+"""Compiled matching of a scan to the walls at a pose, and growing a consensus set there.
+
+Nothing here validates. The state is a handful of flat arrays, passed as such because Numba counts references for every
+array that it takes out of a tuple; their columns are named below. Poses are ``[theta, t_x, t_y]``, index frame from
+scan frame.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from registration._kernels import joint_add, joint_information, joint_solve
+
+# Columns of `walls` (m, 8): unit direction, offset along the left normal, abscissae of begin and end, angle.
+W_DX, W_DY, W_OFFSET, W_BEGIN, W_END, W_ANGLE = range(6)
+WALL_COLUMNS = 8  # a cache line
+
+# Columns of `scan` (n, 16), the most telling segments first.
+(
+    S_DX, S_DY, S_MX, S_MY, S_LENGTH, S_ANGLE, S_CX, S_CY, S_SPREAD, S_OFFSET_VAR, S_ANGLE_VAR, S_WEIGHT, S_GAIN, S_LEFT,
+) = range(14)  # fmt: skip
+SCAN_COLUMNS = 16
+
+# Columns of `matches` (n, 5): wall or -1, offset, angle, overlap, worth in nats.
+M_WALL, M_OFFSET, M_ANGLE, M_OVERLAP, M_VALUE = range(5)
+MATCH_COLUMNS = 5
+
+# Places of `shape`, the geometry of the grid: x0, y0, cell size, columns, rows. Places of `gates`: how many standard
+# deviations, least and greatest gate on the offset (m), least and greatest gate on the angle (rad), least overlap.
+GATES_SIZE = 6
+
+REACH = 0.4  # m; the grid lists a wall in the cells this near to it, so gates end here
+MAX_ANGLE_GATE = 0.35  # rad
+MIN_PIVOT = 1e-12
+SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
+
+
+@njit(inline="always")
+def wrap(angle):
+    """Return the angle in [-pi, pi]."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@njit(inline="always")
+def match_segment(scan, i, c, s, tx, ty, offset_gate, cos_gate, min_overlap, walls, starts, items, shape):
+    """Find the wall that scan segment `i` lies on best: ``(wall or -1, offset, sine of the angle, overlap)``.
+
+    Best is least in offset over gate plus what the overlap lacks. Inlined: a call would cost more than the work.
+    """
+    x = c * scan[i, 2] - s * scan[i, 3] + tx
+    y = s * scan[i, 2] + c * scan[i, 3] + ty
+    best = -1
+    best_offset = 0.0
+    best_sine = 0.0
+    best_overlap = 0.0
+    best_cost = 1e300
+    fx = (x - shape[0]) / shape[2]
+    fy = (y - shape[1]) / shape[2]
+    if fx >= 0.0 and fy >= 0.0 and fx < shape[3] and fy < shape[4]:
+        here = int(fy) * int(shape[3]) + int(fx)
+        dx = c * scan[i, 0] - s * scan[i, 1]
+        dy = s * scan[i, 0] + c * scan[i, 1]
+        length = scan[i, 4]
+        for k in range(starts[here], starts[here + 1]):
+            w = items[k]
+            wx = walls[w, 0]
+            wy = walls[w, 1]
+            offset = wx * y - wy * x - walls[w, 2]
+            if wx * dx + wy * dy >= cos_gate and abs(offset) <= offset_gate:
+                along = wx * x + wy * y
+                covered = min(walls[w, 4], along + 0.5 * length) - max(walls[w, 3], along - 0.5 * length)
+                overlap = min(1.0, covered / length)
+                cost = abs(offset) / offset_gate + 1.0 - overlap
+                if overlap >= min_overlap and cost < best_cost:
+                    best_cost = cost
+                    best = w
+                    best_offset = offset
+                    best_sine = dx * wy - dy * wx
+                    best_overlap = overlap
+    return best, best_offset, best_sine, best_overlap
+
+
+@njit(cache=True, nogil=True)
+def quick_score(scan, theta, tx, ty, px, py, theta_var, walls, starts, items, shape, gates, threshold):
+    """Sum the gains of the segments that lie on a wall, the most telling first; -1 once `threshold` is out of reach.
+
+    ``(px, py)`` is where the base pins the pose (index frame): the uncertainty of the angle counts by the distance
+    from there.
+    """
+    c = math.cos(theta)
+    s = math.sin(theta)
+    total = 0.0
+    for i in range(len(scan)):
+        rx = c * scan[i, 2] - s * scan[i, 3] + tx - px
+        ry = s * scan[i, 2] + c * scan[i, 3] + ty - py
+        gate = gates[0] * math.sqrt(scan[i, 9] + theta_var * (rx * rx + ry * ry))
+        gate = min(gates[2], max(gates[1], gate))
+        angle_gate = gates[0] * math.sqrt(scan[i, 10] + theta_var)
+        angle_gate = min(gates[4], max(gates[3], angle_gate))
+        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
+        _, _, _, overlap = match_segment(
+            scan, i, c, s, tx, ty, gate, cos_gate, gates[5], walls, starts, items, shape
+        )
+        total += scan[i, 12] * overlap
+        if total + scan[i, 13] < threshold:
+            return -1.0
+    return total
+
+
+@njit(cache=True, nogil=True)
+def invert3(f, out):
+    """Write the inverse of a symmetric positive 3 x 3 matrix to `out`; return False where it is singular."""
+    a = f[1, 1] * f[2, 2] - f[1, 2] * f[1, 2]
+    b = f[0, 2] * f[1, 2] - f[0, 1] * f[2, 2]
+    d = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
+    det = f[0, 0] * a + f[0, 1] * b + f[0, 2] * d
+    if not det > MIN_PIVOT * f[0, 0] * f[1, 1] * f[2, 2]:
+        return False
+    out[0, 0] = a / det
+    out[0, 1] = b / det
+    out[0, 2] = d / det
+    out[1, 1] = (f[0, 0] * f[2, 2] - f[0, 2] * f[0, 2]) / det
+    out[1, 2] = (f[0, 1] * f[0, 2] - f[0, 0] * f[1, 2]) / det
+    out[2, 2] = (f[0, 0] * f[1, 1] - f[0, 1] * f[0, 1]) / det
+    out[1, 0] = out[0, 1]
+    out[2, 0] = out[0, 2]
+    out[2, 1] = out[1, 2]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def match_all(scan, pose, covariance, walls, starts, items, shape, gates, matches):
+    """Match every scan segment at a pose, gated by the innovation: ``offset^2`` against ``sigma^2 + g' F^-1 g``."""
+    c = math.cos(pose[0])
+    s = math.sin(pose[0])
+    for i in range(len(scan)):
+        gx = c * scan[i, 2] - s * scan[i, 3]
+        gy = s * scan[i, 2] + c * scan[i, 3]
+        # g = (n, n . J R m) with the normal across the segment.
+        nx = -(s * scan[i, 0] + c * scan[i, 1])
+        ny = c * scan[i, 0] - s * scan[i, 1]
+        lever = ny * gx - nx * gy
+        var = (
+            nx * nx * covariance[0, 0]
+            + 2.0 * nx * ny * covariance[0, 1]
+            + ny * ny * covariance[1, 1]
+            + 2.0 * lever * (nx * covariance[0, 2] + ny * covariance[1, 2])
+            + lever * lever * covariance[2, 2]
+        )
+        gate = min(gates[2], max(gates[1], gates[0] * math.sqrt(scan[i, 9] + max(var, 0.0))))
+        angle_gate = gates[0] * math.sqrt(scan[i, 10] + covariance[2, 2])
+        angle_gate = min(gates[4], max(gates[3], angle_gate))
+        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
+        wall, offset, sine, overlap = match_segment(
+            scan, i, c, s, pose[1], pose[2], gate, cos_gate, gates[5], walls, starts, items, shape
+        )
+        matches[i, 0] = wall
+        matches[i, 1] = offset
+        matches[i, 2] = sine
+        matches[i, 3] = overlap
+
+
+@njit(cache=True, nogil=True)
+def pair(scan, i, walls, w, sign, sums):
+    """Add scan segment `i` on wall `w` to the sums (`sign` 1) or remove it (-1)."""
+    joint_add(
+        sums, -walls[w, 1], walls[w, 0], walls[w, 2], scan[i, 6], scan[i, 7], scan[i, 0], scan[i, 1],
+        scan[i, 8], scan[i, 11], sign,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def value_matches(scan, matches):
+    """Give each match its worth, the gain less half its chi-square, at least 0 (clutter); return their sum, nats."""
+    total = 0.0
+    for i in range(len(scan)):
+        matches[i, 4] = 0.0
+        if matches[i, 0] >= 0.0:
+            offset = matches[i, 1]
+            angle = math.asin(max(-1.0, min(1.0, matches[i, 2])))
+            chi2 = offset * offset / scan[i, 9] + angle * angle / scan[i, 10]
+            value = scan[i, 12] * matches[i, 3] - 0.5 * chi2
+            if value > 0.0:
+                matches[i, 4] = value
+                total += value
+            else:
+                matches[i, 0] = -1.0
+    return total
+
+
+@njit(inline="always")
+def hold(sums, x, y, sign):
+    """Add or remove the weak spring that holds a translation where it is."""
+    sums[9] += sign * SPRING
+    sums[12] += sign * SPRING
+    sums[11] -= sign * SPRING * x
+    sums[13] -= sign * SPRING * y
+    sums[14] += sign * SPRING * (x * x + y * y)
+
+
+@njit(cache=True, nogil=True)
+def refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, sums, information, rounds):
+    """Grow and shrink the consensus set at `pose`, solving anew each time; pose and covariance move in place.
+
+    Pairs that come or go change the sums in constant time. Returns the score in nats; the consensus set stays in
+    `matches`. A direction that no pair fixes is held where it is, and shows in the covariance.
+    """
+    sums[:] = 0.0
+    n = len(scan)
+    held = np.full(n, -1, dtype=np.int64)
+    for _ in range(rounds):
+        match_all(scan, pose, covariance, walls, starts, items, shape, gates, matches)
+        changed = False
+        for i in range(n):
+            w = int(matches[i, 0])
+            if w != held[i]:
+                changed = True
+                if held[i] >= 0:
+                    pair(scan, i, walls, held[i], -1.0, sums)
+                if w >= 0:
+                    pair(scan, i, walls, w, 1.0, sums)
+                held[i] = w
+        if not changed:
+            break
+        x = pose[1]
+        y = pose[2]
+        hold(sums, x, y, 1.0)
+        theta, tx, ty, _, _ = joint_solve(sums, pose[0], False)
+        joint_information(sums, theta, information)
+        hold(sums, x, y, -1.0)
+        if not invert3(information, covariance):
+            return 0.0
+        pose[0] = theta
+        pose[1] = tx
+        pose[2] = ty
+    match_all(scan, pose, covariance, walls, starts, items, shape, gates, matches)
+    return value_matches(scan, matches)

@@ -1,0 +1,187 @@
+"""Compiled choice of bases: the cheap and telling ones first, and when enough have been gone through."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ._search_kernels import BASE_SLACK, BASE_SLACK_SHARE, HARD_PRIOR, search_base
+
+MIN_SINE = 0.3  # of the angle between the segments of a base
+REUSE = 0.3  # what a base is worth less for each earlier use of one of its segments
+
+# Measured costs, in tests of a wall: of a base, an anchor, a metre of slide, a hypothesis.
+COST_BASE = 100.0
+COST_ANCHOR = 12.0
+COST_SLIDE = 5.0
+COST_HYPOTHESIS = 30.0
+HYPOTHESIS_SCALE = 1.6  # observed over expected number of hypotheses, median
+
+
+@njit(cache=True, nogil=True)
+def slack_tables(scan, count, by_direction, bin_starts, longest, summed):
+    """Sum over the walls of each direction bin how far scan segment i could slide on them.
+
+    `longest` (m,): lengths of the walls in the order of `by_direction`; `summed` (m + 1,): their running sum. Returns
+    slides (count, bins) in metres and the number of walls long enough for each segment.
+    """
+    bins = len(bin_starts) - 1
+    slides = np.zeros((count, bins))
+    fitting = np.zeros(count)
+    for i in range(count):
+        length = scan[i, 4]
+        need = length - 2.0 * (BASE_SLACK + BASE_SLACK_SHARE * length)
+        for b in range(bins):
+            low = bin_starts[b]
+            high = bin_starts[b + 1]
+            while low < high:
+                middle = (low + high) // 2
+                if longest[middle] >= need:
+                    low = middle + 1
+                else:
+                    high = middle
+            fit = low - bin_starts[b]
+            slides[i, b] = summed[low] - summed[bin_starts[b]] - fit * max(need, 0.0)
+            fitting[i] += fit
+    return slides, fitting
+
+
+@njit(cache=True, nogil=True)
+def plan_bases(scan, count, by_direction, bin_starts, longest, summed, area):
+    """List the non-parallel pairs of the first `count` scan segments with their logarithmic merit.
+
+    The merit is what the base can tell (the lesser gain) over what it will cost. Returns pairs (k, 2), the one that
+    slides first, and merits (k,).
+    """
+    slides, fitting = slack_tables(scan, count, by_direction, bin_starts, longest, summed)
+    bins = len(bin_starts) - 1
+    total = np.zeros(count)
+    smooth = np.empty((count, bins))
+    for i in range(count):
+        for b in range(bins):
+            total[i] += slides[i, b]
+            smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, (b + 1) % bins]
+    pairs = np.empty((count * (count - 1) // 2, 2), dtype=np.int64)
+    merits = np.empty(len(pairs))
+    k = 0
+    for i in range(count):
+        for j in range(i + 1, count):
+            turn = scan[j, 5] - scan[i, 5]
+            sine = abs(math.sin(turn))
+            if sine < MIN_SINE:
+                continue
+            sweep_i = COST_ANCHOR * fitting[i] + COST_SLIDE * total[i]
+            sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]
+            shift = int(round(turn / (2.0 * math.pi / bins)))
+            expected = 0.0
+            for b in range(bins):
+                expected += slides[i, b] * smooth[j, (b + shift) % bins]
+            expected *= HYPOTHESIS_SCALE / (area * sine)
+            cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
+            pairs[k, 0] = i if sweep_i <= sweep_j else j
+            pairs[k, 1] = j if sweep_i <= sweep_j else i
+            merits[k] = math.log(min(scan[i, 12], scan[j, 12]) / cost)
+            k += 1
+    return pairs[:k], merits[:k]
+
+
+@njit(cache=True, nogil=True)
+def next_base(pairs, merits, uses):
+    """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
+
+    Ties go to the pair that comes first, that of the longest segments.
+    """
+    best = -1
+    best_merit = -math.inf
+    fade = math.log(REUSE)
+    for k in range(len(pairs)):
+        if merits[k] == -math.inf:
+            continue
+        merit = merits[k] + fade * (uses[pairs[k, 0]] + uses[pairs[k, 1]])
+        if merit > best_merit:
+            best_merit = merit
+            best = k
+    if best >= 0:
+        merits[best] = -math.inf
+        uses[pairs[best, 0]] += 1
+        uses[pairs[best, 1]] += 1
+    return best
+
+
+@njit(cache=True, nogil=True)
+def cover(residual, bound, a, b):
+    """Lower the bound on what a pose can score whose consensus set contains none of the bases so far.
+
+    Such a pose lacks one segment of each base. The greedy packing of the gains over the bases is a feasible solution of
+    the dual of that covering problem, so the bound holds. `residual` (n,) is what is left of each gain.
+    """
+    less = min(residual[a], residual[b])
+    residual[a] -= less
+    residual[b] -= less
+    bound[0] -= less
+
+
+@njit(cache=True, nogil=True)
+def strike(missing, inliers, a, b, left):
+    """Take a base off the sampled consensus sets that have missed all bases so far.
+
+    ``inliers[l, i]`` says for 64 samples a word whether segment i is an inlier at level l, ``missing[l]`` which samples
+    are left; writes their share to ``left[l]``.
+    """
+    for level in range(len(missing)):
+        ones = 0
+        for k in range(missing.shape[1]):
+            word = missing[level, k] & ~(inliers[level, a, k] & inliers[level, b, k])
+            missing[level, k] = word
+            # Population count of 64 bits.
+            word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
+            word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+            word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+            ones += int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+        left[level] = ones / (64.0 * missing.shape[1])
+
+
+# Why `advance` came back.
+BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    scan, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, progress,
+    pairs, merits, uses, residual, bound, missing, inliers, left, miss, exhaustive, budget,
+):  # fmt: skip
+    """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
+
+    ``progress[4]`` is the base under way or -1. `miss` is the greatest chance allowed of having missed a better
+    consensus set. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+    """
+    total = 0.0
+    for i in range(len(scan)):
+        total += scan[i, 12]
+    levels = len(missing)
+    spent = 0
+    while True:
+        if progress[4] < 0:
+            progress[4] = next_base(pairs, merits, uses)
+            if progress[4] < 0:
+                return EXHAUSTED
+        a = pairs[progress[4], 0]
+        b = pairs[progress[4], 1]
+        spent += search_base(
+            scan, a, b, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best,
+            progress, budget - spent,
+        )  # fmt: skip
+        if progress[1] > 0:
+            return BUDGET
+        progress[4] = -1
+        cover(residual, bound, a, b)
+        strike(missing, inliers, a, b, left)
+        if not exhaustive and prior[0] != HARD_PRIOR:
+            needed = rules[3] * best[0]
+            if bound[0] < needed:
+                return PROVEN
+            level = int(levels * min(1.0, needed / total)) - 1
+            if level >= 0 and left[level] <= miss:
+                return CONFIDENT
+        if spent > budget:
+            return BUDGET

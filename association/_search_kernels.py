@@ -1,0 +1,361 @@
+"""Compiled search: from bases to scored poses. See `_match_kernels` for the arrays and their columns."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ._match_kernels import quick_score, refine, wrap
+
+BASE_SLACK = 0.2  # m; how far a scan segment of a base may stick out at an end of its wall
+BASE_SLACK_SHARE = 0.1  # of its length
+MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base
+
+# Places of `progress`: bases gone through, anchor within the base, hypotheses, verified ones.
+P_BASE, P_ANCHOR, P_HYPOTHESES, P_VERIFIED = range(4)
+PROGRESS_SIZE = 4
+
+# Columns of `found` (k, 5): value (score and prior together), theta, x, y, score.
+FOUND_COLUMNS = 5
+# Places of `best`: highest value found; least value on a full list; highest score within a hard prior's window.
+BEST_SIZE = 3
+# Places of `rules`: share of the best value that a pose must reach to be kept; distance and angle of distinct poses.
+RULES_SIZE = 3
+# Places of `prior`: kind, x, y, theta, then xx, xy, xt, yy, yt, tt of the information matrix, or radius and angle.
+NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
+PRIOR_SIZE = 10
+SOFT_FLOOR = -20.0  # nats; the most that a soft prior speaks against a pose
+INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those outside
+
+COST_HYPOTHESIS = 50  # in tests of a wall
+COST_REFINE = 800
+
+
+@njit(cache=True, nogil=True)
+def prior_value(prior, theta, x, y):
+    """Return what the prior says of a pose, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
+    if prior[0] == NO_PRIOR:
+        return 0.0
+    dx = x - prior[1]
+    dy = y - prior[2]
+    turn = wrap(theta - prior[3])
+    if prior[0] == HARD_PRIOR:
+        return INSIDE if dx * dx + dy * dy <= prior[4] * prior[4] and abs(turn) <= prior[5] else 0.0
+    square = (
+        prior[4] * dx * dx
+        + 2.0 * prior[5] * dx * dy
+        + 2.0 * prior[6] * dx * turn
+        + prior[7] * dy * dy
+        + 2.0 * prior[8] * dy * turn
+        + prior[9] * turn * turn
+    )
+    return max(SOFT_FLOOR, -0.5 * square)
+
+
+@njit(cache=True, nogil=True)
+def keep(found, count, best, pose, score, value, distance, angle):
+    """Put a pose among the best, at most one within `distance` metres and `angle` radians; ties keep the earlier."""
+    n = count[0]
+    near = -1
+    worst = 0
+    for k in range(n):
+        if (
+            abs(found[k, 2] - pose[1]) < distance
+            and abs(found[k, 3] - pose[2]) < distance
+            and abs(wrap(found[k, 1] - pose[0])) < angle
+            and (near < 0 or found[k, 0] > found[near, 0])
+        ):
+            near = k
+        if found[k, 0] < found[worst, 0]:
+            worst = k
+    if near >= 0:
+        place = near
+        if value <= found[near, 0]:
+            return
+    elif n < len(found):
+        place = n
+        count[0] = n + 1
+    else:
+        place = worst
+        if value <= found[worst, 0]:
+            return
+    found[place, 0] = value
+    found[place, 1] = pose[0]
+    found[place, 2] = pose[1]
+    found[place, 3] = pose[2]
+    found[place, 4] = score
+    if count[0] == len(found):
+        least = found[0, 0]
+        for k in range(1, len(found)):
+            least = min(least, found[k, 0])
+        best[1] = least
+
+
+@njit(inline="always")
+def floor_of(rules, best, bonus):
+    """Return the score that a pose must reach to be kept, given what the prior says of it."""
+    if bonus >= INSIDE:
+        return max(rules[0] * best[2], best[1] - bonus)
+    return max(rules[0] * best[0] - bonus, best[1] - bonus)
+
+
+@njit(cache=True, nogil=True)
+def offer(found, count, best, rules, prior, pose, score):
+    """Keep a refined pose if it is worth it."""
+    bonus = prior_value(prior, pose[0], pose[1], pose[2])
+    if score <= 0.0 or score < floor_of(rules, best, bonus):
+        return
+    keep(found, count, best, pose, score, score + bonus, rules[1], rules[2])
+    if bonus >= INSIDE:
+        best[2] = max(best[2], score)
+        best[0] = max(best[0], score)
+    else:
+        best[0] = max(best[0], score + bonus)
+
+
+@njit(inline="always")
+def end_slack(length):
+    """How far a scan segment, as part of a base, may stick out at each end of its wall."""
+    return BASE_SLACK + BASE_SLACK_SHARE * length
+
+
+@njit(cache=True, nogil=True)
+def anchors(length, walls, by_direction, bin_starts, out):
+    """List the walls long enough for a scan segment of `length` metres."""
+    n = 0
+    need = length - 2.0 * end_slack(length)
+    for b in range(len(bin_starts) - 1):
+        for k in range(bin_starts[b], bin_starts[b + 1]):
+            w = by_direction[k]
+            if walls[w, 4] - walls[w, 3] < need:
+                break
+            out[n] = w
+            n += 1
+    return n
+
+
+@njit(inline="always")
+def contained(scan, i, c, s, tx, ty, walls, w):
+    """Tell whether a scan segment lies within the ends of a wall, up to its slack."""
+    x = c * scan[i, 2] - s * scan[i, 3] + tx
+    y = s * scan[i, 2] + c * scan[i, 3] + ty
+    along = walls[w, 0] * x + walls[w, 1] * y
+    half = 0.5 * scan[i, 4] - end_slack(scan[i, 4])
+    return along - half >= walls[w, 3] and along + half <= walls[w, 4]
+
+
+@njit(inline="always")
+def base_pose(scan, a, b, walls, wa, wb, pose):
+    """Write the pose that puts both midpoints on their lines and splits the misfit of the angles by their variances.
+
+    Returns whether both segments then lie within the ends of their walls.
+    """
+    gap = wrap(walls[wb, 5] - walls[wa, 5] - scan[b, 5] + scan[a, 5])
+    theta = walls[wa, 5] - scan[a, 5] + gap * scan[a, 10] / (scan[a, 10] + scan[b, 10])
+    c = math.cos(theta)
+    s = math.sin(theta)
+    det = walls[wa, 0] * walls[wb, 1] - walls[wa, 1] * walls[wb, 0]
+    # n . t = p - n . R m for both, with n = (-d_y, d_x).
+    x = c * scan[a, 2] - s * scan[a, 3]
+    y = s * scan[a, 2] + c * scan[a, 3]
+    ra = walls[wa, 2] + walls[wa, 1] * x - walls[wa, 0] * y
+    x = c * scan[b, 2] - s * scan[b, 3]
+    y = s * scan[b, 2] + c * scan[b, 3]
+    rb = walls[wb, 2] + walls[wb, 1] * x - walls[wb, 0] * y
+    tx = (ra * walls[wb, 0] - rb * walls[wa, 0]) / det
+    ty = (ra * walls[wb, 1] - rb * walls[wa, 1]) / det
+    pose[0] = theta
+    pose[1] = tx
+    pose[2] = ty
+    return contained(scan, a, c, s, tx, ty, walls, wa) and contained(scan, b, c, s, tx, ty, walls, wb)
+
+
+@njit(cache=True, nogil=True)
+def try_pose(
+    scan, a, b, pose, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches, sums,
+    information, covariance,
+):  # fmt: skip
+    """Score the pose of a base; keep it if it is among the best. Returns what it cost, in tests of a wall."""
+    va = scan[a, 10]
+    vb = scan[b, 10]
+    theta_var = va * vb / (va + vb)
+    c = math.cos(pose[0])
+    s = math.sin(pose[0])
+    mx = 0.5 * (scan[a, 2] + scan[b, 2])
+    my = 0.5 * (scan[a, 3] + scan[b, 3])
+    gx = c * mx - s * my
+    gy = s * mx + c * my
+    progress[2] += 1
+    floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
+    quick = quick_score(
+        scan, pose[0], pose[1], pose[2], gx + pose[1], gy + pose[2], theta_var, walls, starts, items, shape, gates, floor
+    )
+    if quick < 0.0:
+        return COST_HYPOTHESIS
+    progress[3] += 1
+    # The pose turns about the base: covariance of (x, y, theta) with the base held.
+    covariance[0, 0] = theta_var * gy * gy
+    covariance[0, 1] = -theta_var * gx * gy
+    covariance[1, 1] = theta_var * gx * gx
+    covariance[0, 2] = theta_var * gy
+    covariance[1, 2] = -theta_var * gx
+    covariance[2, 2] = theta_var
+    score = refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, sums, information, 3)
+    offer(found, count, best, rules, prior, pose, score)
+    return COST_REFINE
+
+
+@njit(inline="always")
+def sweep(
+    scan, a, b, wa, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches, sums,
+    information, covariance, pose,
+):  # fmt: skip
+    """Slide scan segment `a` along wall `wa` and try every wall that `b` then comes to lie on.
+
+    The wall fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` sweeps.
+    Returns the number of tests.
+    """
+    tolerance = min(gates[4], max(gates[3], gates[0] * math.sqrt(scan[a, 10] + scan[b, 10])))
+    cos_tolerance = 1.0 - 0.5 * tolerance * tolerance
+    dx = walls[wa, 0]
+    dy = walls[wa, 1]
+    # Rotation that lays a on the wall, and the direction that b then has.
+    c = dx * scan[a, 0] + dy * scan[a, 1]
+    s = dy * scan[a, 0] - dx * scan[a, 1]
+    tdx = c * scan[b, 0] - s * scan[b, 1]
+    tdy = s * scan[b, 0] + c * scan[b, 1]
+    mx = scan[b, 2] - scan[a, 2]
+    my = scan[b, 3] - scan[a, 3]
+    # Midpoint of b with a's midpoint at abscissa 0 of its wall; the slide is that abscissa.
+    x = c * mx - s * my - dy * walls[wa, 2]
+    y = s * mx + c * my + dx * walls[wa, 2]
+    half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
+    # The final angle differs a little from the anchor's: the test of the ends is a little looser here.
+    half_b = 0.5 * scan[b, 4] - end_slack(scan[b, 4]) - 0.1
+    at = walls[wa, 3] + half
+    high = walls[wa, 4] - half
+    cell = shape[2]
+    fx = (x + at * dx - shape[0]) / cell
+    fy = (y + at * dy - shape[1]) / cell
+    column = int(math.floor(fx))
+    row = int(math.floor(fy))
+    columns = int(shape[3])
+    rows = int(shape[4])
+    step_x = 1 if dx > 0.0 else -1
+    step_y = 1 if dy > 0.0 else -1
+    pace_x = cell / max(abs(dx), 1e-12)
+    pace_y = cell / max(abs(dy), 1e-12)
+    next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
+    next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
+    tests = 4
+    while at <= high:
+        until = min(next_x, next_y)
+        tests += 1
+        if 0 <= column < columns and 0 <= row < rows:
+            here = row * columns + column
+            for k in range(starts[here], starts[here + 1]):
+                wb = items[k]
+                tests += 1
+                wx = walls[wb, 0]
+                wy = walls[wb, 1]
+                if wx * tdx + wy * tdy < cos_tolerance:
+                    continue
+                across = wx * dy - wy * dx
+                if abs(across) < MIN_CROSSING:
+                    continue
+                slide = (walls[wb, 2] - wx * y + wy * x) / across
+                # A wall is listed in several cells: it counts where the crossing is.
+                if slide < at or slide >= until or slide > high:
+                    continue
+                along = wx * (x + slide * dx) + wy * (y + slide * dy)
+                if along - half_b < walls[wb, 3] or along + half_b > walls[wb, 4]:
+                    continue
+                if base_pose(scan, a, b, walls, wa, wb, pose):
+                    tests += try_pose(
+                        scan, a, b, pose, walls, starts, items, shape, gates, rules, prior, found, count, best,
+                        progress, matches, sums, information, covariance,
+                    )  # fmt: skip
+        at = until
+        if next_x < next_y:
+            column += step_x
+            next_x += pace_x
+        else:
+            row += step_y
+            next_y += pace_y
+    return tests
+
+
+@njit(cache=True, nogil=True)
+def search_base(
+    scan, a, b, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, progress,
+    budget,
+):  # fmt: skip
+    """Go through all pairs of walls that fit the base of scan segments `a`, which slides, and `b`.
+
+    Goes on from the anchor where `progress` stands and stops when `budget` tests are used up. Returns the tests that
+    it took; ``progress[P_ANCHOR]`` is back at 0 when the base is done.
+    """
+    n = len(scan)
+    pose = np.empty(3)
+    matches = np.empty((n, 5))
+    sums = np.empty(18)
+    information = np.empty((3, 3))
+    covariance = np.empty((3, 3))
+    anchor_list = np.empty(len(walls), dtype=np.int32)
+    spent = len(bin_starts)
+    n_anchors = anchors(scan[a, 4], walls, by_direction, bin_starts, anchor_list)
+    while progress[1] < n_anchors:
+        wa = anchor_list[progress[1]]
+        progress[1] += 1
+        spent += sweep(
+            scan, a, b, wa, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches, sums,
+            information, covariance, pose,
+        )  # fmt: skip
+        if spent > budget and progress[1] < n_anchors:
+            return spent
+    progress[1] = 0
+    progress[0] += 1
+    return spent
+
+
+@njit(cache=True, nogil=True)
+def search_slides(
+    scan, a, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, spacing
+):
+    """Lay scan segment `a` on every wall that is long enough, at slides `spacing` metres apart, and keep the best.
+
+    For scans without a base: what is found is a family of poses, fixed across the walls and free along them.
+    """
+    n = len(scan)
+    pose = np.empty(3)
+    matches = np.empty((n, 5))
+    sums = np.empty(18)
+    information = np.empty((3, 3))
+    covariance = np.empty((3, 3))
+    anchor_list = np.empty(len(walls), dtype=np.int32)
+    n_anchors = anchors(scan[a, 4], walls, by_direction, bin_starts, anchor_list)
+    for k in range(n_anchors):
+        w = anchor_list[k]
+        half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
+        low = walls[w, 3] + half
+        high = walls[w, 4] - half
+        steps = min(64, max(1, int(math.ceil((high - low) / spacing))))
+        theta = walls[w, 5] - scan[a, 5]
+        c = math.cos(theta)
+        s = math.sin(theta)
+        gx = c * scan[a, 2] - s * scan[a, 3]
+        gy = s * scan[a, 2] + c * scan[a, 3]
+        for j in range(steps):
+            slide = low + (j + 0.5) / steps * (high - low)
+            pose[0] = theta
+            pose[1] = walls[w, 0] * slide - walls[w, 1] * walls[w, 2] - gx
+            pose[2] = walls[w, 1] * slide + walls[w, 0] * walls[w, 2] - gy
+            var = scan[a, 10]
+            covariance[0, 0] = var * gy * gy
+            covariance[0, 1] = -var * gx * gy
+            covariance[1, 1] = var * gx * gx
+            covariance[0, 2] = var * gy
+            covariance[1, 2] = -var * gx
+            covariance[2, 2] = var
+            score = refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, sums, information, 3)
+            offer(found, count, best, rules, prior, pose, score)

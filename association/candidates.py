@@ -1,0 +1,138 @@
+"""The search itself: from a scan and a map index to the poses that explain the scan best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._plan_kernels import BUDGET, CONFIDENT, EXHAUSTED, PROVEN, advance, plan_bases
+from ._search_kernels import (
+    BEST_SIZE,
+    FOUND_COLUMNS,
+    HARD_PRIOR,
+    NO_PRIOR,
+    PRIOR_SIZE,
+    SOFT_PRIOR,
+    search_slides,
+)
+from .map_index import MapIndex
+from .options import AssociationOptions, CancelledError, Deadline, HardPrior, Prior, SoftPrior
+from .result import SearchReport
+from .scan_rows import ScanRows, gates
+
+Floats = NDArray[np.float64]
+
+KEPT = 64  # poses
+KEEP_SHARE = 0.65  # of the best value; poses below it are no rivals
+RIVAL_SHARE = 0.9  # of the best value; a pose above it must not have been missed
+DISTINCT_DISTANCE = 0.3  # m
+DISTINCT_ANGLE = 0.1  # rad
+BASE_SEGMENTS = 40  # bases are drawn among this many of the most telling segments
+SLIDE_SEGMENTS = 6
+SLIDE_SPACING = 1.0  # m
+CHUNK = 300_000  # tests of a wall between two looks at the clock, a few milliseconds
+LEVELS = 16
+SAMPLE_WORDS = 256  # of 64 samples
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """What the search found.
+
+    Attributes
+    ----------
+    poses : (k, 3) theta, t_x, t_y, index frame from scan frame; the best value first
+    report : SearchReport
+    """
+
+    poses: Floats
+    report: SearchReport
+
+
+@lru_cache(maxsize=1)
+def _sampled_inliers() -> NDArray[np.uint64]:
+    """Sample consensus sets once: ``[level, segment]`` says for 64 samples a word whether the segment is an inlier.
+
+    At level l every segment is one with probability ``(l + 1) / LEVELS``, independently.
+    """
+    rng = np.random.default_rng(20190901)
+    draws = rng.random((BASE_SEGMENTS, SAMPLE_WORDS * 64))
+    shares = (np.arange(LEVELS) + 1) / LEVELS
+    bits = np.packbits(draws[None] < shares[:, None, None], axis=-1)
+    return np.ascontiguousarray(bits).view(np.uint64)
+
+
+def encode_prior(prior: Prior | None, origin: Floats) -> Floats:
+    """Flatten a prior for the kernels, in the index frame."""
+    out = np.zeros(PRIOR_SIZE)
+    out[0] = NO_PRIOR
+    if prior is None:
+        return out
+    out[1:4] = prior.pose.x - origin[0], prior.pose.y - origin[1], prior.pose.theta
+    if isinstance(prior, HardPrior):
+        out[0] = HARD_PRIOR
+        out[4:6] = prior.radius, prior.angle
+    elif isinstance(prior, SoftPrior):
+        out[0] = SOFT_PRIOR
+        information = np.linalg.inv(prior.covariance)
+        out[4:] = information[np.triu_indices(3)]
+    return out
+
+
+def find_candidates(
+    index: MapIndex, scan: ScanRows, prior: Prior | None, options: AssociationOptions, deadline: Deadline
+) -> Candidates:
+    """Go through bases until nothing better can have been missed, the bases are used up or the deadline passes.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    walls, grid = index.walls, index.grid
+    gate = gates(options)
+    rules = np.array([KEEP_SHARE, DISTINCT_DISTANCE, DISTINCT_ANGLE, RIVAL_SHARE])
+    flat_prior = encode_prior(prior, index.origin)
+    found, count, best = np.zeros((KEPT, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64), np.zeros(BEST_SIZE)
+    rows = scan.rows
+    n = min(len(rows), BASE_SEGMENTS)
+    pairs, merits = plan_bases(
+        rows, n, walls.by_direction, walls.bin_starts, walls.longest, walls.summed, index.area
+    )
+    progress = np.array([0, 0, 0, 0, -1])
+    uses, residual, bound = np.zeros(n), rows[:, 12].copy(), np.array([rows[:, 12].sum()])
+    inliers = _sampled_inliers()
+    missing = np.full((LEVELS, SAMPLE_WORDS), ~np.uint64(0))
+    left = np.ones(LEVELS)
+    stopped = EXHAUSTED if len(pairs) == 0 else BUDGET
+    while stopped == BUDGET and not deadline.passed:
+        stopped = advance(
+            rows, walls.rows, walls.by_direction, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
+            flat_prior, found, count, best, progress, pairs, merits, uses, residual, bound, missing, inliers, left,
+            1.0 - options.confidence, options.exhaustive, CHUNK,
+        )  # fmt: skip
+    # A scan without a base, or with none that fits, still fixes the pose across parallel walls.
+    for a in range(min(len(rows), SLIDE_SEGMENTS) if count[0] == 0 else 0):
+        search_slides(
+            rows, a, walls.rows, walls.by_direction, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
+            flat_prior, found, count, best, SLIDE_SPACING,
+        )  # fmt: skip
+    if deadline.cancelled:
+        raise CancelledError
+    k = int(count[0])
+    order = np.lexsort((np.arange(k), -found[:k, 0]))
+    level = int(LEVELS * min(1.0, best[0] / scan.total_gain)) - 1 if len(rows) else -1
+    reached = 1.0 if stopped in (EXHAUSTED, PROVEN) else 1.0 - float(left[level]) if level >= 0 else 0.0
+    report = SearchReport(
+        complete=stopped != BUDGET,
+        exhaustive=stopped == EXHAUSTED and len(rows) <= BASE_SEGMENTS,
+        confidence=max(reached, options.confidence if stopped == CONFIDENT else 0.0),
+        bases=int(progress[0]),
+        hypotheses=int(progress[2]),
+        verified=int(progress[3]),
+        seed=options.seed,
+    )
+    return Candidates(found[order, 1:4], report)
