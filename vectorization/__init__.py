@@ -3,7 +3,7 @@
 from .errors import InvalidOptionError, InvalidScanError, VectorizationError
 from .laser import LaserScan
 from .options import VectorizationOptions
-from .vectorize import Vectorization, vectorize
+from .vectorizer import Vectorization, vectorize
 
 __all__ = [
     "InvalidOptionError",

@@ -22,6 +22,12 @@ NX, NY, P, MEAN, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END = range(LINE)
 # Standard deviations within which a point is taken for the line's own.
 POINT_GATE = 3.5
 
+# Square of a step, in standard deviations, after which the next would be lost in rounding.
+SETTLED = 1e-8
+
+# Standard deviations of chi-square by which it may exceed its mean before the noise is taken for larger than given.
+WIDENING = 3.0
+
 # Cosine of incidence below which a ray says too little of where it meets the line.
 LEAST_COSINE = 0.03
 
@@ -171,6 +177,35 @@ def fit_line(x, y, ux, uy, a, b, variance, floor, line, own):
         line[NX] = nx
         line[NY] = ny
         line[P] = p
-        if turn > 1 and abs(slope) < 1e-14 and abs(e_mean) < 1e-13:
+        if turn > 1 and slope * slope * tt + e_mean * e_mean * w_sum < SETTLED:
             break
     return True
+
+
+@njit(cache=True, nogil=True)
+def describe(lines, x, y):
+    """Return what is told of each line, moved to the place (x, y) of the sensor: endpoints, sigma, centroid and rms.
+
+    Sigma is such that count / sigma^2 is the weight, and widened where the points lie worse than chance lets them.
+    """
+    m = len(lines)
+    endpoints = np.empty((m, 4))
+    sigmas = np.empty(m)
+    centroids = np.empty((m, 2))
+    rms = np.empty(m)
+    for k in range(m):
+        line = lines[k]
+        footx = x + line[P] * line[NX]
+        footy = y + line[P] * line[NY]
+        endpoints[k, 0] = footx - line[BEGIN] * line[NY]
+        endpoints[k, 1] = footy + line[BEGIN] * line[NX]
+        endpoints[k, 2] = footx - line[END] * line[NY]
+        endpoints[k, 3] = footy + line[END] * line[NX]
+        centroids[k, 0] = footx - line[MEAN] * line[NY]
+        centroids[k, 1] = footy + line[MEAN] * line[NX]
+        dof = max(1.0, line[COUNT] - 2.0)
+        sigmas[k] = math.sqrt(line[COUNT] / line[WEIGHT])
+        if line[CHI2] > dof + WIDENING * math.sqrt(2.0 * dof):
+            sigmas[k] *= math.sqrt(line[CHI2] / dof)
+        rms[k] = math.sqrt(line[CHI2] / line[WEIGHT])
+    return endpoints, sigmas, centroids, rms

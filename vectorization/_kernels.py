@@ -104,6 +104,7 @@ def find_gaps(x, y, ux, uy, increment, sigma, default_gap, max_gap):
     """
     n = len(x)
     starts = np.empty(n, dtype=np.int64)
+    farthest = math.sin(min(0.5 * math.pi, MISSING_STEPS * increment))
     count = 0
     for i in range(n):
         gap = i == 0
@@ -112,13 +113,16 @@ def find_gaps(x, y, ux, uy, increment, sigma, default_gap, max_gap):
             dy = y[i] - y[i - 1]
             limit = default_gap
             if increment > 0.0:
-                step = math.atan2(abs(ux[i - 1] * uy[i] - uy[i - 1] * ux[i]), ux[i - 1] * ux[i] + uy[i - 1] * uy[i])
-                if step > MISSING_STEPS * increment:
+                sine = abs(ux[i - 1] * uy[i] - uy[i - 1] * ux[i])
+                cosine = ux[i - 1] * ux[i] + uy[i - 1] * uy[i]
+                if cosine <= 0.0 or sine > farthest:
                     limit = 0.0
                 else:
                     r0 = ux[i - 1] * x[i - 1] + uy[i - 1] * y[i - 1]
                     r1 = ux[i] * x[i] + uy[i] * y[i]
-                    limit = min(r0, r1) * math.sin(step) / math.sin(max(GRAZING - step, 0.5 * GRAZING)) + 4.0 * sigma
+                    # The wall's angle with the second ray, if it makes GRAZING with the first.
+                    grazing = math.sin(GRAZING) * cosine - math.cos(GRAZING) * sine
+                    limit = min(r0, r1) * sine / max(grazing, math.sin(0.5 * GRAZING)) + 4.0 * sigma
             limit = min(limit, max_gap)
             gap = dx * dx + dy * dy > limit * limit
         if gap:
@@ -135,6 +139,7 @@ def farthest_point(x, y, ux, uy, a, b, variance, floor):
     length = math.sqrt(dx * dx + dy * dy)
     best = a
     worst = 0.0
+    least = 1.0
     if length <= 0.0:
         return best, worst
     nx = -dy / length
@@ -144,11 +149,13 @@ def farthest_point(x, y, ux, uy, a, b, variance, floor):
         cosine = nx * ux[i] + ny * uy[i]
         if ux[i] == 0.0 and uy[i] == 0.0:
             cosine = 1.0
-        square = off * off / (variance * cosine * cosine + floor)
-        if square > worst:
-            worst = square
+        v = variance * cosine * cosine + floor
+        # off^2 / v above worst / least, without the division.
+        if off * off * least > worst * v:
+            worst = off * off
+            least = v
             best = i
-    return best, worst
+    return best, worst / least
 
 
 @njit(cache=True, nogil=True)

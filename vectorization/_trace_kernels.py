@@ -29,7 +29,7 @@ from ._fit_kernels import (
     fit_line,
     line_of,
 )
-from ._kernels import MISSING_STEPS, find_gaps, merge, running_sums, settle_breaks, split
+from ._kernels import BREAK_REACH, MISSING_STEPS, find_gaps, merge, running_sums, settle_breaks, split
 
 # A line is kept when its angle is known to this standard deviation (rad) and its chi-square per degree of freedom is
 # at most this: a heap of points is no wall.
@@ -37,9 +37,10 @@ WORST_ANGLE = 0.12
 WORST_FIT = 6.0
 
 # Sine of the angle between two lines below which they have no corner, and how much farther than to the next beam an
-# end may be moved to reach one.
+# end may be moved to reach one, past so many points at most.
 LEAST_CORNER = 0.15
 CORNER_REACH = 1.6
+CORNER_BEAMS = 3
 
 
 @njit(cache=True, nogil=True)
@@ -70,7 +71,7 @@ def trace(x, y, ux, uy, increment, closed, sigma, floor, default_gap, max_gap, m
             keep += 1
     lines = lines[:keep]
     spans = spans[:keep]
-    cut_corners(x, y, ux, uy, lines, spans, increment, closed, sigma)
+    cut_corners(x, y, ux, uy, lines, spans, increment, closed, variance, floor)
     return lines, spans
 
 
@@ -154,33 +155,107 @@ def extend(x, y, ux, uy, start, direction, taken, line, increment, longest, vari
 
 
 @njit(cache=True, nogil=True)
-def cut_corners(x, y, ux, uy, lines, spans, increment, closed, sigma):
-    """Move the ends of neighbouring lines to their intersection where it lies between their nearest points' rays."""
+def cut_corners(x, y, ux, uy, lines, spans, increment, closed, variance, floor):
+    """Move the ends of neighbouring lines to their intersection where it lies between their nearest points' rays.
+
+    The points next to it go to the line on their side of the corner, and both are fitted anew.
+    """
     m = len(lines)
-    n = len(x)
+    for k in range(m - 1):
+        for _ in range(2):
+            found, cx, cy = corner(x, y, ux, uy, lines, spans, k, k + 1, increment, variance)
+            if not found or not share(x, y, ux, uy, lines, spans, k, cx, cy, variance, floor):
+                break
+    if closed and m > 1:
+        found, cx, cy = corner(x, y, ux, uy, lines, spans, m - 1, 0, increment, variance)
+        if found:
+            leave_seam(x, y, ux, uy, lines, spans, cx, cy, variance, floor)
     for k in range(m if closed and m > 1 else m - 1):
         one = lines[k]
         other = lines[(k + 1) % m]
-        i = spans[k, 1]
-        j = spans[(k + 1) % m, 0]
-        if (j - i) % n > 3:
-            continue
-        sine = one[NX] * other[NY] - one[NY] * other[NX]
-        if abs(sine) < LEAST_CORNER:
-            continue
-        cx = (one[P] * other[NY] - other[P] * one[NY]) / sine
-        cy = (other[P] * one[NX] - one[P] * other[NX]) / sine
-        here = one[NX] * cy - one[NY] * cx
-        there = other[NX] * cy - other[NY] * cx
-        # Points of one wall within the gate of the other lie that far beyond the corner.
-        slack = POINT_GATE * sigma / abs(sine)
-        beams = (j - i) % n
-        if abs(here - last_abscissa(one, i, x, y)) > beams * corner_reach(one, i, x, y, ux, uy, increment) + slack:
-            continue
-        if abs(there - last_abscissa(other, j, x, y)) > beams * corner_reach(other, j, x, y, ux, uy, increment) + slack:
-            continue
-        nearer_end(one, here)
-        nearer_end(other, there)
+        found, cx, cy = corner(x, y, ux, uy, lines, spans, k, (k + 1) % m, increment, variance)
+        if found:
+            nearer_end(one, one[NX] * cy - one[NY] * cx)
+            nearer_end(other, other[NX] * cy - other[NY] * cx)
+
+
+@njit(cache=True, nogil=True)
+def corner(x, y, ux, uy, lines, spans, k, following, increment, variance):
+    """Return whether lines k and `following` meet between their nearest points, and where."""
+    one = lines[k]
+    other = lines[following]
+    i = spans[k, 1]
+    j = spans[following, 0]
+    beams = (j - i) % len(x)
+    sine = one[NX] * other[NY] - one[NY] * other[NX]
+    if beams > CORNER_BEAMS or abs(sine) < LEAST_CORNER:
+        return False, 0.0, 0.0
+    cx = (one[P] * other[NY] - other[P] * one[NY]) / sine
+    cy = (other[P] * one[NX] - one[P] * other[NX]) / sine
+    here = abs(one[NX] * cy - one[NY] * cx - last_abscissa(one, i, x, y))
+    there = abs(other[NX] * cy - other[NY] * cx - last_abscissa(other, j, x, y))
+    # Points of one wall within the gate of the other lie that far beyond the corner.
+    slack = POINT_GATE * math.sqrt(variance) / abs(sine)
+    near = here <= beams * corner_reach(one, i, x, y, ux, uy, increment) + slack
+    near = near and there <= beams * corner_reach(other, j, x, y, ux, uy, increment) + slack
+    return near, cx, cy
+
+
+@njit(cache=True, nogil=True)
+def share(x, y, ux, uy, lines, spans, k, cx, cy, variance, floor):
+    """Give the points about a corner of lines k and k + 1 to their own side's line; return whether any changed."""
+    a = spans[k, 0]
+    b = spans[k + 1, 1]
+    last = spans[k, 1]
+    while last + 1 < b - 2 and last < spans[k, 1] + BREAK_REACH and before(x, y, ux, uy, lines, k, cx, cy, last + 1):
+        last += 1
+    while last > a + 2 and last > spans[k, 1] - BREAK_REACH and not before(x, y, ux, uy, lines, k, cx, cy, last):
+        last -= 1
+    if last == spans[k, 1] and last + 1 == spans[k + 1, 0]:
+        return False
+    own = np.empty(len(x), dtype=np.bool_)
+    one = lines[k].copy()
+    other = lines[k + 1].copy()
+    fitted = fit_line(x, y, ux, uy, a, last + 1, variance, floor, one, own)
+    if not fitted or not fit_line(x, y, ux, uy, last + 1, b + 1, variance, floor, other, own):
+        return False
+    if one[COUNT] < 3.0 or other[COUNT] < 3.0:
+        return False
+    lines[k] = one
+    lines[k + 1] = other
+    spans[k, 1] = last
+    spans[k + 1, 0] = last + 1
+    return True
+
+
+@njit(cache=True, nogil=True)
+def leave_seam(x, y, ux, uy, lines, spans, cx, cy, variance, floor):
+    """Take from the first and the last line of a closed scan the points beyond their corner, and fit what is left."""
+    own = np.empty(len(x), dtype=np.bool_)
+    last = len(lines) - 1
+    a = spans[0, 0]
+    b = spans[last, 1]
+    while a < spans[0, 1] - 2 and a < spans[0, 0] + BREAK_REACH and before(x, y, ux, uy, lines, last, cx, cy, a):
+        a += 1
+    while (
+        b > spans[last, 0] + 2 and b > spans[last, 1] - BREAK_REACH and not before(x, y, ux, uy, lines, last, cx, cy, b)
+    ):
+        b -= 1
+    if a > spans[0, 0]:
+        spans[0, 0] = a
+        fit_line(x, y, ux, uy, a, spans[0, 1] + 1, variance, floor, lines[0], own)
+    if b < spans[last, 1]:
+        spans[last, 1] = b
+        fit_line(x, y, ux, uy, spans[last, 0], b + 1, variance, floor, lines[last], own)
+
+
+@njit(cache=True, nogil=True)
+def before(x, y, ux, uy, lines, k, cx, cy, i):
+    """Tell whether point i is on line k's side of its corner with the next: by its ray, or by the nearer line."""
+    if ux[i] != 0.0 or uy[i] != 0.0:
+        return ux[i] * cy - uy[i] * cx >= 0.0
+    here = abs(lines[k, NX] * x[i] + lines[k, NY] * y[i] - lines[k, P])
+    return here <= abs(lines[k + 1, NX] * x[i] + lines[k + 1, NY] * y[i] - lines[k + 1, P])
 
 
 @njit(cache=True, nogil=True)

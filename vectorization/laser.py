@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._ray_kernels import clean
 from .errors import InvalidScanError
 
 Floats = NDArray[np.float64]
@@ -80,9 +81,7 @@ class LaserScan:
     @property
     def cleaned(self) -> Floats:
         """The ranges with every beam without return at inf and every beam of which nothing is known at nan."""
-        with np.errstate(invalid="ignore"):
-            known = np.where((self.ranges < self.range_min) | (self.ranges <= 0.0), np.nan, self.ranges)
-            cleaned: Floats = np.where(known > min(self.range_max, MAX_RANGE), np.inf, known)
+        cleaned: Floats = clean(self.ranges, self.range_min, min(self.range_max, MAX_RANGE))
         return cleaned
 
     def points(self) -> Floats:

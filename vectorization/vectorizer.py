@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from registration import MeasuredSegments, Segments
 
-from ._fit_kernels import BEGIN, CHI2, COUNT, END, LINE, MEAN, NX, NY, SPREAD, WEIGHT, P
-from ._noise_kernels import ray_noise, window_noise
+from ._fit_kernels import BEGIN, COUNT, END, LINE, MEAN, NX, NY, SPREAD, P, describe
+from ._ray_kernels import gather, quantum, ray_noise, window_noise
 from ._trace_kernels import trace
 from .errors import InvalidScanError
 from .laser import MAX_RANGE, LaserScan
@@ -26,10 +26,6 @@ UNKNOWN_SIGMA = 0.02
 LEAST_SIGMA = 1e-3
 ROUGHNESS = 3e-3
 RELATIVE_ROUGHNESS = 0.1
-
-# Ranges are taken for quantised when all are multiples of a step of at least this many units.
-QUANTUM_UNIT = 1e-4
-LEAST_QUANTUM = 10
 
 # Points without rays are neighbours up to this many median spacings.
 SPACINGS = 6.0
@@ -122,19 +118,13 @@ def vectorize(
 
 def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization:
     angles = scan.angles
-    ranges = scan.cleaned
-    order = np.flatnonzero(np.isfinite(ranges))
     increment = abs(scan.angle_increment)
-    if scan.angle_increment < 0.0:
-        order = order[::-1]
     closed = increment * len(angles) > math.tau - 0.5 * increment
-    if closed:
-        order = _from_a_break(order, ranges)
-    r = ranges[order]
-    rays = np.stack([np.cos(angles[order]), np.sin(angles[order])])
+    ranges = scan.cleaned
+    order, r, rays, points = gather(ranges, np.cos(angles), np.sin(angles), scan.angle_increment < 0.0, closed)
     sigma = options.sigma or _estimated(ray_noise(r, rays[0], rays[1], increment), r)
-    lines, spans = _trace(r * rays, rays, increment, closed, sigma, options)
-    measured, rms = _measured(lines, sigma, np.zeros(2))
+    lines, spans = _trace(points, rays, increment, closed, sigma, options)
+    measured, rms = _measured(lines, (0.0, 0.0))
     return Vectorization(measured, rms, sigma, order[spans], angles, ranges, scan.range_max)
 
 
@@ -155,7 +145,7 @@ def _from_viewed_points(points: Floats, viewpoint: Floats, options: Vectorizatio
     # The viewpoint is on the left whatever way the points run.
     backward = _runs_backward(lines, spans, xy)
     spans[backward] = spans[backward, ::-1]
-    measured, rms = _measured(lines, sigma, viewpoint)
+    measured, rms = _measured(lines, (viewpoint[0], viewpoint[1]))
     return Vectorization(measured, rms, sigma, order[spans], np.zeros(0), np.zeros(0), math.inf)
 
 
@@ -167,7 +157,7 @@ def _from_bare_points(points: Floats, options: VectorizationOptions) -> Vectoriz
     backward = _runs_backward(lines, spans, xy)
     lines[backward] *= BACKWARD
     lines[backward, BEGIN], lines[backward, END] = lines[backward, END], lines[backward, BEGIN]
-    measured, rms = _measured(lines, sigma, origin)
+    measured, rms = _measured(lines, (origin[0], origin[1]))
     return Vectorization(measured, rms, sigma, spans, np.zeros(0), np.zeros(0), math.inf)
 
 
@@ -202,29 +192,10 @@ def _checked_points(points: ArrayLike) -> Floats:
     return values
 
 
-def _from_a_break(order: Indices, ranges: Floats) -> Indices:
-    """Turn the order of a closed scan so that no wall lies across its seam.
-
-    The farthest point is an end of its wall: distance from a point grows along a line in both directions.
-    """
-    if len(order) == 0:
-        return order
-    return np.roll(order, -int(np.argmax(ranges[order])))
-
-
 def _estimated(noise: float, ranges: Floats) -> float:
     """Return the noise, but no less than what the quantisation of the ranges lets it be."""
     noise = noise or UNKNOWN_SIGMA
-    return max(noise, LEAST_SIGMA, _quantum(ranges) / math.sqrt(12.0))
-
-
-def _quantum(ranges: Floats) -> float:
-    """Return the step that all ranges are multiples of, metres, 0 for none."""
-    units = np.round(ranges / QUANTUM_UNIT)
-    if len(units) < 2 or (np.abs(ranges / QUANTUM_UNIT - units) > 0.1).any():
-        return 0.0
-    step = int(np.gcd.reduce(units.astype(np.int64)))
-    return step * QUANTUM_UNIT if step >= LEAST_QUANTUM else 0.0
+    return max(noise, LEAST_SIGMA, float(quantum(ranges)) / math.sqrt(12.0))
 
 
 def _trace(
@@ -244,17 +215,8 @@ def _trace(
     return lines, spans
 
 
-def _measured(lines: Floats, sigma: float, origin: Floats) -> tuple[MeasuredSegments, Floats]:
-    normals = lines[:, [NX, NY]]
-    along = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
-    feet = lines[:, P, None] * normals + origin
-    ends = [feet + lines[:, t, None] * along for t in (BEGIN, END)]
-    segments = Segments.from_array(np.hstack(ends))
-    count = lines[:, COUNT]
-    chi2 = lines[:, CHI2]
-    dof = np.maximum(1.0, count - 2.0)
-    widened = np.where(chi2 > dof + 3.0 * np.sqrt(2.0 * dof), np.sqrt(chi2 / dof), 1.0)
-    sigmas = widened * np.sqrt(count / lines[:, WEIGHT])
-    centroids = feet + lines[:, MEAN, None] * along
-    measured = MeasuredSegments.from_segments(segments, sigmas, count, (centroids, lines[:, SPREAD]))
-    return measured, np.sqrt(chi2 / lines[:, WEIGHT])
+def _measured(lines: Floats, origin: tuple[float, float]) -> tuple[MeasuredSegments, Floats]:
+    endpoints, sigmas, centroids, rms = describe(lines, origin[0], origin[1])
+    moments = centroids, lines[:, SPREAD]
+    measured = MeasuredSegments.from_segments(Segments.from_array(endpoints), sigmas, lines[:, COUNT], moments)
+    return measured, rms

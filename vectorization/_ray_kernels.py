@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Compiled estimate of range noise from a scan itself.
+"""Compiled preparation of ranges: what is known of each beam, in which order, and what noise they show.
 
 Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in
 ``tests/vectorization/reference.py``.
@@ -11,14 +11,81 @@ import numpy as np
 from numba import njit
 
 # Share of the triples of points that are trusted to lie on straight walls, and that quantile of |z| of a Gaussian.
-TRUSTED = 0.4
-GAUSSIAN_QUANTILE = 0.5244005127080407
+TRUSTED = 0.3
+GAUSSIAN_QUANTILE = 0.3853204664075677
 
 # Points in a window where noise has no direction, and the median of chi-square of its five degrees of freedom over 5.
 WINDOW = 7
 MEDIAN_CHI = 0.8703
 
 LEAST_TRIPLES = 10
+
+# Ranges are quantised when all are multiples of a step of so many of these units (m).
+QUANTUM_UNIT = 1e-4
+LEAST_QUANTUM = 10
+
+
+@njit(cache=True, nogil=True)
+def clean(ranges, range_min, range_max):
+    """Return the ranges with beams without return at inf and beams of which nothing is known at nan."""
+    cleaned = ranges.copy()
+    for i in range(len(ranges)):
+        if ranges[i] > range_max:
+            cleaned[i] = math.inf
+        elif ranges[i] < range_min or ranges[i] <= 0.0:
+            cleaned[i] = math.nan
+    return cleaned
+
+
+@njit(cache=True, nogil=True)
+def gather(cleaned, cosines, sines, backward, closed):
+    """Return indices, ranges, the rays' two components and the points' of the beams that have a range.
+
+    Counter-clockwise, so from the last if the scan went `backward`. A `closed` scan is turned so that no wall lies
+    across its seam: it begins at the farthest point, which is an end of its wall, as distance from a place grows along
+    a line in both directions.
+    """
+    n = len(cleaned)
+    order = np.empty(n, dtype=np.int64)
+    count = 0
+    farthest = 0
+    for k in range(n):
+        i = n - 1 - k if backward else k
+        if math.isfinite(cleaned[i]):
+            order[count] = i
+            if cleaned[i] > cleaned[order[farthest]]:
+                farthest = count
+            count += 1
+    if closed:
+        order = np.concatenate((order[farthest:count], order[:farthest]))
+    order = order[:count]
+    r = np.empty(count)
+    rays = np.empty((2, count))
+    points = np.empty((2, count))
+    for k in range(count):
+        i = order[k]
+        r[k] = cleaned[i]
+        rays[0, k] = cosines[i]
+        rays[1, k] = sines[i]
+        points[0, k] = r[k] * cosines[i]
+        points[1, k] = r[k] * sines[i]
+    return order, r, rays, points
+
+
+@njit(cache=True, nogil=True)
+def quantum(ranges):
+    """Return the step that all ranges are multiples of, metres, 0 for none or one below a millimetre."""
+    step = 0
+    for i in range(len(ranges)):
+        units = ranges[i] / QUANTUM_UNIT
+        whole = round(units)
+        if abs(units - whole) > 0.1:
+            return 0.0
+        while whole > 0:
+            step, whole = whole, step % whole
+        if step < LEAST_QUANTUM:
+            return 0.0
+    return step * QUANTUM_UNIT
 
 
 @njit(cache=True, nogil=True)
