@@ -3,6 +3,7 @@
 from .correspondences import Correspondences
 from .errors import InvalidArgumentError, InvalidSegmentsError, RegistrationError
 from .joint import JointSums
+from .observability import Freedom, find_freedom
 from .one_step import OneStepSums
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
@@ -13,6 +14,7 @@ from .transform import RigidTransform, wrap_angle
 __all__ = [
     "Ambiguity",
     "Correspondences",
+    "Freedom",
     "InvalidArgumentError",
     "InvalidSegmentsError",
     "JointSums",
@@ -24,6 +26,7 @@ __all__ = [
     "RegistrationResult",
     "RigidTransform",
     "Segments",
+    "find_freedom",
     "register",
     "wrap_angle",
 ]

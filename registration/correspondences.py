@@ -132,7 +132,10 @@ def floored_sigma(sigma: ArrayLike) -> Floats:
 
 
 def _left(directions: Floats) -> Floats:
-    return np.stack([-directions[:, 1], directions[:, 0]], axis=1)
+    normals = np.empty_like(directions)
+    np.negative(directions[:, 1], out=normals[:, 0])
+    normals[:, 1] = directions[:, 0]
+    return normals
 
 
 def _dots(a: Floats, b: Floats) -> Floats:

@@ -18,19 +18,23 @@ from .transform import RigidTransform
 
 Floats = NDArray[np.float64]
 
-_ZERO = Ambiguity(0.0, 0.0)
-NO_ANSWER = RegistrationResult(
-    degenerate=True,
-    usable=False,
-    pose=None,
-    covariance=None,
-    unobservable=None,
-    offsets=np.zeros(0),
-    angles=np.zeros(0),
-    weights=np.zeros(0),
-    diagnostics=RegistrationDiagnostics(_ZERO, _ZERO, None, None, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0),
-)
-"""What there is to say about no pairs at all."""
+
+def no_answer(options: RegistrationOptions) -> RegistrationResult:
+    """Return what there is to say about no pairs at all."""
+    zero = Ambiguity(0.0, 0.0)
+    at = None if options.evaluate_at is None else zero
+    nothing = np.zeros(0)
+    return RegistrationResult(
+        degenerate=True,
+        usable=False,
+        pose=None,
+        covariance=None,
+        unobservable=None,
+        offsets=nothing,
+        angles=nothing,
+        weights=nothing,
+        diagnostics=RegistrationDiagnostics(zero, zero, at, None, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0),
+    )
 
 
 def residuals(pairs: Correspondences, fit: Fit) -> tuple[Floats, Floats]:

@@ -33,6 +33,8 @@ class Problem:
     ----------
     pairs : Correspondences
         In the scan's own frame, and in a map frame whose origin is in the middle of the map segments.
+    centred : Correspondences
+        The pairs about the middles of both sets: what the joint sums are taken of, to lose no digits.
     weights : PairWeights
     map_origin : (2,)
         That origin, in the caller's map frame, metres.
@@ -43,15 +45,11 @@ class Problem:
     """
 
     pairs: Correspondences
+    centred: Correspondences
     weights: PairWeights
     map_origin: Floats
     scan_origin: Floats
     reference_angle: float
-
-    @property
-    def centred(self) -> Correspondences:
-        """The pairs about the middles of both sets: what the joint sums are taken of, to lose no digits."""
-        return self.pairs.about(np.zeros(2), self.scan_origin)
 
     def one_step_sums(self, x: float, y: float) -> OneStepSums:
         """Return the paper's sums about a transform, here of the recentred map frame."""

@@ -89,7 +89,8 @@ class RegistrationResult:
     offsets : (n,)
         ``n_map . (R m_scan + t) - p_map`` at the midpoints, metres.
     angles : (n,)
-        ``wrap(angle(d_map) - angle(d_scan) - theta)``, radians.
+        ``wrap(angle(d_map) - angle(d_scan) - theta)``, radians; where directions mean nothing, of the scan segment
+        turned to run along the map's.
     weights : (n,)
         As used by the estimator and the ambiguities.
     diagnostics : RegistrationDiagnostics

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
 from .correspondences import Correspondences
-from .diagnostics import NO_ANSWER, covariance_of, diagnose, residuals
+from .diagnostics import covariance_of, diagnose, no_answer, residuals
 from .estimate import Problem, fit_joint, fit_one_step
 from .one_step import OneStepSums
 from .options import RegistrationOptions
@@ -56,17 +56,17 @@ def register(
     InvalidArgumentError
         When `pairs`, a sigma or a weight is wrong; with the argument and the index at fault.
     """
-    everything = Correspondences.of(map_segments, scan, pairs)
-    weights = weigh(everything, map_sigma, options)
-    if not len(everything):
-        return NO_ANSWER
+    given = Correspondences.of(map_segments, scan, pairs)
+    weights = weigh(given, map_sigma, options)
+    if not len(given):
+        return no_answer(options)
 
-    problem, everything, unique = _pose_problem(everything, weights, oriented=options.oriented)
+    problem, centred, unique = _pose_problem(given, weights, oriented=options.oriented)
     fit = (fit_joint if options.estimator == "joint" else fit_one_step)(problem, options)
     degenerate = fit.freedom.degenerate or not unique
 
     x, y = fit.local_translation(problem) + problem.map_origin
-    offsets, angles = residuals(everything, fit)
+    offsets, angles = residuals(centred, fit)
     diagnostics = diagnose(problem, fit, options)
     has_covariance = not degenerate and options.estimator == "joint"
     direction = fit.freedom.direction
@@ -84,7 +84,7 @@ def register(
 
 
 def _pose_problem(
-    everything: Correspondences, weights: PairWeights, *, oriented: bool
+    given: Correspondences, weights: PairWeights, *, oriented: bool
 ) -> tuple[Problem, Correspondences, bool]:
     """Recentre, and turn segments round where directions mean nothing.
 
@@ -92,11 +92,11 @@ def _pose_problem(
     way to turn them fits.
     """
     active = weights.used > 0.0
-    map_origin = everything.map_midpoints[active].mean(axis=0)
-    scan_origin = everything.centroids[active].mean(axis=0)
-    local = everything.about(map_origin, np.zeros(2))
-    centred = local.about(np.zeros(2), scan_origin)
     counted = weights.take(active)
+    map_origin = given.map_midpoints[active].mean(axis=0)
+    scan_origin = given.centroids[active].mean(axis=0)
+    local = given.about(map_origin, np.zeros(2))
+    centred = local.about(np.zeros(2), scan_origin)
     unique = True
     if not oriented:
         is_noise = counted.noise is not None
@@ -106,4 +106,4 @@ def _pose_problem(
         local, centred = local.turned(against), centred.turned(against)
     pairs = local.take(active)
     reference = OneStepSums.of_set(pairs, counted.used).solve("wahba")[0].theta
-    return Problem(pairs, counted, map_origin, scan_origin, reference), centred, unique
+    return Problem(pairs, centred.take(active), counted, map_origin, scan_origin, reference), centred, unique

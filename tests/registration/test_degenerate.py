@@ -57,13 +57,14 @@ def test_one_pair_is_degenerate(estimator):
 def test_no_pair_has_no_pose(estimator):
     map_segments = corridor()
     scan = MeasuredSegments.from_segments(map_segments, 0.0)
-    options = RegistrationOptions(estimator, weighting="uniform", weights=[])
+    options = RegistrationOptions(estimator, weights=[], evaluate_at=POSE)
     result = register(map_segments, scan, [], 0.0, options)
     assert result.degenerate
     assert not result.usable
     assert result.pose is None
     assert result.unobservable is None
     assert result.diagnostics.similarity is None
+    assert result.diagnostics.ambiguity_at.total == 0.0
     assert len(result.offsets) == len(result.angles) == len(result.weights) == 0
 
 

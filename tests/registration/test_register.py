@@ -328,6 +328,8 @@ def test_information_without_noise_is_refused():
     with pytest.raises(InvalidArgumentError) as caught:
         register(map_segments, scan, diagonal(6))
     assert caught.value.argument == "scan.sigma"
+    with_little = MeasuredSegments.from_segments(scan.segments, 1e-200)
+    np.testing.assert_allclose(register(map_segments, with_little, diagonal(6)).weights, 1e24 * scan.points)
     assert register(map_segments, scan, diagonal(6), 0.01).usable
     assert register(map_segments, scan, diagonal(6), 0.0, RegistrationOptions(weighting="uniform")).usable
 
