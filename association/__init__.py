@@ -1,5 +1,7 @@
 """Unknown correspondences: where in a map of segments a scan was taken, and how sure that is."""
 
+from .errors import AssociationError, InvalidMapError, InvalidSearchError
+from .map_index import MapIndex
 from .options import (
     AssociationOptions,
     Beams,
@@ -19,10 +21,12 @@ from .result import (
     SearchReport,
     Status,
 )
+from .search import associate
 
 __all__ = [
     "Alternative",
     "AssociationDiagnostics",
+    "AssociationError",
     "AssociationOptions",
     "AssociationResult",
     "AssociationWarning",
@@ -31,9 +35,13 @@ __all__ = [
     "Correspondence",
     "Deadline",
     "HardPrior",
+    "InvalidMapError",
+    "InvalidSearchError",
+    "MapIndex",
     "Prior",
     "Scan",
     "SearchReport",
     "SoftPrior",
     "Status",
+    "associate",
 ]

@@ -12,23 +12,14 @@ from numba import njit
 
 from registration._kernels import joint_add, joint_information, joint_solve
 
-# Columns of `walls` (m, 8): unit direction, offset along the left normal, abscissae of begin and end, angle.
-W_DX, W_DY, W_OFFSET, W_BEGIN, W_END, W_ANGLE = range(6)
-WALL_COLUMNS = 8  # a cache line
-
-# Columns of `scan` (n, 16), the most telling segments first.
-(
-    S_DX, S_DY, S_MX, S_MY, S_LENGTH, S_ANGLE, S_CX, S_CY, S_SPREAD, S_OFFSET_VAR, S_ANGLE_VAR, S_WEIGHT, S_GAIN, S_LEFT,
-) = range(14)  # fmt: skip
+# Columns of `walls` (m, 8), one cache line a wall: 0, 1 unit direction; 2 offset along the left normal; 3, 4 abscissae
+# of begin and end along the direction; 5 angle.
+# Columns of `scan` (n, 16), the most telling segments first: 0, 1 unit direction; 2, 3 midpoint; 4 length; 5 angle;
+# 6, 7 centroid; 8 spread; 9, 10 variance of offset and angle; 11 weight; 12 gain; 13 sum of the gains of later rows.
 SCAN_COLUMNS = 16
-
-# Columns of `matches` (n, 5): wall or -1, offset, angle, overlap, worth in nats.
-M_WALL, M_OFFSET, M_ANGLE, M_OVERLAP, M_VALUE = range(5)
-MATCH_COLUMNS = 5
-
+# Columns of `matches` (n, 5): 0 wall or -1; 1 offset; 2 sine of the angle; 3 overlap; 4 worth in nats.
 # Places of `shape`, the geometry of the grid: x0, y0, cell size, columns, rows. Places of `gates`: how many standard
 # deviations, least and greatest gate on the offset (m), least and greatest gate on the angle (rad), least overlap.
-GATES_SIZE = 6
 
 REACH = 0.4  # m; the grid lists a wall in the cells this near to it, so gates end here
 MAX_ANGLE_GATE = 0.35  # rad
@@ -99,9 +90,7 @@ def quick_score(scan, theta, tx, ty, px, py, theta_var, walls, starts, items, sh
         angle_gate = gates[0] * math.sqrt(scan[i, 10] + theta_var)
         angle_gate = min(gates[4], max(gates[3], angle_gate))
         cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
-        _, _, _, overlap = match_segment(
-            scan, i, c, s, tx, ty, gate, cos_gate, gates[5], walls, starts, items, shape
-        )
+        _, _, _, overlap = match_segment(scan, i, c, s, tx, ty, gate, cos_gate, gates[5], walls, starts, items, shape)
         total += scan[i, 12] * overlap
         if total + scan[i, 13] < threshold:
             return -1.0

@@ -72,7 +72,7 @@ def plan_bases(scan, count, by_direction, bin_starts, longest, summed, area):
                 continue
             sweep_i = COST_ANCHOR * fitting[i] + COST_SLIDE * total[i]
             sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]
-            shift = int(round(turn / (2.0 * math.pi / bins)))
+            shift = round(turn / (2.0 * math.pi / bins))
             expected = 0.0
             for b in range(bins):
                 expected += slides[i, b] * smooth[j, (b + shift) % bins]

@@ -188,7 +188,19 @@ def try_pose(
     progress[2] += 1
     floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
     quick = quick_score(
-        scan, pose[0], pose[1], pose[2], gx + pose[1], gy + pose[2], theta_var, walls, starts, items, shape, gates, floor
+        scan,
+        pose[0],
+        pose[1],
+        pose[2],
+        gx + pose[1],
+        gy + pose[2],
+        theta_var,
+        walls,
+        starts,
+        items,
+        shape,
+        gates,
+        floor,
     )
     if quick < 0.0:
         return COST_HYPOTHESIS
@@ -237,8 +249,8 @@ def sweep(
     cell = shape[2]
     fx = (x + at * dx - shape[0]) / cell
     fy = (y + at * dy - shape[1]) / cell
-    column = int(math.floor(fx))
-    row = int(math.floor(fy))
+    column = math.floor(fx)
+    row = math.floor(fy)
     columns = int(shape[3])
     rows = int(shape[4])
     step_x = 1 if dx > 0.0 else -1
@@ -287,8 +299,8 @@ def sweep(
 
 @njit(cache=True, nogil=True)
 def search_base(
-    scan, a, b, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, progress,
-    budget,
+    scan, a, b, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best,
+    progress, budget,
 ):  # fmt: skip
     """Go through all pairs of walls that fit the base of scan segments `a`, which slides, and `b`.
 
@@ -308,8 +320,8 @@ def search_base(
         wa = anchor_list[progress[1]]
         progress[1] += 1
         spent += sweep(
-            scan, a, b, wa, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches, sums,
-            information, covariance, pose,
+            scan, a, b, wa, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches,
+            sums, information, covariance, pose,
         )  # fmt: skip
         if spent > budget and progress[1] < n_anchors:
             return spent
@@ -339,7 +351,7 @@ def search_slides(
         half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
         low = walls[w, 3] + half
         high = walls[w, 4] - half
-        steps = min(64, max(1, int(math.ceil((high - low) / spacing))))
+        steps = min(64, max(1, math.ceil((high - low) / spacing)))
         theta = walls[w, 5] - scan[a, 5]
         c = math.cos(theta)
         s = math.sin(theta)

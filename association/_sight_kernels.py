@@ -36,8 +36,8 @@ def first_hit(x, y, dx, dy, limit, walls, starts, items, shape):
                 return limit, -1
             at = max(at, edge / d * cell)
     at += 1e-9 if at > 0.0 else 0.0
-    column = int(math.floor(fx + at / cell * dx))
-    row = int(math.floor(fy + at / cell * dy))
+    column = math.floor(fx + at / cell * dx)
+    row = math.floor(fy + at / cell * dy)
     step_x = 1 if dx > 0.0 else -1
     step_y = 1 if dy > 0.0 else -1
     pace_x = cell / max(abs(dx), 1e-12)
@@ -85,7 +85,7 @@ def count_blockers(scan, matches, viewpoint, pose, walls, starts, items, shape, 
     y = s * viewpoint[0] + c * viewpoint[1] + pose[2]
     for i in range(len(scan)):
         length = scan[i, 4]
-        rays = min(MAX_RAYS, max(1, int(math.ceil(length / RAY_SPACING))))
+        rays = min(MAX_RAYS, max(1, math.ceil(length / RAY_SPACING)))
         usable = max(0.0, length - 2.0 * END_MARGIN)
         for k in range(rays):
             along = ((k + 0.5) / rays - 0.5) * usable
@@ -122,7 +122,20 @@ def sight_penalty(to_matched, to_clutter):
 
 @njit(cache=True, nogil=True)
 def rank(
-    scan, poses, walls, starts, items, shape, gates, viewpoint, sighted, scores, covariances, shares, reliabilities, matches
+    scan,
+    poses,
+    walls,
+    starts,
+    items,
+    shape,
+    gates,
+    viewpoint,
+    sighted,
+    scores,
+    covariances,
+    shares,
+    reliabilities,
+    matches,
 ):
     """Refine the candidate poses (k, 3) in place and score them with the lines of sight.
 
@@ -155,6 +168,16 @@ def rank(
         shares[k] = found / length
         if sighted:
             count_blockers(
-                scan, matches[k], viewpoint, poses[k], walls, starts, items, shape, SIGHT_TOLERANCE, to_matched, to_clutter
+                scan,
+                matches[k],
+                viewpoint,
+                poses[k],
+                walls,
+                starts,
+                items,
+                shape,
+                SIGHT_TOLERANCE,
+                to_matched,
+                to_clutter,
             )
             scores[k] -= sight_penalty(to_matched, to_clutter)

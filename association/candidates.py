@@ -99,9 +99,7 @@ def find_candidates(
     found, count, best = np.zeros((KEPT, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64), np.zeros(BEST_SIZE)
     rows = scan.rows
     n = min(len(rows), BASE_SEGMENTS)
-    pairs, merits = plan_bases(
-        rows, n, walls.by_direction, walls.bin_starts, walls.longest, walls.summed, index.area
-    )
+    pairs, merits = plan_bases(rows, n, walls.by_direction, walls.bin_starts, walls.longest, walls.summed, index.area)
     progress = np.array([0, 0, 0, 0, -1])
     uses, residual, bound = np.zeros(n), rows[:, 12].copy(), np.array([rows[:, 12].sum()])
     inliers = _sampled_inliers()

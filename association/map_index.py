@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,7 @@ class Grid(NamedTuple):
     items: NDArray[np.int32]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MapIndex:
     """What is computed once per map; immutable, shared between threads.
 
@@ -76,6 +77,8 @@ class MapIndex:
         Centre of the map, metres in the map frame; the index works relative to it, so that maps far out lose nothing.
     local : Segments
         The segments relative to `origin`.
+    directed : int
+        Number of segments as sent; piece i stands for segment ``i % directed``.
     wall_of_piece : (n,) the wall that each segment is part of
     pieces, piece_starts : wall w consists of segments ``pieces[piece_starts[w]:piece_starts[w + 1]]``
     walls : Walls
@@ -86,6 +89,7 @@ class MapIndex:
     sigma: float
     origin: Floats
     local: Segments
+    directed: int
     wall_of_piece: NDArray[np.int32]
     pieces: NDArray[np.int32]
     piece_starts: NDArray[np.int64]
@@ -116,12 +120,21 @@ class MapIndex:
         low, high = corners.min(axis=0), corners.max(axis=0)
         if (high - low).max() > MAX_EXTENT:
             raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="map.segments")
-        origin = np.round(0.5 * (low + high))
+        return cls._of(segments, sigma, np.round(0.5 * (low + high)), len(segments))
+
+    @classmethod
+    def _of(cls, segments: Segments, sigma: float, origin: Floats, directed: int) -> MapIndex:
         local = segments.shifted(-origin)
         walls, wall_of_piece = _merge(local)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
-        return cls(segments, sigma, origin, local, wall_of_piece, order, starts, walls, _grid(walls))
+        return cls(segments, sigma, origin, local, directed, wall_of_piece, order, starts, walls, _grid(walls))
+
+    @cached_property
+    def undirected(self) -> MapIndex:
+        """The same map with every segment in both directions, for scans whose directions mean nothing."""
+        both = np.concatenate([self.segments.endpoints, self.segments.endpoints[:, [2, 3, 0, 1]]])
+        return MapIndex._of(Segments.from_array(both), self.sigma, self.origin, self.directed)
 
     @property
     def area(self) -> float:
@@ -131,7 +144,8 @@ class MapIndex:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        arrays = [self.wall_of_piece, self.pieces, self.piece_starts, *self.walls, *self.grid]
+        walls, grid = self.walls, self.grid
+        arrays: list[NDArray[Any]] = [self.wall_of_piece, self.pieces, self.piece_starts, *walls, *grid]
         geometry = 2 * 11 * 8 * len(self.segments)
         return geometry + sum(a.nbytes for a in arrays)
 

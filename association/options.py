@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments, RigidTransform
+
+from ._match_kernels import MAX_ANGLE_GATE, REACH
+from .errors import InvalidSearchError
+
+Estimator = Literal["joint", "one_step"]
+Rotation = Literal["wahba", "mitsuta"]
+
+MAX_ALTERNATIVES = 50
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +73,19 @@ class SoftPrior:
     pose: RigidTransform
     covariance: Floats
 
+    def __post_init__(self) -> None:
+        c = np.asarray(self.covariance, dtype=np.float64)
+        good = c.shape == (3, 3) and bool(np.isfinite(c).all()) and bool(np.allclose(c, c.T, rtol=1e-6, atol=0.0))
+        if good:
+            scale = np.sqrt(np.abs(np.diag(c)))
+            good = bool(scale.min() >= 1e-6 and scale.max() <= 1e6)
+            good = good and bool(np.linalg.eigvalsh(c / np.outer(scale, scale)).min() > 1e-9)
+        if not good:
+            raise InvalidSearchError(
+                "expected a symmetric positive definite 3 x 3 matrix with deviations from 1e-6 to 1e6",
+                argument="prior.covariance",
+            )
+
 
 @dataclass(frozen=True, slots=True)
 class HardPrior:
@@ -72,6 +94,11 @@ class HardPrior:
     pose: RigidTransform
     radius: float
     angle: float
+
+    def __post_init__(self) -> None:
+        for name, value, high in (("radius", self.radius, 1e6), ("angle", self.angle, 4.0)):
+            if not 0.0 < value <= high:
+                raise InvalidSearchError(f"expected a number above 0 and up to {high:g}", argument=f"prior.{name}")
 
 
 Prior = SoftPrior | HardPrior
@@ -99,6 +126,13 @@ class AssociationOptions:
         Radians; gate on the angle between them. None: from the sigmas.
     min_overlap : float
         Share of a scan segment's length that must lie on the map, 0 to 1.
+    estimator, rotation : str
+        Of the final pose, as in `registration.RegistrationOptions`.
+
+    Raises
+    ------
+    InvalidSearchError
+        When a value is out of range.
     """
 
     max_alternatives: int = 5
@@ -109,6 +143,21 @@ class AssociationOptions:
     offset_tolerance: float | None = None
     angle_tolerance: float | None = None
     min_overlap: float = 0.5
+    estimator: Estimator = "joint"
+    rotation: Rotation = "wahba"
+
+    def __post_init__(self) -> None:
+        ranges: list[tuple[str, float | None, float, float]] = [
+            ("max_alternatives", self.max_alternatives, 0, MAX_ALTERNATIVES),
+            ("confidence", self.confidence, 0.5, 1.0),
+            ("seed", self.seed, 0, 2**63 - 1),
+            ("offset_tolerance", self.offset_tolerance, 1e-3, REACH),
+            ("angle_tolerance", self.angle_tolerance, 1e-3, MAX_ANGLE_GATE),
+            ("min_overlap", self.min_overlap, 0.0, 1.0),
+        ]
+        for name, value, low, high in ranges:
+            if value is not None and not low <= value <= high:
+                raise InvalidSearchError(f"expected a number from {low:g} to {high:g}", argument=f"options.{name}")
 
 
 class CancelledError(Exception):

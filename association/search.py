@@ -1,0 +1,154 @@
+"""The main path: from a scan and a map index to a pose with its verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from registration import RegistrationResult, RigidTransform
+
+from .accept import accept, correspondences, place_on_family, register_accepted
+from .candidates import find_candidates
+from .map_index import MapIndex
+from .options import AssociationOptions, Deadline, Prior, Scan
+from .ranking import Ranked, rank_candidates
+from .result import Alternative, AssociationDiagnostics, AssociationResult, AssociationWarning, SearchReport, Status
+from .scan_rows import gates, scan_rows
+from .sight import missing_walls
+from .significance import significance
+from .verdict import Verdict, judge
+
+DEFAULT_OPTIONS = AssociationOptions()
+
+
+def associate(
+    index: MapIndex,
+    scan: Scan,
+    prior: Prior | None = None,
+    options: AssociationOptions = DEFAULT_OPTIONS,
+    deadline: Deadline | None = None,
+) -> AssociationResult:
+    """Find where in a map a scan was taken, without knowing which segment is which.
+
+    Propose poses from bases of two scan segments, verify them, grow and shrink their consensus sets, judge.
+
+    Parameters
+    ----------
+    index : MapIndex
+    scan : Scan
+        In the sensor's frame.
+    prior : SoftPrior, HardPrior or None
+        In the map frame.
+    options : AssociationOptions
+    deadline : Deadline or None
+        When it passes, the best so far is the answer and ``search.complete`` is False.
+
+    Returns
+    -------
+    AssociationResult
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    if not options.oriented:
+        index = index.undirected
+    rows = scan_rows(scan.measured, index.sigma)
+    candidates = find_candidates(index, rows, prior, options, deadline or Deadline())
+    ranked = rank_candidates(index, scan, rows, candidates, (prior, options))
+    best = next((r for r in ranked if r.inside), None)
+    chance = 1.0 if best is None else significance(index, rows, gates(options), float(best.matches[:, 4].sum()))
+    accepted = None if best is None else accept(index, scan, rows, best)
+    registered = None if accepted is None else register_accepted(index, scan, accepted, options)
+    verdict = judge(ranked, chance, registered)
+    if best is None or accepted is None or registered is None or verdict.status is Status.NO_MATCH:
+        return _no_match(scan, ranked, verdict, candidates.report, (index, options))
+    matched = set(accepted.pairs[:, 0].tolist())
+    pose = registered.pose
+    if verdict.status is Status.DEGENERATE:
+        pose = place_on_family(index, rows, best, registered, None if prior is None else prior.pose)
+    usable = verdict.status is Status.OK and candidates.report.complete and not verdict.contradicted
+    return AssociationResult(
+        status=verdict.status,
+        usable=usable,
+        probability=verdict.probability,
+        pose=pose,
+        covariance=None if verdict.status is Status.DEGENERATE else registered.covariance,
+        unobservable=_weak_direction(registered) if verdict.status is Status.DEGENERATE else None,
+        correspondences=correspondences(index, accepted, registered),
+        unmatched_scan=tuple(i for i in range(len(scan.measured)) if i not in matched),
+        missing_map=missing_walls(index, scan, rows, best),
+        diagnostics=AssociationDiagnostics(
+            registration=registered.diagnostics,
+            inlier_fraction=best.share,
+            score=best.score,
+            runner_up=verdict.runner_up,
+            margin=verdict.margin,
+            significance=chance,
+        ),
+        alternatives=_alternatives([r for r in ranked if r is not best], index, options),
+        search=candidates.report,
+        warnings=_warnings(verdict, candidates.report),
+    )
+
+
+def _weak_direction(registered: RegistrationResult) -> tuple[float, float] | None:
+    """Return the direction that is not fixed, of the two opposite ones that with a positive first component."""
+    if registered.unobservable is not None or registered.covariance is None:
+        return registered.unobservable
+    axis = np.linalg.eigh(registered.covariance[:2, :2])[1][:, 1]
+    axis = axis if axis[0] > 0.0 or (axis[0] == 0.0 and axis[1] > 0.0) else -axis
+    return float(axis[0]), float(axis[1])
+
+
+def _alternatives(others: list[Ranked], index: MapIndex, options: AssociationOptions) -> tuple[Alternative, ...]:
+    x, y = index.origin
+    return tuple(
+        Alternative(
+            pose=RigidTransform(r.pose.x + float(x), r.pose.y + float(y), r.pose.theta),
+            covariance=r.covariance,
+            score=r.score,
+            reliability=r.reliability,
+            inlier_fraction=r.share,
+        )
+        for r in others[: options.max_alternatives]
+    )
+
+
+def _no_match(
+    scan: Scan,
+    ranked: list[Ranked],
+    verdict: Verdict,
+    report: SearchReport,
+    place: tuple[MapIndex, AssociationOptions],
+) -> AssociationResult:
+    return AssociationResult(
+        status=Status.NO_MATCH,
+        usable=False,
+        probability=0.0,
+        pose=None,
+        covariance=None,
+        unobservable=None,
+        correspondences=(),
+        unmatched_scan=tuple(range(len(scan.measured))),
+        missing_map=(),
+        diagnostics=None,
+        alternatives=_alternatives(ranked, *place),
+        search=report,
+        warnings=_warnings(verdict, report),
+    )
+
+
+def _warnings(verdict: Verdict, report: SearchReport) -> tuple[AssociationWarning, ...]:
+    found = []
+    if verdict.contradicted:
+        found.append(
+            AssociationWarning("prior_contradicted", "A clearly better pose lies where the prior says it should not.")
+        )
+    if not report.complete:
+        found.append(
+            AssociationWarning(
+                "search_incomplete", "The deadline ended the search; a better pose may have been missed."
+            )
+        )
+    return tuple(found)

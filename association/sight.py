@@ -1,0 +1,27 @@
+"""Lines of sight at the answer: which map segments should have been seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._sight_kernels import BLOCKING_RAYS, SIGHT_TOLERANCE, count_blockers
+from .map_index import MapIndex
+from .options import Scan
+from .ranking import Ranked
+from .scan_rows import ScanRows
+
+
+def missing_walls(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> tuple[int, ...]:
+    """List the map segments of walls that rays to the consensus set pass through; none without a viewpoint."""
+    if scan.viewpoint is None:
+        return ()
+    m = len(index.walls.rows)
+    to_matched, to_clutter = np.zeros(m, dtype=np.int64), np.zeros(m, dtype=np.int64)
+    pose = np.array([best.pose.theta, best.pose.x, best.pose.y])
+    count_blockers(
+        rows.rows, best.matches, np.array(scan.viewpoint), pose, index.walls.rows, index.grid.starts, index.grid.items,
+        index.grid.shape, SIGHT_TOLERANCE, to_matched, to_clutter,
+    )  # fmt: skip
+    walls = np.nonzero(to_matched >= BLOCKING_RAYS / 2)[0]
+    pieces = [index.pieces[index.piece_starts[w] : index.piece_starts[w + 1]] for w in walls]
+    return tuple(sorted({int(p) % index.directed for group in pieces for p in group}))
