@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ._kernels import BREAK_PENALTY, MISSING_STEPS, SUMS, sums_cost
+from ._kernels import BREAK_PENALTY, SUMS, sums_cost
 
 LINE = 10
 NX, NY, P, MEAN, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END = range(LINE)
@@ -31,9 +31,13 @@ WIDENING = 3.0
 # Cosine of incidence below which a ray says too little of where it meets the line.
 LEAST_COSINE = 0.03
 
-# Points that may lie between two pieces of one line, and metres that a line is extended over at a time.
-SKIPPED = 3
+# Points and steps between rays that may lie between two pieces of one line, and metres that it may be extended over.
+SKIPPED = 4
+SKIPPED_STEPS = 6.5
 LONGEST_STEP = 1.5
+
+# Sine of the angle between two lines above which they are not tried for being one.
+NEAR_PARALLEL = 0.2
 
 
 @njit(cache=True, nogil=True)
@@ -57,11 +61,8 @@ def bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance,
         if count > 0 and a - bounds[count - 1, 1] <= SKIPPED and max(b - a, totals[count - 1, 0]) >= min_points:
             z = bounds[count - 1, 1] - 1
             joint[:] = totals[count - 1] + own
-            step = math.hypot(x[a] - x[z], y[a] - y[z])
-            turn = math.atan2(abs(ux[z] * uy[a] - uy[z] * ux[a]), ux[z] * ux[a] + uy[z] * uy[a])
-            near = step <= longest and turn <= MISSING_STEPS * increment + 1e-9
             growth = math.inf
-            if near:
+            if adjoin(x, y, ux, uy, z, a, increment, longest):
                 apart = sums_cost(totals[count - 1], variance, floor) + sums_cost(own, variance, floor)
                 growth = sums_cost(joint, variance, floor) - apart
             if growth < BREAK_PENALTY and not seen_through(joint, z + 1, a, x, y, ux, uy, variance, floor):
@@ -73,6 +74,52 @@ def bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance,
         totals[count] = own
         count += 1
     return bounds[:count].copy(), totals[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def adjoin(x, y, ux, uy, z, a, increment, longest):
+    """Tell whether one wall may reach from point z to point a."""
+    turn = math.atan2(abs(ux[z] * uy[a] - uy[z] * ux[a]), ux[z] * ux[a] + uy[z] * uy[a])
+    near = math.hypot(x[a] - x[z], y[a] - y[z]) <= longest
+    return near and a - z - 1 <= SKIPPED and turn <= SKIPPED_STEPS * increment + 1e-9
+
+
+@njit(cache=True, nogil=True)
+def rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor):
+    """Make one of neighbouring lines, in place, that their points do not tell apart by their full likelihood.
+
+    The running sums take the noise for the same all along a piece and sometimes break a wall for it. Returns how many
+    lines are left.
+    """
+    own = np.empty(len(x), dtype=np.bool_)
+    joint = np.empty(LINE)
+    count = 0
+    for k in range(len(lines)):
+        lines[count] = lines[k]
+        spans[count] = spans[k]
+        count += 1
+        if count < 2:
+            continue
+        one = lines[count - 2]
+        other = lines[count - 1]
+        sine = one[NX] * other[NY] - one[NY] * other[NX]
+        cosine = one[NX] * other[NX] + one[NY] * other[NY]
+        z = spans[count - 2, 1]
+        a = spans[count - 1, 0]
+        if abs(sine) > NEAR_PARALLEL or cosine < 0.0 or not adjoin(x, y, ux, uy, z, a, increment, longest):
+            continue
+        joint[:] = one if one[WEIGHT] * one[SPREAD] > other[WEIGHT] * other[SPREAD] else other
+        first = spans[count - 2, 0]
+        last = spans[count - 1, 1]
+        for _ in range(3):
+            # Started from one part's line, whose gate may miss the other's far points at first.
+            fit_line(x, y, ux, uy, first, last + 1, variance, floor, joint, own)
+        everyone = joint[COUNT] >= one[COUNT] + other[COUNT] - 1.0
+        if everyone and joint[CHI2] - one[CHI2] - other[CHI2] < BREAK_PENALTY:
+            lines[count - 2] = joint
+            spans[count - 2, 1] = last
+            count -= 1
+    return count
 
 
 @njit(cache=True, nogil=True)

@@ -28,6 +28,7 @@ from ._fit_kernels import (
     bridge,
     fit_line,
     line_of,
+    rejoin,
 )
 from ._kernels import BREAK_REACH, MISSING_STEPS, find_gaps, merge, running_sums, settle_breaks, split
 
@@ -64,7 +65,7 @@ def trace(x, y, ux, uy, increment, closed, sigma, floor, default_gap, max_gap, m
     bounds, totals = bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance, floor)
     lines, spans = fit_all(x, y, ux, uy, bounds, totals, variance, floor, min_points, increment, longest)
     keep = 0
-    for k in range(len(lines)):
+    for k in range(rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor)):
         if acceptable(lines[k], increment > 0.0, min_points, min_length):
             lines[keep] = lines[k]
             spans[keep] = spans[k]

@@ -105,7 +105,7 @@ def vectorize(
     Raises
     ------
     InvalidScanError
-        When points are not finite numbers of shape (m, 2) within 10 km of each other.
+        When points are not finite numbers of shape (m, 2), or farther than 10 km from the first or from the viewpoint.
     """
     options = options or VectorizationOptions()
     if isinstance(scan, LaserScan):
@@ -113,7 +113,7 @@ def vectorize(
     points = _checked_points(scan)
     if viewpoint is None:
         return _from_bare_points(points, options)
-    return _from_viewed_points(points, np.asarray(viewpoint, dtype=np.float64), options)
+    return _from_viewed_points(points, _checked_viewpoint(viewpoint, points), options)
 
 
 def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization:
@@ -190,6 +190,15 @@ def _checked_points(points: ArrayLike) -> Floats:
             f"expected finite numbers within {MAX_RANGE:g} m of the first", argument="points", index=int(np.argmax(bad))
         )
     return values
+
+
+def _checked_viewpoint(viewpoint: tuple[float, float], points: Floats) -> Floats:
+    place = np.asarray(viewpoint, dtype=np.float64)
+    if place.shape != (2,) or not np.isfinite(place).all():
+        raise InvalidScanError(f"expected two finite numbers, got {viewpoint!r}", argument="viewpoint")
+    if (np.abs(points - place) > MAX_RANGE).any():
+        raise InvalidScanError(f"expected within {MAX_RANGE:g} m of all points", argument="viewpoint")
+    return place
 
 
 def _estimated(noise: float, ranges: Floats) -> float:

@@ -1,0 +1,115 @@
+"""Slow, obviously right twins of the kernels in ``vectorization/``."""
+
+import itertools
+import math
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from vectorization._kernels import BREAK_PENALTY, BREAK_REACH, GRAZING, MISSING_STEPS
+
+
+def stretch_cost(points, rays, variance, floor):
+    """Chi-square of the total least squares line through points, by the singular values."""
+    n = len(points)
+    if n < 3:
+        return 0.0
+    _, singular, basis = np.linalg.svd(points - points.mean(axis=0))
+    normal = basis[1]
+    cosines = np.where((rays == 0).all(axis=1), 1.0, rays @ normal)
+    return singular[1] ** 2 / np.mean(variance * cosines**2 + floor)
+
+
+def find_gaps(points, rays, increment, sigma, default_gap, max_gap):
+    starts = [0] if len(points) else []
+    for i in range(1, len(points)):
+        limit = default_gap
+        if increment > 0:
+            step = math.acos(min(1.0, max(-1.0, rays[i - 1] @ rays[i])))
+            nearer = min(np.linalg.norm(points[i - 1]), np.linalg.norm(points[i]))
+            limit = nearer * math.sin(step) / math.sin(max(GRAZING - step, GRAZING / 2)) + 4 * sigma
+            if step > MISSING_STEPS * increment:
+                limit = 0.0
+        if np.linalg.norm(points[i] - points[i - 1]) > min(limit, max_gap):
+            starts.append(i)
+    return starts
+
+
+def farthest_point(points, rays, variance, floor):
+    along = points[-1] - points[0]
+    along = along / np.linalg.norm(along)
+    normal = np.array([-along[1], along[0]])
+    cosines = np.where((rays == 0).all(axis=1), 1.0, rays @ normal)
+    squares = ((points - points[0]) @ normal) ** 2 / (variance * cosines**2 + floor)
+    k = int(np.argmax(squares[1:-1])) + 1
+    return k, squares[k]
+
+
+def merge(pieces, points, rays, gaps, variance, floor):
+    pieces = [tuple(p) for p in pieces]
+
+    def cost(a, b):
+        return stretch_cost(points[a:b], rays[a:b], variance, floor)
+
+    while True:
+        joints = [
+            (cost(a, d) - cost(a, b) - cost(c, d), k)
+            for k, ((a, b), (c, d)) in enumerate(itertools.pairwise(pieces))
+            if c not in gaps
+        ]
+        if not joints or min(joints)[0] >= BREAK_PENALTY:
+            return pieces
+        k = min(joints)[1]
+        pieces[k : k + 2] = [(pieces[k][0], pieces[k + 1][1])]
+
+
+def settle_breaks(pieces, points, rays, gaps, variance, floor):
+    pieces = [list(p) for p in pieces]
+    for one, other in itertools.pairwise(pieces):
+        a, b, c = one[0], one[1], other[1]
+        if b in gaps or b - a < 2 or c - b < 2:
+            continue
+        costs = {
+            k: stretch_cost(points[a:k], rays[a:k], variance, floor)
+            + stretch_cost(points[k:c], rays[k:c], variance, floor)
+            for k in range(max(a + 2, b - BREAK_REACH), min(c - 2, b + BREAK_REACH) + 1)
+        }
+        one[1] = other[0] = min(costs, key=costs.get)
+    return [tuple(p) for p in pieces]
+
+
+def fit_line(ranges, rays, normal_angle, distance):
+    """Maximum likelihood line under range noise alone: normal's angle and distance, information times sigma^2."""
+    solution = least_squares(
+        lambda v: ranges - v[1] / (rays @ [np.cos(v[0]), np.sin(v[0])]),
+        [normal_angle, distance],
+        xtol=1e-15,
+        ftol=1e-15,
+    )
+    return solution.x, solution.jac.T @ solution.jac
+
+
+def ray_noise(ranges, angles, increment, trusted, quantile):
+    z = []
+    for i in range(1, len(ranges) - 1):
+        (ra, rb, rc), (a, b, c) = ranges[i - 1 : i + 2], angles[i - 1 : i + 2]
+        if max(b - a, c - b) < 1.6 * increment:
+            coefficients = np.array([np.sin(c - b) / ra, -np.sin(c - a) / rb, np.sin(b - a) / rc])
+            z.append(abs(coefficients.sum()) / np.linalg.norm(coefficients / [ra, rb, rc]))
+    return np.sort(z)[int(trusted * len(z))] / quantile
+
+
+def window_noise(points, window, median):
+    squares = []
+    for a in range(len(points) - window + 1):
+        p = points[a : a + window]
+        squares.append(np.linalg.svd(p - p.mean(axis=0))[1][1] ** 2 / (window - 2))
+    return math.sqrt(np.sort(squares)[len(squares) // 2] / median)
+
+
+def gather(cleaned, angles, backward, closed):
+    order = np.arange(len(cleaned))[:: -1 if backward else 1]
+    order = order[np.isfinite(cleaned[order])]
+    if closed and len(order):
+        order = np.roll(order, -int(np.argmax(cleaned[order])))
+    return order, cleaned[order], np.stack([np.cos(angles[order]), np.sin(angles[order])])

@@ -1,0 +1,269 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from registration import RigidTransform, Segments
+from simulation import Scanner, l_room, oblique, scan, square_room
+from vectorization import LaserScan, VectorizationOptions, vectorize
+
+POSE = RigidTransform(0.7, -0.4, 0.3)
+SQUARE = square_room(6.0).segments
+
+
+def laser(seen):
+    s = seen.scanner
+    return LaserScan(s.angle_min, s.angle_increment, seen.ranges, s.range_min, s.range_max)
+
+
+def seen_from(pose, segments, scanner, seed=0):
+    return scan(segments, pose, scanner, np.random.default_rng(seed))
+
+
+def in_map(pose, found):
+    return pose.apply(found.measured.segments.endpoints.reshape(-1, 2)).reshape(-1, 4)
+
+
+def assert_same_walls(actual, expected, atol):
+    assert len(actual) == len(expected)
+    for wall in expected:
+        assert np.abs(actual - wall).max(axis=1).min() <= atol
+
+
+@pytest.mark.parametrize("pose", [RigidTransform(0, 0, 0), POSE, RigidTransform(-2, 2.4, 3.0)])
+@pytest.mark.parametrize("world", [square_room(6.0), l_room()], ids=["square", "l"])
+def test_a_room_without_noise_gives_exactly_its_walls(world, pose):
+    pose = RigidTransform(world.poses[0].x + 0.3 * pose.x, world.poses[0].y + 0.3 * pose.y, pose.theta)
+    found = vectorize(laser(seen_from(pose, world.segments, Scanner(sigma=0.0))))
+    assert_same_walls(in_map(pose, found), world.segments.endpoints, 1e-9)
+    np.testing.assert_allclose(found.rms, 0.0, atol=1e-9)
+
+
+def test_a_wall_alone_has_the_numbers_of_its_closed_form():
+    # Five beams on the wall x = 2, one step of 0.1 rad apart.
+    a = 0.1 * np.arange(-2, 3)
+    found = vectorize(LaserScan(-0.2, 0.1, 2 / np.cos(a)), VectorizationOptions(sigma=0.01))
+    measured = found.measured
+    y = 2 * np.tan(a)
+    np.testing.assert_allclose(measured.segments.endpoints, [[2, y[0], 2, y[-1]]], atol=1e-12)
+    # Noise along the ray, and 3 mm of the wall's own, straight through the wall.
+    weights = 1 / ((0.01 * np.cos(a)) ** 2 + 0.003**2)
+    assert measured.points.tolist() == [5]
+    assert measured.sigma[0] == pytest.approx(np.sqrt(5 / weights.sum()))
+    np.testing.assert_allclose(measured.centroids, [[2, 0]], atol=1e-12)
+    assert measured.spreads[0] == pytest.approx(np.sum(weights * y**2) / np.sum(weights))
+    assert found.beams.tolist() == [[0, 4]]
+    assert found.sigma == 0.01
+
+
+def test_segments_have_the_sensor_on_their_left():
+    world = oblique(0.02)
+    found = vectorize(laser(seen_from(world.poses[3], world.segments, Scanner(sigma=0.01))))
+    assert len(found.measured) >= 8
+    assert (found.measured.segments.offsets < 0).all()
+
+
+def test_a_clockwise_scan_gives_the_same_segments_with_their_beams_counted_down():
+    scanner = Scanner(700, -2.5, 0.007, sigma=0.02)
+    seen = seen_from(POSE, SQUARE, scanner)
+    one = vectorize(laser(seen))
+    other = vectorize(LaserScan(seen.angles[-1], -0.007, seen.ranges[::-1], 0.0, 20.0))
+    np.testing.assert_allclose(other.measured.segments.endpoints, one.measured.segments.endpoints, atol=1e-9)
+    np.testing.assert_array_equal(other.beams, 699 - one.beams)
+    assert (other.beams[:, 0] > other.beams[:, 1]).all()
+
+
+@settings(deadline=None, max_examples=15)
+@given(start=st.floats(-3, 3), steps=st.integers(0, 719))
+def test_where_the_angles_start_turns_the_segments_and_nothing_else(start, steps):
+    step = math.tau / 720
+    seen = seen_from(POSE, SQUARE, Scanner(720, -math.pi, step, sigma=0.02))
+    one = vectorize(laser(seen)).measured
+    other = vectorize(LaserScan(start, step, np.roll(seen.ranges, steps), 0.0, 20.0)).measured
+    turn = RigidTransform(0, 0, start + step * steps + math.pi)
+    turned = turn.apply(one.segments.endpoints.reshape(-1, 2)).reshape(-1, 4)
+    assert_same_walls(other.segments.endpoints, turned, 1e-6)
+    assert np.sort(other.points).tolist() == np.sort(one.points).tolist()
+
+
+def test_a_door_parts_a_wall():
+    walls = Segments.from_array([[3, -2, 3, -0.4], [3, 0.4, 3, 2], [6, -3, 6, 3]])
+    found = vectorize(laser(seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(1.1, 400, sigma=0.01))))
+    ends = found.measured.segments.endpoints
+    near = ends[ends[:, 0] < 4]
+    assert len(ends) == 3
+    assert len(near) == 2
+    np.testing.assert_allclose(near[0, 3], -0.4, atol=0.02)
+    np.testing.assert_allclose(near[1, 1], 0.4, atol=0.02)
+
+
+def test_a_thin_post_does_not_part_a_wall():
+    walls = Segments.from_array([[3, -2, 3, 2], [1.5, -0.004, 1.5, 0.004]])
+    seen = seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(1.0, 401, sigma=0.01))
+    assert (seen.hits == 1).any()
+    found = vectorize(laser(seen))
+    assert len(found.measured) == 1
+    assert found.measured.segments.lengths[0] == pytest.approx(6 * math.tan(0.5), abs=0.05)
+    assert found.measured.points[0] == pytest.approx(401 - np.sum(seen.hits == 1), abs=1)
+
+
+def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does():
+    ranges = 2 / np.cos(np.arange(-30, 31) * 0.01)
+    ranges[[10, 40]] = np.nan, np.inf
+    scan_ = LaserScan(-0.3, 0.01, ranges)
+    assert len(vectorize(scan_).measured) == 1
+    assert vectorize(scan_).measured.points[0] == 59
+    parted = vectorize(scan_, VectorizationOptions(max_gap=0.03))
+    assert parted.beams.tolist() == [[0, 9], [11, 39], [41, 60]]
+
+
+def test_corners_are_cut_where_the_walls_meet():
+    world = oblique(0.02)
+    pose = world.poses[4]
+    found = vectorize(laser(seen_from(pose, world.segments, Scanner(sigma=0.01))))
+    ends = in_map(pose, found).reshape(-1, 2)
+    corners = [
+        corner for corner in world.segments.endpoints[:15, :2] if np.sum(np.hypot(*(ends - corner).T) < 0.02) == 2
+    ]
+    assert len(corners) >= 8
+    joined = found.measured.segments.endpoints
+    same = np.abs(joined[:-1, 2:] - joined[1:, :2]).max(axis=1) < 1e-9
+    assert same.sum() >= 8
+
+
+def test_a_bend_too_slight_for_any_one_point_is_found_by_many():
+    # 3 degrees; 4 cm off the chord in the middle at 2 cm of noise.
+    walls = Segments.from_array([[3, -1.5, 3, 0], [3, 0, 3 - 1.5 * math.sin(0.06), 1.5 * math.cos(0.06)]])
+    found = vectorize(laser(seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(0.9, 540))))
+    assert len(found.measured) == 2
+    np.testing.assert_allclose(found.measured.segments.endpoints[0, 2:], [3, 0], atol=0.3)
+
+
+@pytest.mark.parametrize("quantum", [0.01, 0.05])
+def test_quantised_ranges_neither_split_walls_nor_promise_too_much(quantum):
+    scanner = Scanner(360, -math.pi, math.tau / 360, sigma=0.003, quantum=quantum)
+    for seed in range(5):
+        found = vectorize(laser(seen_from(POSE, SQUARE, scanner, seed)))
+        assert len(found.measured) == 4
+        assert found.sigma >= quantum / math.sqrt(12)
+        assert_same_walls(in_map(POSE, found), SQUARE.endpoints, 2 * quantum)
+
+
+def test_sigma_is_estimated_from_the_scan():
+    for sigma in (0.005, 0.02, 0.05):
+        estimates = [vectorize(laser(seen_from(POSE, SQUARE, Scanner(sigma=sigma), k))).sigma for k in range(10)]
+        assert np.mean(estimates) == pytest.approx(sigma, rel=0.1)
+        assert vectorize(laser(seen_from(POSE, SQUARE, Scanner(sigma=sigma)))).measured.sigma.max() < 1.2 * sigma
+
+
+def test_what_a_segment_claims_is_what_it_is_off_by():
+    """Offset and angle against the claimed variance: chi-square with two degrees of freedom, mean 2."""
+    pose = RigidTransform(-1.9, 1.2, 0.3)
+    offsets, angles = [], []
+    for seed in range(150):
+        seen = seen_from(pose, SQUARE, Scanner(720, -3.0, math.tau / 720), seed)
+        m = vectorize(laser(seen), VectorizationOptions(sigma=0.02)).measured
+        assert len(m) == 4
+        d = RigidTransform(0, 0, pose.theta).apply(m.segments.directions)
+        k = np.argmax(d @ SQUARE.directions.T, axis=1)
+        information = m.points / m.sigma**2
+        off = np.sum(SQUARE.normals[k] * pose.apply(m.centroids), axis=1) - SQUARE.offsets[k]
+        turn = d[:, 0] * SQUARE.directions[k, 1] - d[:, 1] * SQUARE.directions[k, 0]
+        offsets.append(off * np.sqrt(information))
+        angles.append(turn * np.sqrt(information * m.spreads))
+    # 600 values each: 4 standard deviations of their mean square are 0.23.
+    assert np.mean(np.square(offsets)) == pytest.approx(1.0, abs=0.23)
+    assert np.mean(np.square(angles)) == pytest.approx(1.0, abs=0.23)
+    assert abs(np.mean(offsets)) < 4 / math.sqrt(600)
+
+
+def test_grazing_noise_counts_with_its_incidence():
+    found = vectorize(laser(seen_from(POSE, SQUARE, Scanner())), VectorizationOptions(sigma=0.02))
+    m = found.measured
+    for k in range(4):
+        a = LaserScan(-math.pi, math.tau / 1080, np.ones(1080)).angles[np.arange(*np.sort(found.beams[k]))]
+        if found.beams[k, 0] > found.beams[k, 1]:
+            continue
+        cosines = np.stack([np.cos(a), np.sin(a)], 1) @ m.segments.normals[k]
+        assert m.sigma[k] == pytest.approx(0.02 / np.sqrt(np.mean(1 / (cosines**2 + 0.0225))), rel=0.01)
+    assert m.sigma.max() < 0.0195
+
+
+def test_a_rough_wall_has_its_sigma_widened():
+    rng = np.random.default_rng(0)
+    a = np.linspace(-0.4, 0.4, 200)
+    rough = 2 / np.cos(a) + rng.normal(0, 0.02, 200)
+    found = vectorize(LaserScan(a[0], a[1] - a[0], rough), VectorizationOptions(sigma=0.012, min_points=20))
+    assert len(found.measured) >= 1
+    assert found.measured.sigma.max() > 0.0165
+
+
+@pytest.mark.parametrize("value", [math.inf, math.nan, 0.0])
+def test_a_scan_without_returns_has_no_segments(value):
+    found = vectorize(LaserScan(-1.0, 0.01, np.full(200, value), 0.1, 10.0))
+    assert len(found.measured) == 0
+    assert found.beams.shape == (0, 2)
+    assert found.rms.shape == (0,)
+    assert found.ranges.shape == found.angles.shape == (200,)
+    assert found.range_max == 10.0
+
+
+@pytest.mark.parametrize("ranges", [[], [1.0], [1.0, None, 1.0]])
+def test_a_scan_too_short_for_a_segment_has_none(ranges):
+    assert len(vectorize(LaserScan(0.0, 0.1, ranges)).measured) == 0
+
+
+def test_beams_are_handed_out_as_evidence():
+    found = vectorize(LaserScan(0.5, 0.1, [1.0, None, math.inf, 12.0, 0.01], 0.1, 10.0))
+    np.testing.assert_allclose(found.angles, [0.5, 0.6, 0.7, 0.8, 0.9])
+    np.testing.assert_array_equal(found.ranges, [1.0, np.nan, np.inf, np.inf, np.nan])
+
+
+def test_a_heap_of_points_is_no_wall():
+    rng = np.random.default_rng(1)
+    ranges = rng.uniform(2.0, 4.0, 300)
+    assert len(vectorize(LaserScan(-1.5, 0.01, ranges), VectorizationOptions(sigma=0.02)).measured) <= 2
+
+
+def test_short_walls_and_few_points_are_left_out_as_asked():
+    ranges = 2 / np.cos(np.arange(-10, 11) * 0.01)  # 0.40 m, 21 points
+    for options, expected in [
+        (VectorizationOptions(min_length=0.39), 1), (VectorizationOptions(min_length=0.42), 0),
+        (VectorizationOptions(min_points=21), 1), (VectorizationOptions(min_points=22), 0),
+    ]:  # fmt: skip
+        assert len(vectorize(LaserScan(-0.1, 0.01, ranges), options).measured) == expected
+
+
+def test_points_with_a_viewpoint_are_what_the_laser_saw():
+    scanner = Scanner(700, -2.5, 0.007, sigma=0.02)
+    seen = seen_from(POSE, SQUARE, scanner)
+    by_laser = vectorize(laser(seen)).measured.segments.endpoints
+    for points in (seen.points, seen.points[::-1]):
+        found = vectorize(points)
+        np.testing.assert_allclose(found.measured.segments.endpoints, by_laser, atol=1e-6)
+    moved = vectorize(POSE.apply(seen.points), viewpoint=(POSE.x, POSE.y))
+    expected = POSE.apply(by_laser.reshape(-1, 2)).reshape(-1, 4)
+    np.testing.assert_allclose(moved.measured.segments.endpoints, expected, atol=1e-6)
+
+
+def test_points_without_a_viewpoint_run_as_they_come():
+    seen = seen_from(POSE, SQUARE, Scanner(700, -2.5, 0.007, sigma=0.005))
+    forth = vectorize(seen.points, viewpoint=None)
+    back = vectorize(seen.points[::-1], viewpoint=None)
+    assert (forth.measured.segments.offsets < 0).all()
+    assert (back.measured.segments.offsets > 0).all()
+    assert len(forth.measured) == len(back.measured) == 4
+    walls = back.measured.segments.endpoints[::-1][:, [2, 3, 0, 1]]
+    np.testing.assert_allclose(forth.measured.segments.endpoints, walls, atol=0.02)
+    assert (forth.beams[:, 0] < forth.beams[:, 1]).all()
+
+
+def test_points_far_from_the_origin_lose_nothing():
+    seen = seen_from(POSE, SQUARE, Scanner(700, -2.5, 0.007, sigma=0.0))
+    far = np.array([4e5, 5e6])
+    for viewpoint in (None, (4e5, 5e6)):
+        near = vectorize(seen.points, viewpoint=viewpoint and (0.0, 0.0)).measured
+        moved = vectorize(seen.points + far, viewpoint=viewpoint).measured
+        np.testing.assert_allclose(moved.segments.endpoints - np.tile(far, 2), near.segments.endpoints, atol=1e-6)
