@@ -81,6 +81,8 @@ class SearchGate:
         self._executor.shutdown(wait=False, cancel_futures=True)
 
     async def _enter(self, deadline: Deadline, admitted: bool) -> None:
+        if deadline.passed:
+            raise too_late()
         if self.running < self.slots and not self._waiting:
             self.running += 1
             return

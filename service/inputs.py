@@ -66,6 +66,8 @@ def association_options_of(options: SearchOptions) -> AssociationOptions:
         offset_tolerance=options.offset_tolerance,
         angle_tolerance=options.angle_tolerance,
         min_overlap=options.min_overlap,
+        estimator=options.estimator,
+        rotation=options.rotation,
     )
 
 

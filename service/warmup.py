@@ -33,7 +33,7 @@ def warm_up() -> None:
     ):
         register(room, measured, pairs, 0.0, options)
     turn = np.linspace(-np.pi, np.pi, 360, endpoint=False)
-    ranges = _ranges(turn)
+    ranges = room_ranges(turn)
     seen = vectorize(LaserScan(-np.pi, turn[1] - turn[0], ranges, 0.1, 30.0))
     vectorize(np.stack([ranges * np.cos(turn), ranges * np.sin(turn)], axis=1))
     index = MapIndex.build(room, 0.0)
@@ -47,7 +47,7 @@ def warm_up() -> None:
         associate(index, scan, prior, how, Deadline())
 
 
-def _ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the distance from the origin to the room's walls along each angle, metres."""
     nearest = np.full(len(angles), np.inf)
     for x1, y1, x2, y2 in ROOM:

@@ -181,10 +181,9 @@ class MapStore:
             ).first()
         if row is None:
             raise unknown_map()
-        document = bytes(row.document)
-        if hashlib.sha256(document).hexdigest() != row.sha256:
+        if hashlib.sha256(row.document).hexdigest() != row.sha256:
             raise ProblemError("map_corrupt", "the stored map does not match its checksum; put it again")
-        return StoredMap(MapRecord(map_id, row.revision, row.sha256), document)
+        return StoredMap(MapRecord(map_id, row.revision, row.sha256), row.document)
 
     def list(self, limit: int, after: str) -> tuple[list[MapSummary], str | None]:
         """Return up to `limit` maps with an id beyond `after`, and where to go on."""

@@ -160,7 +160,7 @@ class SearchOptions(Strict):
     """How to search, and what to put into the answer."""
 
     max_alternatives: Annotated[int, Field(ge=0, le=100)] = 5
-    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9999
+    confidence: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9999
     exhaustive: bool = False
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(None, description="milliseconds")

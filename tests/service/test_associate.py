@@ -1,0 +1,165 @@
+"""POST /v1/associate, :batch and /v1/vectorize."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from service.schemas import examples
+from service.warmup import ROOM, room_ranges
+
+TURN = [-math.pi + math.tau * i / 720 for i in range(720)]
+
+
+def associated(client: httpx.Client, **parts: Any) -> dict[str, Any]:
+    response = client.post("/v1/associate", json={**examples.ASSOCIATE, **parts})
+    assert response.status_code == 200, response.text
+    answer: dict[str, Any] = response.json()
+    return answer
+
+
+def laser(**more: Any) -> dict[str, Any]:
+    # From (0, 0) in the room: what the scanner reads there, one beam without return.
+    ranges: list[float | None] = room_ranges(np.array(TURN)).tolist()
+    ranges[17] = None
+    return {"angle_min": TURN[0], "angle_increment": TURN[1] - TURN[0], "ranges": ranges, **more}
+
+
+def test_the_example_is_found(client: httpx.Client) -> None:
+    answer = associated(client, client_ref={"n": 1}, scan={**examples.ASSOCIATE["scan"], "stamp": [7, "s"]})
+    assert (answer["status"], answer["usable"]) == ("ok", True)
+    assert answer["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
+    assert answer["pose"]["y"] == pytest.approx(0.5, abs=1e-6)
+    assert answer["pose"]["theta"] == pytest.approx(math.pi / 2, abs=1e-6)
+    assert {(pair["scan"], pair["map"]) for pair in answer["correspondences"]} == {(i, i) for i in range(6)}
+    assert (answer["frame_id"], answer["child_frame_id"]) == ("map", "laser")
+    assert (answer["stamp"], answer["client_ref"], answer["map"]) == ([7, "s"], {"n": 1}, None)
+    assert answer["unmatched_scan"] == []
+    assert answer["segments"] is None
+    assert answer["search"]["complete"] is True
+    assert answer["timing_ms"].keys() == {"decode", "search", "total"}
+
+
+def test_ranges_are_found_and_give_their_segments(client: httpx.Client) -> None:
+    answer = associated(client, scan={"laser": laser(range_min=0.1, range_max=30.0), "sigma": None})
+    assert answer["status"] == "ok"
+    assert answer["pose"]["x"] == pytest.approx(0.0, abs=0.02)
+    assert answer["pose"]["theta"] == pytest.approx(0.0, abs=0.01)
+    assert len(answer["segments"]) >= len(ROOM)
+
+
+def test_points_are_found(client: httpx.Client) -> None:
+    points = [[r * math.cos(a), r * math.sin(a)] for r, a in zip(room_ranges(np.array(TURN)), TURN, strict=True)]
+    answer = associated(client, scan={"points": points})
+    assert answer["status"] == "ok"
+    assert answer["pose"]["y"] == pytest.approx(0.0, abs=0.02)
+
+
+def test_an_empty_scan_is_no_match(client: httpx.Client) -> None:
+    for scan in ({"segments": []}, {"points": []}, {"laser": {**laser(), "ranges": [None] * 10}}):
+        answer = associated(client, scan=scan)
+        assert (answer["status"], answer["pose"], answer["usable"]) == ("no_match", None, False)
+
+
+def test_only_what_is_asked_for_is_included(client: httpx.Client) -> None:
+    names = {"correspondences", "alternatives", "segments", "missing_map"}
+    assert names <= associated(client).keys()
+    assert not names & associated(client, options={"include": []}).keys()
+    assert names & associated(client, options={"include": ["missing_map"]}).keys() == {"missing_map"}
+
+
+def test_priors_of_both_kinds_are_taken(client: httpx.Client) -> None:
+    at = {"x": 1.0, "y": 0.5, "theta": 1.57}
+    for prior in ({**at, "covariance": [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]}, {**at, "radius": 1.0, "angle": 0.5}):
+        assert associated(client, prior=prior)["status"] == "ok"
+
+
+def test_the_paper_s_estimator_has_no_covariance(client: httpx.Client) -> None:
+    answer = associated(client, options={"estimator": "one_step", "rotation": "mitsuta"})
+    assert answer["covariance"] is None
+    assert answer["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_same_seed_gives_the_same_answer(client: httpx.Client) -> None:
+    first, second = (
+        {
+            name: value
+            for name, value in associated(client, options={"seed": 5}).items()
+            if name not in ("request_id", "timing_ms")
+        }
+        for _ in range(2)
+    )
+    assert first == second
+
+
+def test_a_deadline_that_has_passed_is_504(client: httpx.Client) -> None:
+    response = client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {"deadline_ms": 0}})
+    assert (response.status_code, response.json()["code"]) == (504, "deadline_exceeded")
+
+
+def test_a_bad_scan_in_a_batch_is_one_error_item(client: httpx.Client) -> None:
+    bad_prior = {"x": 0, "y": 0, "theta": 0, "radius": "far", "angle": 1}
+    body = {
+        "map": {"segments": examples.WALLS},
+        "scans": [{"segments": examples.SEEN}, {"segments": [[0, 0, 1, 0], [1, 2, 3]]}, {"segments": examples.SEEN}, 5],
+        "priors": [None, None, bad_prior, None],
+    }
+    response = client.post("/v1/associate:batch", json=body)
+    assert response.status_code == 200
+    results = response.json()["results"]
+    assert [(item["index"], item["status_code"]) for item in results] == [(0, 200), (1, 422), (2, 422), (3, 422)]
+    single = associated(client, options={})
+    assert results[0]["result"]["pose"] == single["pose"]
+    assert results[0]["result"]["correspondences"] == single["correspondences"]
+    pointers = [item["problem"]["errors"][0]["pointer"] for item in results[1:]]
+    assert pointers == ["/scans/1/segments/1", "/priors/2/radius", "/scans/3"]
+
+
+def test_a_batch_over_its_deadline_has_504_items(client: httpx.Client) -> None:
+    body = {**examples.BATCH, "options": {"deadline_ms": 0}}
+    assert client.post("/v1/associate:batch", json=body).status_code == 504
+
+
+def test_a_batch_of_a_map_that_is_none_fails_whole(client: httpx.Client) -> None:
+    response = client.post("/v1/associate:batch", json={**examples.BATCH, "map": {"map_id": "no-such"}})
+    assert (response.status_code, response.json()["code"]) == (404, "unknown_map")
+
+
+def test_vectorize_finds_the_corner(client: httpx.Client) -> None:
+    answer = client.post("/v1/vectorize", json=examples.VECTORIZE).json()
+    assert len(answer["segments"]) == 2
+    for name in ("points", "centroids", "spreads", "sigmas", "rms"):
+        assert len(answer[name]) == 2
+    # Counter-clockwise, free space on the left: up the wall at x = 2, then back along y = 2.
+    assert answer["segments"][0] == pytest.approx([2.0, 0.0, 2.0, 2.0], abs=0.05)
+    assert answer["segments"][1] == pytest.approx([2.0, 2.0, 0.1, 2.0], abs=0.05)
+
+
+def test_what_vectorize_gives_can_be_sent_back(client: httpx.Client) -> None:
+    found = client.post("/v1/vectorize", json={"laser": laser(range_max=30.0)}).json()
+    scan = {name: found[name] for name in ("segments", "points", "centroids", "spreads")}
+    answer = associated(client, scan={**scan, "sigma": found["sigmas"]})
+    assert answer["status"] == "ok"
+    assert answer["pose"]["x"] == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({}, ""),
+        ({"laser": laser(), "points": [[0, 1]]}, ""),
+        ({"laser": laser(angle_increment=0.0)}, "/laser/angle_increment"),
+        ({"laser": laser(range_min=5.0, range_max=4.0)}, "/laser/range_max"),
+        ({"laser": laser(ranges=[1.0, "2"])}, "/laser/ranges/1"),
+        ({"points": [[0.0, 0.0], [1e8, 0.0]]}, "/points/1"),
+        ({"points": [], "options": {"min_points": 2}}, "/options/min_points"),
+    ],
+)
+def test_scans_that_are_none(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
+    response = client.post("/v1/vectorize", json=body)
+    assert response.status_code == 422
+    assert response.json()["errors"][0]["pointer"] == pointer

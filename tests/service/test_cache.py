@@ -1,0 +1,71 @@
+"""Indexed maps in memory."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from association import MapIndex
+from registration import Segments
+from service.finite import NotFiniteError, encode
+from service.maps import CachedMap, IndexCache
+from service.metrics import Metrics
+
+INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
+
+
+def a_map(size: int) -> CachedMap:
+    return CachedMap(INDEX, "map", size)
+
+
+def test_the_least_recently_used_goes_first() -> None:
+    cache = IndexCache(100, Metrics())
+    for name in "abc":
+        cache.get(name, lambda: a_map(30))
+    cache.get("a", lambda: pytest.fail("is there"))
+    cache.get("d", lambda: a_map(30))
+    assert (len(cache), cache.bytes) == (3, 90)
+    cache.get("a", lambda: pytest.fail("is there"))
+    built = []
+    cache.get("b", lambda: built.append("b") or a_map(30))
+    assert built == ["b"]
+
+
+def test_what_is_too_large_is_used_and_not_kept() -> None:
+    cache = IndexCache(10, Metrics())
+    assert cache.get("a", lambda: a_map(30)).bytes == 30
+    assert (len(cache), cache.bytes) == (0, 0)
+
+
+def test_callers_at_the_same_time_share_one_build() -> None:
+    cache = IndexCache(100, Metrics())
+    release, builds = threading.Event(), []
+
+    def build() -> CachedMap:
+        builds.append(1)
+        release.wait(10)
+        return a_map(1)
+
+    with ThreadPoolExecutor(4) as threads:
+        asked = [threads.submit(cache.get, "a", build) for _ in range(4)]
+        release.set()
+        answers = [one.result(10) for one in asked]
+    assert len(builds) == 1
+    assert all(answer is answers[0] for answer in answers)
+
+
+def test_a_failed_build_is_not_remembered() -> None:
+    cache = IndexCache(100, Metrics())
+    with pytest.raises(ZeroDivisionError):
+        cache.get("a", lambda: 1 // 0)  # type: ignore[arg-type, return-value]
+    assert cache.get("a", lambda: a_map(1)).bytes == 1
+
+
+@pytest.mark.parametrize("answer", [np.nan, {"a": [1.0, {"b": np.inf}]}, {"a": np.array([[1.0, -np.inf]])}, (np.nan,)])
+def test_nothing_that_is_not_finite_leaves(answer: object) -> None:
+    with pytest.raises(NotFiniteError):
+        encode(answer)
+    assert encode({"a": np.array([1.0]), "b": None}) == b'{"a":[1.0],"b":null}'

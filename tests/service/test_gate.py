@@ -1,0 +1,140 @@
+"""Who may search: slots, queue, deadlines, and those who leave."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import pytest
+
+from association import Deadline
+from service.gate import SearchGate
+from service.problems import ProblemError
+
+
+def soon() -> Deadline:
+    return Deadline(at=time.monotonic() + 30.0)
+
+
+async def until(condition: object) -> None:
+    assert callable(condition)
+    for _ in range(1000):
+        if condition():
+            return
+        await asyncio.sleep(0.005)
+    raise AssertionError("did not come about")
+
+
+def test_never_more_at_once_than_slots_and_the_rest_in_order() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(2, 10)
+        running, most, order = 0, 0, []
+        lock = threading.Lock()
+
+        def work(number: int) -> int:
+            nonlocal running, most
+            with lock:
+                running += 1
+                most = max(most, running)
+                order.append(number)
+            time.sleep(0.01)
+            with lock:
+                running -= 1
+            return number
+
+        answers = await asyncio.gather(*(gate.run(lambda n=n: work(n), soon()) for n in range(10)))
+        assert answers == list(range(10))
+        assert most == 2
+        assert order[2:] == sorted(order[2:])
+        assert (gate.running, gate.waiting) == (0, 0)
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_beyond_the_queue_is_overloaded() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 1)
+        release = threading.Event()
+        first = asyncio.ensure_future(gate.run(release.wait, soon()))
+        second = asyncio.ensure_future(gate.run(lambda: 2, soon()))
+        await until(lambda: gate.waiting == 1)
+        with pytest.raises(ProblemError) as caught:
+            gate.refuse_when_full()
+        assert caught.value.response("id").headers["retry-after"] == "1"
+        with pytest.raises(ProblemError) as caught:
+            await gate.run(lambda: 3, soon())
+        assert caught.value.code == "overloaded"
+        further = asyncio.ensure_future(gate.run(lambda: 4, soon(), admitted=True))
+        await asyncio.sleep(0)
+        release.set()
+        assert (await first, await second, await further) == (True, 2, 4)
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_deadline_passes_in_the_queue() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 1)
+        release = threading.Event()
+        first = asyncio.ensure_future(gate.run(release.wait, soon()))
+        await until(lambda: gate.running == 1)
+        with pytest.raises(ProblemError) as caught:
+            await gate.run(lambda: 2, Deadline(at=time.monotonic() + 0.02))
+        assert caught.value.code == "deadline_exceeded"
+        assert gate.waiting == 0
+        release.set()
+        await first
+        assert gate.running == 0
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_who_leaves_the_queue_frees_the_place_and_who_runs_keeps_the_slot() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 1)
+        release = threading.Event()
+        first = asyncio.ensure_future(gate.run(release.wait, soon()))
+        second = asyncio.ensure_future(gate.run(lambda: 2, soon()))
+        await until(lambda: gate.waiting == 1)
+        second.cancel()
+        await until(lambda: gate.waiting == 0)
+        first.cancel()
+        await asyncio.sleep(0.02)
+        assert gate.running == 1
+        release.set()
+        await until(lambda: gate.running == 0)
+        assert await gate.run(lambda: 3, soon()) == 3
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_failure_gives_the_slot_back() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 0)
+        with pytest.raises(ZeroDivisionError):
+            await gate.run(lambda: 1 // 0, soon())
+        assert await gate.run(lambda: 3, soon()) == 3
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_everything_that_runs_can_be_told_to_give_up() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 0)
+        deadline = soon()
+        release = threading.Event()
+        work = asyncio.ensure_future(gate.run(release.wait, deadline))
+        await until(lambda: gate.running == 1)
+        gate.cancel_all()
+        assert deadline.cancelled
+        release.set()
+        await work
+        gate.close()
+
+    asyncio.run(scenario())

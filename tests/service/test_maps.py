@@ -1,0 +1,160 @@
+"""Maps by id: revisions, conditions, damage, and that an acknowledged one is kept."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service.maps import MapStore, Preconditions
+from service.problems import ProblemError
+from service.schemas import examples
+
+BOX = (4, (0.0, 0.0, 1.0, 1.0))
+
+
+def test_a_map_comes_back_to_the_bit(client: httpx.Client) -> None:
+    document = {
+        "segments": [[0.1 + 0.2, 1e-7, 1e3 + 1 / 3, 2.0**-40], [-0.0, 1.0, 3.3, 4.4]],
+        "sigma": 0.1,
+        "frame_id": "Gebäude 7 \U0001f916",
+        "meta": {"floor": [3, None, True, "x"]},
+    }
+    put = client.put("/v1/maps/bits", json=document)
+    assert put.status_code == 201
+    assert put.json() == {"map_id": "bits", "revision": 1, "segments": 2, "bounds": [-0.0, 2.0**-40, 1e3 + 1 / 3, 4.4]}
+    got = client.get("/v1/maps/bits")
+    assert got.json() == document
+    assert str(got.json()["segments"][1][0]) == "-0.0"
+    client.delete("/v1/maps/bits")
+
+
+def test_revisions_and_conditions(client: httpx.Client) -> None:
+    url = "/v1/maps/conditions"
+    assert client.put(url, json=examples.MAP, headers={"if-match": '"1"'}).status_code == 412
+    assert client.put(url, json=examples.MAP, headers={"if-match": "*"}).status_code == 412
+    first = client.put(url, json=examples.MAP, headers={"if-none-match": "*"})
+    assert (first.status_code, first.headers["etag"], first.json()["revision"]) == (201, '"1"', 1)
+    assert first.json()["bounds"] == [-4.0, -3.0, 4.0, 3.0]
+    assert client.put(url, json=examples.MAP, headers={"if-none-match": "*"}).status_code == 412
+    assert client.put(url, json=examples.MAP, headers={"if-match": '"7", "8"'}).status_code == 412
+    assert client.put(url, json=examples.MAP, headers={"if-match": 'W/"1"'}).status_code == 412
+    second = client.put(url, json=examples.MAP, headers={"if-match": '"7", "1"'})
+    assert (second.status_code, second.headers["etag"]) == (200, '"2"')
+
+    unchanged = client.get(url, headers={"if-none-match": 'W/"2"'})
+    assert (unchanged.status_code, unchanged.content, unchanged.headers["etag"]) == (304, b"", '"2"')
+    assert client.get(url, headers={"if-none-match": '"1"'}).status_code == 200
+
+    assert client.delete(url, headers={"if-match": '"1"'}).json()["code"] == "revision_conflict"
+    gone = client.delete(url, headers={"if-match": '"2"'})
+    assert (gone.status_code, gone.content) == (204, b"")
+    assert client.delete(url).json()["code"] == "unknown_map"
+    assert client.get(url).json()["code"] == "unknown_map"
+    # A number is never used twice, so that an old tag cannot match a new map.
+    again = client.put(url, json=examples.MAP)
+    assert (again.status_code, again.headers["etag"]) == (201, '"3"')
+    client.delete(url)
+
+
+def test_a_listing_has_pages(client: httpx.Client) -> None:
+    names = ["b", "a", "B", "a.1", "a-1"]
+    for name in names:
+        client.put(f"/v1/maps/{name}", json=examples.MAP)
+    seen: list[str] = []
+    cursor: str | None = ""
+    while cursor is not None:
+        page = client.get("/v1/maps", params={"limit": 2, "cursor": cursor}).json()
+        assert len(page["maps"]) <= 2
+        seen += [item["map_id"] for item in page["maps"]]
+        cursor = page["next"]
+    assert seen == sorted(names)
+    for name in names:
+        assert client.delete(f"/v1/maps/{name}").status_code == 204
+    assert client.get("/v1/maps").json() == {"maps": [], "next": None}
+    assert client.get("/v1/maps", params={"limit": 0}).json()["code"] == "invalid_request"
+
+
+@pytest.mark.parametrize("name", ["a b", "x" * 129, "ä", "a:b", "%00"])
+def test_ids_have_a_form(client: httpx.Client, name: str) -> None:
+    response = client.put(f"/v1/maps/{name}", json=examples.MAP)
+    assert response.status_code == 422
+    assert response.json()["errors"][0]["pointer"] == "/path/map_id"
+
+
+def test_a_changed_map_is_searched_in_its_new_form(client: httpx.Client) -> None:
+    body = {"map": {"map_id": "changing"}, "scan": {"segments": examples.SEEN}}
+    client.put("/v1/maps/changing", json=examples.MAP)
+    assert client.post("/v1/associate", json=body).json()["map"] == {"map_id": "changing", "revision": 1}
+    client.put("/v1/maps/changing", json={"segments": examples.WALLS, "frame_id": "other"})
+    answer = client.post("/v1/associate", json=body).json()
+    assert answer["map"] == {"map_id": "changing", "revision": 2}
+    assert answer["frame_id"] == "other"
+    client.delete("/v1/maps/changing")
+    assert client.post("/v1/associate", json=body).json()["code"] == "unknown_map"
+
+
+def test_an_acknowledged_map_survives_a_kill(start_service: Callable[..., Any]) -> None:
+    first = start_service()
+    assert first.client.put("/v1/maps/kept", json=examples.MAP).status_code == 201
+    first.process.kill()
+    first.process.wait()
+    again = start_service(first.data_dir)
+    assert again.client.get("/v1/maps/kept").json() == examples.MAP
+
+
+def test_a_damaged_map_is_named_and_not_served(start_service: Callable[..., Any]) -> None:
+    running = start_service()
+    running.client.put("/v1/maps/damaged", json=examples.MAP)
+    running.client.put("/v1/maps/whole", json=examples.MAP)
+    with sqlite3.connect(running.data_dir / "maps.sqlite3") as database:
+        database.execute(
+            "UPDATE maps SET document = CAST(replace(document, '4', '5') AS BLOB) WHERE map_id = 'damaged'"
+        )
+    database.close()
+    assert running.client.get("/v1/maps/damaged").json()["code"] == "map_corrupt"
+    body = {"map": {"map_id": "damaged"}, "scan": {"segments": examples.SEEN}}
+    assert running.client.post("/v1/associate", json=body).status_code == 409
+    assert running.client.get("/v1/maps/whole").status_code == 200
+    assert running.client.put("/v1/maps/damaged", json=examples.MAP).status_code == 200
+    assert running.client.get("/v1/maps/damaged").json() == examples.MAP
+
+
+def test_a_full_store_leaves_what_was_there(tmp_path: Path) -> None:
+    store = MapStore(f"sqlite:///{tmp_path / 'maps.sqlite3'}")
+    store.open()
+    store.put("m", b"before", BOX, Preconditions())
+    with store._engine.connect() as connection:
+        connection.exec_driver_sql("PRAGMA max_page_count=8")
+    with pytest.raises(ProblemError) as caught:
+        store.put("m", b"x" * 1_000_000, BOX, Preconditions())
+    assert caught.value.code == "storage_full"
+    assert store.load("m").document == b"before"
+    store.close()
+
+
+def test_a_read_only_store_still_reads(tmp_path: Path) -> None:
+    path = tmp_path / "maps.sqlite3"
+    writable = MapStore(f"sqlite:///{path}")
+    writable.open()
+    writable.put("m", b"before", BOX, Preconditions())
+    writable.close()
+    store = MapStore(f"sqlite:///file:{path}?mode=ro&uri=true")
+    store.open()
+    with pytest.raises(ProblemError) as caught:
+        store.put("m", b"after", BOX, Preconditions())
+    assert caught.value.code == "read_only"
+    assert store.load("m").document == b"before"
+    store.close()
+
+
+def test_a_database_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "maps.sqlite3").write_bytes(b"this is no database at all" * 100)
+    store = MapStore(f"sqlite:///{tmp_path / 'maps.sqlite3'}")
+    with pytest.raises(ProblemError):
+        store.open()
+    store.close()

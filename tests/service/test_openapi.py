@@ -1,0 +1,96 @@
+"""The contract's own document."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from service.problems import CODES
+
+
+@pytest.fixture(scope="module")
+def document(service: Any) -> dict[str, Any]:
+    found: dict[str, Any] = httpx.get(service.url + "/openapi.json").json()
+    return found
+
+
+def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    for path, item in document["paths"].items():
+        for method, operation in item.items():
+            yield method.upper(), path, operation
+
+
+def test_every_route_is_in_it(document: dict[str, Any]) -> None:
+    assert {(method, path) for method, path, _ in operations(document)} == {
+        ("POST", "/v1/register"),
+        ("POST", "/v1/associate"),
+        ("POST", "/v1/associate:batch"),
+        ("POST", "/v1/vectorize"),
+        ("PUT", "/v1/maps/{map_id}"),
+        ("GET", "/v1/maps/{map_id}"),
+        ("DELETE", "/v1/maps/{map_id}"),
+        ("GET", "/v1/maps"),
+        ("GET", "/v1/limits"),
+        ("GET", "/version"),
+        ("GET", "/livez"),
+        ("GET", "/readyz"),
+        ("GET", "/metrics"),
+    }
+
+
+def test_every_error_is_a_problem_of_a_known_code(document: dict[str, Any]) -> None:
+    for method, path, operation in operations(document):
+        for status, response in operation["responses"].items():
+            if int(status) < 400:
+                continue
+            (media_type, content), *more = response["content"].items()
+            assert (media_type, more) == ("application/problem+json", []), (method, path, status)
+            assert content["schema"] == {"$ref": "#/components/schemas/Problem"}
+            for code, example in content["examples"].items():
+                assert CODES[code] == int(status) == example["value"]["status"]
+        if path.startswith("/v1/"):
+            assert {"401", "403", "500"} <= operation["responses"].keys()
+
+
+def test_every_reference_resolves(document: dict[str, Any]) -> None:
+    def references(value: Any) -> Iterator[str]:
+        if isinstance(value, dict):
+            if isinstance(value.get("$ref"), str):
+                yield value["$ref"]
+            for item in value.values():
+                yield from references(item)
+        elif isinstance(value, list):
+            for item in value:
+                yield from references(item)
+
+    found = set(references(document))
+    assert len(found) > 20
+    for reference in found:
+        place: Any = document
+        for name in reference.removeprefix("#/").split("/"):
+            place = place[name]
+
+
+def test_every_example_is_answered(document: dict[str, Any], client: httpx.Client) -> None:
+    tried = 0
+    for method, path, operation in operations(document):
+        content = operation.get("requestBody", {}).get("content", {})
+        for example in content.get("application/json", {}).get("examples", {}).values():
+            url = path.replace("{map_id}", "hq-3")
+            status = client.request(method, url, json=example["value"]).status_code
+            stored = example["value"].get("map", {}).get("map_id")
+            assert status in ((404,) if stored else (200, 201)), (path, status)
+            client.delete("/v1/maps/hq-3")
+            tried += 1
+    assert tried >= 6
+
+
+def test_quantities_have_units(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    assert "metres" in schemas["Laser"]["properties"]["ranges"]["description"]
+    assert "radians" in schemas["Laser"]["properties"]["angle_min"]["description"]
+    assert "m^2" in schemas["AssociateAnswer"]["properties"]["covariance"]["description"]
+    assert "metres" in schemas["InlineMap"]["properties"]["segments"]["description"]
