@@ -9,8 +9,9 @@ from ._match_kernels import refine
 
 RAY_SPACING = 0.25  # m, between the points of a segment that rays are sent to
 SIGHT_TOLERANCE = 0.2  # m; a wall this near before the end of a ray does not block it
-BLOCKED = 2.0  # nats, against a pose, for a wall that rays to the consensus set pass through
-BLOCKED_CLUTTER = 2.0  # nats, likewise for rays to clutter
+BLOCKED = 2.0  # nats a metre of wall, against a pose, where rays to the consensus set pass through the wall
+BLOCKED_CLUTTER = 2.0  # nats a metre, likewise for rays to clutter
+BLOCKING_LENGTH = 3.0  # m; beyond it a wall speaks no more
 BLOCKING_RAYS = 4.0  # that count fully
 MAX_RAYS = 12  # to one segment
 END_MARGIN = 0.06  # m; rays keep this far from the ends of a segment, where neighbours meet
@@ -105,18 +106,19 @@ def count_blockers(scan, matches, viewpoint, pose, walls, starts, items, shape, 
 
 
 @njit(cache=True, nogil=True)
-def sight_penalty(to_matched, to_clutter):
+def sight_penalty(to_matched, to_clutter, walls):
     """Return what the walls that should have blocked the view speak against a pose, nats, at least 0.
 
-    A wall counts once, however many rays pass: it may have been taken away. Rays to clutter prove less than rays to
-    the consensus set, yet many walls between the sensor and what it saw are unlikely at the right pose.
+    A wall counts once, however many rays pass, and by its length: short ones on a map made by a robot are often people
+    and carts that have gone since. Rays to clutter prove less than rays to the consensus set, yet many walls between
+    the sensor and what it saw are unlikely at the right pose.
     """
     total = 0.0
     for w in range(len(to_matched)):
-        if to_matched[w] > 0:
-            total += BLOCKED * min(1.0, to_matched[w] / BLOCKING_RAYS)
-        if to_clutter[w] > 0:
-            total += BLOCKED_CLUTTER * min(1.0, to_clutter[w] / BLOCKING_RAYS)
+        if to_matched[w] > 0 or to_clutter[w] > 0:
+            length = min(BLOCKING_LENGTH, walls[w, 4] - walls[w, 3])
+            total += BLOCKED * length * min(1.0, to_matched[w] / BLOCKING_RAYS)
+            total += BLOCKED_CLUTTER * length * min(1.0, to_clutter[w] / BLOCKING_RAYS)
     return total
 
 
@@ -180,4 +182,4 @@ def rank(
                 to_matched,
                 to_clutter,
             )
-            scores[k] -= sight_penalty(to_matched, to_clutter)
+            scores[k] -= sight_penalty(to_matched, to_clutter, walls)

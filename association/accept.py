@@ -106,7 +106,7 @@ def place_on_family(
         points = pose.apply(np.stack([seen[:, 2:4] - half, seen[:, 2:4] + half], axis=1))
         on_map, on_scan = ends @ u, points @ u
         shift = 0.5 * float(on_map.min() + on_map.max() - on_scan.min() - on_scan.max())
-    return RigidTransform(pose.x + shift * u[0], pose.y + shift * u[1], pose.theta)
+    return RigidTransform(pose.x + shift * float(u[0]), pose.y + shift * float(u[1]), pose.theta)
 
 
 def correspondences(index: MapIndex, accepted: Accepted, registered: RegistrationResult) -> tuple[Correspondence, ...]:

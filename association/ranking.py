@@ -38,6 +38,8 @@ class Ranked:
         Whether it lies within a hard prior's window; True without one.
     share : float
         Of the scan's length that is matched.
+    length : float
+        Of the matched segments together, metres.
     reliability : float
         Eq. (28).
     matches : (n, 5)
@@ -50,6 +52,7 @@ class Ranked:
     value: float
     inside: bool
     share: float
+    length: float
     reliability: float
     matches: Floats
 
@@ -79,9 +82,18 @@ def rank_candidates(
         inside = flat[0] != 2.0 or values[i] >= INSIDE / 2
         value = float(values[i] if values[i] < INSIDE / 2 else scores[i])
         ranked.append(
-            Ranked(pose, covariances[i], float(scores[i]), value, bool(inside), float(shares[i]),
-                   float(reliabilities[i]), matches[i])
-        )  # fmt: skip
+            Ranked(
+                pose=pose,
+                covariance=covariances[i],
+                score=float(scores[i]),
+                value=value,
+                inside=bool(inside),
+                share=float(shares[i]),
+                length=float(rows.rows[matches[i, :, 0] >= 0.0, 4].sum()),
+                reliability=float(reliabilities[i]),
+                matches=matches[i],
+            )
+        )
     return ranked
 
 

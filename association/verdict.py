@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration import RegistrationResult
 
@@ -13,17 +14,17 @@ from ._sight_kernels import BLOCKED
 from .ranking import Ranked
 from .result import Status
 
-# Logistic model of the chance that the first pose is right, from the calibration command in benchmarks/.
-INTERCEPT = -1.6
-PER_LEAD = 0.35  # nats of lead over the best other pose, up to MAX_LEAD
-PER_CROWD = 0.15  # log of the other poses' share in the evidence, tempered
-PER_SHARE = 2.4  # matched share of the scan's length
-PER_ROOT_COUNT = 0.4  # square root of the number of matched segments
-MAX_LEAD = 60.0
-TEMPERATURE = 4.0
-LEAST_CROWD = -12.0
+Floats = NDArray[np.float64]
 
-USABLE_PROBABILITY = 0.95
+# Chance that the first explanation or a twin of it is right: a logistic model of `features`. The coefficients are those
+# that `python -m benchmarks.calibration` fits.
+COEFFICIENTS = (-6.30, 0.182, -0.199, 11.34, 0.586, -0.871, -4.03)
+MAX_LEAD = 40.0  # nats
+CROWD_TEMPERATURE = 4.0  # nats
+LEAST_CROWD = -12.0
+TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as likely as one to e
+
+USABLE_PROBABILITY = 0.93
 CHANCE = 1e-2  # significance beyond which chance explains a scan as well
 CHANCE_SHARE = 0.5  # of the scan's length that then must be matched for an answer
 CONTRADICTION = 3.0 * BLOCKED  # nats by which a pose that the prior speaks against must be better to contradict it
@@ -76,14 +77,38 @@ def judge(ranked: list[Ranked], chance: float, registered: RegistrationResult | 
     return Verdict(status, probability, margin, runner_up, contradicted)
 
 
+def features(best: Ranked, others: list[Ranked]) -> Floats:
+    """Return what the probability depends on.
+
+    Returns
+    -------
+    (7,)
+        1; lead over the best other explanation, nats; minus the log of the others' tempered evidence; matched share of
+        the scan's length; square root of the number of matched segments; square root of their length, sqrt(m); standard
+        deviation of the position along its weakest direction, up to 1 m.
+    """
+    lead = best.value - others[0].value if others else best.value
+    crowd = math.log(_evidence(best, others, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
+    count = int((best.matches[:, 0] >= 0.0).sum())
+    deviation = math.sqrt(float(np.linalg.eigvalsh(best.covariance[:2, :2])[1]))
+    return np.array(
+        [1.0, min(lead, MAX_LEAD), -crowd, best.share, math.sqrt(count), math.sqrt(best.length), min(deviation, 1.0)]
+    )
+
+
+def twin_share(best: Ranked, others: list[Ranked]) -> float:
+    """Return the chance of the best explanation among those that are about as good, above 0 and up to 1."""
+    return 1.0 / (1.0 + _evidence(best, others, TWIN_TEMPERATURE))
+
+
 def right_probability(best: Ranked, others: list[Ranked]) -> float:
     """Return the calibrated chance that the best explanation is right, 0 to 1."""
-    lead = min(MAX_LEAD, best.value - others[0].value if others else best.value)
-    crowd = sum(math.exp((other.value - best.value) / TEMPERATURE) for other in others)
-    crowd = max(LEAST_CROWD, math.log(crowd)) if crowd > 0.0 else LEAST_CROWD
-    count = int((best.matches[:, 0] >= 0.0).sum())
-    logit = INTERCEPT + PER_LEAD * lead - PER_CROWD * crowd + PER_SHARE * best.share + PER_ROOT_COUNT * math.sqrt(count)
-    return 1.0 / (1.0 + math.exp(-logit))
+    logit = float(features(best, others) @ np.array(COEFFICIENTS))
+    return twin_share(best, others) / (1.0 + math.exp(-logit))
+
+
+def _evidence(best: Ranked, others: list[Ranked], temperature: float) -> float:
+    return sum(math.exp(min(0.0, other.value - best.value) / temperature) for other in others)
 
 
 def is_degenerate(registered: RegistrationResult) -> bool:
