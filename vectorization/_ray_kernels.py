@@ -10,9 +10,10 @@ import math
 import numpy as np
 from numba import njit
 
-# Share of the triples of points that are trusted to lie on straight walls, and that quantile of |z| of a Gaussian.
-TRUSTED = 0.3
-GAUSSIAN_QUANTILE = 0.3853204664075677
+# Share of the triples of points that are trusted to lie on straight walls, and the mean square of that lower share of a
+# Gaussian's |z|. A mean, for quantised ranges make a quantile jump.
+TRUSTED = 0.5
+TRUSTED_MEAN_SQUARE = 0.14262
 
 # Points in a window where noise has no direction, and the median of chi-square of its five degrees of freedom over 5.
 WINDOW = 7
@@ -115,7 +116,11 @@ def ray_noise(ranges, ux, uy, increment):
     if count < LEAST_TRIPLES:
         return 0.0
     k = int(TRUSTED * count)
-    return np.partition(z[:count], k)[k] / GAUSSIAN_QUANTILE
+    least = np.partition(z[:count], k)
+    squares = 0.0
+    for i in range(k):
+        squares += least[i] * least[i]
+    return math.sqrt(squares / (k * TRUSTED_MEAN_SQUARE))
 
 
 @njit(cache=True, nogil=True)

@@ -32,8 +32,8 @@ class VectorizationOptions:
     """
 
     sigma: float | None = None
-    min_points: int = 5
-    min_length: float = 0.15
+    min_points: int = 4
+    min_length: float = 0.1
     max_gap: float | None = None
 
     def __post_init__(self) -> None:

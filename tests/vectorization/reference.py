@@ -89,14 +89,14 @@ def fit_line(ranges, rays, normal_angle, distance):
     return solution.x, solution.jac.T @ solution.jac
 
 
-def ray_noise(ranges, angles, increment, trusted, quantile):
+def ray_noise(ranges, angles, increment, trusted, mean_square):
     z = []
     for i in range(1, len(ranges) - 1):
         (ra, rb, rc), (a, b, c) = ranges[i - 1 : i + 2], angles[i - 1 : i + 2]
         if max(b - a, c - b) < 1.6 * increment:
             coefficients = np.array([np.sin(c - b) / ra, -np.sin(c - a) / rb, np.sin(b - a) / rc])
             z.append(abs(coefficients.sum()) / np.linalg.norm(coefficients / [ra, rb, rc]))
-    return np.sort(z)[int(trusted * len(z))] / quantile
+    return math.sqrt(np.mean(np.square(np.sort(z)[: int(trusted * len(z))])) / mean_square)
 
 
 def window_noise(points, window, median):

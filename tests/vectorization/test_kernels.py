@@ -18,9 +18,9 @@ from vectorization._kernels import (
     sums_cost,
 )
 from vectorization._ray_kernels import (
-    GAUSSIAN_QUANTILE,
     MEDIAN_CHI,
     TRUSTED,
+    TRUSTED_MEAN_SQUARE,
     WINDOW,
     clean,
     gather,
@@ -163,7 +163,7 @@ def test_the_noise_estimates_are_the_twins(seed):
     points, rays = drawn(seed)
     ranges = np.linalg.norm(points, axis=1)
     angles = np.arctan2(rays[:, 1], rays[:, 0])
-    expected = reference.ray_noise(ranges, angles, 0.01, TRUSTED, GAUSSIAN_QUANTILE)
+    expected = reference.ray_noise(ranges, angles, 0.01, TRUSTED, TRUSTED_MEAN_SQUARE)
     assert ray_noise(ranges, *np.ascontiguousarray(rays.T), 0.01) == pytest.approx(expected)
     expected = reference.window_noise(points, WINDOW, MEDIAN_CHI)
     assert window_noise(*np.ascontiguousarray(points.T)) == pytest.approx(expected)
