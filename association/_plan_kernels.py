@@ -5,9 +5,8 @@ import math
 import numpy as np
 from numba import njit
 
-from ._search_kernels import BASE_SLACK, BASE_SLACK_SHARE, HARD_PRIOR, search_base
+from ._search_kernels import BASE_SLACK, BASE_SLACK_SHARE, HARD_PRIOR, MIN_CROSSING_BASE, search_base
 
-MIN_SINE = 0.3  # of the angle between the segments of a base
 REUSE = 0.3  # what a base is worth less for each earlier use of one of its segments
 
 # Measured costs, in tests of a wall: of a base, an anchor, a metre of slide, a hypothesis.
@@ -68,7 +67,7 @@ def plan_bases(scan, count, by_direction, bin_starts, longest, summed, area):
         for j in range(i + 1, count):
             turn = scan[j, 5] - scan[i, 5]
             sine = abs(math.sin(turn))
-            if sine < MIN_SINE:
+            if sine < MIN_CROSSING_BASE:
                 continue
             sweep_i = COST_ANCHOR * fitting[i] + COST_SLIDE * total[i]
             sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]

@@ -10,6 +10,7 @@ from ._match_kernels import quick_score, refine, wrap
 BASE_SLACK = 0.2  # m; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base
+MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base
 
 # Places of `progress`: bases gone through, anchor within the base, hypotheses, verified ones.
 P_BASE, P_ANCHOR, P_HYPOTHESES, P_VERIFIED = range(4)
@@ -241,9 +242,11 @@ def sweep(
     # Midpoint of b with a's midpoint at abscissa 0 of its wall; the slide is that abscissa.
     x = c * mx - s * my - dy * walls[wa, 2]
     y = s * mx + c * my + dx * walls[wa, 2]
-    half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
-    # The final angle differs a little from the anchor's: the test of the ends is a little looser here.
-    half_b = 0.5 * scan[b, 4] - end_slack(scan[b, 4]) - 0.1
+    # The final angle splits the misfit: b turns about a by up to `swing`, so the ends are tested loosely until then.
+    sine = abs(scan[a, 0] * scan[b, 1] - scan[a, 1] * scan[b, 0])
+    swing = tolerance * scan[a, 10] / (scan[a, 10] + scan[b, 10]) * math.sqrt(mx * mx + my * my) / sine
+    half = 0.5 * scan[a, 4] - end_slack(scan[a, 4]) - swing
+    half_b = 0.5 * scan[b, 4] - end_slack(scan[b, 4]) - swing
     at = walls[wa, 3] + half
     high = walls[wa, 4] - half
     cell = shape[2]

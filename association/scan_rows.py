@@ -28,6 +28,8 @@ GATE_SIGMAS = 3.0
 MIN_OFFSET_GATE = 0.08  # m
 MIN_ANGLE_GATE = math.radians(4.0)
 
+DEFAULT_OPTIONS = AssociationOptions()
+
 
 @dataclass(frozen=True, slots=True)
 class ScanRows:
@@ -48,7 +50,7 @@ class ScanRows:
         return float(self.rows[:, 12].sum())
 
 
-def scan_rows(measured: MeasuredSegments, map_sigma: float) -> ScanRows:
+def scan_rows(measured: MeasuredSegments, map_sigma: float, options: AssociationOptions = DEFAULT_OPTIONS) -> ScanRows:
     """Order a scan by what its segments tell; ties by index.
 
     Parameters
@@ -56,11 +58,15 @@ def scan_rows(measured: MeasuredSegments, map_sigma: float) -> ScanRows:
     measured : MeasuredSegments
     map_sigma : float
         Standard deviation of the map's lines, metres.
+    options : AssociationOptions
+        A tolerance wider than the sigmas' own gate says that the map is that far off.
     """
     s = measured.segments
     line_var = measured.sigma**2 / measured.points
     offset_var = line_var + map_sigma**2 + MODEL_OFFSET**2
     angle_var = line_var / np.maximum(measured.spreads, 1e-6) + MODEL_ANGLE**2
+    offset_var = np.maximum(offset_var, ((options.offset_tolerance or 0.0) / GATE_SIGMAS) ** 2)
+    angle_var = np.maximum(angle_var, ((options.angle_tolerance or 0.0) / GATE_SIGMAS) ** 2)
     gains = GAIN + GAIN_PER_METRE * np.minimum(s.lengths, GAIN_LENGTH)
     angles = np.arctan2(s.directions[:, 1], s.directions[:, 0])
     order = np.lexsort((np.arange(len(s)), -s.lengths))

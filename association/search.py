@@ -53,7 +53,7 @@ def associate(
     """
     if not options.oriented:
         index = index.undirected
-    rows = scan_rows(scan.measured, index.sigma)
+    rows = scan_rows(scan.measured, index.sigma, options)
     candidates = find_candidates(index, rows, prior, options, deadline or Deadline())
     ranked = rank_candidates(index, scan, rows, candidates, (prior, options))
     best = next((r for r in ranked if r.inside), None)

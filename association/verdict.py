@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from registration import RegistrationResult
 
-from ._sight_kernels import BLOCKED
 from .ranking import Ranked
 from .result import Status
 
@@ -27,7 +26,8 @@ TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as
 USABLE_PROBABILITY = 0.93
 CHANCE = 1e-2  # significance beyond which chance explains a scan as well
 CHANCE_SHARE = 0.5  # of the scan's length that then must be matched for an answer
-CONTRADICTION = 3.0 * BLOCKED  # nats by which a pose that the prior speaks against must be better to contradict it
+CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
+FAR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
 MAX_DEVIATION = 0.5  # m; beyond it the weakest direction counts as not fixed
 
 
@@ -58,7 +58,8 @@ def judge(ranked: list[Ranked], chance: float, registered: RegistrationResult | 
     if not inside or registered is None:
         return Verdict(Status.NO_MATCH, 0.0, None, None, bool(ranked))
     best = inside[0]
-    contradicted = any(r.score > best.score + CONTRADICTION for r in ranked if r is not best)
+    better_elsewhere = any(r.score > best.score + CONTRADICTION for r in ranked if r is not best)
+    contradicted = better_elsewhere or best.value - best.score < FAR
     others = inside[1:]
     lead = best.value - others[0].value if others else best.value
     probability = right_probability(best, others)

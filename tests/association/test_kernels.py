@@ -1,0 +1,172 @@
+"""Every kernel does what its slow twin does."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numba import njit
+
+from association import AssociationOptions, MapIndex
+from association import _match_kernels as match
+from association import _plan_kernels as plan
+from association import _search_kernels as search
+from association._sight_kernels import first_hit
+from association.scan_rows import gates, scan_rows
+from registration import MeasuredSegments, RigidTransform, Segments
+
+from . import reference
+from .scenes import maze, seen
+
+SEEDS = st.integers(0, 2**31 - 1)
+INDEX = MapIndex.build(Segments.from_array(maze(1)))
+GRID = (INDEX.grid.starts, INDEX.grid.items, INDEX.grid.shape)
+GATES = gates(AssociationOptions())
+
+
+@njit
+def match_one(scan, i, c, s, tx, ty, offset_gate, cos_gate, min_overlap, walls, starts, items, shape):
+    return match.match_segment(scan, i, c, s, tx, ty, offset_gate, cos_gate, min_overlap, walls, starts, items, shape)
+
+
+def drawn(seed, radius=10.0, **options):
+    """Return scan rows and their pose in the index frame."""
+    rng = np.random.default_rng(seed)
+    at = RigidTransform(*rng.uniform(8.0, 22.0, 2), rng.uniform(-3.0, 3.0))
+    endpoints, _ = seen(maze(1), at, noise=0.02, cut=0.5, clutter=5, seed=seed, radius=radius, **options)
+    rows = scan_rows(MeasuredSegments.from_segments(Segments.from_array(endpoints)), 0.0).rows
+    return rng, rows, np.array([at.theta, at.x - INDEX.origin[0], at.y - INDEX.origin[1]])
+
+
+@given(SEEDS)
+@settings(max_examples=200, deadline=None)
+def test_first_hit(seed):
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-25.0, 25.0, 2)
+    turn = rng.choice([rng.uniform(-math.pi, math.pi), 0.0, math.pi / 2])
+    limit = rng.choice([3.0, 60.0])
+    ray = (x, y, math.cos(turn), math.sin(turn), limit)
+    distance, wall = first_hit(*ray, INDEX.walls.rows, *GRID)
+    expected, by = reference.first_hit(*ray, INDEX.walls.rows)
+    assert distance == pytest.approx(expected, abs=1e-9)
+    assert wall == by
+
+
+@given(SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_match_segment(seed):
+    rng, rows, pose = drawn(seed)
+    pose = pose + rng.normal(size=3) * [0.02, 0.1, 0.1]
+    found = 0
+    for i, row in enumerate(rows):
+        args = (pose[1], pose[2], 0.3, math.cos(0.1), 0.5, INDEX.walls.rows)
+        got = match_one(rows, i, math.cos(pose[0]), math.sin(pose[0]), *args, *GRID)
+        expected = reference.match_segment(row, pose[0], *args)
+        assert got[0] == expected[0]
+        np.testing.assert_allclose(got[1:], expected[1:], atol=1e-9)
+        found += got[0] >= 0
+    assert found > 0
+
+
+@given(SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_quick_score(seed):
+    rng, rows, pose = drawn(seed)
+    pose = pose + rng.normal(size=3) * [0.01, 0.05, 0.05]
+    variance = 1e-4
+    expected = reference.quick_score(rows, *pose, pose[1:], variance, INDEX.walls.rows, GATES)
+
+    def got(threshold):
+        return match.quick_score(rows, *pose, *pose[1:], variance, INDEX.walls.rows, *GRID, GATES, threshold)
+
+    assert got(0.0) == pytest.approx(expected)
+    assert got(expected - 1e-6) == pytest.approx(expected)
+    assert got(expected + 1e-6) == -1.0
+
+
+def test_refine_finds_the_pose_again():
+    """From 10 cm and 1 degree off, the consensus set grows back and holds nothing but true pairs."""
+    at = RigidTransform(14.0, 15.0, 0.4)
+    endpoints, truth = seen(maze(1), at, clutter=4, radius=12.0)
+    prepared = scan_rows(MeasuredSegments.from_segments(Segments.from_array(endpoints)), 0.0)
+    pose = np.array([at.theta + 0.017, at.x - INDEX.origin[0] + 0.07, at.y - INDEX.origin[1] - 0.07])
+    covariance, matches = np.diag([0.01, 0.01, 4e-4]), np.empty((len(truth), 5))
+    match.refine(
+        prepared.rows, pose, covariance, INDEX.walls.rows, *GRID, GATES, matches, np.empty(18), np.empty((3, 3)), 4
+    )
+    np.testing.assert_allclose(pose, [at.theta, at.x - INDEX.origin[0], at.y - INDEX.origin[1]], atol=1e-9)
+    expected = np.where(truth >= 0, INDEX.wall_of_piece[np.maximum(truth, 0)], -1)[prepared.order]
+    np.testing.assert_array_equal(matches[expected >= 0, 0], expected[expected >= 0])
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_a_base_is_swept_whole(seed):
+    """Every pose that going through all pairs of walls gives is proposed, and no other."""
+    _, rows, _ = drawn(seed, radius=7.0)
+    long = [i for i in range(len(rows)) if rows[i, 4] > 1.0]
+    pairs = [(i, j) for i in long for j in long if i < j and abs(math.sin(rows[i, 5] - rows[j, 5])) > 0.3]
+    if not pairs:
+        return
+    a, b = pairs[seed % len(pairs)]
+    tolerance = min(GATES[4], max(GATES[3], GATES[0] * math.sqrt(rows[a, 10] + rows[b, 10])))
+
+    def slack(length):
+        return search.BASE_SLACK + search.BASE_SLACK_SHARE * length
+
+    expected = reference.placements(rows, a, b, INDEX.walls.rows, slack, tolerance)
+    progress = np.zeros(5, dtype=np.int64)
+    rules = np.array([0.65, 0.3, 0.1, 0.9])
+    search.search_base(
+        rows, a, b, INDEX.walls.rows, INDEX.walls.by_direction, INDEX.walls.bin_starts, *GRID, GATES, rules,
+        np.zeros(10), np.zeros((64, 5)), np.zeros(1, dtype=np.int64), np.array([1e9, 0.0, 0.0]), progress, 10**9,
+    )  # fmt: skip
+    assert progress[2] == len(expected)
+
+
+def test_invert3():
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(3, 3))
+    matrix, out = root @ root.T, np.empty((3, 3))
+    assert match.invert3(matrix, out)
+    np.testing.assert_allclose(out, np.linalg.inv(matrix))
+    assert not match.invert3(np.diag([1.0, 1.0, 0.0]), out)
+
+
+def test_bound_is_never_below_what_can_have_been_missed():
+    """Brute force over all consensus sets that contain none of the bases."""
+    rng = np.random.default_rng(4)
+    gains = rng.uniform(1.0, 10.0, 9)
+    residual, bound = gains.copy(), np.array([gains.sum()])
+    tried = []
+    for _ in range(12):
+        a, b = rng.choice(9, 2, replace=False)
+        plan.cover(residual, bound, a, b)
+        tried.append((1 << int(a)) | (1 << int(b)))
+        free = [s for s in range(512) if not any(s & t == t for t in tried)]
+        missed = max(sum(gains[i] for i in range(9) if s >> i & 1) for s in free)
+        assert bound[0] >= missed - 1e-9
+
+
+def test_strike_counts_the_samples_that_are_left():
+    rng = np.random.default_rng(5)
+    inliers = rng.integers(0, 2**63, (3, 6, 4), dtype=np.uint64)
+    missing, left = np.full((3, 4), ~np.uint64(0)), np.ones(3)
+    bits = np.unpackbits(inliers.view(np.uint8), axis=-1).astype(bool)
+    alive = np.ones((3, 256), dtype=bool)
+    for a, b in ((0, 1), (2, 3), (1, 4)):
+        plan.strike(missing, inliers, a, b, left)
+        alive &= ~(bits[:, a] & bits[:, b])
+        np.testing.assert_allclose(left, alive.mean(axis=1))
+
+
+def test_prior_value():
+    soft = np.array([1.0, 2.0, 3.0, 3.1, 4.0, 0.0, 0.0, 1.0, 0.0, 100.0])
+    assert search.prior_value(soft, 3.1, 2.0, 3.0) == 0.0
+    assert search.prior_value(soft, -3.1, 2.5, 3.0) == pytest.approx(-0.5 * (1.0 + 100.0 * (math.tau - 6.2) ** 2))
+    assert search.prior_value(soft, 3.1, 200.0, 3.0) == search.SOFT_FLOOR
+    hard = np.array([2.0, 2.0, 3.0, 3.1, 0.5, 0.2, 0, 0, 0, 0])
+    assert search.prior_value(hard, -3.1, 2.4, 3.2) == search.INSIDE
+    assert search.prior_value(hard, 3.1, 2.4, 3.4) == 0.0
+    assert search.prior_value(hard, 2.8, 2.0, 3.0) == 0.0
