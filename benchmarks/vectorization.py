@@ -1,7 +1,8 @@
 """The vectorizer's and the virtual scanner's rows: speed, accuracy over the bound, walls found, segments that are none.
 
 ``python -m benchmarks.vectorization [--poses 300]``. The floor plans and logs are read from the folder that
-``LINEFIX_BENCH_DATA`` names, by default ``../shared/data`` beside the repository; without it only drawn worlds are used.
+``LINEFIX_BENCH_DATA`` names, by default ``../shared/data`` beside the repository; without it drawn worlds stand in for
+the plans, and the logs are left out.
 """
 
 from __future__ import annotations
@@ -16,7 +17,18 @@ from pathlib import Path
 import numpy as np
 
 from registration import RigidTransform, Segments, wrap_angle
-from simulation import Scanner, SimulatedScan, scan
+from simulation import (
+    OfficePlan,
+    Scanner,
+    SimulatedScan,
+    cut_square,
+    l_room,
+    oblique,
+    offices,
+    pillars,
+    scan,
+    with_obstacles,
+)
 from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 DATA = Path(os.environ.get("LINEFIX_BENCH_DATA", Path(__file__).parents[1] / ".." / "shared" / "data"))
@@ -48,12 +60,20 @@ def floorplan_scenes(count: int) -> list[tuple[Segments, RigidTransform]]:
     return scenes
 
 
+def drawn_scenes(count: int) -> list[tuple[Segments, RigidTransform]]:
+    rng = np.random.default_rng(0)
+    floor = offices(rng, OfficePlan(rooms=20, corridors=6))
+    worlds = [cut_square(), oblique(0.02), pillars(0.03), l_room(), floor, with_obstacles(floor, 200, rng)]
+    scenes = [(world.segments, pose) for world in worlds for pose in world.poses]
+    return scenes[:: max(1, len(scenes) // count)]
+
+
 def in_sensor_frame(map: Segments, pose: RigidTransform) -> Segments:
     return Segments.from_array(pose.inverse().apply(map.endpoints.reshape(-1, 2)).reshape(-1, 4))
 
 
 def visible_walls(seen: SimulatedScan, map: Segments) -> list[np.ndarray]:
-    """Return runs of consecutive beams on one wall, as beam indices; collinear map segments that adjoin are one wall."""
+    """Return runs of consecutive beams on one wall, as beam indices; collinear segments that adjoin are one wall."""
     walls: list[np.ndarray] = []
     start = 0
     hits = seen.hits
@@ -169,7 +189,8 @@ def accuracy(name: str, scenes: list[tuple[Segments, RigidTransform]], scanner: 
         f"{name:34s} offset/bound {rms(total['offset']):.3f} ({rms(clipped['offset']):.3f} within 5)  "
         f"angle/bound {rms(total['angle']):.3f} ({rms(clipped['angle']):.3f})  "
         f"claimed chi2 {np.mean(total['claimed']):.2f} of 2 (median {np.median(total['claimed']):.2f} of 1.39)  "
-        f"of {np.mean(total['whole']):.2f} on one line  walls found {np.mean(total['wall']):.3f} of {len(total['wall'])}  "
+        f"of {np.mean(total['whole']):.2f} on one line  "
+        f"walls found {np.mean(total['wall']):.3f} of {len(total['wall'])}  "
         f"no wall {1 - np.mean(total['matched']):.4f} of {len(total['matched'])}"
     )
 
@@ -220,14 +241,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--poses", type=int, default=300)
     count = parser.parse_args().poses
-    if not (DATA / "queries").is_dir():
-        print(f"no data in {DATA}: floor plans and logs are left out")
-        return
-    scenes = floorplan_scenes(count)
+    if (DATA / "queries").is_dir():
+        name, scenes = "floor plans", floorplan_scenes(count)
+    else:
+        print(f"no data in {DATA}")
+        name, scenes = "drawn worlds", drawn_scenes(count)
     speed(scenes[:: max(1, len(scenes) // 60)])
-    accuracy("floor plans, 2 cm, sigma given", scenes, Scanner(), 0.02)
-    accuracy("floor plans, 2 cm, sigma estimated", scenes, Scanner(), None)
-    accuracy("floor plans, 1 cm, sigma estimated", scenes, Scanner(sigma=0.01), None)
+    accuracy(f"{name}, 2 cm, sigma given", scenes, Scanner(), 0.02)
+    accuracy(f"{name}, 2 cm, sigma estimated", scenes, Scanner(), None)
+    accuracy(f"{name}, 1 cm, sigma estimated", scenes, Scanner(sigma=0.01), None)
     logs()
 
 

@@ -37,6 +37,9 @@ from ._kernels import BREAK_REACH, MISSING_STEPS, find_gaps, merge, running_sums
 WORST_ANGLE = 0.12
 WORST_FIT = 6.0
 
+# Standard deviations within which the last point of a line is taken for its own: what lies beside a wall begins there.
+END_GATE = 2.0
+
 # Sine of the angle between two lines below which they have no corner, and how much farther than to the next beam an
 # end may be moved to reach one, past so many points at most.
 LEAST_CORNER = 0.15
@@ -115,15 +118,29 @@ def fit_all(x, y, ux, uy, bounds, totals, variance, floor, min_points, increment
         high = extend(x, y, ux, uy, b - 1, 1, taken, line, increment, longest, variance, floor)
         if (low < a or high > b - 1) and not fit_line(x, y, ux, uy, low, high + 1, variance, floor, line, own):
             continue
-        while low < high and not own[low]:
+        first = low
+        last = high
+        while low < high and strays(x, y, ux, uy, low, line, variance, floor):
             low += 1
-        while high > low and not own[high]:
+        while high > low and strays(x, y, ux, uy, high, line, variance, floor):
             high -= 1
+        if (low > first or high < last) and not fit_line(x, y, ux, uy, low, high + 1, variance, floor, line, own):
+            continue
         taken[low : high + 1] = True
         spans[count, 0] = low
         spans[count, 1] = high
         count += 1
     return lines[:count].copy(), spans[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def strays(x, y, ux, uy, i, line, variance, floor):
+    """Tell whether point i, the last of its line, is better taken for one of what lies beside the wall."""
+    e = line[NX] * x[i] + line[NY] * y[i] - line[P]
+    cosine = 1.0
+    if ux[i] != 0.0 or uy[i] != 0.0:
+        cosine = line[NX] * ux[i] + line[NY] * uy[i]
+    return e * e > END_GATE * END_GATE * (variance * cosine * cosine + floor)
 
 
 @njit(cache=True, nogil=True)
