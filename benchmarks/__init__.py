@@ -1,1 +1,7 @@
 """Speed and quality: what the house can do, in figures, each beside its goal."""
+
+import os
+
+# One core; read when numpy and numba are loaded.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[_name] = "1"

@@ -88,7 +88,9 @@ def building(key: MapKey) -> str:
         return name[:8]
     if family == "apartments":
         return name[:-5]
-    return re.sub(r"[_P]*\d+$", "", name)
+    if family == "public_buildings":
+        return re.sub(r"[_P]*\d+$", "", name)
+    return name
 
 
 def held_out(key: MapKey) -> bool:

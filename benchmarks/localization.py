@@ -141,35 +141,48 @@ def print_wrong(title: str, outcomes: Iterable[Outcome]) -> None:
     print_table(title, head, cells)
 
 
-def localization(only: set[str], stride: int, *, listing: bool) -> None:
-    """Run what is wanted and print its tables."""
+def localization(only: set[str], stride: int, *, listing: bool) -> list[Row]:
+    """Run what is wanted, print its tables and return the rows that were judged."""
     groups: dict[str, list[Outcome]] = {}
     away: list[Outcome] = []
+    rows: list[Row] = []
+
+    def told(title: str, more: list[Row]) -> None:
+        print_rows(title, more)
+        rows.extend(more)
+
     if not only or "floor-plans" in only:
         plans = floor_plans(stride)
         real = plans.name == "floor plans"
         found, away = run(plans, steps=True), strangers(plans)
         groups |= {level: [o for o in found if o.query.level == level] for level in LEVELS}
-        rows = [*level_rows(found, goals=real), *time_rows(found, goals=real)]
-        print_rows(f"{plans.name}, {len(found)} scans", [*rows, stranger_row("another building: not usable", away)])
+        told(
+            f"{plans.name.capitalize()}, {len(found)} scans",
+            [
+                *level_rows(found, goals=real),
+                *time_rows(found, goals=real),
+                stranger_row("another building: not usable", away),
+            ],
+        )
     chosen = [log for log in logs(stride) if not only or log.name in only]
     of_logs = {log.name: run(log) for log in chosen}
     if of_logs:
         groups |= of_logs
-        print_rows("Logs", log_rows(of_logs))
+        told("Logs", log_rows(of_logs))
     if len(chosen) == len(LOGS):
         elsewhere = other_logs(chosen)
-        print_rows("Logs in the map of another", [stranger_row("another log: not usable", elsewhere)])
+        told("Logs in the map of another", [stranger_row("another log: not usable", elsewhere)])
         away = away + elsewhere
     print_statuses(groups)
     everything = [o for outcomes in groups.values() for o in outcomes]
     print_reliability("Probability", everything)
     held = [o for o in everything if held_out(o.query.map)]
     print_reliability("Probability, buildings that nothing was fitted to", held)
-    print_rows("Probability", [reliability_row("probability, greatest distance in points", held)])
+    told("Probability", [reliability_row("probability, greatest distance in points", held)])
     if listing:
         print_wrong("Usable but wrong", everything)
         print_wrong("Usable in another building", away)
+    return rows
 
 
 def main() -> None:

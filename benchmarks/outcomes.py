@@ -81,7 +81,7 @@ def run_one(collection: Collection, query: Query, key: MapKey | None = None, *, 
     wall, cpu = time.perf_counter() - began[0], time.thread_time() - began[1]
     search = math.nan
     if steps:
-        rows = scan_rows(scan.measured, index.sigma)
+        rows = scan_rows(scan.measured, index.sigma, OPTIONS)
         start = time.thread_time()
         find_candidates(index, rows, None, OPTIONS, Deadline())
         search = 1e3 * (time.thread_time() - start)
@@ -104,14 +104,19 @@ def run(collection: Collection, *, steps: bool = False, key: Callable[[Query], M
     return outcomes
 
 
-def strangers(collection: Collection) -> list[Outcome]:
-    """Search every scan in the map of another building of its family, drawn by seed."""
+def other_map(collection: Collection) -> list[MapKey]:
+    """Draw for every query the map of another building of its family, by seed."""
     rng = np.random.default_rng(SEED)
     others = {
         here: [k for k in collection.maps if k[0] == here[0] and building(k) != building(here)]
         for here in {q.map for q in collection.queries}
     }
-    chosen = {id(q): others[q.map][rng.integers(len(others[q.map]))] for q in collection.queries}
+    return [others[q.map][rng.integers(len(others[q.map]))] for q in collection.queries]
+
+
+def strangers(collection: Collection) -> list[Outcome]:
+    """Search every scan in the map of another building."""
+    chosen = dict(zip(map(id, collection.queries), other_map(collection), strict=True))
     return run(collection, key=lambda query: chosen[id(query)])
 
 

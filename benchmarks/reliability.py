@@ -23,17 +23,31 @@ def reliability_row(what: str, outcomes: Sequence[Outcome]) -> Row:
 
 
 def reliability(outcomes: Sequence[Outcome]) -> list[tuple[int, float, float]]:
-    """Return for ten bins of `probability` the count of answers, the mean probability and the share that is right."""
+    """Return the bins of all that was answered with a pose."""
     answered = [o for o in outcomes if o.result.status is not Status.NO_MATCH]
-    p = np.array([o.result.probability for o in answered])
-    right = np.array([o.right for o in answered], dtype=float)
-    bins = np.minimum((p * BINS).astype(int), BINS - 1)
-    return [(int(inside.sum()), mean(p[inside]), mean(right[inside])) for inside in (bins == b for b in range(BINS))]
+    return bins(np.array([o.result.probability for o in answered]), np.array([o.right for o in answered], dtype=bool))
+
+
+def bins(probabilities: np.ndarray, right: np.ndarray) -> list[tuple[int, float, float]]:
+    """Return for ten bins of probability the count of answers, the mean probability and the share that is right."""
+    which = np.minimum((probabilities * BINS).astype(int), BINS - 1)
+    return [
+        (int(inside.sum()), mean(probabilities[inside]), mean(right[inside]))
+        for inside in (which == b for b in range(BINS))
+    ]
 
 
 def print_reliability(title: str, outcomes: Sequence[Outcome]) -> None:
+    _print(title, reliability(outcomes))
+
+
+def print_bins(title: str, probabilities: np.ndarray, right: np.ndarray) -> None:
+    _print(title, bins(probabilities, right))
+
+
+def _print(title: str, found: list[tuple[int, float, float]]) -> None:
     cells = [
         (f"{b / BINS:.1f} to {(b + 1) / BINS:.1f}", str(count), f"{p:.3f}", f"{share:.3f}", f"{100 * (share - p):+.1f}")
-        for b, (count, p, share) in enumerate(reliability(outcomes))
+        for b, (count, p, share) in enumerate(found)
     ]
     print_table(title, ("probability", "answers", "mean", "observed", "points off"), cells)

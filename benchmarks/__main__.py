@@ -1,0 +1,81 @@
+"""All figures beside their goals, quality and speed: ``python -m benchmarks [table ...]``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+from . import vectorization
+from .drawn import SCANNER
+from .estimators import estimators
+from .growth import PAIRS, SIZES, growth
+from .localization import localization
+from .lookalikes import lookalikes
+from .queries import DATA, data_found
+from .table import Row, machine, print_rows
+
+DEFAULT = ("localization", "estimators", "lookalikes")
+
+
+def _localization(quick: int) -> list[Row]:
+    return localization(set(), quick, listing=True)
+
+
+def _estimators(quick: int) -> list[Row]:
+    trials = 10_000 // quick
+    rows = estimators(trials)
+    print_rows(f"Estimators with known correspondences, {trials:,} trials a scene", rows)
+    return rows
+
+
+def _lookalikes(quick: int) -> list[Row]:
+    seeds = max(2, 20 // quick)
+    rows = lookalikes(seeds)
+    print_rows(f"Look-alikes, {seeds} scans a scene", rows)
+    return rows
+
+
+def _growth(quick: int) -> list[Row]:
+    return growth(max(5, 30 // quick), SIZES if quick == 1 else SIZES[:-1], PAIRS if quick == 1 else PAIRS[:-1])
+
+
+def _vectorization(quick: int) -> list[Row]:
+    if data_found():
+        print("\n### Vectorization\n")
+        scenes = vectorization.floorplan_scenes(300 // quick)
+        vectorization.speed(scenes[:: max(1, len(scenes) // 60)])
+        vectorization.accuracy("floor plans, 2 cm, sigma given", scenes, SCANNER, SCANNER.sigma)
+        vectorization.accuracy("floor plans, 2 cm, sigma estimated", scenes, SCANNER, None)
+    return []
+
+
+TABLES: dict[str, Callable[[int], list[Row]]] = {
+    "localization": _localization,
+    "estimators": _estimators,
+    "lookalikes": _lookalikes,
+    "growth": _growth,
+    "vectorization": _vectorization,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("tables", nargs="*", help=f"of {', '.join(TABLES)}, or all; by default {', '.join(DEFAULT)}")
+    parser.add_argument("--quick", type=int, default=1, metavar="N", help="take about one in N of everything")
+    args = parser.parse_args()
+    names = list(TABLES) if args.tables == ["all"] else args.tables or list(DEFAULT)
+    unknown = [name for name in names if name not in TABLES]
+    if unknown or args.quick < 1:
+        parser.error(f"no such table: {', '.join(unknown)}" if unknown else "--quick takes a number from 1 up")
+    print(f"{machine()}; one thread; data: {DATA.name if data_found() else 'absent, drawn offices instead'}")
+    rows = [row for name in names for row in TABLES[name](args.quick)]
+    short = [row for row in rows if row.met is False]
+    missed = [row for row in rows if row.aimed is False]
+    print(f"\n{sum(row.met is True for row in rows)} goals met, {len(short)} short; {len(missed)} aims missed.")
+    for kind, found in (("short", short), ("aim missed", missed)):
+        for row in found:
+            print(f"- {kind}: {row.what.strip()}: {row.measured}, {row.goal if kind == 'short' else row.aim}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,224 @@
+"""How times grow: constant-time sums with the number of pairs, the search with the size of the map.
+
+``python -m benchmarks.growth [--queries 30] [--sizes 200,2000,20000,200000]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from association import MapIndex, Scan, associate
+from registration import Correspondences, JointSums, MeasuredSegments, RigidTransform, Segments
+from simulation import OfficePlan
+
+from .collection import SIGMA
+from .drawn import NEAR, campus_of_offices, cluttered_scan, nearby, take_scan
+from .outcomes import OPTIONS, offset, progress
+from .queries import FAMILIES, data_found, floor_plans
+from .table import Row, at_most, mean, print_rows, print_table, quantile
+
+PAIRS = (10, 100, 1_000, 10_000, 100_000, 1_000_000)
+SIZES = (200, 2_000, 20_000, 200_000)
+TIMES = {200: (0.3, 1.0), 2_000: (1.0, 5.0), 20_000: (5.0, 20.0), 200_000: (40.0, 150.0)}  # ms, median and p95
+INDEX_SECONDS, INDEX_MEGABYTES = 5.0, 500.0  # of the greatest map
+SCAN_SEGMENTS = 25
+CLUTTER = 0.3
+SEED = 20190901
+LANE = 400.0  # m; where a row of the campus ends
+APART = 5.0  # m between plans
+DISTANCE, ANGLE = 0.1, 1.0  # m, degrees
+
+
+def best_time(action: Callable[[], object], repeats: int) -> float:
+    """Return the processor seconds of the fastest of some calls, the others being disturbed."""
+    times = []
+    for _ in range(repeats):
+        start = time.thread_time()
+        action()
+        times.append(time.thread_time() - start)
+    return min(times)
+
+
+def sums_cells(counts: tuple[int, ...]) -> list[tuple[str, ...]]:
+    """Time adding a pair to sums over many, solving, and summing anew; microseconds."""
+    rng = np.random.default_rng(SEED)
+    cells = []
+    for count in counts:
+        middles, angles = rng.uniform(-20.0, 20.0, (count + 1, 2)), rng.uniform(-math.pi, math.pi, count + 1)
+        half = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        segments = Segments.from_array(np.hstack([middles - half, middles + half]))
+        rows = np.repeat(np.arange(count + 1), 2).reshape(-1, 2)
+        pairs = Correspondences.of(segments, MeasuredSegments.from_segments(segments, SIGMA), rows)
+        everything, weights = pairs.take(slice(0, count)), np.full(count, 1e4)
+        sums = JointSums.of_set(everything, weights)
+        add = best_time(lambda sums=sums, pairs=pairs, k=count: sums.add(pairs, k, 1e4), 300)
+        solve = best_time(lambda sums=sums: sums.solve(0.0), 300)
+        anew = best_time(lambda e=everything, w=weights: JointSums.of_set(e, w), 30 if count < 100_000 else 5)
+        cells.append((f"{count:,}", f"{1e6 * add:.1f}", f"{1e6 * solve:.1f}", f"{1e6 * anew:,.1f}"))
+    return cells
+
+
+def campus(size: int) -> Segments:
+    """Lay floor plans, or drawn offices, side by side until there are `size` segments; cut off what is beyond.
+
+    Each plan comes once as it is. When all have been laid they come mirrored and stretched by up to a tenth, so that no
+    place has an exact twin.
+    """
+    rng = np.random.default_rng(SEED)
+    if not data_found():
+        plan = OfficePlan(rooms=8, corridors=3)
+        world = campus_of_offices(rng, 1 + size // 250, plan)
+        return world.segments.take(np.arange(min(size, len(world.segments))))
+    plans = [s.endpoints for key, s in sorted(floor_plans().maps.items()) if key[0] in FAMILIES]
+    if size < 1000:
+        plans = [p for p in plans if len(p) <= size]
+    pieces: list[np.ndarray] = []
+    x = y = deepest = 0.0
+    left, lap = size, 0
+    while left > 0:
+        for k in rng.permutation(len(plans)):
+            ends = plans[k]
+            if lap:
+                ends = ends * rng.uniform(0.9, 1.1) * [-1.0, 1.0, -1.0, 1.0]
+                ends = ends[:, [2, 3, 0, 1]]  # a mirror exchanges left and right
+            corners = ends.reshape(-1, 2)
+            low, extent = corners.min(axis=0), np.ptp(corners, axis=0)
+            if x > 0.0 and x + extent[0] > LANE * math.sqrt(size / 20_000):
+                x, y, deepest = 0.0, y + deepest + APART, 0.0
+            pieces.append((ends + np.tile([x, y] - low, 2))[:left])
+            x, deepest, left = x + extent[0] + APART, max(deepest, float(extent[1])), left - len(pieces[-1])
+            if left == 0:
+                break
+        lap += 1
+    return Segments.from_array(np.vstack(pieces))
+
+
+def draw_query(segments: Segments, rng: np.random.Generator) -> tuple[RigidTransform, Segments]:
+    """Scan the campus from a free place where enough is seen, and keep some 25 segments, 30 % of them clutter."""
+    mapped_count = round(SCAN_SEGMENTS * (1.0 - CLUTTER))
+    while True:
+        pose = _free_pose(segments, rng)
+        scan, mapped = cluttered_scan(segments, pose, CLUTTER, rng)
+        on_map, clutter = np.flatnonzero(mapped), np.flatnonzero(~mapped)
+        if len(on_map) >= mapped_count - 5 and len(clutter) >= 5:
+            on_map = on_map[:mapped_count]
+            clutter = clutter[: round(len(on_map) * CLUTTER / (1.0 - CLUTTER))]
+            return pose, scan.take(rng.permutation(np.concatenate([on_map, clutter])))
+
+
+def _free_pose(segments: Segments, rng: np.random.Generator) -> RigidTransform:
+    """Draw a place from which most that is seen shows its free side and is not too near."""
+    while True:
+        k = rng.integers(len(segments))
+        p = segments.midpoints[k] + rng.uniform(1.0, 4.0) * segments.normals[k]
+        pose = RigidTransform(p[0], p[1], rng.uniform(-math.pi, math.pi))
+        near = nearby(segments, pose, NEAR)
+        measured, walls = take_scan(near, pose, rng)
+        found = np.flatnonzero(walls >= 0)
+        if len(found) < 8:
+            continue
+        seen = near.take(walls[found])
+        facing = np.einsum("ij,ij->i", p - seen.midpoints, seen.normals) > 0.0
+        if np.mean(facing) > 0.95 and np.min(np.linalg.norm(measured.segments.midpoints, axis=1)) > 0.5:
+            return pose
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """Searches in a map of one size: processor times in ms, shares, and what the index takes."""
+
+    segments: int
+    median: float
+    p95: float
+    passed: float
+    hypotheses: float
+    right: float
+    wrong_usable: int
+    scan: float
+    build: float
+    megabytes: float
+
+
+def grow(size: int, queries: int) -> Growth:
+    """Index a campus and search it."""
+    rng = np.random.default_rng(SEED)
+    segments = campus(size)
+    start = time.thread_time()
+    index = MapIndex.build(segments)
+    build = time.thread_time() - start
+    cpu, passed, hypotheses, right, wrong, counts = [], [], [], [], 0, []
+    for k in range(queries + 2):
+        pose, scan = draw_query(segments, rng)
+        sent = Scan(MeasuredSegments.from_segments(scan, SIGMA))
+        began = time.perf_counter(), time.thread_time()
+        result = associate(index, sent, None, OPTIONS)
+        times = time.perf_counter() - began[0], time.thread_time() - began[1]
+        if k < 2:
+            continue  # warm-up
+        off = (math.inf, math.inf) if result.pose is None else offset(result.pose, pose)
+        right.append(off[0] < DISTANCE and off[1] < ANGLE)
+        wrong += result.usable and not right[-1]
+        passed.append(1e3 * times[0])
+        cpu.append(1e3 * times[1])
+        hypotheses.append(result.search.hypotheses)
+        counts.append(len(scan))
+        progress(f"{size:,} segments", k - 1, queries)
+    return Growth(
+        len(segments), quantile(cpu, 0.5), quantile(cpu, 0.95), quantile(passed, 0.5), quantile(hypotheses, 0.5),
+        mean(right), wrong, mean(counts), build, index.nbytes / 1e6,
+    )  # fmt: skip
+
+
+def print_growth(found: list[Growth]) -> None:
+    cells = [
+        (f"{g.segments:,}", f"{g.median:.2f}", f"{g.p95:.2f}", f"{g.passed:.2f}", f"{g.hypotheses:,.0f}",
+         f"{g.right:.2f}", str(g.wrong_usable), f"{g.scan:.0f}", f"{g.build:.2f}", f"{g.megabytes:.1f}")
+        for g in found
+    ]  # fmt: skip
+    head = ("map segments", "median ms", "p95 ms", "median ms passed", "hypotheses", "right first", "usable, wrong",
+            "scan segments", "index s", "index MB")  # fmt: skip
+    print_table("Search over the size of the map", head, cells)
+
+
+def growth_rows(found: list[Growth]) -> list[Row]:
+    """Judge the times of the sizes that goals were set for."""
+    rows = []
+    for g in found:
+        median, p95 = TIMES.get(g.segments, (None, None))
+        rows.append(at_most(f"{g.segments:,} map segments: search, median ms", g.median, None, median, ".2f"))
+        rows.append(at_most(f"{g.segments:,} map segments: search, p95 ms", g.p95, None, p95, ".2f"))
+    for g in found:
+        if g.segments == SIZES[-1]:
+            rows.append(at_most(f"{g.segments:,} map segments: index, s", g.build, None, INDEX_SECONDS, ".2f"))
+            rows.append(at_most(f"{g.segments:,} map segments: index, MB", g.megabytes, None, INDEX_MEGABYTES, ".0f"))
+    return rows
+
+
+def growth(queries: int, sizes: tuple[int, ...], pairs: tuple[int, ...] = PAIRS) -> list[Row]:
+    """Run both, print their tables and return the rows that were judged."""
+    head = ("pairs in the sums", "add one, us", "solve, us", "sum anew, us")
+    print_table("Constant-time sums of the joint estimator", head, sums_cells(pairs))
+    grow(sizes[0], 2)  # index and search are compiled
+    found = [grow(size, queries) for size in sizes]
+    print_growth(found)
+    rows = growth_rows(found)
+    print_rows("Growth", rows)
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--queries", type=int, default=30, help="a size")
+    parser.add_argument("--sizes", default=",".join(map(str, SIZES)))
+    args = parser.parse_args()
+    growth(args.queries, tuple(int(size) for size in args.sizes.split(",")))
+
+
+if __name__ == "__main__":
+    main()
