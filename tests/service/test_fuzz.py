@@ -21,7 +21,6 @@ CASES = int(os.environ.get("FUZZ_CASES", "20"))
 LONG_CASES = int(os.environ.get("FUZZ_LONG_CASES", "3000"))
 PATHS = ["/v1/register", "/v1/associate", "/v1/associate:batch", "/v1/vectorize"]
 HELD = [
-    checks.not_a_server_error,
     checks.status_code_conformance,
     checks.content_type_conformance,
     checks.response_schema_conformance,
@@ -65,7 +64,10 @@ def hold_to_the_schema(schema: Any, operation: tuple[str, str], mode: Generation
     @settings(max_examples=cases, **FUZZ)
     @given(case=schema[path][method].as_strategy(generation_mode=mode))
     def one(case: schemathesis.Case) -> None:
-        case.call_and_validate(checks=HELD)
+        response = case.call()
+        # A deadline may be asked for that is over at once.
+        assert response.status_code < 500 or response.status_code == 504, response.text
+        case.validate_response(response, checks=HELD)
 
     one()
 
