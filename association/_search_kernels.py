@@ -354,18 +354,24 @@ def search_slides(
         half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
         low = walls[w, 3] + half
         high = walls[w, 4] - half
-        steps = min(64, max(1, math.ceil((high - low) / spacing)))
+        steps = max(1, math.ceil((high - low) / spacing))
         theta = walls[w, 5] - scan[a, 5]
         c = math.cos(theta)
         s = math.sin(theta)
         gx = c * scan[a, 2] - s * scan[a, 3]
         gy = s * scan[a, 2] + c * scan[a, 3]
+        var = scan[a, 10]
         for j in range(steps):
             slide = low + (j + 0.5) / steps * (high - low)
+            px = walls[w, 0] * slide - walls[w, 1] * walls[w, 2]
+            py = walls[w, 1] * slide + walls[w, 0] * walls[w, 2]
             pose[0] = theta
-            pose[1] = walls[w, 0] * slide - walls[w, 1] * walls[w, 2] - gx
-            pose[2] = walls[w, 1] * slide + walls[w, 0] * walls[w, 2] - gy
-            var = scan[a, 10]
+            pose[1] = px - gx
+            pose[2] = py - gy
+            floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
+            quick = quick_score(scan, theta, pose[1], pose[2], px, py, var, walls, starts, items, shape, gates, floor)
+            if quick < 0.0:
+                continue
             covariance[0, 0] = var * gy * gy
             covariance[0, 1] = -var * gx * gy
             covariance[1, 1] = var * gx * gx

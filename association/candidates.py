@@ -31,8 +31,10 @@ RIVAL_SHARE = 0.9  # of the best value; a pose above it must not have been misse
 DISTINCT_DISTANCE = 0.3  # m
 DISTINCT_ANGLE = 0.1  # rad
 BASE_SEGMENTS = 40  # bases are drawn among this many of the most telling segments
-SLIDE_SEGMENTS = 6
-SLIDE_SPACING = 1.0  # m
+SLIDE_SEGMENTS = 3
+SLIDE_SPACING = 0.5  # m
+KEPT_SLIDES = 64
+PARALLEL_SINE = 0.1
 CHUNK = 300_000  # tests of a wall between two looks at the clock, a few milliseconds
 LEVELS = 16
 SAMPLE_WORDS = 256  # of 64 samples
@@ -63,6 +65,16 @@ def _sampled_inliers() -> NDArray[np.uint64]:
     shares = (np.arange(LEVELS) + 1) / LEVELS
     bits = np.packbits(draws[None] < shares[:, None, None], axis=-1)
     return np.ascontiguousarray(bits).view(np.uint64)
+
+
+def _sliding_segments(rows: Floats, floor: float) -> list[int]:
+    """Pick the longest segments of the classes of parallel ones that may explain more than `floor` nats."""
+    chosen: list[int] = []
+    for i in range(min(len(rows), BASE_SEGMENTS)):
+        parallel = np.abs(rows[i, 0] * rows[:, 1] - rows[i, 1] * rows[:, 0]) < PARALLEL_SINE
+        if len(chosen) < SLIDE_SEGMENTS and rows[parallel, 12].sum() > floor:
+            chosen.append(i)
+    return chosen
 
 
 def encode_prior(prior: Prior | None, origin: Floats) -> Floats:
@@ -112,16 +124,17 @@ def find_candidates(
             flat_prior, found, count, best, progress, pairs, merits, uses, residual, bound, missing, inliers, left,
             1.0 - options.confidence, options.exhaustive, CHUNK,
         )  # fmt: skip
-    # A scan without a base, or with none that fits, still fixes the pose across parallel walls.
-    for a in range(min(len(rows), SLIDE_SEGMENTS) if count[0] == 0 else 0):
+    # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
+    slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
+    for a in _sliding_segments(rows, KEEP_SHARE * best[0]):
         search_slides(
             rows, a, walls.rows, walls.by_direction, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
-            flat_prior, found, count, best, SLIDE_SPACING,
+            flat_prior, slides, slide_count, best, SLIDE_SPACING,
         )  # fmt: skip
+    found = np.concatenate([found[: count[0]], slides[: slide_count[0]]])
     if deadline.cancelled:
         raise CancelledError
-    k = int(count[0])
-    order = np.lexsort((np.arange(k), -found[:k, 0]))
+    order = np.argsort(-found[:, 0], kind="stable")
     level = int(LEVELS * min(1.0, best[0] / scan.total_gain)) - 1 if len(rows) else -1
     reached = 1.0 if stopped in (EXHAUSTED, PROVEN) else 1.0 - float(left[level]) if level >= 0 else 0.0
     report = SearchReport(

@@ -47,7 +47,11 @@ def print_bins(title: str, probabilities: np.ndarray, right: np.ndarray) -> None
 
 def _print(title: str, found: list[tuple[int, float, float]]) -> None:
     cells = [
-        (f"{b / BINS:.1f} to {(b + 1) / BINS:.1f}", str(count), f"{p:.3f}", f"{share:.3f}", f"{100 * (share - p):+.1f}")
+        (f"{b / BINS:.1f} to {(b + 1) / BINS:.1f}", str(count), *_told(count, p, share))
         for b, (count, p, share) in enumerate(found)
     ]
     print_table(title, ("probability", "answers", "mean", "observed", "points off"), cells)
+
+
+def _told(count: int, p: float, share: float) -> tuple[str, str, str]:
+    return (f"{p:.3f}", f"{share:.3f}", f"{100 * (share - p):+.1f}") if count else ("", "", "")

@@ -36,6 +36,10 @@ SKIPPED = 4
 SKIPPED_STEPS = 6.5
 LONGEST_STEP = 1.5
 
+# Root mean square distance (m) between one line and two below which the break is no feature: plaster, and a range
+# finder's bias that changes with range and incidence, bend straight walls by as much.
+FLATNESS = 0.007
+
 # Sine of the angle between two lines above which they are not tried for being one.
 NEAR_PARALLEL = 0.2
 
@@ -115,7 +119,8 @@ def rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor):
             # Started from one part's line, whose gate may miss the other's far points at first.
             fit_line(x, y, ux, uy, first, last + 1, variance, floor, joint, own)
         everyone = joint[COUNT] >= one[COUNT] + other[COUNT] - 1.0
-        if everyone and joint[CHI2] - one[CHI2] - other[CHI2] < BREAK_PENALTY:
+        excess = joint[CHI2] - one[CHI2] - other[CHI2]
+        if everyone and (excess < BREAK_PENALTY or excess < FLATNESS * FLATNESS * joint[WEIGHT]):
             lines[count - 2] = joint
             spans[count - 2, 1] = last
             count -= 1
