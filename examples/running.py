@@ -1,0 +1,67 @@
+"""Start the service in a process of its own, on a free loopback port, and stop it again."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+START_SECONDS = 300.0  # the first start of all compiles the kernels
+STOP_SECONDS = 15.0
+
+
+class StartError(Exception):
+    """The service did not come up; the message ends with its log."""
+
+
+@contextmanager
+def running_service() -> Iterator[tuple[str, int]]:
+    """Give the URL and the process id of a service that is ready; it and its data are gone afterwards."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    url = f"http://127.0.0.1:{port}"
+    # Settings of the caller's own service have no say here.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    with tempfile.TemporaryDirectory(prefix="linefix-demo-") as folder:
+        log = Path(folder) / "log"
+        command = [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", str(port)]
+        with log.open("wb") as sink:
+            process = subprocess.Popen(
+                [*command, "--data-dir", folder, "--drain-seconds", "0"], env=environment, stdout=sink, stderr=sink
+            )
+        try:
+            _wait_until_ready(url, process, log)
+            yield url, process.pid
+        finally:
+            _stop(process)
+
+
+def _wait_until_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    give_up = time.monotonic() + START_SECONDS
+    while time.monotonic() < give_up:
+        if process.poll() is not None:
+            raise StartError(f"the service ended with status {process.returncode}:\n{log.read_text()}")
+        try:
+            with urllib.request.urlopen(f"{url}/readyz", timeout=5):
+                return
+        except (urllib.error.URLError, OSError):
+            time.sleep(0.1)
+    raise StartError(f"the service was not ready within {START_SECONDS:.0f} s:\n{log.read_text()}")
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(STOP_SECONDS)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

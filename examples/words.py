@@ -1,0 +1,74 @@
+"""An answer in words, beside the truth."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from registration import RigidTransform, wrap_angle
+
+Answer = dict[str, Any]
+NEAR = 0.1  # m from the truth, within which a pose is the right one
+AS_WELL = 5.0  # nats below the best score, within which another pose explains a scan about as well
+
+
+def equals(answer: Answer) -> list[dict[str, Any]]:
+    """Return the alternatives that explain the scan about as well as the first pose."""
+    least = answer["diagnostics"]["score"] - AS_WELL
+    return [other for other in answer["alternatives"] if other["score"] >= least]
+
+
+def verdict_in_words(answer: Answer) -> str:
+    """Say what the answer means for a robot, in one sentence."""
+    status = answer["status"]
+    if status == "no_match":
+        return "nothing in this map explains the scan"
+    if status == "degenerate":
+        dx, dy = answer["unobservable"]
+        here, others = answer["pose"]["theta"], equals(answer)
+        round_too = any(abs(wrap_angle(other["pose"]["theta"] - here)) > 0.5 * math.pi for other in others)
+        return f"unknown along ({dx:.2f}, {dy:.2f}){', and which way round' if round_too else ', fixed across it'}"
+    if status == "ambiguous":
+        count = len(equals(answer))
+        return f"{count} other {'place explains' if count == 1 else 'places explain'} the scan about as well"
+    return f"here, with a chance of {100 * answer['probability']:.1f} %"
+
+
+def pose_in_words(pose: dict[str, float] | RigidTransform | None) -> str:
+    """Write a pose with its units."""
+    if pose is None:
+        return "none"
+    if isinstance(pose, RigidTransform):
+        pose = {"x": pose.x, "y": pose.y, "theta": pose.theta}
+    x, y, theta = pose["x"], pose["y"], pose["theta"]
+    return f"x {x:7.3f} m, y {y:7.3f} m, heading {math.degrees(theta):7.2f} deg"
+
+
+def distance(pose: dict[str, float], truth: RigidTransform) -> tuple[float, float]:
+    """Return how far a pose is from the truth: metres, and radians from 0 to pi."""
+    turned = abs(wrap_angle(pose["theta"] - truth.theta))
+    return math.hypot(pose["x"] - truth.x, pose["y"] - truth.y), turned
+
+
+def comparison_in_words(answer: Answer, truth: RigidTransform | None) -> str:
+    """Say how far the answer is from the truth."""
+    pose = answer["pose"]
+    if truth is None:
+        return "elsewhere, so this is right" if pose is None else "elsewhere, so this is wrong"
+    if pose is None:
+        return "no pose was given"
+    metres, radians = distance(pose, truth)
+    if answer["status"] == "degenerate":
+        dx, dy = answer["unobservable"]
+        along = abs((pose["x"] - truth.x) * dx + (pose["y"] - truth.y) * dy)
+        across = abs((pose["y"] - truth.y) * dx - (pose["x"] - truth.x) * dy)
+        if radians > 0.5 * math.pi:
+            return f"the other way round, {along:.2f} m along"
+        return f"{1000 * across:.1f} mm from it across, {along:.2f} m along"
+    apart = f"{1000 * metres:.1f} mm and {math.degrees(radians):.3f} deg from it"
+    if answer["status"] == "ambiguous":
+        if metres < NEAR:
+            return f"{apart}, the first of them"
+        letters = (chr(ord("A") + k) for k, one in enumerate(equals(answer)) if distance(one["pose"], truth)[0] < NEAR)
+        return f"{next(letters, 'none of them')}, {metres:.2f} m from the first"
+    return apart
