@@ -73,18 +73,19 @@ def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start):
 
 
 def test_joint_solve_of_parallel_lines_gives_the_shortest_translation():
-    normals = np.array([[0.0, 1.0], [0.0, -1.0]])
+    # Two walls along 0.5 rad that face each other, seen in place but for 2 m across.
+    along, across = np.array([math.cos(0.5), math.sin(0.5)]), np.array([-math.sin(0.5), math.cos(0.5)])
     sums = _kernels.joint_sums(
-        normals,
+        np.array([across, -across]),
         np.array([2.0, 1.0]),
-        np.array([[4.0, 0.0], [5.0, -3.0]]),
-        np.array([[1.0, 0.0], [-1.0, 0.0]]),
+        np.array([4.0 * along, 5.0 * along - 3.0 * across]),
+        np.array([along, -along]),
         np.ones(2),
         np.ones(2),
     )
     theta, x, y, cost, observable = _kernels.joint_solve(sums, 0.0, True)
     assert not observable
-    assert (theta, x, y, cost) == pytest.approx((0.0, 0.0, 2.0, 0.0), abs=1e-12)
+    np.testing.assert_allclose([theta, x, y, cost], [0.0, *(2.0 * across), 0.0], atol=1e-12)
 
 
 @given(SEEDS)
