@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
 USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve --help lists every setting."
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
@@ -12,10 +14,29 @@ USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve -
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
+def choose_kernel_cache(packages: Path) -> None:
+    """Name a directory for compiled kernels that this user can write, where the packages' own are not.
+
+    Without one Numba refuses to start: "no locator available".
+    """
+    own = packages / "association" / "__pycache__"
+    if "NUMBA_CACHE_DIR" in os.environ or os.access(own if own.exists() else own.parent, os.W_OK):
+        return
+    kept = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "linefix" / "kernels"
+    try:
+        kept.mkdir(mode=0o700, parents=True, exist_ok=True)
+        writable = os.access(kept, os.W_OK)
+    except OSError:
+        writable = False
+    # The last resort is compiled anew at every start. Its name cannot be guessed: what is in it gets executed.
+    os.environ["NUMBA_CACHE_DIR"] = str(kept) if writable else tempfile.mkdtemp(prefix="linefix-kernels-")
+
+
 def serve(arguments: Sequence[str]) -> int:
     """Read the settings and run the service."""
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
+    choose_kernel_cache(Path(__file__).parents[1])
     from .settings import SettingsError, read_settings
 
     try:
