@@ -38,7 +38,7 @@ LONGEST_STEP = 1.5
 
 # Root mean square distance (m) between one line and two below which the break is no feature: plaster, and a range
 # finder's bias that changes with range and incidence, bend straight walls by as much.
-FLATNESS = 0.007
+FLATNESS = 5e-3
 
 # Sine of the angle between two lines above which they are not tried for being one.
 NEAR_PARALLEL = 0.2
