@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from association import Deadline
 from service.gate import SearchGate
 from service.problems import ProblemError
+from service.runtime import HangUpError, Runtime
+from service.settings import Settings
 
 
 def soon() -> Deadline:
@@ -109,6 +112,37 @@ def test_who_leaves_the_queue_frees_the_place_and_who_runs_keeps_the_slot() -> N
         await until(lambda: gate.running == 0)
         assert await gate.run(lambda: 3, soon()) == 3
         gate.close()
+
+    asyncio.run(scenario())
+
+
+class GoneRequest:
+    """A request whose client hangs up while the search runs."""
+
+    def __init__(self) -> None:
+        self.gone = asyncio.Event()
+
+    async def receive(self) -> dict[str, str]:
+        await self.gone.wait()
+        return {"type": "http.disconnect"}
+
+
+def test_a_client_that_hangs_up_ends_its_search(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        runtime = Runtime(Settings(data_dir=tmp_path, searches=1))
+        deadline, request = soon(), GoneRequest()
+
+        def search() -> None:
+            while not deadline.cancelled:
+                time.sleep(0.001)
+
+        answer = asyncio.ensure_future(runtime.search(request, search, deadline))  # type: ignore[arg-type]
+        await until(lambda: runtime.gate.running == 1)
+        request.gone.set()
+        with pytest.raises(HangUpError):
+            await answer
+        await until(lambda: runtime.gate.running == 0)
+        runtime.close()
 
     asyncio.run(scenario())
 

@@ -162,19 +162,29 @@ def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable
 
 def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., Any]) -> None:
     running = start_service(searches=1, queue=1)
-    body = heavy_body(50_000)
-    head = f"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n".encode()
-    for _ in range(6):
-        with socket.create_connection(("127.0.0.1", running.port), timeout=20) as connection:
-            connection.sendall(head + body)
-    # Without the places coming free the queue of one would be full by now.
-    give_up = time.monotonic() + 20
-    while time.monotonic() < give_up:
-        if running.client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200:
-            break
-        time.sleep(0.05)
-    else:
-        pytest.fail("the places stayed taken")
+
+    def wait_for(state: str) -> None:
+        give_up = time.monotonic() + 30
+        while time.monotonic() < give_up:
+            text = running.client.get("/metrics").text
+            if "linefix_searches_running 1.0" in text and f"linefix_searches_waiting {state}" in text:
+                return
+            time.sleep(0.01)
+        pytest.fail(f"never {state} waiting")
+
+    busy = threading.Thread(target=lambda: httpx.post(running.url + "/v1/associate", content=heavy_body(), timeout=60))
+    busy.start()
+    wait_for("0.0")
+    body = orjson.dumps(examples.ASSOCIATE)
+    with socket.create_connection(("127.0.0.1", running.port), timeout=20) as connection:
+        connection.sendall(
+            f"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
+        )
+        wait_for("1.0")
+    wait_for("0.0")
+    # The one before it still runs: the place came free because its client left.
+    assert busy.is_alive()
+    busy.join()
     assert "a defect" not in running.log()
 
 
