@@ -165,60 +165,21 @@ def fit_line(x, y, ux, uy, a, b, variance, floor, line, own):
     whose abscissae are where the rays meet the line. Points without ray count with their distance from the line.
     Marks the points used in `own`; returns whether there are any two apart.
     """
-    scale = 1.0
+    scale = 2.0
     for turn in range(5):
-        w_sum = 0.0
-        t_sum = 0.0
-        e_sum = 0.0
-        tt = 0.0
-        te = 0.0
-        ee = 0.0
-        count = 0
-        gate = POINT_GATE * POINT_GATE * scale * (2.0 if turn == 0 else 1.0)
-        low = math.inf
-        high = -math.inf
-        reference = line[MEAN]
-        for i in range(a, b):
-            e = line[NX] * x[i] + line[NY] * y[i] - line[P]
-            t = line[NX] * y[i] - line[NY] * x[i]
-            cosine = 1.0
-            if ux[i] != 0.0 or uy[i] != 0.0:
-                cosine = line[NX] * ux[i] + line[NY] * uy[i]
-                if cosine > LEAST_COSINE:
-                    t = line[P] * (line[NX] * uy[i] - line[NY] * ux[i]) / cosine
-            v = variance * cosine * cosine + floor
-            own[i] = e * e <= gate * v
-            if not own[i]:
-                continue
-            w = 1.0 / v
-            low = min(low, t)
-            high = max(high, t)
-            t -= reference
-            w_sum += w
-            t_sum += w * t
-            e_sum += w * e
-            tt += w * t * t
-            te += w * t * e
-            ee += w * e * e
-            count += 1
-        if count < 2:
+        gate = POINT_GATE * POINT_GATE * scale
+        count, w, t_mean, e_mean, tt, te, chi2 = weigh(x, y, ux, uy, a, b, variance, floor, line, own, gate)
+        if count < 2 or not tt > 0.0:
             return False
-        t_mean = t_sum / w_sum
-        e_mean = e_sum / w_sum
-        tt -= w_sum * t_mean * t_mean
-        te -= w_sum * t_mean * e_mean
-        if not tt > 0.0:
-            return False
-        line[MEAN] = reference + t_mean
-        line[SPREAD] = tt / w_sum
-        line[WEIGHT] = w_sum
+        line[MEAN] += t_mean
+        line[SPREAD] = tt / w
+        line[WEIGHT] = w
         line[COUNT] = count
-        line[CHI2] = ee
-        line[BEGIN] = low
-        line[END] = high
+        line[CHI2] = chi2
+        if turn == 0:
+            scale = max(1.0, chi2 / max(1, count - 2))
         slope = te / tt
         offset = line[P] + e_mean
-        scale = max(1.0, ee / max(1, count - 2)) if turn == 0 else scale
         # Turn about the mean: the normal by -slope, the mean point moves along the normal alone.
         c = 1.0 / math.sqrt(1.0 + slope * slope)
         s = slope * c
@@ -229,9 +190,54 @@ def fit_line(x, y, ux, uy, a, b, variance, floor, line, own):
         line[NX] = nx
         line[NY] = ny
         line[P] = p
-        if turn > 1 and slope * slope * tt + e_mean * e_mean * w_sum < SETTLED:
+        if turn > 1 and slope * slope * tt + e_mean * e_mean * w < SETTLED:
             break
     return True
+
+
+@njit(cache=True, nogil=True)
+def weigh(x, y, ux, uy, a, b, variance, floor, line, own, gate):
+    """Sum up the points a to b - 1 whose squared distance from the line is within `gate` variances; set its ends.
+
+    Returns their number, weight, the means of abscissa (from the line's mean) and distance, the weighted squares and
+    products about these means, and the chi-square.
+    """
+    w_sum = 0.0
+    t_sum = 0.0
+    e_sum = 0.0
+    tt = 0.0
+    te = 0.0
+    ee = 0.0
+    count = 0
+    line[BEGIN] = math.inf
+    line[END] = -math.inf
+    for i in range(a, b):
+        e = line[NX] * x[i] + line[NY] * y[i] - line[P]
+        t = line[NX] * y[i] - line[NY] * x[i]
+        cosine = 1.0
+        if ux[i] != 0.0 or uy[i] != 0.0:
+            cosine = line[NX] * ux[i] + line[NY] * uy[i]
+            if cosine > LEAST_COSINE:
+                t = line[P] * (line[NX] * uy[i] - line[NY] * ux[i]) / cosine
+        v = variance * cosine * cosine + floor
+        own[i] = e * e <= gate * v
+        if own[i]:
+            line[BEGIN] = min(line[BEGIN], t)
+            line[END] = max(line[END], t)
+            w = 1.0 / v
+            t -= line[MEAN]
+            w_sum += w
+            t_sum += w * t
+            e_sum += w * e
+            tt += w * t * t
+            te += w * t * e
+            ee += w * e * e
+            count += 1
+    if count == 0:
+        return 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    t_mean = t_sum / w_sum
+    e_mean = e_sum / w_sum
+    return count, w_sum, t_mean, e_mean, tt - t_sum * t_mean, te - t_sum * e_mean, ee
 
 
 @njit(cache=True, nogil=True)
