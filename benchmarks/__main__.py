@@ -40,12 +40,11 @@ def _growth(quick: int) -> list[Row]:
 
 
 def _vectorization(quick: int) -> list[Row]:
-    if data_found():
-        print("\n### Vectorization\n")
-        scenes = vectorization.floorplan_scenes(300 // quick)
-        vectorization.speed(scenes[:: max(1, len(scenes) // 60)])
-        vectorization.accuracy("floor plans, 2 cm, sigma given", scenes, SCANNER, SCANNER.sigma)
-        vectorization.accuracy("floor plans, 2 cm, sigma estimated", scenes, SCANNER, None)
+    print("\n### Vectorization\n")
+    scenes = (vectorization.floorplan_scenes if data_found() else vectorization.drawn_scenes)(300 // quick)
+    vectorization.speed(scenes[:: max(1, len(scenes) // 60)])
+    vectorization.accuracy("2 cm, sigma given", scenes, SCANNER, SCANNER.sigma)
+    vectorization.accuracy("2 cm, sigma estimated", scenes, SCANNER, None)
     return []
 
 

@@ -177,8 +177,14 @@ def localization(only: set[str], stride: int, *, listing: bool) -> list[Row]:
     everything = [o for outcomes in groups.values() for o in outcomes]
     print_reliability("Probability", everything)
     held = [o for o in everything if held_out(o.query.map)]
-    print_reliability("Probability, buildings that nothing was fitted to", held)
-    told("Probability", [reliability_row("probability, greatest distance in points", held)])
+    print_reliability("Probability, the half that calibration leaves out", held)
+    told(
+        "Probability, greatest distance from the observed share in points",
+        [
+            reliability_row("probability, all answers", everything),
+            reliability_row("probability, the half that calibration leaves out", held),
+        ],
+    )
     if listing:
         print_wrong("Usable but wrong", everything)
         print_wrong("Usable in another building", away)

@@ -19,7 +19,9 @@ TELLING = 100  # answers in a bin from which its share is judged
 def reliability_row(what: str, outcomes: Sequence[Outcome]) -> Row:
     """Judge the probability: its greatest distance from the observed share, over bins of 100 answers and more."""
     gaps = [100.0 * abs(p - share) for count, p, share in reliability(outcomes) if count >= TELLING]
-    return at_most(what, max(gaps, default=math.nan), None, 3.0, ".1f")
+    row = at_most(what, max(gaps, default=math.nan), None, 3.0, ".1f")
+    told = f"{row.measured} ({len(gaps)} of {BINS} bins have {TELLING} answers)"
+    return Row(row.what, told, row.goal, row.met, row.aim, row.aimed)
 
 
 def reliability(outcomes: Sequence[Outcome]) -> list[tuple[int, float, float]]:
