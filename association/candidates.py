@@ -27,6 +27,9 @@ Floats = NDArray[np.float64]
 
 KEPT = 64  # poses
 KEEP_SHARE = 0.65  # of the best value; poses below it are no rivals
+# Where raw beams are to decide, the segments propose more.
+KEPT_FOR_BEAMS = 192
+KEEP_SHARE_FOR_BEAMS = 0.5
 RIVAL_SHARE = 0.9  # of the best value; a pose above it must not have been missed
 DISTINCT_DISTANCE = 0.3  # m
 DISTINCT_ANGLE = 0.1  # rad
@@ -95,9 +98,17 @@ def encode_prior(prior: Prior | None, origin: Floats) -> Floats:
 
 
 def find_candidates(
-    index: MapIndex, scan: ScanRows, prior: Prior | None, options: AssociationOptions, deadline: Deadline
+    index: MapIndex,
+    scan: ScanRows,
+    prior: Prior | None,
+    options: AssociationOptions,
+    deadline: Deadline,
+    *,
+    for_beams: bool = False,
 ) -> Candidates:
     """Go through bases until nothing better can have been missed, the bases are used up or the deadline passes.
+
+    Poses are kept more freely when raw beams are to decide between them (`for_beams`).
 
     Raises
     ------
@@ -106,9 +117,10 @@ def find_candidates(
     """
     walls, grid = index.walls, index.grid
     gate = gates(options)
-    rules = np.array([KEEP_SHARE, DISTINCT_DISTANCE, DISTINCT_ANGLE, RIVAL_SHARE])
+    kept, share = (KEPT_FOR_BEAMS, KEEP_SHARE_FOR_BEAMS) if for_beams else (KEPT, KEEP_SHARE)
+    rules = np.array([share, DISTINCT_DISTANCE, DISTINCT_ANGLE, RIVAL_SHARE])
     flat_prior = encode_prior(prior, index.origin)
-    found, count, best = np.zeros((KEPT, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64), np.zeros(BEST_SIZE)
+    found, count, best = np.zeros((kept, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64), np.zeros(BEST_SIZE)
     rows = scan.rows
     n = min(len(rows), BASE_SEGMENTS)
     pairs, merits = plan_bases(rows, n, walls.by_direction, walls.bin_starts, walls.longest, walls.summed, index.area)
@@ -126,7 +138,7 @@ def find_candidates(
         )  # fmt: skip
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
-    for a in _sliding_segments(rows, KEEP_SHARE * best[0]):
+    for a in _sliding_segments(rows, share * best[0]):
         search_slides(
             rows, a, walls.rows, walls.by_direction, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
             flat_prior, slides, slide_count, best, SLIDE_SPACING,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from registration import RigidTransform, wrap_angle
 
+from ._beam_kernels import rank_beams
 from ._search_kernels import INSIDE, prior_value
 from ._sight_kernels import rank
 from .candidates import DISTINCT_ANGLE, DISTINCT_DISTANCE, Candidates, encode_prior
@@ -18,6 +19,12 @@ from .options import AssociationOptions, Prior, Scan
 from .scan_rows import ScanRows, gates
 
 Floats = NDArray[np.float64]
+
+FEW_BEAMS = 60  # for a first look; neighbouring beams say the same
+MOST_BEAMS = 180
+BEAM_FINALISTS = 32
+BEAMS_READ = 100.0  # nats, for a pose at which all beams read the wall they should
+BEAMS_PASSED = 50.0  # nats, against one at which all beams passed through a wall
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +69,11 @@ def rank_candidates(
 ) -> list[Ranked]:
     """Refine and order the candidates: within the prior's window first, then by value; ties by the search's order."""
     prior, options = priors
-    k, n = len(candidates.poses), len(rows.rows)
-    poses = candidates.poses.copy()
-    scores, shares, reliabilities = np.zeros(k), np.zeros(k), np.zeros(k)
-    covariances, matches = np.zeros((k, 3, 3)), np.zeros((k, n, 5))
-    viewpoint = np.array(scan.viewpoint if scan.viewpoint is not None else (0.0, 0.0))
-    rank(
-        rows.rows, poses, index.walls.rows, index.grid.starts, index.grid.items, index.grid.shape, gates(options),
-        viewpoint, scan.viewpoint is not None, scores, covariances, shares, reliabilities, matches,
-    )  # fmt: skip
+    scored = _score(index, scan, rows, candidates.poses, options)
+    if scan.beams is not None and len(candidates.poses):
+        scored = _weigh_beams(index, scan, rows, scored, options)
+    poses, scores = scored.poses, scored.scores
+    k = len(poses)
     flat = encode_prior(prior, index.origin)
     values = scores + np.array([prior_value(flat, *pose) for pose in poses])
     ranked: list[Ranked] = []
@@ -84,17 +87,76 @@ def rank_candidates(
         ranked.append(
             Ranked(
                 pose=pose,
-                covariance=covariances[i],
+                covariance=scored.covariances[i],
                 score=float(scores[i]),
                 value=value,
                 inside=bool(inside),
-                share=float(shares[i]),
-                length=float(rows.rows[matches[i, :, 0] >= 0.0, 4].sum()),
-                reliability=float(reliabilities[i]),
-                matches=matches[i],
+                share=float(scored.shares[i]),
+                length=float(rows.rows[scored.matches[i, :, 0] >= 0.0, 4].sum()),
+                reliability=float(scored.reliabilities[i]),
+                matches=scored.matches[i],
             )
         )
     return ranked
+
+
+@dataclass(frozen=True, slots=True)
+class _Scored:
+    """Arrays over k candidates, see `_sight_kernels.rank`."""
+
+    poses: Floats
+    scores: Floats
+    covariances: Floats
+    shares: Floats
+    reliabilities: Floats
+    matches: Floats
+
+
+def _score(index: MapIndex, scan: Scan, rows: ScanRows, at: Floats, options: AssociationOptions) -> _Scored:
+    """Refine the poses on their consensus sets and score those, with lines of sight unless there are beams."""
+    k, n = len(at), len(rows.rows)
+    scored = _Scored(at.copy(), np.zeros(k), np.zeros((k, 3, 3)), np.zeros(k), np.zeros(k), np.zeros((k, n, 5)))
+    rank(
+        rows.rows, scored.poses, index.walls.rows, index.grid.starts, index.grid.items, index.grid.shape,
+        gates(options),
+        _viewpoint(scan), scan.viewpoint is not None and scan.beams is None, scored.scores, scored.covariances,
+        scored.shares, scored.reliabilities, scored.matches,
+    )  # fmt: skip
+    return scored
+
+
+def _weigh_beams(index: MapIndex, scan: Scan, rows: ScanRows, scored: _Scored, options: AssociationOptions) -> _Scored:
+    """Add what the raw beams say to the scores, and move the best poses to where the beams fit."""
+    by_few = scored.scores + _beam_scores(index, scan, scored.poses, FEW_BEAMS, 0)
+    best = np.argsort(-by_few, kind="stable")[:BEAM_FINALISTS]
+    poses = scored.poses[best]
+    evidence = _beam_scores(index, scan, poses, MOST_BEAMS, len(poses))
+    final = _score(index, scan, rows, poses, options)
+    final.scores[:] = np.where(final.scores > 0.0, final.scores + evidence, 0.0)
+    return final
+
+
+def _beam_scores(index: MapIndex, scan: Scan, poses: Floats, most: int, refined: int) -> Floats:
+    """Return what at most `most` of the beams say of each pose, nats over a pose where none reads what it should.
+
+    Moves the first `refined` of the poses.
+    """
+    if scan.beams is None:
+        return np.zeros(len(poses))
+    known = ~np.isnan(scan.beams.ranges)
+    angles, ranges = scan.beams.angles[known], scan.beams.ranges[known]
+    step = max(1, math.ceil(len(angles) / most))
+    evidence = np.zeros((len(poses), 2))
+    rank_beams(
+        np.ascontiguousarray(angles[::step]), np.ascontiguousarray(ranges[::step]), scan.beams.range_max,
+        _viewpoint(scan), poses, index.walls.rows, index.grid.starts, index.grid.items, index.grid.shape, refined,
+        evidence,
+    )  # fmt: skip
+    return np.asarray(BEAMS_READ * evidence[:, 0] - BEAMS_PASSED * evidence[:, 1])
+
+
+def _viewpoint(scan: Scan) -> Floats:
+    return np.array(scan.viewpoint if scan.viewpoint is not None else (0.0, 0.0))
 
 
 def _same(a: RigidTransform, b: RigidTransform) -> bool:

@@ -54,7 +54,8 @@ def associate(
     if not options.oriented:
         index = index.undirected
     rows = scan_rows(scan.measured, index.sigma, options)
-    candidates = find_candidates(index, rows, prior, options, deadline or Deadline())
+    beams = scan.beams is not None
+    candidates = find_candidates(index, rows, prior, options, deadline or Deadline(), for_beams=beams)
     ranked = rank_candidates(index, scan, rows, candidates, (prior, options))
     best = next((r for r in ranked if r.inside), None)
     chance = 1.0 if best is None else significance(index, rows, gates(options), float(best.matches[:, 4].sum()))
@@ -66,7 +67,7 @@ def associate(
     matched = set(accepted.pairs[:, 0].tolist())
     pose = registered.pose
     if verdict.status is Status.DEGENERATE:
-        pose = place_on_family(index, rows, best, registered, None if prior is None else prior.pose)
+        pose = place_on_family(index, rows, best, registered, _anchor(index, scan, best, prior))
     usable = verdict.status is Status.OK and candidates.report.complete and not verdict.contradicted
     return AssociationResult(
         status=verdict.status,
@@ -90,6 +91,16 @@ def associate(
         search=candidates.report,
         warnings=_warnings(verdict, candidates.report),
     )
+
+
+def _anchor(index: MapIndex, scan: Scan, best: Ranked, prior: Prior | None) -> RigidTransform | None:
+    """Return what picks one pose of a family: the prior, else where the raw beams fit best, else nothing."""
+    if prior is not None:
+        return prior.pose
+    if scan.beams is None:
+        return None
+    x, y = index.origin
+    return RigidTransform(best.pose.x + float(x), best.pose.y + float(y), best.pose.theta)
 
 
 def _weak_direction(registered: RegistrationResult) -> tuple[float, float] | None:
