@@ -15,7 +15,8 @@ from registration._kernels import joint_add, joint_information, joint_solve
 # Columns of `walls` (m, 8), one cache line a wall: 0, 1 unit direction; 2 offset along the left normal; 3, 4 abscissae
 # of begin and end along the direction; 5 angle.
 # Columns of `scan` (n, 16), the most telling segments first: 0, 1 unit direction; 2, 3 midpoint; 4 length; 5 angle;
-# 6, 7 centroid; 8 spread; 9, 10 variance of offset and angle; 11 weight; 12 gain; 13 sum of the gains of later rows.
+# 6, 7 centroid; 8 spread; 9, 10 variance of offset and angle; 11 weight; 12 gain; 13 sum of the gains of later rows;
+# 14 variance of the offset without the model's slack.
 SCAN_COLUMNS = 16
 # Columns of `matches` (n, 5): 0 wall or -1; 1 offset; 2 sine of the angle; 3 overlap; 4 worth in nats.
 # Places of `shape`, the geometry of the grid: x0, y0, cell size, columns, rows. Places of `gates`: how many standard
@@ -24,6 +25,8 @@ SCAN_COLUMNS = 16
 REACH = 0.4  # m; the grid lists a wall in the cells this near to it, so gates end here
 MAX_ANGLE_GATE = 0.35  # rad
 MIN_PIVOT = 1e-12
+MAX_STEP = 1.0  # m; a consensus set that moves its pose farther than that, or
+MAX_TURN = 0.2  # rad, is not the one that the pose was proposed for
 SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
 
 
@@ -220,6 +223,9 @@ def refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, 
         hold(sums, x, y, -1.0)
         if not invert3(information, covariance):
             return 0.0
+        if abs(wrap(theta - pose[0])) > MAX_TURN or (tx - x) ** 2 + (ty - y) ** 2 > MAX_STEP**2:
+            # Nearly parallel pairs, one of them wrong, throw the crossing far away.
+            break
         pose[0] = theta
         pose[1] = tx
         pose[2] = ty

@@ -35,7 +35,8 @@ DISTINCT_DISTANCE = 0.3  # m
 DISTINCT_ANGLE = 0.1  # rad
 BASE_SEGMENTS = 40  # bases are drawn among this many of the most telling segments
 SLIDE_SEGMENTS = 3
-SLIDE_SPACING = 0.5  # m
+SLIDE_SPACING = 2.0  # m; what is found stands for the family along the walls
+SLIDE_SPACING_FOR_BEAMS = 0.5  # m; there beams tell where along them
 KEPT_SLIDES = 64
 PARALLEL_SINE = 0.1
 CHUNK = 300_000  # tests of a wall between two looks at the clock, a few milliseconds
@@ -138,10 +139,12 @@ def find_candidates(
         )  # fmt: skip
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
+    spacing = SLIDE_SPACING_FOR_BEAMS if for_beams else SLIDE_SPACING
+    rules[1] = 0.9 * spacing
     for a in _sliding_segments(rows, share * best[0]):
         search_slides(
             rows, a, walls.rows, walls.by_direction, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
-            flat_prior, slides, slide_count, best, SLIDE_SPACING,
+            flat_prior, slides, slide_count, best, spacing,
         )  # fmt: skip
     found = np.concatenate([found[: count[0]], slides[: slide_count[0]]])
     if deadline.cancelled:

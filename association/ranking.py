@@ -8,18 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RigidTransform, wrap_angle
+from registration import RigidTransform
 
 from ._beam_kernels import rank_beams
 from ._search_kernels import INSIDE, prior_value
 from ._sight_kernels import rank
 from .candidates import DISTINCT_ANGLE, DISTINCT_DISTANCE, Candidates, encode_prior
 from .map_index import MapIndex
-from .options import AssociationOptions, Prior, Scan
+from .options import AssociationOptions, HardPrior, Prior, Scan
 from .scan_rows import ScanRows, gates
 
 Floats = NDArray[np.float64]
 
+MOST_DISTINCT = 60
+SAME_FAMILY = 12.8  # squared deviations; two poses nearer than that by the better one's covariance are one (99.5 %)
 FEW_BEAMS = 60  # for a first look; neighbouring beams say the same
 MOST_BEAMS = 180
 BEAM_FINALISTS = 32
@@ -49,6 +51,8 @@ class Ranked:
         Of the matched segments together, metres.
     reliability : float
         Eq. (28).
+    misfit : float
+        Mean squared offset over what the sigmas alone expect.
     matches : (n, 5)
         By row of the scan, see `_match_kernels`.
     """
@@ -61,6 +65,7 @@ class Ranked:
     share: float
     length: float
     reliability: float
+    misfit: float
     matches: Floats
 
 
@@ -73,31 +78,52 @@ def rank_candidates(
     if scan.beams is not None and len(candidates.poses):
         scored = _weigh_beams(index, scan, rows, scored, options)
     poses, scores = scored.poses, scored.scores
-    k = len(poses)
     flat = encode_prior(prior, index.origin)
     values = scores + np.array([prior_value(flat, *pose) for pose in poses])
     ranked: list[Ranked] = []
-    for i in np.lexsort((np.arange(k), -values)):
+    for i in _distinct(poses, scored.covariances, np.where(scores > 0.0, values, -np.inf)):
         theta, x, y = (float(v) for v in poses[i])
-        pose = RigidTransform(x, y, theta)
-        if scores[i] <= 0.0 or any(_same(pose, other.pose) for other in ranked):
-            continue
-        inside = flat[0] != 2.0 or values[i] >= INSIDE / 2
-        value = float(values[i] if values[i] < INSIDE / 2 else scores[i])
+        hard = values[i] >= INSIDE / 2
+        matched = scored.matches[i, :, 0] >= 0.0
+        squares = scored.matches[i, matched, 1] ** 2 / rows.rows[matched, 14]
         ranked.append(
             Ranked(
-                pose=pose,
+                pose=RigidTransform(x, y, theta),
                 covariance=scored.covariances[i],
                 score=float(scores[i]),
-                value=value,
-                inside=bool(inside),
+                value=float(scores[i] if hard else values[i]),
+                inside=not isinstance(prior, HardPrior) or bool(hard),
                 share=float(scored.shares[i]),
-                length=float(rows.rows[scored.matches[i, :, 0] >= 0.0, 4].sum()),
+                length=float(rows.rows[matched, 4].sum()),
                 reliability=float(scored.reliabilities[i]),
+                misfit=float(squares.mean()) if len(squares) else 0.0,
                 matches=scored.matches[i],
             )
         )
     return ranked
+
+
+def _distinct(poses: Floats, covariances: Floats, values: Floats) -> list[int]:
+    """Order the poses (k, 3) by value, ties by index, and leave out those that a better one stands for.
+
+    A pose stands for those that are near, and for those that its own covariance does not tell from it: a family along
+    a corridor is one explanation.
+    """
+    order = [int(i) for i in np.argsort(-values, kind="stable") if np.isfinite(values[i])]
+    left = np.array(order, dtype=np.intp)
+    kept: list[int] = []
+    while len(left) and len(kept) < MOST_DISTINCT:
+        i = int(left[0])
+        kept.append(i)
+        step = np.empty((len(left), 3))
+        step[:, :2] = poses[left, 1:] - poses[i, 1:]
+        step[:, 2] = np.remainder(poses[left, 0] - poses[i, 0] + math.pi, math.tau) - math.pi
+        near = (np.hypot(step[:, 0], step[:, 1]) < DISTINCT_DISTANCE) & (np.abs(step[:, 2]) < DISTINCT_ANGLE)
+        square = np.einsum("ij,jk,ik->i", step, np.linalg.inv(covariances[i]), step)
+        near |= square < SAME_FAMILY
+        near[0] = True
+        left = left[~near]
+    return kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +183,3 @@ def _beam_scores(index: MapIndex, scan: Scan, poses: Floats, most: int, refined:
 
 def _viewpoint(scan: Scan) -> Floats:
     return np.array(scan.viewpoint if scan.viewpoint is not None else (0.0, 0.0))
-
-
-def _same(a: RigidTransform, b: RigidTransform) -> bool:
-    near = math.hypot(a.x - b.x, a.y - b.y) < DISTINCT_DISTANCE
-    return near and abs(wrap_angle(a.theta - b.theta)) < DISTINCT_ANGLE

@@ -75,6 +75,7 @@ def scan_rows(measured: MeasuredSegments, map_sigma: float, options: Association
         [s.directions, s.midpoints, s.lengths, angles, measured.centroids, measured.spreads, offset_var, angle_var,
          1.0 / offset_var, gains]
     )[order]  # fmt: skip
+    rows[:, 14] = np.maximum(line_var + map_sigma**2, 1e-8)[order]
     rows[:, 13] = gains.sum() - np.cumsum(gains[order])
     return ScanRows(order, rows)
 

@@ -61,7 +61,7 @@ def associate(
     chance = 1.0 if best is None else significance(index, rows, gates(options), float(best.matches[:, 4].sum()))
     accepted = None if best is None else accept(index, scan, rows, best)
     registered = None if accepted is None else register_accepted(index, scan, accepted, options)
-    verdict = judge(ranked, chance, registered)
+    verdict = judge(ranked, registered, with_beams=beams)
     if best is None or accepted is None or registered is None or verdict.status is Status.NO_MATCH:
         return _no_match(scan, ranked, verdict, candidates.report, (index, options))
     matched = set(accepted.pairs[:, 0].tolist())

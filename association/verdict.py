@@ -17,15 +17,16 @@ Floats = NDArray[np.float64]
 
 # Chance that the first explanation or a twin of it is right: a logistic model of `features`. The coefficients are those
 # that `python -m benchmarks.calibration` fits.
-COEFFICIENTS = (-6.30, 0.182, -0.199, 11.34, 0.586, -0.871, -4.03)
+COEFFICIENTS = (-6.076, 0.173, -0.170, 10.67, 0.788, -0.806, -3.331, -0.408)
+COEFFICIENTS_WITH_BEAMS = (-6.065, 0.106, 0.309, 5.718, 0.966, -0.162, -2.343, 0.055)
 MAX_LEAD = 40.0  # nats
 CROWD_TEMPERATURE = 4.0  # nats
 LEAST_CROWD = -12.0
+LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as likely as one to e
 
 USABLE_PROBABILITY = 0.93
-CHANCE = 1e-2  # significance beyond which chance explains a scan as well
-CHANCE_SHARE = 0.5  # of the scan's length that then must be matched for an answer
+NO_MATCH_PROBABILITY = 0.03  # of the first explanation or a twin of it
 CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
 FAR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
 MAX_DEVIATION = 0.5  # m; beyond it the weakest direction counts as not fixed
@@ -42,17 +43,17 @@ class Verdict:
     contradicted: bool
 
 
-def judge(ranked: list[Ranked], chance: float, registered: RegistrationResult | None) -> Verdict:
-    """Weigh the best explanation against the others and against chance.
+def judge(ranked: list[Ranked], registered: RegistrationResult | None, *, with_beams: bool) -> Verdict:
+    """Weigh the best explanation against the others and against none being right.
 
     Parameters
     ----------
     ranked : list of Ranked
         As ordered by `rank_candidates`; may be empty.
-    chance : float
-        Significance of the best one, 0 to 1.
     registered : RegistrationResult or None
         Of the best one's pairs.
+    with_beams : bool
+        Whether raw beams are in the scores.
     """
     inside = [r for r in ranked if r.inside]
     if not inside or registered is None:
@@ -62,12 +63,13 @@ def judge(ranked: list[Ranked], chance: float, registered: RegistrationResult | 
     contradicted = better_elsewhere or best.value - best.score < FAR
     others = inside[1:]
     lead = best.value - others[0].value if others else best.value
-    probability = right_probability(best, others)
+    any_right = 1.0 / (1.0 + math.exp(-logit(best, others, with_beams=with_beams)))
+    probability = any_right * twin_share(best, others)
     if contradicted:
         probability = min(probability, 0.5)
     margin = lead if others else None
     runner_up = max(0.0, others[0].value / best.value) if others and best.value > 0.0 else None
-    if chance > CHANCE and best.share < CHANCE_SHARE:
+    if any_right < NO_MATCH_PROBABILITY:
         status = Status.NO_MATCH
     elif is_degenerate(registered):
         status = Status.DEGENERATE
@@ -83,18 +85,18 @@ def features(best: Ranked, others: list[Ranked]) -> Floats:
 
     Returns
     -------
-    (7,)
+    (8,)
         1; lead over the best other explanation, nats; minus the log of the others' tempered evidence; matched share of
         the scan's length; square root of the number of matched segments; square root of their length, sqrt(m); standard
-        deviation of the position along its weakest direction, up to 1 m.
+        deviation of the position along its weakest direction, up to 1 m; log of the misfit.
     """
     lead = best.value - others[0].value if others else best.value
     crowd = math.log(_evidence(best, others, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
     count = int((best.matches[:, 0] >= 0.0).sum())
     deviation = math.sqrt(float(np.linalg.eigvalsh(best.covariance[:2, :2])[1]))
-    return np.array(
-        [1.0, min(lead, MAX_LEAD), -crowd, best.share, math.sqrt(count), math.sqrt(best.length), min(deviation, 1.0)]
-    )
+    misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
+    seen = [best.share, math.sqrt(count), math.sqrt(best.length)]
+    return np.array([1.0, min(lead, MAX_LEAD), -crowd, *seen, min(deviation, 1.0), misfit])
 
 
 def twin_share(best: Ranked, others: list[Ranked]) -> float:
@@ -102,10 +104,10 @@ def twin_share(best: Ranked, others: list[Ranked]) -> float:
     return 1.0 / (1.0 + _evidence(best, others, TWIN_TEMPERATURE))
 
 
-def right_probability(best: Ranked, others: list[Ranked]) -> float:
-    """Return the calibrated chance that the best explanation is right, 0 to 1."""
-    logit = float(features(best, others) @ np.array(COEFFICIENTS))
-    return twin_share(best, others) / (1.0 + math.exp(-logit))
+def logit(best: Ranked, others: list[Ranked], *, with_beams: bool) -> float:
+    """Return the log-odds that the best explanation or a twin of it is right."""
+    coefficients = COEFFICIENTS_WITH_BEAMS if with_beams else COEFFICIENTS
+    return float(features(best, others) @ np.array(coefficients))
 
 
 def _evidence(best: Ranked, others: list[Ranked], temperature: float) -> float:
