@@ -47,6 +47,13 @@ def test_nothing_within_the_limit_is_no_return():
     assert (seen.ranges[~far] <= 1.2).all()
 
 
+def test_noise_lifts_no_range_above_the_limit():
+    limit = 1.0
+    seen = scan(SQUARE, ORIGIN, Scanner(2000, -0.01, 1e-5, range_max=limit, sigma=0.05), np.random.default_rng(0))
+    assert np.isinf(seen.ranges).any()
+    assert seen.ranges[np.isfinite(seen.ranges)].max() <= limit
+
+
 def test_an_empty_map_gives_no_returns():
     seen = scan(Segments.from_array([]), ORIGIN, QUIET)
     assert np.isinf(seen.ranges).all()

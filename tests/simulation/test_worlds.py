@@ -88,10 +88,10 @@ def test_offices_grow_as_asked_and_all_rooms_can_be_reached():
 
 
 def test_obstacles_come_after_the_map_and_keep_away_from_the_poses():
-    world = with_obstacles(square_room(20.0), 12, np.random.default_rng(2))
+    world = with_obstacles(square_room(10.0), 40, np.random.default_rng(2))
     assert world.mapped == 4
-    assert len(world.segments) == 4 + 4 * 12
-    np.testing.assert_array_equal(world.map.endpoints, square_room(20.0).segments.endpoints)
+    assert len(world.segments) == 4 + 4 * 40
+    np.testing.assert_array_equal(world.map.endpoints, square_room(10.0).segments.endpoints)
     for pose in world.poses:
         seen = scan(world.segments, pose, FAR)
         assert seen.facing.all()

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from vectorization._kernels import BREAK_PENALTY, BREAK_REACH, GRAZING, MISSING_STEPS
+from vectorization._ray_kernels import LEAST_TRIPLES
 
 
 def stretch_cost(points, rays, variance, floor):
@@ -96,6 +97,8 @@ def ray_noise(ranges, angles, increment, trusted, mean_square):
         if max(b - a, c - b) < 1.6 * increment:
             coefficients = np.array([np.sin(c - b) / ra, -np.sin(c - a) / rb, np.sin(b - a) / rc])
             z.append(abs(coefficients.sum()) / np.linalg.norm(coefficients / [ra, rb, rc]))
+    if len(z) < LEAST_TRIPLES:
+        return 0.0
     return math.sqrt(np.mean(np.square(np.sort(z)[: int(trusted * len(z))])) / mean_square)
 
 
