@@ -90,17 +90,19 @@ def _column_span(x1, y1, x2, y2, radius, low, high):
 
 
 @njit(cache=True, nogil=True)
-def grid_cells(endpoints, radius, x0, y0, cell, columns, rows):
-    """List for every cell of a uniform grid the walls that come within `radius` of it.
+def grid_cells(endpoints, radius, x0, y0, cell, columns, rows, sectors, n_sectors):
+    """List for every cell of a uniform grid and every sector the walls that come within `radius` of the cell.
 
-    Returns ``(starts, items)``: cell ``c = row * columns + column`` holds ``items[starts[c]:starts[c + 1]]``.
+    `sectors` (m,): which of the `n_sectors` a wall is listed under. Returns ``(starts, items)``: place
+    ``c = (row * columns + column) * n_sectors + sector`` holds ``items[starts[c]:starts[c + 1]]``.
     """
-    starts = np.zeros(columns * rows + 1, dtype=np.int64)
+    places = columns * rows * n_sectors
+    starts = np.zeros(places + 1, dtype=np.int64)
     items = np.zeros(0, dtype=np.int32)
     for counting in (True, False):
         if not counting:
             total = 0
-            for c in range(columns * rows + 1):
+            for c in range(places + 1):
                 here = starts[c]
                 starts[c] = total
                 total += here
@@ -118,12 +120,12 @@ def grid_cells(endpoints, radius, x0, y0, cell, columns, rows):
                 bottom = max(0, int((ya - y0) / cell))
                 top = min(rows - 1, int((yb - y0) / cell))
                 for row in range(bottom, top + 1):
-                    c = row * columns + column
+                    c = (row * columns + column) * n_sectors + sectors[i]
                     if not counting:
                         items[starts[c]] = i
                     starts[c] += 1
     # The second pass moved every start to the next one's place.
-    for c in range(columns * rows, 0, -1):
+    for c in range(places, 0, -1):
         starts[c] = starts[c - 1]
     starts[0] = 0
     return starts, items

@@ -36,68 +36,88 @@ def wrap(angle):
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@njit(inline="always")
-def match_segment(scan, i, c, s, tx, ty, offset_gate, cos_gate, min_overlap, walls, starts, items, shape):
-    """Find the wall that scan segment `i` lies on best: ``(wall or -1, offset, sine of the angle, overlap)``.
+@njit(cache=True, nogil=True)
+def match_scan(scan, pose, covariance, walls, starts, items, shape, gates, threshold, matches):
+    """Find for every scan segment the wall that it lies on best, the most telling segments first.
 
-    Best is least in offset over gate plus what the overlap lacks. Inlined: a call would cost more than the work.
+    Gated by the innovation: ``offset^2`` against ``sigma^2 + g' C g`` with the pose's covariance C. Best is least in
+    offset over gate plus what the overlap lacks. Writes wall or -1, offset, sine of the angle and overlap to `matches`
+    and returns the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach.
+
+    One loop without calls: handing arrays on costs more than the work, Numba counts references to each.
     """
-    x = c * scan[i, 2] - s * scan[i, 3] + tx
-    y = s * scan[i, 2] + c * scan[i, 3] + ty
-    best = -1
-    best_offset = 0.0
-    best_sine = 0.0
-    best_overlap = 0.0
-    best_cost = 1e300
-    fx = (x - shape[0]) / shape[2]
-    fy = (y - shape[1]) / shape[2]
-    if fx >= 0.0 and fy >= 0.0 and fx < shape[3] and fy < shape[4]:
-        here = int(fy) * int(shape[3]) + int(fx)
+    c = math.cos(pose[0])
+    s = math.sin(pose[0])
+    tx = pose[1]
+    ty = pose[2]
+    per_cell = 1.0 / shape[2]
+    columns = int(shape[3])
+    total = 0.0
+    for i in range(len(scan)):
+        gx = c * scan[i, 2] - s * scan[i, 3]
+        gy = s * scan[i, 2] + c * scan[i, 3]
         dx = c * scan[i, 0] - s * scan[i, 1]
         dy = s * scan[i, 0] + c * scan[i, 1]
+        # g = (n, n . J R m) with the normal n across the segment.
+        lever = dx * gx + dy * gy
+        var = (
+            dy * dy * covariance[0, 0]
+            - 2.0 * dx * dy * covariance[0, 1]
+            + dx * dx * covariance[1, 1]
+            + 2.0 * lever * (dx * covariance[1, 2] - dy * covariance[0, 2])
+            + lever * lever * covariance[2, 2]
+        )
+        offset_gate = min(gates[2], max(gates[1], gates[0] * math.sqrt(scan[i, 9] + max(var, 0.0))))
+        angle_gate = min(gates[4], max(gates[3], gates[0] * math.sqrt(scan[i, 10] + covariance[2, 2])))
+        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
+        x = gx + tx
+        y = gy + ty
+        fx = (x - shape[0]) * per_cell
+        fy = (y - shape[1]) * per_cell
         length = scan[i, 4]
-        for k in range(starts[here], starts[here + 1]):
-            w = items[k]
-            wx = walls[w, 0]
-            wy = walls[w, 1]
-            offset = wx * y - wy * x - walls[w, 2]
-            if wx * dx + wy * dy >= cos_gate and abs(offset) <= offset_gate:
+        best_cost = 1e300
+        matches[i, 0] = -1.0
+        matches[i, 3] = 0.0
+        if fx >= 0.0 and fy >= 0.0 and fx < shape[3] and fy < shape[4]:
+            here = int(fy) * columns + int(fx)
+            for k in range(starts[here], starts[here + 1]):
+                w = items[k]
+                wx = walls[w, 0]
+                wy = walls[w, 1]
+                offset = wx * y - wy * x - walls[w, 2]
+                if abs(offset) > offset_gate or wx * dx + wy * dy < cos_gate:
+                    continue
                 along = wx * x + wy * y
                 covered = min(walls[w, 4], along + 0.5 * length) - max(walls[w, 3], along - 0.5 * length)
                 overlap = min(1.0, covered / length)
                 cost = abs(offset) / offset_gate + 1.0 - overlap
-                if overlap >= min_overlap and cost < best_cost:
+                if overlap >= gates[5] and cost < best_cost:
                     best_cost = cost
-                    best = w
-                    best_offset = offset
-                    best_sine = dx * wy - dy * wx
-                    best_overlap = overlap
-    return best, best_offset, best_sine, best_overlap
-
-
-@njit(cache=True, nogil=True)
-def quick_score(scan, theta, tx, ty, px, py, theta_var, walls, starts, items, shape, gates, threshold):
-    """Sum the gains of the segments that lie on a wall, the most telling first; -1 once `threshold` is out of reach.
-
-    ``(px, py)`` is where the base pins the pose (index frame): the uncertainty of the angle counts by the distance
-    from there.
-    """
-    c = math.cos(theta)
-    s = math.sin(theta)
-    total = 0.0
-    for i in range(len(scan)):
-        rx = c * scan[i, 2] - s * scan[i, 3] + tx - px
-        ry = s * scan[i, 2] + c * scan[i, 3] + ty - py
-        gate = gates[0] * math.sqrt(scan[i, 9] + theta_var * (rx * rx + ry * ry))
-        gate = min(gates[2], max(gates[1], gate))
-        angle_gate = gates[0] * math.sqrt(scan[i, 10] + theta_var)
-        angle_gate = min(gates[4], max(gates[3], angle_gate))
-        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
-        _, _, _, overlap = match_segment(scan, i, c, s, tx, ty, gate, cos_gate, gates[5], walls, starts, items, shape)
-        total += scan[i, 12] * overlap
+                    matches[i, 0] = w
+                    matches[i, 1] = offset
+                    matches[i, 2] = dx * wy - dy * wx
+                    matches[i, 3] = overlap
+        total += scan[i, 12] * matches[i, 3]
         if total + scan[i, 13] < threshold:
             return -1.0
     return total
+
+
+@njit(cache=True, nogil=True)
+def turning(theta_var, gx, gy, covariance):
+    """Write the covariance of a pose held at a point, and turning about it with `theta_var`.
+
+    ``(gx, gy)`` is that point in the scan frame, rotated: the lever from the sensor to it.
+    """
+    covariance[0, 0] = theta_var * gy * gy
+    covariance[0, 1] = -theta_var * gx * gy
+    covariance[1, 0] = covariance[0, 1]
+    covariance[1, 1] = theta_var * gx * gx
+    covariance[0, 2] = theta_var * gy
+    covariance[2, 0] = covariance[0, 2]
+    covariance[1, 2] = -theta_var * gx
+    covariance[2, 1] = covariance[1, 2]
+    covariance[2, 2] = theta_var
 
 
 @njit(cache=True, nogil=True)
@@ -119,38 +139,6 @@ def invert3(f, out):
     out[2, 0] = out[0, 2]
     out[2, 1] = out[1, 2]
     return True
-
-
-@njit(cache=True, nogil=True)
-def match_all(scan, pose, covariance, walls, starts, items, shape, gates, matches):
-    """Match every scan segment at a pose, gated by the innovation: ``offset^2`` against ``sigma^2 + g' F^-1 g``."""
-    c = math.cos(pose[0])
-    s = math.sin(pose[0])
-    for i in range(len(scan)):
-        gx = c * scan[i, 2] - s * scan[i, 3]
-        gy = s * scan[i, 2] + c * scan[i, 3]
-        # g = (n, n . J R m) with the normal across the segment.
-        nx = -(s * scan[i, 0] + c * scan[i, 1])
-        ny = c * scan[i, 0] - s * scan[i, 1]
-        lever = ny * gx - nx * gy
-        var = (
-            nx * nx * covariance[0, 0]
-            + 2.0 * nx * ny * covariance[0, 1]
-            + ny * ny * covariance[1, 1]
-            + 2.0 * lever * (nx * covariance[0, 2] + ny * covariance[1, 2])
-            + lever * lever * covariance[2, 2]
-        )
-        gate = min(gates[2], max(gates[1], gates[0] * math.sqrt(scan[i, 9] + max(var, 0.0))))
-        angle_gate = gates[0] * math.sqrt(scan[i, 10] + covariance[2, 2])
-        angle_gate = min(gates[4], max(gates[3], angle_gate))
-        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
-        wall, offset, sine, overlap = match_segment(
-            scan, i, c, s, pose[1], pose[2], gate, cos_gate, gates[5], walls, starts, items, shape
-        )
-        matches[i, 0] = wall
-        matches[i, 1] = offset
-        matches[i, 2] = sine
-        matches[i, 3] = overlap
 
 
 @njit(cache=True, nogil=True)
@@ -202,7 +190,7 @@ def refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, 
     n = len(scan)
     held = np.full(n, -1, dtype=np.int64)
     for _ in range(rounds):
-        match_all(scan, pose, covariance, walls, starts, items, shape, gates, matches)
+        match_scan(scan, pose, covariance, walls, starts, items, shape, gates, 0.0, matches)
         changed = False
         for i in range(n):
             w = int(matches[i, 0])
@@ -229,5 +217,5 @@ def refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, 
         pose[0] = theta
         pose[1] = tx
         pose[2] = ty
-    match_all(scan, pose, covariance, walls, starts, items, shape, gates, matches)
+    match_scan(scan, pose, covariance, walls, starts, items, shape, gates, 0.0, matches)
     return value_matches(scan, matches)

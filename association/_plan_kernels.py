@@ -18,10 +18,10 @@ HYPOTHESIS_SCALE = 1.6  # observed over expected number of hypotheses, median
 
 
 @njit(cache=True, nogil=True)
-def slack_tables(scan, count, by_direction, bin_starts, longest, summed):
+def slack_tables(scan, count, bin_starts, longest, summed):
     """Sum over the walls of each direction bin how far scan segment i could slide on them.
 
-    `longest` (m,): lengths of the walls in the order of `by_direction`; `summed` (m + 1,): their running sum. Returns
+    `longest` (m,): lengths of the walls; `summed` (m + 1,): their running sum. Returns
     slides (count, bins) in metres and the number of walls long enough for each segment.
     """
     bins = len(bin_starts) - 1
@@ -46,13 +46,13 @@ def slack_tables(scan, count, by_direction, bin_starts, longest, summed):
 
 
 @njit(cache=True, nogil=True)
-def plan_bases(scan, count, by_direction, bin_starts, longest, summed, area):
+def plan_bases(scan, count, bin_starts, longest, summed, area):
     """List the non-parallel pairs of the first `count` scan segments with their logarithmic merit.
 
     The merit is what the base can tell (the lesser gain) over what it will cost. Returns pairs (k, 2), the one that
     slides first, and merits (k,).
     """
-    slides, fitting = slack_tables(scan, count, by_direction, bin_starts, longest, summed)
+    slides, fitting = slack_tables(scan, count, bin_starts, longest, summed)
     bins = len(bin_starts) - 1
     total = np.zeros(count)
     smooth = np.empty((count, bins))
@@ -146,8 +146,9 @@ BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
 @njit(cache=True, nogil=True)
 def advance(
-    scan, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, progress,
-    pairs, merits, uses, residual, bound, missing, inliers, left, miss, exhaustive, budget,
+    scan, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates, rules, prior,
+    found, count, best, progress, pairs, merits, uses, residual, bound, missing, inliers, left, miss, exhaustive,
+    budget,
 ):  # fmt: skip
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
@@ -167,8 +168,8 @@ def advance(
         a = pairs[progress[4], 0]
         b = pairs[progress[4], 1]
         spent += search_base(
-            scan, a, b, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best,
-            progress, budget - spent,
+            scan, a, b, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates,
+            rules, prior, found, count, best, progress, budget - spent,
         )  # fmt: skip
         if progress[1] > 0:
             return BUDGET

@@ -5,10 +5,13 @@ import math
 import numpy as np
 from numba import njit
 
-from ._match_kernels import quick_score, refine, wrap
+from ._match_kernels import match_scan, refine, turning, wrap
 
 BASE_SLACK = 0.2  # m; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length
+SECTORS = (
+    16  # a power of two; of directions, in the lists of the walls that a sweep may meet; 0 degrees is the middle of one
+)
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base
 MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base
 
@@ -121,13 +124,12 @@ def end_slack(length):
 
 
 @njit(cache=True, nogil=True)
-def anchors(length, walls, by_direction, bin_starts, out):
+def anchors(length, walls, bin_starts, out):
     """List the walls long enough for a scan segment of `length` metres."""
     n = 0
     need = length - 2.0 * end_slack(length)
     for b in range(len(bin_starts) - 1):
-        for k in range(bin_starts[b], bin_starts[b + 1]):
-            w = by_direction[k]
+        for w in range(bin_starts[b], bin_starts[b + 1]):
             if walls[w, 4] - walls[w, 3] < need:
                 break
             out[n] = w
@@ -135,21 +137,11 @@ def anchors(length, walls, by_direction, bin_starts, out):
     return n
 
 
-@njit(inline="always")
-def contained(scan, i, c, s, tx, ty, walls, w):
-    """Tell whether a scan segment lies within the ends of a wall, up to its slack."""
-    x = c * scan[i, 2] - s * scan[i, 3] + tx
-    y = s * scan[i, 2] + c * scan[i, 3] + ty
-    along = walls[w, 0] * x + walls[w, 1] * y
-    half = 0.5 * scan[i, 4] - end_slack(scan[i, 4])
-    return along - half >= walls[w, 3] and along + half <= walls[w, 4]
-
-
-@njit(inline="always")
+@njit(cache=True, nogil=True)
 def base_pose(scan, a, b, walls, wa, wb, pose):
     """Write the pose that puts both midpoints on their lines and splits the misfit of the angles by their variances.
 
-    Returns whether both segments then lie within the ends of their walls.
+    Returns whether both segments then lie within the ends of their walls, up to their slack.
     """
     gap = wrap(walls[wb, 5] - walls[wa, 5] - scan[b, 5] + scan[a, 5])
     theta = walls[wa, 5] - scan[a, 5] + gap * scan[a, 10] / (scan[a, 10] + scan[b, 10])
@@ -157,158 +149,59 @@ def base_pose(scan, a, b, walls, wa, wb, pose):
     s = math.sin(theta)
     det = walls[wa, 0] * walls[wb, 1] - walls[wa, 1] * walls[wb, 0]
     # n . t = p - n . R m for both, with n = (-d_y, d_x).
-    x = c * scan[a, 2] - s * scan[a, 3]
-    y = s * scan[a, 2] + c * scan[a, 3]
-    ra = walls[wa, 2] + walls[wa, 1] * x - walls[wa, 0] * y
-    x = c * scan[b, 2] - s * scan[b, 3]
-    y = s * scan[b, 2] + c * scan[b, 3]
-    rb = walls[wb, 2] + walls[wb, 1] * x - walls[wb, 0] * y
+    ax = c * scan[a, 2] - s * scan[a, 3]
+    ay = s * scan[a, 2] + c * scan[a, 3]
+    bx = c * scan[b, 2] - s * scan[b, 3]
+    by = s * scan[b, 2] + c * scan[b, 3]
+    ra = walls[wa, 2] + walls[wa, 1] * ax - walls[wa, 0] * ay
+    rb = walls[wb, 2] + walls[wb, 1] * bx - walls[wb, 0] * by
     tx = (ra * walls[wb, 0] - rb * walls[wa, 0]) / det
     ty = (ra * walls[wb, 1] - rb * walls[wa, 1]) / det
     pose[0] = theta
     pose[1] = tx
     pose[2] = ty
-    return contained(scan, a, c, s, tx, ty, walls, wa) and contained(scan, b, c, s, tx, ty, walls, wb)
+    along = walls[wa, 0] * (ax + tx) + walls[wa, 1] * (ay + ty)
+    half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
+    if along - half < walls[wa, 3] or along + half > walls[wa, 4]:
+        return False
+    along = walls[wb, 0] * (bx + tx) + walls[wb, 1] * (by + ty)
+    half = 0.5 * scan[b, 4] - end_slack(scan[b, 4])
+    return along - half >= walls[wb, 3] and along + half <= walls[wb, 4]
 
 
 @njit(cache=True, nogil=True)
 def try_pose(
-    scan, a, b, pose, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches, sums,
-    information, covariance,
+    scan, gx, gy, theta_var, pose, walls, starts, items, shape, gates, rules, prior, found, count, best, progress,
+    matches, sums, information, covariance,
 ):  # fmt: skip
-    """Score the pose of a base; keep it if it is among the best. Returns what it cost, in tests of a wall."""
-    va = scan[a, 10]
-    vb = scan[b, 10]
-    theta_var = va * vb / (va + vb)
-    c = math.cos(pose[0])
-    s = math.sin(pose[0])
-    mx = 0.5 * (scan[a, 2] + scan[b, 2])
-    my = 0.5 * (scan[a, 3] + scan[b, 3])
-    gx = c * mx - s * my
-    gy = s * mx + c * my
+    """Score a proposed pose, held at the lever ``(gx, gy)`` from the sensor; keep it if it is among the best.
+
+    Returns what it cost, in tests of a wall.
+    """
     progress[2] += 1
     floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
-    quick = quick_score(
-        scan,
-        pose[0],
-        pose[1],
-        pose[2],
-        gx + pose[1],
-        gy + pose[2],
-        theta_var,
-        walls,
-        starts,
-        items,
-        shape,
-        gates,
-        floor,
-    )
-    if quick < 0.0:
+    turning(theta_var, gx, gy, covariance)
+    if match_scan(scan, pose, covariance, walls, starts, items, shape, gates, floor, matches) < 0.0:
         return COST_HYPOTHESIS
     progress[3] += 1
-    # The pose turns about the base: covariance of (x, y, theta) with the base held.
-    covariance[0, 0] = theta_var * gy * gy
-    covariance[0, 1] = -theta_var * gx * gy
-    covariance[1, 1] = theta_var * gx * gx
-    covariance[0, 2] = theta_var * gy
-    covariance[1, 2] = -theta_var * gx
-    covariance[2, 2] = theta_var
     score = refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, sums, information, 3)
     offer(found, count, best, rules, prior, pose, score)
     return COST_REFINE
 
 
-@njit(inline="always")
-def sweep(
-    scan, a, b, wa, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches, sums,
-    information, covariance, pose,
-):  # fmt: skip
-    """Slide scan segment `a` along wall `wa` and try every wall that `b` then comes to lie on.
-
-    The wall fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` sweeps.
-    Returns the number of tests.
-    """
-    tolerance = min(gates[4], max(gates[3], gates[0] * math.sqrt(scan[a, 10] + scan[b, 10])))
-    cos_tolerance = 1.0 - 0.5 * tolerance * tolerance
-    dx = walls[wa, 0]
-    dy = walls[wa, 1]
-    # Rotation that lays a on the wall, and the direction that b then has.
-    c = dx * scan[a, 0] + dy * scan[a, 1]
-    s = dy * scan[a, 0] - dx * scan[a, 1]
-    tdx = c * scan[b, 0] - s * scan[b, 1]
-    tdy = s * scan[b, 0] + c * scan[b, 1]
-    mx = scan[b, 2] - scan[a, 2]
-    my = scan[b, 3] - scan[a, 3]
-    # Midpoint of b with a's midpoint at abscissa 0 of its wall; the slide is that abscissa.
-    x = c * mx - s * my - dy * walls[wa, 2]
-    y = s * mx + c * my + dx * walls[wa, 2]
-    # The final angle splits the misfit: b turns about a by up to `swing`, so the ends are tested loosely until then.
-    sine = abs(scan[a, 0] * scan[b, 1] - scan[a, 1] * scan[b, 0])
-    swing = tolerance * scan[a, 10] / (scan[a, 10] + scan[b, 10]) * math.sqrt(mx * mx + my * my) / sine
-    half = 0.5 * scan[a, 4] - end_slack(scan[a, 4]) - swing
-    half_b = 0.5 * scan[b, 4] - end_slack(scan[b, 4]) - swing
-    at = walls[wa, 3] + half
-    high = walls[wa, 4] - half
-    cell = shape[2]
-    fx = (x + at * dx - shape[0]) / cell
-    fy = (y + at * dy - shape[1]) / cell
-    column = math.floor(fx)
-    row = math.floor(fy)
-    columns = int(shape[3])
-    rows = int(shape[4])
-    step_x = 1 if dx > 0.0 else -1
-    step_y = 1 if dy > 0.0 else -1
-    pace_x = cell / max(abs(dx), 1e-12)
-    pace_y = cell / max(abs(dy), 1e-12)
-    next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
-    next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
-    tests = 4
-    while at <= high:
-        until = min(next_x, next_y)
-        tests += 1
-        if 0 <= column < columns and 0 <= row < rows:
-            here = row * columns + column
-            for k in range(starts[here], starts[here + 1]):
-                wb = items[k]
-                tests += 1
-                wx = walls[wb, 0]
-                wy = walls[wb, 1]
-                if wx * tdx + wy * tdy < cos_tolerance:
-                    continue
-                across = wx * dy - wy * dx
-                if abs(across) < MIN_CROSSING:
-                    continue
-                slide = (walls[wb, 2] - wx * y + wy * x) / across
-                # A wall is listed in several cells: it counts where the crossing is.
-                if slide < at or slide >= until or slide > high:
-                    continue
-                along = wx * (x + slide * dx) + wy * (y + slide * dy)
-                if along - half_b < walls[wb, 3] or along + half_b > walls[wb, 4]:
-                    continue
-                if base_pose(scan, a, b, walls, wa, wb, pose):
-                    tests += try_pose(
-                        scan, a, b, pose, walls, starts, items, shape, gates, rules, prior, found, count, best,
-                        progress, matches, sums, information, covariance,
-                    )  # fmt: skip
-        at = until
-        if next_x < next_y:
-            column += step_x
-            next_x += pace_x
-        else:
-            row += step_y
-            next_y += pace_y
-    return tests
-
-
 @njit(cache=True, nogil=True)
 def search_base(
-    scan, a, b, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best,
-    progress, budget,
+    scan, a, b, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates, rules, prior,
+    found, count, best, progress, budget,
 ):  # fmt: skip
     """Go through all pairs of walls that fit the base of scan segments `a`, which slides, and `b`.
 
-    Goes on from the anchor where `progress` stands and stops when `budget` tests are used up. Returns the tests that
-    it took; ``progress[P_ANCHOR]`` is back at 0 when the base is done.
+    A wall under `a` fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` then
+    sweeps. The final angle splits the misfit of both, so that b turns about a by up to `swing` metres: the ends are
+    tested loosely until then. Goes on from the anchor where `progress` stands and stops when `budget` tests are used
+    up. Returns the tests that it took; ``progress[P_ANCHOR]`` is back at 0 when the base is done.
+
+    The walk stands here whole, and reads arrays only by element: see `match_scan`.
     """
     n = len(scan)
     pose = np.empty(3)
@@ -317,15 +210,98 @@ def search_base(
     information = np.empty((3, 3))
     covariance = np.empty((3, 3))
     anchor_list = np.empty(len(walls), dtype=np.int32)
+    n_anchors = anchors(scan[a, 4], walls, bin_starts, anchor_list)
+    va = scan[a, 10]
+    vb = scan[b, 10]
+    theta_var = va * vb / (va + vb)
+    tolerance = min(gates[4], max(gates[3], gates[0] * math.sqrt(va + vb)))
+    cos_tolerance = 1.0 - 0.5 * tolerance * tolerance
+    turn = scan[b, 5] - scan[a, 5]
+    mx = scan[b, 2] - scan[a, 2]
+    my = scan[b, 3] - scan[a, 3]
+    swing = tolerance * va / (va + vb) * math.hypot(mx, my) / abs(math.sin(turn))
+    half_a = 0.5 * scan[a, 4] - end_slack(scan[a, 4]) - swing
+    half_b = 0.5 * scan[b, 4] - end_slack(scan[b, 4]) - swing
+    adx = scan[a, 0]
+    ady = scan[a, 1]
+    bdx = scan[b, 0]
+    bdy = scan[b, 1]
+    pin_x = 0.5 * (scan[a, 2] + scan[b, 2])
+    pin_y = 0.5 * (scan[a, 3] + scan[b, 3])
+    x0 = sector_shape[0]
+    y0 = sector_shape[1]
+    cell = sector_shape[2]
+    per_cell = 1.0 / cell
+    columns = int(sector_shape[3])
+    rows = int(sector_shape[4])
+    per_radian = SECTORS / (2.0 * math.pi)
+    spread = tolerance * per_radian
     spent = len(bin_starts)
-    n_anchors = anchors(scan[a, 4], walls, by_direction, bin_starts, anchor_list)
     while progress[1] < n_anchors:
         wa = anchor_list[progress[1]]
         progress[1] += 1
-        spent += sweep(
-            scan, a, b, wa, walls, starts, items, shape, gates, rules, prior, found, count, best, progress, matches,
-            sums, information, covariance, pose,
-        )  # fmt: skip
+        spent += 5
+        dx = walls[wa, 0]
+        dy = walls[wa, 1]
+        at = walls[wa, 3] + half_a
+        high = walls[wa, 4] - half_a
+        # Rotation that lays a on the wall, and the direction that b then has.
+        c = dx * adx + dy * ady
+        s = dy * adx - dx * ady
+        tdx = c * bdx - s * bdy
+        tdy = s * bdx + c * bdy
+        # Midpoint of b with a's midpoint at abscissa 0 of its wall; the slide is that abscissa.
+        x = c * mx - s * my - dy * walls[wa, 2]
+        y = s * mx + c * my + dx * walls[wa, 2]
+        fx = (x + at * dx - x0) * per_cell
+        fy = (y + at * dy - y0) * per_cell
+        column = math.floor(fx)
+        row = math.floor(fy)
+        step_x = 1 if dx > 0.0 else -1
+        step_y = 1 if dy > 0.0 else -1
+        pace_x = cell / max(abs(dx), 1e-12)
+        pace_y = cell / max(abs(dy), 1e-12)
+        next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
+        next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
+        # The sectors that the direction of b may lie in, one or two.
+        turned = (walls[wa, 5] + turn + math.pi) * per_radian + 0.5
+        first_sector = math.floor(turned - spread)
+        last_sector = math.floor(turned + spread)
+        while at <= high:
+            until = min(next_x, next_y)
+            if 0 <= column < columns and 0 <= row < rows:
+                here = (row * columns + column) * SECTORS
+                for raw in range(first_sector, last_sector + 1):
+                    place = here + (raw & (SECTORS - 1))
+                    for k in range(sector_starts[place], sector_starts[place + 1]):
+                        wb = sector_items[k]
+                        spent += 1
+                        wx = walls[wb, 0]
+                        wy = walls[wb, 1]
+                        across = wx * dy - wy * dx
+                        if wx * tdx + wy * tdy < cos_tolerance or abs(across) < MIN_CROSSING:
+                            continue
+                        slide = (walls[wb, 2] - wx * y + wy * x) / across
+                        # A wall is listed in several cells: it counts where the crossing is.
+                        if slide < at or slide >= until or slide > high:
+                            continue
+                        along = wx * (x + slide * dx) + wy * (y + slide * dy)
+                        if along - half_b < walls[wb, 3] or along + half_b > walls[wb, 4]:
+                            continue
+                        if base_pose(scan, a, b, walls, wa, wb, pose):
+                            gx = c * pin_x - s * pin_y
+                            gy = s * pin_x + c * pin_y
+                            spent += try_pose(
+                                scan, gx, gy, theta_var, pose, walls, starts, items, shape, gates, rules, prior, found,
+                                count, best, progress, matches, sums, information, covariance,
+                            )  # fmt: skip
+            at = until
+            if next_x < next_y:
+                column += step_x
+                next_x += pace_x
+            else:
+                row += step_y
+                next_y += pace_y
         if spent > budget and progress[1] < n_anchors:
             return spent
     progress[1] = 0
@@ -335,7 +311,7 @@ def search_base(
 
 @njit(cache=True, nogil=True)
 def search_slides(
-    scan, a, walls, by_direction, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, spacing
+    scan, a, walls, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, progress, spacing
 ):
     """Lay scan segment `a` on every wall that is long enough, at slides `spacing` metres apart, and keep the best.
 
@@ -348,7 +324,7 @@ def search_slides(
     information = np.empty((3, 3))
     covariance = np.empty((3, 3))
     anchor_list = np.empty(len(walls), dtype=np.int32)
-    n_anchors = anchors(scan[a, 4], walls, by_direction, bin_starts, anchor_list)
+    n_anchors = anchors(scan[a, 4], walls, bin_starts, anchor_list)
     for k in range(n_anchors):
         w = anchor_list[k]
         half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
@@ -363,20 +339,10 @@ def search_slides(
         var = scan[a, 10]
         for j in range(steps):
             slide = low + (j + 0.5) / steps * (high - low)
-            px = walls[w, 0] * slide - walls[w, 1] * walls[w, 2]
-            py = walls[w, 1] * slide + walls[w, 0] * walls[w, 2]
             pose[0] = theta
-            pose[1] = px - gx
-            pose[2] = py - gy
-            floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
-            quick = quick_score(scan, theta, pose[1], pose[2], px, py, var, walls, starts, items, shape, gates, floor)
-            if quick < 0.0:
-                continue
-            covariance[0, 0] = var * gy * gy
-            covariance[0, 1] = -var * gx * gy
-            covariance[1, 1] = var * gx * gx
-            covariance[0, 2] = var * gy
-            covariance[1, 2] = -var * gx
-            covariance[2, 2] = var
-            score = refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, sums, information, 3)
-            offer(found, count, best, rules, prior, pose, score)
+            pose[1] = walls[w, 0] * slide - walls[w, 1] * walls[w, 2] - gx
+            pose[2] = walls[w, 1] * slide + walls[w, 0] * walls[w, 2] - gy
+            try_pose(
+                scan, gx, gy, var, pose, walls, starts, items, shape, gates, rules, prior, found, count, best, progress,
+                matches, sums, information, covariance,
+            )  # fmt: skip

@@ -14,6 +14,7 @@ from registration import Segments
 
 from ._map_kernels import collinear_groups, grid_cells
 from ._match_kernels import REACH
+from ._search_kernels import SECTORS
 from .errors import InvalidMapError
 
 Floats = NDArray[np.float64]
@@ -24,36 +25,36 @@ MERGE_LATERAL = 0.03  # m
 MERGE_ANGLE = math.radians(2.0)
 DIRECTION_BINS = 90
 CELL = 1.0  # m
+SWEEP_CELL = 2.0  # m
+SWEEP_REACH = 0.02  # m; rounding
 MAX_CELLS = 4_000_000
 
 
 class Walls(NamedTuple):
-    """The walls, in the index's own frame (see `MapIndex.origin`).
+    """The walls in the index's own frame (see `MapIndex.origin`), by direction bin and the longest of a bin first.
 
     Attributes
     ----------
     rows : (m, 8) direction x and y, offset along the left normal, abscissae of begin and end along the direction
         (metres), angle (radians in (-pi, pi]), two unused; see `_match_kernels`
-    by_direction : (m,) walls ordered by direction bin, the longest of a bin first
-    bin_starts : (DIRECTION_BINS + 1,) where each bin begins in `by_direction`
-    longest : (m,) their lengths in that order, metres
+    bin_starts : (DIRECTION_BINS + 1,) where each bin begins
+    longest : (m,) their lengths, metres
     summed : (m + 1,) running sum of `longest`
     """
 
     rows: Floats
-    by_direction: NDArray[np.int32]
     bin_starts: NDArray[np.int64]
     longest: Floats
     summed: Floats
 
 
 class Grid(NamedTuple):
-    """A uniform grid over the walls.
+    """A uniform grid over the walls, each cell with one list or one for every sector of directions.
 
     Attributes
     ----------
     shape : (5,) x0, y0, cell size (metres), columns, rows
-    starts, items : cell ``row * columns + column`` lists ``items[starts[c]:starts[c + 1]]``, walls within `REACH`
+    starts, items : place ``c = (row * columns + column) * sectors + sector`` lists ``items[starts[c]:starts[c + 1]]``
     """
 
     shape: Floats
@@ -83,6 +84,9 @@ class MapIndex:
     pieces, piece_starts : wall w consists of segments ``pieces[piece_starts[w]:piece_starts[w + 1]]``
     walls : Walls
     grid : Grid
+        Walls within `REACH` of each cell, whatever their direction: what lies at a point?
+    sectors : Grid
+        Walls on each cell by direction, `SECTORS` of them: which walls of that direction does a sweep meet?
     """
 
     segments: Segments
@@ -95,6 +99,7 @@ class MapIndex:
     piece_starts: NDArray[np.int64]
     walls: Walls
     grid: Grid
+    sectors: Grid
 
     @classmethod
     def build(cls, segments: Segments, sigma: float = 0.0) -> MapIndex:
@@ -128,7 +133,7 @@ class MapIndex:
         walls, wall_of_piece = _merge(local)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
-        return cls(segments, sigma, origin, local, directed, wall_of_piece, order, starts, walls, _grid(walls))
+        return cls(segments, sigma, origin, local, directed, wall_of_piece, order, starts, walls, *_grids(walls))
 
     @cached_property
     def undirected(self) -> MapIndex:
@@ -145,7 +150,7 @@ class MapIndex:
     def nbytes(self) -> int:
         """Memory held, bytes."""
         walls, grid = self.walls, self.grid
-        arrays: list[NDArray[Any]] = [self.wall_of_piece, self.pieces, self.piece_starts, *walls, *grid]
+        arrays: list[NDArray[Any]] = [self.wall_of_piece, self.pieces, self.piece_starts, *walls, *grid, *self.sectors]
         geometry = 2 * 11 * 8 * len(self.segments)
         return geometry + sum(a.nbytes for a in arrays)
 
@@ -185,12 +190,14 @@ def _merge(local: Segments) -> tuple[Walls, NDArray[np.int32]]:
     np.maximum.at(ends, wall, along_end)
     angles = np.arctan2(d[:, 1], d[:, 0])
     bins = direction_bin(angles)
-    order = np.lexsort((np.arange(m), begins - ends, bins)).astype(np.int32)
+    order = np.lexsort((np.arange(m), begins - ends, bins))
     starts = np.searchsorted(bins[order], np.arange(DIRECTION_BINS + 1))
-    rows = np.column_stack([d, offsets, begins, ends, angles, np.zeros((m, 2))])
+    rows = np.column_stack([d, offsets, begins, ends, angles, np.zeros((m, 2))])[order]
     longest = (ends - begins)[order]
     summed = np.concatenate([[0.0], np.cumsum(longest)])
-    return Walls(np.ascontiguousarray(rows), order, starts, longest, summed), wall.astype(np.int32)
+    place = np.empty(m, dtype=np.int32)
+    place[order] = np.arange(m)
+    return Walls(np.ascontiguousarray(rows), starts, longest, summed), place[wall]
 
 
 def direction_bin(angles: Floats) -> NDArray[np.intp]:
@@ -198,14 +205,24 @@ def direction_bin(angles: Floats) -> NDArray[np.intp]:
     return np.minimum(((angles + np.pi) * (DIRECTION_BINS / math.tau)).astype(np.intp), DIRECTION_BINS - 1)
 
 
-def _grid(walls: Walls) -> Grid:
-    dx, dy, offset, begin, end = walls.rows.T[:5]
+def _grids(walls: Walls) -> tuple[Grid, Grid]:
+    dx, dy, offset, begin, end, angle = walls.rows.T[:6]
     a = np.column_stack([dx * begin - dy * offset, dy * begin + dx * offset])
     b = np.column_stack([dx * end - dy * offset, dy * end + dx * offset])
-    corners = np.concatenate([a, b])
-    low = corners.min(axis=0) - REACH - CELL
-    extent = corners.max(axis=0) + REACH + CELL - low
-    cell = max(CELL, math.sqrt(extent[0] * extent[1] / MAX_CELLS), extent.max() / MAX_CELLS)
+    ends = np.hstack([a, b])
+    none = np.zeros(len(ends), dtype=np.int64)
+    sector = np.floor((angle + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int64) % SECTORS
+    return _grid(ends, none, 1, (CELL, REACH)), _grid(ends, sector, SECTORS, (SWEEP_CELL, SWEEP_REACH))
+
+
+def _grid(ends: Floats, sector: NDArray[np.int64], sectors: int, sizes: tuple[float, float]) -> Grid:
+    """Lay a grid of cells of ``sizes[0]`` metres, or larger ones where the extent asks for it."""
+    size, reach = sizes
+    corners = ends.reshape(-1, 2)
+    low = corners.min(axis=0) - reach - size
+    extent = corners.max(axis=0) + reach + size - low
+    most = MAX_CELLS / sectors
+    cell = max(size, math.sqrt(extent[0] * extent[1] / most), extent.max() / most)
     columns, rows = (math.ceil(e / cell) for e in extent)
-    starts, items = grid_cells(np.hstack([a, b]), REACH, low[0], low[1], cell, columns, rows)
+    starts, items = grid_cells(ends, reach, low[0], low[1], cell, columns, rows, sector, sectors)
     return Grid(np.array([low[0], low[1], cell, columns, rows]), starts, items)

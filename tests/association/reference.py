@@ -39,18 +39,21 @@ def match_segment(row, theta, tx, ty, offset_gate, cos_gate, min_overlap, walls)
     return found
 
 
-def quick_score(scan, theta, tx, ty, pin, theta_var, walls, gates):
-    """Sum the gains of all segments, without stopping early."""
-    c, s = math.cos(theta), math.sin(theta)
-    total = 0.0
+def match_scan(scan, pose, covariance, walls, gates):
+    """Match every segment, gated by its innovation, without stopping early; also sum the gains by overlap."""
+    c, s = math.cos(pose[0]), math.sin(pose[0])
+    turn = np.array([[c, -s], [s, c]])
+    found, total = [], 0.0
     for row in scan:
-        middle = np.array([[c, -s], [s, c]]) @ row[2:4] + np.array([tx, ty])
-        lever = np.hypot(*(middle - pin))
-        offset_gate = min(gates[2], max(gates[1], gates[0] * math.sqrt(row[9] + theta_var * lever**2)))
-        angle_gate = min(gates[4], max(gates[3], gates[0] * math.sqrt(row[10] + theta_var)))
-        cos_gate = 1.0 - 0.5 * angle_gate**2
-        total += row[12] * match_segment(row, theta, tx, ty, offset_gate, cos_gate, gates[5], walls)[3]
-    return total
+        middle, d = turn @ row[2:4], turn @ row[:2]
+        n = np.array([-d[1], d[0]])
+        g = np.array([*n, n @ np.array([-middle[1], middle[0]])])
+        offset_gate = min(gates[2], max(gates[1], gates[0] * math.sqrt(row[9] + g @ covariance @ g)))
+        angle_gate = min(gates[4], max(gates[3], gates[0] * math.sqrt(row[10] + covariance[2, 2])))
+        match = match_segment(row, *pose, offset_gate, 1.0 - 0.5 * angle_gate**2, gates[5], walls)
+        found.append(match)
+        total += row[12] * match[3]
+    return found, total
 
 
 def placements(scan, a, b, walls, slack, tolerance):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit
 
 from association import AssociationOptions, MapIndex
 from association import _match_kernels as match
@@ -22,12 +21,8 @@ from .scenes import maze, seen
 SEEDS = st.integers(0, 2**31 - 1)
 INDEX = MapIndex.build(Segments.from_array(maze(1)))
 GRID = (INDEX.grid.starts, INDEX.grid.items, INDEX.grid.shape)
+SECTORS = (INDEX.sectors.starts, INDEX.sectors.items, INDEX.sectors.shape)
 GATES = gates(AssociationOptions())
-
-
-@njit
-def match_one(scan, i, c, s, tx, ty, offset_gate, cos_gate, min_overlap, walls, starts, items, shape):
-    return match.match_segment(scan, i, c, s, tx, ty, offset_gate, cos_gate, min_overlap, walls, starts, items, shape)
 
 
 def drawn(seed, radius=10.0, **options):
@@ -54,35 +49,34 @@ def test_first_hit(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=50, deadline=None)
-def test_match_segment(seed):
-    rng, rows, pose = drawn(seed)
-    pose = pose + rng.normal(size=3) * [0.02, 0.1, 0.1]
-    found = 0
-    for i, row in enumerate(rows):
-        args = (pose[1], pose[2], 0.3, math.cos(0.1), 0.5, INDEX.walls.rows)
-        got = match_one(rows, i, math.cos(pose[0]), math.sin(pose[0]), *args, *GRID)
-        expected = reference.match_segment(row, pose[0], *args)
-        assert got[0] == expected[0]
-        np.testing.assert_allclose(got[1:], expected[1:], atol=1e-9)
-        found += got[0] >= 0
-    assert found > 0
-
-
-@given(SEEDS)
-@settings(max_examples=50, deadline=None)
-def test_quick_score(seed):
+@settings(max_examples=60, deadline=None)
+def test_match_scan(seed):
     rng, rows, pose = drawn(seed)
     pose = pose + rng.normal(size=3) * [0.01, 0.05, 0.05]
-    variance = 1e-4
-    expected = reference.quick_score(rows, *pose, pose[1:], variance, INDEX.walls.rows, GATES)
+    root = rng.normal(size=(3, 3)) * [[0.05], [0.05], [0.01]]
+    covariance, matches = root @ root.T, np.empty((len(rows), 5))
 
     def got(threshold):
-        return match.quick_score(rows, *pose, *pose[1:], variance, INDEX.walls.rows, *GRID, GATES, threshold)
+        args = (rows, pose, covariance, INDEX.walls.rows, *GRID, GATES, threshold, matches)
+        return match.match_scan(*args)
 
-    assert got(0.0) == pytest.approx(expected)
-    assert got(expected - 1e-6) == pytest.approx(expected)
-    assert got(expected + 1e-6) == -1.0
+    expected, total = reference.match_scan(rows, pose, covariance, INDEX.walls.rows, GATES)
+    assert got(0.0) == pytest.approx(total)
+    np.testing.assert_array_equal(matches[:, 0], [e[0] for e in expected])
+    found = matches[:, 0] >= 0
+    assert found.any()
+    np.testing.assert_allclose(matches[found, 1:4], np.array([e[1:] for e in expected])[found], atol=1e-9)
+    assert got(total - 1e-6) == pytest.approx(total)
+    assert got(total + 1e-6) == -1.0
+
+
+def test_turning_holds_the_pin():
+    """Of a pose that turns about a point the covariance of that point's place is 0."""
+    covariance = np.empty((3, 3))
+    match.turning(0.01, 2.0, -3.0, covariance)
+    at_pin = np.array([[1.0, 0.0, 3.0], [0.0, 1.0, 2.0]])  # derivative of R p + t by (x, y, theta), R p = (2, -3)
+    np.testing.assert_allclose(at_pin @ covariance @ at_pin.T, 0.0, atol=1e-15)
+    assert covariance[2, 2] == 0.01
 
 
 def test_refine_finds_the_pose_again():
@@ -119,7 +113,7 @@ def test_a_base_is_swept_whole(seed):
     progress = np.zeros(5, dtype=np.int64)
     rules = np.array([0.65, 0.3, 0.1, 0.9])
     search.search_base(
-        rows, a, b, INDEX.walls.rows, INDEX.walls.by_direction, INDEX.walls.bin_starts, *GRID, GATES, rules,
+        rows, a, b, INDEX.walls.rows, INDEX.walls.bin_starts, *GRID, *SECTORS, GATES, rules,
         np.zeros(10), np.zeros((64, 5)), np.zeros(1, dtype=np.int64), np.array([1e9, 0.0, 0.0]), progress, 10**9,
     )  # fmt: skip
     assert progress[2] == len(expected)
