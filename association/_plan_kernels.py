@@ -121,23 +121,38 @@ def cover(residual, bound, a, b):
 
 
 @njit(cache=True, nogil=True)
-def strike(missing, inliers, a, b, left):
+def strike(missing, inliers, a, b, fewest):
     """Take a base off the sampled consensus sets that have missed all bases so far.
 
-    ``inliers[l, i]`` says for 64 samples a word whether segment i is an inlier at level l, ``missing[l]`` which samples
-    are left; writes their share to ``left[l]``.
+    ``inliers[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1 segments, ``missing[m]`` which
+    samples are left; sets of less than `fewest` segments are left alone. Returns the share left of those of `fewest`.
     """
-    for level in range(len(missing)):
-        ones = 0
+    ones = 0
+    for m in range(fewest - 1, len(missing)):
         for k in range(missing.shape[1]):
-            word = missing[level, k] & ~(inliers[level, a, k] & inliers[level, b, k])
-            missing[level, k] = word
-            # Population count of 64 bits.
-            word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
-            word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
-            word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-            ones += int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
-        left[level] = ones / (64.0 * missing.shape[1])
+            missing[m, k] = missing[m, k] & ~(inliers[m, a, k] & inliers[m, b, k])
+    for k in range(missing.shape[1]):
+        # Population count of 64 bits.
+        word = missing[fewest - 1, k]
+        word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
+        word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+        word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+        ones += int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+    return ones / (64.0 * missing.shape[1])
+
+
+@njit(cache=True, nogil=True)
+def fewest_segments(best_gains, beyond, needed):
+    """Return how many of the first segments a consensus set has at least that scores `needed`.
+
+    `best_gains` (n,): their gains, the largest first; `beyond`: what all other segments of the scan could add.
+    """
+    total = beyond
+    for m in range(len(best_gains)):
+        if total >= needed:
+            return max(m, 2)
+        total += best_gains[m]
+    return max(len(best_gains), 2)
 
 
 # Why `advance` came back.
@@ -147,18 +162,17 @@ BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 @njit(cache=True, nogil=True)
 def advance(
     scan, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates, rules, prior,
-    found, count, best, progress, pairs, merits, uses, residual, bound, missing, inliers, left, miss, exhaustive,
+    found, count, best, progress, pairs, merits, uses, residual, bound, best_gains, missing, inliers, miss, exhaustive,
     budget,
 ):  # fmt: skip
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
-    ``progress[4]`` is the base under way or -1. `miss` is the greatest chance allowed of having missed a better
-    consensus set. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+    ``progress[4]`` is the base under way or -1. ``miss[0]`` is the chance of having missed a better consensus set, kept
+    up to date, ``miss[1]`` the greatest one allowed. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
     """
-    total = 0.0
-    for i in range(len(scan)):
-        total += scan[i, 12]
-    levels = len(missing)
+    beyond = 0.0
+    for i in range(len(best_gains), len(scan)):
+        beyond += scan[i, 12]
     spent = 0
     while True:
         if progress[4] < 0:
@@ -175,13 +189,12 @@ def advance(
             return BUDGET
         progress[4] = -1
         cover(residual, bound, a, b)
-        strike(missing, inliers, a, b, left)
+        needed = rules[3] * best[0]
+        miss[0] = strike(missing, inliers, a, b, fewest_segments(best_gains, beyond, needed))
         if not exhaustive and prior[0] != HARD_PRIOR:
-            needed = rules[3] * best[0]
             if bound[0] < needed:
                 return PROVEN
-            level = int(levels * min(1.0, needed / total)) - 1
-            if level >= 0 and left[level] <= miss:
+            if miss[0] <= miss[1]:
                 return CONFIDENT
         if spent > budget:
             return BUDGET

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ._plan_kernels import BUDGET, CONFIDENT, EXHAUSTED, PROVEN, advance, plan_bases
+from ._plan_kernels import BUDGET, EXHAUSTED, PROVEN, advance, plan_bases
 from ._search_kernels import (
     BEST_SIZE,
     FOUND_COLUMNS,
@@ -40,8 +40,7 @@ SLIDE_SPACING_FOR_BEAMS = 0.5  # m; there beams tell where along them
 KEPT_SLIDES = 64
 PARALLEL_SINE = 0.1
 CHUNK = 300_000  # tests of a wall between two looks at the clock, a few milliseconds
-LEVELS = 16
-SAMPLE_WORDS = 256  # of 64 samples
+SAMPLE_WORDS = 160  # of 64 samples, a resolution of 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +57,15 @@ class Candidates:
     report: SearchReport
 
 
-@lru_cache(maxsize=1)
-def _sampled_inliers() -> NDArray[np.uint64]:
-    """Sample consensus sets once: ``[level, segment]`` says for 64 samples a word whether the segment is an inlier.
+@lru_cache(maxsize=BASE_SEGMENTS + 1)
+def _sampled_inliers(n: int) -> NDArray[np.uint64]:
+    """Sample consensus sets among n segments: ``[m, i]`` says for 64 samples a word whether i is in a set of m + 1.
 
-    At level l every segment is one with probability ``(l + 1) / LEVELS``, independently.
+    All sets of a size are as likely. A better consensus set has so many segments at least, whichever they are.
     """
-    rng = np.random.default_rng(20190901)
-    draws = rng.random((BASE_SEGMENTS, SAMPLE_WORDS * 64))
-    shares = (np.arange(LEVELS) + 1) / LEVELS
-    bits = np.packbits(draws[None] < shares[:, None, None], axis=-1)
+    draws = np.random.default_rng(20190901).random((SAMPLE_WORDS * 64, n))
+    ranks = np.argsort(np.argsort(draws, axis=1), axis=1).T
+    bits = np.packbits(ranks[None] <= np.arange(n)[:, None, None], axis=-1)
     return np.ascontiguousarray(bits).view(np.uint64)
 
 
@@ -127,15 +125,16 @@ def find_candidates(
     pairs, merits = plan_bases(rows, n, walls.bin_starts, walls.longest, walls.summed, index.area)
     progress = np.array([0, 0, 0, 0, -1])
     uses, residual, bound = np.zeros(n), rows[:, 12].copy(), np.array([rows[:, 12].sum()])
-    inliers = _sampled_inliers()
-    missing = np.full((LEVELS, SAMPLE_WORDS), ~np.uint64(0))
-    left = np.ones(LEVELS)
+    inliers = _sampled_inliers(n)
+    missing = np.full((n, SAMPLE_WORDS), ~np.uint64(0))
+    best_gains = -np.sort(-rows[:n, 12])
+    miss = np.array([1.0, 1.0 - options.confidence])
     stopped = EXHAUSTED if len(pairs) == 0 else BUDGET
     while stopped == BUDGET and not deadline.passed:
         stopped = advance(
             rows, walls.rows, walls.bin_starts, grid.starts, grid.items, grid.shape, sectors.starts, sectors.items,
             sectors.shape, gate, rules, flat_prior, found, count, best, progress, pairs, merits, uses, residual, bound,
-            missing, inliers, left, 1.0 - options.confidence, options.exhaustive, CHUNK,
+            best_gains, missing, inliers, miss, options.exhaustive, CHUNK,
         )  # fmt: skip
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
@@ -150,12 +149,10 @@ def find_candidates(
     if deadline.cancelled:
         raise CancelledError
     order = np.argsort(-found[:, 0], kind="stable")
-    level = int(LEVELS * min(1.0, best[0] / scan.total_gain)) - 1 if len(rows) else -1
-    reached = 1.0 if stopped in (EXHAUSTED, PROVEN) else 1.0 - float(left[level]) if level >= 0 else 0.0
     report = SearchReport(
         complete=stopped != BUDGET,
         exhaustive=stopped == EXHAUSTED and len(rows) <= BASE_SEGMENTS,
-        confidence=max(reached, options.confidence if stopped == CONFIDENT else 0.0),
+        confidence=1.0 if stopped in (EXHAUSTED, PROVEN) else 1.0 - float(miss[0]),
         bases=int(progress[0]),
         hypotheses=int(progress[2]),
         verified=int(progress[3]),

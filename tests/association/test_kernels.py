@@ -1,5 +1,6 @@
 """Every kernel does what its slow twin does."""
 
+import itertools
 import math
 
 import numpy as np
@@ -12,6 +13,7 @@ from association import _match_kernels as match
 from association import _plan_kernels as plan
 from association import _search_kernels as search
 from association._sight_kernels import first_hit
+from association.candidates import _sampled_inliers
 from association.scan_rows import gates, scan_rows
 from registration import MeasuredSegments, RigidTransform, Segments
 
@@ -144,15 +146,26 @@ def test_bound_is_never_below_what_can_have_been_missed():
 
 
 def test_strike_counts_the_samples_that_are_left():
-    rng = np.random.default_rng(5)
-    inliers = rng.integers(0, 2**63, (3, 6, 4), dtype=np.uint64)
-    missing, left = np.full((3, 4), ~np.uint64(0)), np.ones(3)
+    inliers = _sampled_inliers(6)
+    missing = np.full((6, inliers.shape[-1]), ~np.uint64(0))
     bits = np.unpackbits(inliers.view(np.uint8), axis=-1).astype(bool)
-    alive = np.ones((3, 256), dtype=bool)
+    assert (bits.sum(axis=1) == np.arange(1, 7)[:, None]).all(), "every sample of level m has m + 1 segments"
+    alive = np.ones((6, bits.shape[-1]), dtype=bool)
     for a, b in ((0, 1), (2, 3), (1, 4)):
-        plan.strike(missing, inliers, a, b, left)
+        left = plan.strike(missing, inliers, a, b, 3)
         alive &= ~(bits[:, a] & bits[:, b])
-        np.testing.assert_allclose(left, alive.mean(axis=1))
+        assert left == pytest.approx(alive[2].mean())
+    # Of the 20 sets of three of six, those without a base: by counting.
+    bases = [{0, 1}, {2, 3}, {1, 4}]
+    sets = list(itertools.combinations(range(6), 3))
+    expected = np.mean([not any(base <= set(s) for base in bases) for s in sets])
+    assert left == pytest.approx(expected, abs=0.02)
+
+
+def test_fewest_segments():
+    gains = np.array([5.0, 3.0, 2.0, 1.0])
+    assert [plan.fewest_segments(gains, 0.0, x) for x in (4.0, 8.0, 8.5, 10.5, 99.0)] == [2, 2, 3, 4, 4]
+    assert plan.fewest_segments(gains, 5.0, 9.0) == 2
 
 
 def test_prior_value():
