@@ -48,7 +48,7 @@ def test_nothing_within_the_limit_is_no_return():
 
 
 def test_noise_lifts_no_range_above_the_limit():
-    limit = 1.0
+    limit = 1.001  # the wall is at 1.0
     seen = scan(SQUARE, ORIGIN, Scanner(2000, -0.01, 1e-5, range_max=limit, sigma=0.05), np.random.default_rng(0))
     assert np.isinf(seen.ranges).any()
     assert seen.ranges[np.isfinite(seen.ranges)].max() <= limit
