@@ -27,7 +27,7 @@ def main() -> int:
     """Run the demo; the status is 1 when a verdict is not the honest one."""
     print("drawing a building with furniture that no map knows, and scanning it ...", flush=True)
     building, cases = draw_cases()
-    print("starting the service (the very first start compiles its kernels, about a minute) ...", flush=True)
+    print("starting the service (the very first start compiles its kernels, a minute or two) ...", flush=True)
     begun = time.monotonic()
     with running_service() as (url, pid):
         print(f"ready at {url} after {time.monotonic() - begun:.1f} s, process {pid}\n")
