@@ -61,7 +61,8 @@ def test_revisions_and_conditions(client: httpx.Client) -> None:
     client.delete(url)
 
 
-def test_a_listing_has_pages(client: httpx.Client) -> None:
+def test_a_listing_has_pages(start_service: Callable[..., Any]) -> None:
+    client = start_service().client
     names = ["b", "a", "B", "a.1", "a-1"]
     for name in names:
         client.put(f"/v1/maps/{name}", json=examples.MAP)
