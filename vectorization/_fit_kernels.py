@@ -69,7 +69,8 @@ def bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance,
             if adjoin(x, y, ux, uy, z, a, increment, longest):
                 apart = sums_cost(totals[count - 1], variance, floor) + sums_cost(own, variance, floor)
                 growth = sums_cost(joint, variance, floor) - apart
-            if growth < BREAK_PENALTY and not seen_through(joint, z + 1, a, x, y, ux, uy, variance, floor):
+            nx, ny, p = line_of(joint)
+            if growth < BREAK_PENALTY and not seen_through(nx, ny, p, z + 1, a, x, y, ux, uy, variance, floor):
                 bounds[count - 1, 1] = b
                 totals[count - 1] = joint
                 continue
@@ -118,6 +119,8 @@ def rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor):
         for _ in range(3):
             # Started from one part's line, whose gate may miss the other's far points at first.
             fit_line(x, y, ux, uy, first, last + 1, variance, floor, joint, own)
+        if seen_through(joint[NX], joint[NY], joint[P], z + 1, a, x, y, ux, uy, variance, floor):
+            continue
         everyone = joint[COUNT] >= one[COUNT] + other[COUNT] - 1.0
         excess = joint[CHI2] - one[CHI2] - other[CHI2]
         if everyone and (excess < BREAK_PENALTY or excess < FLATNESS * FLATNESS * joint[WEIGHT]):
@@ -128,9 +131,8 @@ def rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor):
 
 
 @njit(cache=True, nogil=True)
-def seen_through(total, a, b, x, y, ux, uy, variance, floor):
-    """Tell whether a point from a to b - 1 lies behind the line of the sums, as seen from the sensor."""
-    nx, ny, p = line_of(total)
+def seen_through(nx, ny, p, a, b, x, y, ux, uy, variance, floor):
+    """Tell whether a point from a to b - 1 lies behind the line, as seen from the sensor."""
     for i in range(a, b):
         cosine = nx * ux[i] + ny * uy[i]
         off = nx * x[i] + ny * y[i] - p

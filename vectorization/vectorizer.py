@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from registration import MeasuredSegments, Segments
 
-from ._fit_kernels import BEGIN, COUNT, END, LINE, MEAN, NX, NY, SPREAD, P, describe
+from ._fit_kernels import BEGIN, COUNT, END, LINE, NX, NY, SPREAD, describe
 from ._ray_kernels import gather, quantum, ray_noise, window_noise
 from ._trace_kernels import trace
 from .errors import InvalidScanError
@@ -31,10 +31,6 @@ RELATIVE_ROUGHNESS = 0.1
 SPACINGS = 6.0
 
 LEAST_INCREMENT = 1e-6  # rad
-
-# Signs of a line's numbers when its direction is turned about.
-BACKWARD = np.ones(LINE)
-BACKWARD[[NX, NY, P, MEAN, BEGIN, END]] = -1.0
 
 MAX_POINTS = 100_000
 
@@ -155,7 +151,6 @@ def _from_bare_points(points: Floats, options: VectorizationOptions) -> Vectoriz
     sigma = options.sigma or _estimated(window_noise(xy[0], xy[1]), np.zeros(0))
     lines, spans = _trace(xy, np.zeros_like(xy), 0.0, False, sigma, options)
     backward = _runs_backward(lines, spans, xy)
-    lines[backward] *= BACKWARD
     lines[backward, BEGIN], lines[backward, END] = lines[backward, END], lines[backward, BEGIN]
     measured, rms = _measured(lines, (origin[0], origin[1]))
     return Vectorization(measured, rms, sigma, spans, np.zeros(0), np.zeros(0), math.inf)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vectorization._fit_kernels import CHI2, COUNT, LINE, MEAN, NX, NY, SPREAD, WEIGHT, P, fit_line, line_of
+from vectorization._fit_kernels import BEGIN, CHI2, COUNT, END, LINE, MEAN, NX, NY, SPREAD, WEIGHT, P, fit_line, line_of
 from vectorization._kernels import (
     best_break,
     farthest_point,
@@ -28,6 +28,7 @@ from vectorization._ray_kernels import (
     ray_noise,
     window_noise,
 )
+from vectorization._trace_kernels import WORST_ANGLE, WORST_FIT, acceptable
 
 from . import reference
 
@@ -209,3 +210,26 @@ def test_ranges_are_cleaned_by_rep_117():
 )
 def test_the_quantum_is_what_all_ranges_are_multiples_of(ranges, expected):
     assert quantum(np.array(ranges, dtype=np.float32).astype(np.float64)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "accepted"),
+    [
+        (COUNT, 10.0, True), (COUNT, 9.0, False),
+        (END, 0.49, False),
+        (WEIGHT, 1.01 / (WORST_ANGLE**2 * 0.1), True), (WEIGHT, 0.99 / (WORST_ANGLE**2 * 0.1), False),
+        (CHI2, 0.99 * WORST_FIT * 8, True), (CHI2, 1.01 * WORST_FIT * 8, False),
+        (P, 0.0, False),
+    ],
+)  # fmt: skip
+def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(place, value, accepted):
+    line = np.zeros(LINE)
+    line[[NX, P, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END]] = 1.0, 2.0, 0.1, 1e5, 10.0, 8.0, -0.5, 0.5
+    line[place] = value
+    assert acceptable(line, True, 10, 1.0) is accepted
+
+
+def test_points_without_rays_may_lie_on_a_line_through_their_middle():
+    line = np.zeros(LINE)
+    line[[NX, P, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END]] = 1.0, 0.0, 0.1, 1e5, 10.0, 8.0, -0.5, 0.5
+    assert acceptable(line, False, 10, 1.0)

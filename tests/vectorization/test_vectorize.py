@@ -41,6 +41,14 @@ def test_a_room_without_noise_gives_exactly_its_walls(world, pose):
     np.testing.assert_allclose(found.rms, 0.0, atol=1e-9)
 
 
+@settings(deadline=None, max_examples=40)
+@given(x=st.floats(-2.5, 2.5), y=st.floats(-2.5, 2.5), theta=st.floats(-3, 3))
+def test_wherever_the_sensor_stands_the_room_is_exact(x, y, theta):
+    pose = RigidTransform(x, y, theta)
+    found = vectorize(laser(seen_from(pose, SQUARE, Scanner(sigma=0.0))))
+    assert_same_walls(in_map(pose, found), SQUARE.endpoints, 1e-9)
+
+
 def test_a_wall_alone_has_the_numbers_of_its_closed_form():
     # Five beams on the wall x = 2, one step of 0.1 rad apart.
     a = 0.1 * np.arange(-2, 3)
@@ -107,6 +115,25 @@ def test_a_thin_post_does_not_part_a_wall():
     assert len(found.measured) == 1
     assert found.measured.segments.lengths[0] == pytest.approx(6 * math.tan(0.5), abs=0.05)
     assert found.measured.points[0] == pytest.approx(401 - np.sum(seen.hits == 1), abs=1)
+
+
+def test_a_slit_that_is_seen_through_parts_a_wall():
+    walls = Segments.from_array([[3, -2, 3, -0.01], [3, 0.01, 3, 2], [5, -1, 5, 1]])
+    seen = seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(1.0, 401, sigma=0.01))
+    assert 1 <= np.sum(seen.hits == 2) <= 4
+    found = vectorize(laser(seen))
+    assert len(found.measured) == 2
+    assert found.measured.segments.endpoints[0, 3] < 0.0 < found.measured.segments.endpoints[1, 1]
+
+
+def test_a_point_beside_the_end_of_a_wall_is_not_its_own():
+    a = 0.01 * np.arange(31)
+    ranges = 2 / np.cos(a)
+    ranges[-1] += 0.06
+    found = vectorize(LaserScan(0.0, 0.01, ranges), VectorizationOptions(sigma=0.02))
+    assert found.beams.tolist() == [[0, 29]]
+    assert found.measured.points.tolist() == [30]
+    np.testing.assert_allclose(found.measured.segments.endpoints[0], [2, 0, 2, 2 * math.tan(0.29)], atol=1e-7)
 
 
 def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does():
@@ -246,6 +273,15 @@ def test_points_with_a_viewpoint_are_what_the_laser_saw():
     moved = vectorize(POSE.apply(seen.points), viewpoint=(POSE.x, POSE.y))
     expected = POSE.apply(by_laser.reshape(-1, 2)).reshape(-1, 4)
     np.testing.assert_allclose(moved.measured.segments.endpoints, expected, atol=1e-6)
+
+
+def test_a_wall_whose_points_run_the_other_way_still_has_the_viewpoint_on_its_left():
+    y = 0.03 * np.arange(60)
+    onward = np.stack([np.full(60, 3.0), y], axis=1)
+    contrary = np.stack([np.full(30, -3.0), y[:30]], axis=1)
+    found = vectorize(np.vstack([onward, contrary]))
+    assert found.beams.tolist() == [[0, 59], [89, 60]]
+    np.testing.assert_allclose(found.measured.segments.endpoints, [[3, 0, 3, y[59]], [-3, y[29], -3, 0]], atol=1e-9)
 
 
 def test_points_without_a_viewpoint_run_as_they_come():
