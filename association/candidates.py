@@ -34,7 +34,7 @@ RIVAL_SHARE = 0.9  # of the best value; a pose above it must not have been misse
 DISTINCT_DISTANCE = 0.3  # m
 DISTINCT_ANGLE = 0.1  # rad
 BASE_SEGMENTS = 40  # bases are drawn among this many of the most telling segments
-SLIDE_SEGMENTS = 3
+SLIDE_SEGMENTS = 4
 SLIDE_SPACING = 2.0  # m; what is found stands for the family along the walls
 SLIDE_SPACING_FOR_BEAMS = 0.5  # m; there beams tell where along them
 KEPT_SLIDES = 64
@@ -70,12 +70,14 @@ def _sampled_inliers(n: int) -> NDArray[np.uint64]:
 
 
 def _sliding_segments(rows: Floats, floor: float) -> list[int]:
-    """Pick the longest segments of the classes of parallel ones that may explain more than `floor` nats."""
+    """Pick the two longest segments of each class of parallel ones that may explain more than `floor` nats."""
+    few = rows[:BASE_SEGMENTS]
+    parallel = np.abs(np.outer(few[:, 0], rows[:, 1]) - np.outer(few[:, 1], rows[:, 0])) < PARALLEL_SINE
+    promising = parallel @ rows[:, 12] > floor
     chosen: list[int] = []
-    for i in range(min(len(rows), BASE_SEGMENTS)):
-        parallel = np.abs(rows[i, 0] * rows[:, 1] - rows[i, 1] * rows[:, 0]) < PARALLEL_SINE
-        if len(chosen) < SLIDE_SEGMENTS and rows[parallel, 12].sum() > floor:
-            chosen.append(i)
+    for i in np.nonzero(promising)[0]:
+        if len(chosen) < SLIDE_SEGMENTS and parallel[i, chosen].sum() < 2:
+            chosen.append(int(i))
     return chosen
 
 
@@ -140,7 +142,7 @@ def find_candidates(
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
     spacing = SLIDE_SPACING_FOR_BEAMS if for_beams else SLIDE_SPACING
     rules[1] = 0.9 * spacing
-    for a in _sliding_segments(rows, share * best[0]):
+    for a in _sliding_segments(rows, (share if for_beams else RIVAL_SHARE) * best[0]):
         search_slides(
             rows, a, walls.rows, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
             flat_prior, slides, slide_count, best, progress, spacing,

@@ -111,6 +111,7 @@ def _distinct(poses: Floats, covariances: Floats, values: Floats) -> list[int]:
     """
     order = [int(i) for i in np.argsort(-values, kind="stable") if np.isfinite(values[i])]
     left = np.array(order, dtype=np.intp)
+    informations = np.linalg.inv(covariances) if len(order) else covariances
     kept: list[int] = []
     while len(left) and len(kept) < MOST_DISTINCT:
         i = int(left[0])
@@ -119,8 +120,7 @@ def _distinct(poses: Floats, covariances: Floats, values: Floats) -> list[int]:
         step[:, :2] = poses[left, 1:] - poses[i, 1:]
         step[:, 2] = np.remainder(poses[left, 0] - poses[i, 0] + math.pi, math.tau) - math.pi
         near = (np.hypot(step[:, 0], step[:, 1]) < DISTINCT_DISTANCE) & (np.abs(step[:, 2]) < DISTINCT_ANGLE)
-        square = np.einsum("ij,jk,ik->i", step, np.linalg.inv(covariances[i]), step)
-        near |= square < SAME_FAMILY
+        near |= ((step @ informations[i]) * step).sum(axis=1) < SAME_FAMILY
         near[0] = True
         left = left[~near]
     return kept
