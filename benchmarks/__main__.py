@@ -12,6 +12,7 @@ from .growth import PAIRS, SIZES, growth
 from .localization import localization
 from .lookalikes import lookalikes
 from .queries import DATA, data_found
+from .ranges import ranges
 from .table import Row, machine, print_rows
 
 DEFAULT = ("localization", "estimators", "lookalikes")
@@ -48,12 +49,19 @@ def _vectorization(quick: int) -> list[Row]:
     return []
 
 
+def _ranges(quick: int) -> list[Row]:
+    rows = ranges(quick)
+    print_rows("Logs with their raw ranges", rows)
+    return rows
+
+
 TABLES: dict[str, Callable[[int], list[Row]]] = {
     "localization": _localization,
     "estimators": _estimators,
     "lookalikes": _lookalikes,
     "growth": _growth,
     "vectorization": _vectorization,
+    "ranges": _ranges,
 }
 
 
