@@ -75,10 +75,10 @@ std::optional<Pose> usable_pose(const std::string& answer) {
 
 int main(int argc, char** argv) try {
   const std::string url = argc > 1 ? argv[1] : "http://127.0.0.1:8000";
-  // An L-shaped room, and its walls as seen from (1, 2) by a robot that looks along the map's y axis.
+  // An L-shaped room, and its walls as seen from (1, 1) by a robot that looks along the map's y axis.
   const std::vector<Segment> walls = {{0, 0, 6, 0}, {6, 0, 6, 2}, {6, 2, 4, 2}, {4, 2, 4, 5}, {4, 5, 0, 5}, {0, 5, 0, 0}};
   std::vector<Segment> seen;
-  for (const auto& [x1, y1, x2, y2] : walls) seen.push_back({y1 - 2, 1 - x1, y2 - 2, 1 - x2});
+  for (const auto& [x1, y1, x2, y2] : walls) seen.push_back({y1 - 1, 1 - x1, y2 - 1, 1 - x2});
 
   const std::string answer = post(url + "/v1/associate", "{\"map\":{\"segments\":" + to_json(walls) +
                                                              "},\"scan\":{\"segments\":" + to_json(seen) +

@@ -14,8 +14,8 @@ from typing import Any
 
 # An L-shaped room, walked round counter-clockwise: free space on the left of every wall. Metres.
 WALLS = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
-# The same walls as a robot sees them that stands at (1, 2) and looks along the map's y axis.
-SEEN = [[y1 - 2, 1 - x1, y2 - 2, 1 - x2] for x1, y1, x2, y2 in WALLS]
+# The same walls as a robot sees them that stands at (1, 1) and looks along the map's y axis.
+SEEN = [[y1 - 1, 1 - x1, y2 - 1, 1 - x2] for x1, y1, x2, y2 in WALLS]
 
 
 class RefusedError(Exception):
