@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import MeasuredSegments
-
 from ._match_kernels import MAX_ANGLE_GATE, REACH, SCAN_COLUMNS
-from .options import AssociationOptions
+from .options import AssociationOptions, Scan
 
 Floats = NDArray[np.float64]
 
 # What no sigma that is sent accounts for: maps drawn or built with some slack, walls that are not quite straight.
 MODEL_OFFSET = 0.02  # m
 MODEL_ANGLE = math.radians(0.6)
+# Roughness of a wall and bias of the ranges shift neighbouring points together: no number of points averages it out. It
+# decides the angle of short segments, which come with raw ranges.
+COMMON_ERROR = 0.008  # m
 
 # What finding a segment on a wall is worth against its being clutter, nats: a share of its own, and one by length.
 GAIN = 6.0
@@ -50,21 +51,22 @@ class ScanRows:
         return float(self.rows[:, 12].sum())
 
 
-def scan_rows(measured: MeasuredSegments, map_sigma: float, options: AssociationOptions = DEFAULT_OPTIONS) -> ScanRows:
+def scan_rows(scan: Scan, map_sigma: float, options: AssociationOptions = DEFAULT_OPTIONS) -> ScanRows:
     """Order a scan by what its segments tell; ties by index.
 
     Parameters
     ----------
-    measured : MeasuredSegments
+    scan : Scan
     map_sigma : float
         Standard deviation of the map's lines, metres.
     options : AssociationOptions
         A tolerance wider than the sigmas' own gate says that the map is that far off.
     """
-    s = measured.segments
+    measured, s = scan.measured, scan.measured.segments
+    common = COMMON_ERROR if scan.beams is not None else 0.0
     line_var = measured.sigma**2 / measured.points
     offset_var = line_var + map_sigma**2 + MODEL_OFFSET**2
-    angle_var = line_var / np.maximum(measured.spreads, 1e-6) + MODEL_ANGLE**2
+    angle_var = (line_var + common**2) / np.maximum(measured.spreads, 1e-6) + MODEL_ANGLE**2
     offset_var = np.maximum(offset_var, ((options.offset_tolerance or 0.0) / GATE_SIGMAS) ** 2)
     angle_var = np.maximum(angle_var, ((options.angle_tolerance or 0.0) / GATE_SIGMAS) ** 2)
     gains = GAIN + GAIN_PER_METRE * np.minimum(s.lengths, GAIN_LENGTH)

@@ -53,7 +53,7 @@ def associate(
     """
     if not options.oriented:
         index = index.undirected
-    rows = scan_rows(scan.measured, index.sigma, options)
+    rows = scan_rows(scan, index.sigma, options)
     beams = scan.beams is not None
     candidates = find_candidates(index, rows, prior, options, deadline or Deadline(), for_beams=beams)
     ranked = rank_candidates(index, scan, rows, candidates, (prior, options))

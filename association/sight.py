@@ -22,6 +22,9 @@ def missing_walls(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> 
         rows.rows, best.matches, np.array(scan.viewpoint), pose, index.walls.rows, index.grid.starts, index.grid.items,
         index.grid.shape, SIGHT_TOLERANCE, to_matched, to_clutter,
     )  # fmt: skip
+    # A wall that holds part of the consensus set was seen, and at a grazing angle rays to its neighbour pass its end.
+    seen = best.matches[:, 0].astype(np.intp)
+    to_matched[seen[seen >= 0]] = 0
     walls = np.nonzero(to_matched >= BLOCKING_RAYS / 2)[0]
     pieces = [index.pieces[index.piece_starts[w] : index.piece_starts[w + 1]] for w in walls]
     return tuple(sorted({int(p) % index.directed for group in pieces for p in group}))

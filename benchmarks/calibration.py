@@ -61,7 +61,7 @@ class Example:
 def explain(index: MapIndex, query: Query, group: str, collection: Collection, *, own: bool) -> Example | None:
     """Search a scan up to the point where the verdict is due; None where there is no explanation."""
     scan = query.scan
-    rows = scan_rows(scan.measured, index.sigma, OPTIONS)
+    rows = scan_rows(scan, index.sigma, OPTIONS)
     candidates = find_candidates(index, rows, None, OPTIONS, Deadline())
     ranked = rank_candidates(index, scan, rows, candidates, (None, OPTIONS))
     if not ranked:

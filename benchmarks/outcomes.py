@@ -81,7 +81,7 @@ def run_one(collection: Collection, query: Query, key: MapKey | None = None, *, 
     wall, cpu = time.perf_counter() - began[0], time.thread_time() - began[1]
     search = math.nan
     if steps:
-        rows = scan_rows(scan.measured, index.sigma, OPTIONS)
+        rows = scan_rows(scan, index.sigma, OPTIONS)
         start = time.thread_time()
         find_candidates(index, rows, None, OPTIONS, Deadline())
         search = 1e3 * (time.thread_time() - start)

@@ -15,10 +15,10 @@ from association import _search_kernels as search
 from association._sight_kernels import first_hit
 from association.candidates import _sampled_inliers
 from association.scan_rows import gates, scan_rows
-from registration import MeasuredSegments, RigidTransform, Segments
+from registration import RigidTransform, Segments
 
 from . import reference
-from .scenes import maze, seen
+from .scenes import maze, scan_of, seen
 
 SEEDS = st.integers(0, 2**31 - 1)
 INDEX = MapIndex.build(Segments.from_array(maze(1)))
@@ -32,7 +32,7 @@ def drawn(seed, radius=10.0, **options):
     rng = np.random.default_rng(seed)
     at = RigidTransform(*rng.uniform(8.0, 22.0, 2), rng.uniform(-3.0, 3.0))
     endpoints, _ = seen(maze(1), at, noise=0.02, cut=0.5, clutter=5, seed=seed, radius=radius, **options)
-    rows = scan_rows(MeasuredSegments.from_segments(Segments.from_array(endpoints)), 0.0).rows
+    rows = scan_rows(scan_of(endpoints), 0.0).rows
     return rng, rows, np.array([at.theta, at.x - INDEX.origin[0], at.y - INDEX.origin[1]])
 
 
@@ -85,7 +85,7 @@ def test_refine_finds_the_pose_again():
     """From 10 cm and 1 degree off, the consensus set grows back and holds nothing but true pairs."""
     at = RigidTransform(14.0, 15.0, 0.4)
     endpoints, truth = seen(maze(1), at, clutter=4, radius=12.0)
-    prepared = scan_rows(MeasuredSegments.from_segments(Segments.from_array(endpoints)), 0.0)
+    prepared = scan_rows(scan_of(endpoints), 0.0)
     pose = np.array([at.theta + 0.017, at.x - INDEX.origin[0] + 0.07, at.y - INDEX.origin[1] - 0.07])
     covariance, matches = np.diag([0.01, 0.01, 4e-4]), np.empty((len(truth), 5))
     match.refine(

@@ -95,9 +95,17 @@ def test_a_wall_that_should_hide_another_speaks_against_a_pose():
     assert other.missing_map == (len(ROOM),)
 
 
+def test_a_wall_that_was_seen_is_not_missing():
+    """Rays to the wall that is met edge-on graze the end of its neighbour."""
+    walls = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+    scan = [[-2, 1, -2, -5], [-2, -5, 0, -5], [0, -5, 0, -3], [0, -3, 3, -3], [3, -3, 3, 1]]
+    result = associate(index_of(walls), scan_of(np.array(scan, dtype=float), viewpoint=(0.0, 0.0)))
+    assert not set(result.missing_map) & {c.map for c in result.correspondences}
+
+
 def test_significance_is_a_probability_that_falls_with_the_score():
     index = index_of(maze(1))
-    rows = scan_rows(scan_of(seen(maze(1), pose(15.0, 15.0), radius=10.0)[0]).measured, 0.0)
+    rows = scan_rows(scan_of(seen(maze(1), pose(15.0, 15.0), radius=10.0)[0]), 0.0)
     values = [significance(index, rows, gates(AssociationOptions()), s) for s in (0.0, 30.0, 60.0, 120.0, 1e4)]
     assert values[0] == 1.0
     assert all(0.0 < b <= a <= 1.0 for a, b in itertools.pairwise(values))
