@@ -12,6 +12,7 @@ SIGHT_TOLERANCE = 0.2  # m; a wall this near before the end of a ray does not bl
 BLOCKED = 2.0  # nats a metre of wall, against a pose, where rays to the consensus set pass through the wall
 BLOCKED_CLUTTER = 2.0  # nats a metre, likewise for rays to clutter
 BLOCKING_LENGTH = 3.0  # m; beyond it a wall speaks no more
+FAR_BEHIND = 25.0  # nats; a candidate so far behind needs no lines of sight
 BLOCKING_RAYS = 4.0  # that count fully
 MAX_RAYS = 12  # to one segment
 END_MARGIN = 0.06  # m; rays keep this far from the ends of a segment, where neighbours meet
@@ -148,6 +149,7 @@ def rank(
     information = np.empty((3, 3))
     to_matched = np.zeros(len(walls), dtype=np.int64)
     to_clutter = np.zeros(len(walls), dtype=np.int64)
+    best = 0.0
     length = 0.0
     for i in range(len(scan)):
         length += scan[i, 4]
@@ -168,7 +170,8 @@ def rank(
             if matches[k, i, 0] >= 0.0:
                 found += scan[i, 4]
         shares[k] = found / length
-        if sighted:
+        # The candidates come best first: what is far behind is no rival, its score may stay too good.
+        if sighted and scores[k] > best - FAR_BEHIND:
             count_blockers(
                 scan,
                 matches[k],
@@ -183,3 +186,4 @@ def rank(
                 to_clutter,
             )
             scores[k] -= sight_penalty(to_matched, to_clutter, walls)
+            best = max(best, scores[k])

@@ -141,6 +141,21 @@ class MapIndex:
         both = np.concatenate([self.segments.endpoints, self.segments.endpoints[:, [2, 3, 0, 1]]])
         return MapIndex._of(Segments.from_array(both), self.sigma, self.origin, self.directed)
 
+    @cached_property
+    def sorted_lengths(self) -> tuple[Floats, Floats]:
+        """The walls' lengths in ascending order, and for each place the sum from there on; metres."""
+        lengths = np.sort(self.walls.longest)
+        return lengths, np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+
+    @cached_property
+    def agreeing_share(self) -> float:
+        """The chance that two points of walls have the same direction, up to a neighbouring bin."""
+        shares = np.add.reduceat(
+            np.append(self.walls.longest, 0.0), np.minimum(self.walls.bin_starts[:-1], len(self.walls.rows))
+        )
+        shares = np.where(np.diff(self.walls.bin_starts) > 0, shares, 0.0) / self.walls.summed[-1]
+        return float((shares * (shares + np.roll(shares, 1) + np.roll(shares, -1))).sum())
+
     @property
     def area(self) -> float:
         """Of the map's bounding box with a margin, m^2."""

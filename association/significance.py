@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .map_index import DIRECTION_BINS, MapIndex, direction_bin
+from .map_index import MapIndex
 from .scan_rows import ScanRows
 
 Floats = NDArray[np.float64]
@@ -48,12 +48,7 @@ def significance(index: MapIndex, scan: ScanRows, gates: Floats, score: float) -
 
 def chance_matches(index: MapIndex, rows: Floats, gates: Floats) -> Floats:
     """Return (n,) the probability that each scan segment lies on a wall at a random pose with agreeing directions."""
-    walls = index.walls
-    lengths = np.sort(walls.longest)
-    beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+    lengths, beyond = index.sorted_lengths
     usable = beyond[np.searchsorted(lengths, gates[5] * rows[:, 4])]
-    by_bin = np.bincount(direction_bin(walls.rows[:, 5]), walls.rows[:, 4] - walls.rows[:, 3], DIRECTION_BINS)
-    shares = by_bin / walls.summed[-1]
-    neighbours = shares + np.roll(shares, 1) + np.roll(shares, -1)
-    agreeing = float((shares * neighbours).sum())
+    agreeing = index.agreeing_share
     return np.asarray(np.clip(2.0 * gates[1] * agreeing * usable / index.area, 1e-6, 0.9))
