@@ -20,7 +20,7 @@ from .scan_rows import ScanRows, gates
 
 Floats = NDArray[np.float64]
 
-MOST_DISTINCT = 60
+LEAST_DISTINCT = 24  # explanations that are told apart at least: the verdict weighs the best against the others
 SAME_FAMILY = 12.8  # squared deviations; two poses nearer than that by the better one's covariance are one (99.5 %)
 FEW_BEAMS = 60  # for a first look; neighbouring beams say the same
 MOST_BEAMS = 180
@@ -81,7 +81,8 @@ def rank_candidates(
     flat = encode_prior(prior, index.origin)
     values = scores + np.array([prior_value(flat, *pose) for pose in poses])
     ranked: list[Ranked] = []
-    for i in _distinct(poses, scored.covariances, np.where(scores > 0.0, values, -np.inf)):
+    most = max(LEAST_DISTINCT, options.max_alternatives + 1)
+    for i in _distinct(poses, scored.covariances, np.where(scores > 0.0, values, -np.inf), most):
         theta, x, y = (float(v) for v in poses[i])
         hard = values[i] >= INSIDE / 2
         matched = scored.matches[i, :, 0] >= 0.0
@@ -103,8 +104,8 @@ def rank_candidates(
     return ranked
 
 
-def _distinct(poses: Floats, covariances: Floats, values: Floats) -> list[int]:
-    """Order the poses (k, 3) by value, ties by index, and leave out those that a better one stands for.
+def _distinct(poses: Floats, covariances: Floats, values: Floats, most: int) -> list[int]:
+    """Order the best `most` poses (k, 3) by value, ties by index, without those that a better one stands for.
 
     A pose stands for those that are near, and for those that its own covariance does not tell from it: a family along
     a corridor is one explanation.
@@ -113,7 +114,7 @@ def _distinct(poses: Floats, covariances: Floats, values: Floats) -> list[int]:
     left = np.array(order, dtype=np.intp)
     informations = np.linalg.inv(covariances) if len(order) else covariances
     kept: list[int] = []
-    while len(left) and len(kept) < MOST_DISTINCT:
+    while len(left) and len(kept) < most:
         i = int(left[0])
         kept.append(i)
         step = np.empty((len(left), 3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration import RegistrationResult, RigidTransform
 
@@ -16,6 +17,8 @@ from .scan_rows import gates, scan_rows
 from .sight import missing_walls
 from .significance import significance
 from .verdict import Verdict, judge
+
+Floats = NDArray[np.float64]
 
 DEFAULT_OPTIONS = AssociationOptions()
 
@@ -74,7 +77,7 @@ def associate(
         usable=usable,
         probability=verdict.probability,
         pose=pose,
-        covariance=None if verdict.status is Status.DEGENERATE else registered.covariance,
+        covariance=None if verdict.status is Status.DEGENERATE else _covariance(registered),
         unobservable=_weak_direction(registered) if verdict.status is Status.DEGENERATE else None,
         correspondences=correspondences(index, accepted, registered),
         unmatched_scan=tuple(i for i in range(len(scan.measured)) if i not in matched),
@@ -101,6 +104,17 @@ def _anchor(index: MapIndex, scan: Scan, best: Ranked, prior: Prior | None) -> R
         return None
     x, y = index.origin
     return RigidTransform(best.pose.x + float(x), best.pose.y + float(y), best.pose.theta)
+
+
+def _covariance(registered: RegistrationResult) -> Floats | None:
+    """Return the covariance, widened by chi2 / dof where the residuals are larger than the sigmas can explain.
+
+    A map that is a centimetre off, with sigma 0, would otherwise claim half a millimetre.
+    """
+    if registered.covariance is None or registered.usable:
+        return registered.covariance
+    diagnostics = registered.diagnostics
+    return np.asarray(registered.covariance * max(1.0, diagnostics.chi2 / max(1, diagnostics.dof)))
 
 
 def _weak_direction(registered: RegistrationResult) -> tuple[float, float] | None:

@@ -199,6 +199,15 @@ def test_covariance_is_that_of_the_errors():
     assert abs(total / 300 - 3.0) < 4.0 * math.sqrt(6.0 / 300)
 
 
+def test_residuals_beyond_the_sigmas_widen_the_covariance():
+    endpoints, _ = seen(ROOM, INSIDE, noise=0.03, seed=5)
+    trusting = associate(ROOM_INDEX, scan_of(endpoints, 1e-3))
+    chi2, dof = trusting.diagnostics.registration.chi2, trusting.diagnostics.registration.dof
+    assert chi2 > 10 * dof
+    fair = associate(ROOM_INDEX, scan_of(endpoints, 1e-3 * math.sqrt(chi2 / dof)))
+    np.testing.assert_allclose(trusting.covariance, fair.covariance, rtol=0.05, atol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("options", "argument"),
     [
