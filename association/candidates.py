@@ -30,7 +30,7 @@ KEEP_SHARE = 0.65  # of the best value; poses below it are no rivals
 # Where raw beams are to decide, the segments propose more.
 KEPT_FOR_BEAMS = 192
 KEEP_SHARE_FOR_BEAMS = 0.5
-RIVAL_SHARE = 0.9  # of the best value; a pose above it must not have been missed
+RIVAL_SHARE = 0.95  # of the best value; a pose above it must not have been missed
 DISTINCT_DISTANCE = 0.3  # m
 DISTINCT_ANGLE = 0.1  # rad
 BASE_SEGMENTS = 40  # bases are drawn among this many of the most telling segments

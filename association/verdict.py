@@ -27,7 +27,7 @@ LEAST_CROWD = -12.0
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as likely as one to e
 
-USABLE_PROBABILITY = 0.93
+USABLE_PROBABILITY = 0.94
 NO_MATCH_PROBABILITY = 0.03  # of the first explanation or a twin of it
 CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
 FAR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
