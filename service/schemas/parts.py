@@ -32,10 +32,6 @@ SOFT, HARD = "<soft>", "<hard>"
 TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, SOFT, HARD))
 
 
-def _has(value: Any, name: str) -> bool:
-    return isinstance(value, dict) and name in value
-
-
 class InlineMap(Strict):
     """A map in the request itself."""
 
@@ -50,11 +46,19 @@ class StoredMap(Strict):
     map_id: MapId
 
 
-def _map_kind(value: Any) -> str:
-    return STORED if _has(value, "map_id") else INLINE
+def _map_kind(value: Any) -> str | None:
+    if not isinstance(value, dict):
+        return INLINE
+    inline, stored = "segments" in value, "map_id" in value
+    return None if inline == stored else STORED if stored else INLINE
 
 
-AnyMap = Annotated[Annotated[InlineMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)], Discriminator(_map_kind)]
+AnyMap = Annotated[
+    Annotated[InlineMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)],
+    Discriminator(
+        _map_kind, custom_error_type="one_of", custom_error_message="expected exactly one of segments and map_id"
+    ),
+]
 
 
 class _Scan(Strict):
@@ -118,19 +122,25 @@ class PointScan(_Scan):
     sigma: RaySigma | None = Field(None, description="of single points, metres; null: estimated")
 
 
-def _scan_kind(value: Any) -> str:
-    if _has(value, "laser"):
-        return BY_LASER
-    if _has(value, "points") and not _has(value, "segments"):
-        return BY_POINTS
-    return BY_SEGMENTS
+def _scan_kind(value: Any) -> str | None:
+    if not isinstance(value, dict):
+        return BY_SEGMENTS
+    if "laser" in value:
+        return None if "segments" in value or "points" in value else BY_LASER
+    if "segments" in value:
+        return BY_SEGMENTS  # `points` beside it are counts
+    return BY_POINTS if "points" in value else None
 
 
 AnyScan = Annotated[
     Annotated[SegmentScan, Tag(BY_SEGMENTS)]
     | Annotated[LaserScan, Tag(BY_LASER)]
     | Annotated[PointScan, Tag(BY_POINTS)],
-    Discriminator(_scan_kind),
+    Discriminator(
+        _scan_kind,
+        custom_error_type="one_of",
+        custom_error_message="expected exactly one of segments, laser and points",
+    ),
 ]
 
 
@@ -147,12 +157,20 @@ class HardPriorFields(Pose):
     angle: Annotated[float, Field(ge=0.0, le=1e9)] = Field(description="radians around theta")
 
 
-def _prior_kind(value: Any) -> str:
-    return SOFT if _has(value, "covariance") else HARD
+def _prior_kind(value: Any) -> str | None:
+    if not isinstance(value, dict):
+        return HARD
+    soft, hard = "covariance" in value, "radius" in value or "angle" in value
+    return None if soft == hard else SOFT if soft else HARD
 
 
 AnyPrior = Annotated[
-    Annotated[SoftPriorFields, Tag(SOFT)] | Annotated[HardPriorFields, Tag(HARD)], Discriminator(_prior_kind)
+    Annotated[SoftPriorFields, Tag(SOFT)] | Annotated[HardPriorFields, Tag(HARD)],
+    Discriminator(
+        _prior_kind,
+        custom_error_type="one_of",
+        custom_error_message="expected exactly one of covariance, and radius with angle",
+    ),
 ]
 
 

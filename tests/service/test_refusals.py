@@ -97,7 +97,8 @@ def test_options_are_strict(client: httpx.Client, options: object, pointer: str)
 @pytest.mark.parametrize(
     ("prior", "pointer"),
     [
-        ({"x": 0, "y": 0, "theta": 0}, "/prior/radius"),
+        ({"x": 0, "y": 0, "theta": 0}, "/prior"),
+        ({"x": 0, "y": 0, "theta": 0, "angle": 1}, "/prior/radius"),
         ({"x": 0, "y": 0, "theta": 0, "radius": 1}, "/prior/angle"),
         ({"x": 0, "y": 0, "theta": 0, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "/prior/covariance"),
         ({"x": 0, "y": 0, "theta": 0, "covariance": [[1, 1, 0], [0, 1, 0], [0, 0, 1]]}, "/prior/covariance"),
@@ -109,6 +110,33 @@ def test_options_are_strict(client: httpx.Client, options: object, pointer: str)
 def test_priors_are_strict(client: httpx.Client, prior: object, pointer: str) -> None:
     problem = refused(client.post("/v1/associate", json=associate_body(prior=prior)), 422, "invalid_request")
     assert problem["errors"][0]["pointer"] == pointer
+
+
+@pytest.mark.parametrize(
+    ("parts", "pointer", "names"),
+    [
+        ({"map": {}}, "/map", ["segments", "map_id"]),
+        ({"map": {"segments": ROOM, "map_id": "m"}}, "/map", ["segments", "map_id"]),
+        ({"scan": {}}, "/scan", ["segments", "laser", "points"]),
+        ({"scan": {"sigma": 0.1}}, "/scan", ["segments", "laser", "points"]),
+        ({"scan": {"segments": ROOM, "laser": {}}}, "/scan", ["segments", "laser", "points"]),
+        ({"scan": {"points": [], "laser": {}}}, "/scan", ["segments", "laser", "points"]),
+        ({"prior": {"x": 0, "y": 0, "theta": 0}}, "/prior", ["covariance", "radius", "angle"]),
+        (
+            {"prior": {"x": 0, "y": 0, "theta": 0, "radius": 1, "covariance": []}},
+            "/prior",
+            ["covariance", "radius", "angle"],
+        ),
+    ],
+)
+def test_what_is_either_or_names_every_choice(
+    client: httpx.Client, parts: dict[str, Any], pointer: str, names: list[str]
+) -> None:
+    problem = refused(client.post("/v1/associate", json=associate_body(**parts)), 422, "invalid_request")
+    (error,) = problem["errors"]
+    assert error["pointer"] == pointer
+    assert error["message"].startswith("expected exactly one of")
+    assert all(name in error["message"] for name in names)
 
 
 def test_ten_thousand_bad_rows_make_a_small_answer_without_an_echo(client: httpx.Client) -> None:
@@ -174,7 +202,8 @@ def test_paths_and_methods(client: httpx.Client) -> None:
     response = client.get("/v1/associate")
     refused(response, 405, "method_not_allowed")
     assert response.headers["allow"] == "POST"
-    assert client.request("BREW", "/livez").status_code == 405
+    assert client.request("PATCH", "/livez").status_code == 405
+    refused(client.request("BREW", "/livez"), 400, "invalid_http")
 
 
 def test_media_types(client: httpx.Client) -> None:
