@@ -22,11 +22,12 @@ from vectorization import VectorizationError
 from .context import RequestContext, request_id_of
 from .keys import KeyGuard
 from .openapi import describe
-from .problems import ProblemError, faults_of, internal, invalid, problem_of
+from .problems import ProblemError, faults_of, internal, invalid
 from .routes import associate, maps, operations, pages, register, vectorize
 from .runtime import HangUpError, Runtime
 from .schemas.strict import TooLargeError
 from .settings import Settings
+from .translation import problem_of
 from .version import VERSION
 from .warmup import warm_up
 
@@ -67,7 +68,7 @@ def create_app(settings: Settings) -> FastAPI:
     for gone in (HangUpError, ClientDisconnect):
         app.add_exception_handler(gone, _nobody)
     # The last added is the outermost.
-    app.add_middleware(KeyGuard, keys=settings.keys)
+    app.add_middleware(KeyGuard, keyring=runtime.keyring)
     app.add_middleware(RequestContext, metrics=runtime.metrics)
     document: dict[str, Any] = {}
 

@@ -37,7 +37,7 @@ class BodyReader:
     max_bytes_at_once : int
         Of all bodies that are being read or parsed.
     timeout : float
-        Seconds that a body may take to arrive.
+        Seconds that a request may take to arrive, its head included.
     """
 
     def __init__(self, max_bytes: int, max_bytes_at_once: int, timeout: float) -> None:
@@ -58,8 +58,9 @@ class BodyReader:
         gzipped = _check_headers(request)
         self._check_length(request)
         data = bytearray()
+        now = asyncio.get_running_loop().time()
         try:
-            async with asyncio.timeout(self._timeout):
+            async with asyncio.timeout_at(request.scope["state"].get("arrived", now) + self._timeout):
                 async for piece in request.stream():
                     if len(data) + len(piece) > self._max_bytes:
                         raise self._too_large()
@@ -73,7 +74,7 @@ class BodyReader:
         except TimeoutError:
             raise ProblemError(
                 "request_timeout",
-                f"the body did not arrive within {self._timeout:g} seconds",
+                f"the request did not arrive within {self._timeout:g} seconds",
                 headers={"Connection": "close"},
             ) from None
         finally:

@@ -46,8 +46,7 @@ def serve(arguments: Sequence[str]) -> int:
         return 2
     from .server import serve as run
 
-    run(settings)
-    return 0
+    return run(settings)
 
 
 def main() -> None:

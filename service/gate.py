@@ -1,10 +1,9 @@
-"""Who may search now: at most one search per core, a short queue, and no for the rest."""
+"""Who may search now: at most one search per core, a short queue shared fairly, and no for the rest."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 from association import Deadline
 
 from .problems import ProblemError
+from .turns import FairQueue, Holder, Turn
 
 T = TypeVar("T")
 
@@ -31,25 +31,48 @@ class SearchGate:
 
     def __init__(self, slots: int, queue: int) -> None:
         self.slots = slots
-        self._queue = queue
+        self._places = slots + queue
         self._executor = ThreadPoolExecutor(slots, thread_name_prefix="search")
-        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._queue = FairQueue()
         self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
         self.running = 0
 
     @property
     def waiting(self) -> int:
         """How many wait."""
-        return len(self._waiting)
+        return self._queue.waiting
 
-    def refuse_when_full(self) -> None:
+    @property
+    def full(self) -> bool:
+        """Whether everything is taken, though a holder with less than its share may still be let in."""
+        return self.running >= self.slots and self.running + self.waiting >= self._places
+
+    def refusal(self, holder: Holder = None) -> ProblemError | None:
+        """Return why a request that came now could not even wait, or None when it could.
+
+        A full queue is shared: a holder that has less than its share of the places is let in all the same, and whoever
+        has the most gives up one.
+        """
+        if not self.full:
+            return None
+        mine = self._queue.places_of(holder)
+        holders = self._queue.holders + (mine == 0)
+        share = self._places / holders
+        if holders > 1 and mine >= share:
+            return rate_limited()
+        if holders > 1 and mine + 1 <= share:
+            return None
+        return ProblemError("overloaded", "every core is searching and the queue is full", headers={"Retry-After": "1"})
+
+    def refuse_when_full(self, holder: Holder = None) -> None:
         """Raise when a request that came now could not even wait."""
-        if self.running >= self.slots and self.waiting >= self._queue:
-            raise ProblemError(
-                "overloaded", "every core is searching and the queue is full", headers={"Retry-After": "1"}
-            )
+        refusal = self.refusal(holder)
+        if refusal is not None:
+            raise refusal
 
-    async def run(self, function: Callable[[], T], deadline: Deadline, *, admitted: bool = False) -> T:
+    async def run(
+        self, function: Callable[[], T], deadline: Deadline, holder: Holder = None, *, admitted: bool = False
+    ) -> T:
         """Run a function when its turn comes.
 
         A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns, so that there
@@ -59,16 +82,18 @@ class SearchGate:
         Raises
         ------
         ProblemError
-            When the queue is full, or the deadline passes before the turn comes.
+            When the queue is full, or the deadline passes before the turn comes, or the place went to somebody who has
+            fewer.
         """
-        await self._enter(deadline, admitted)
+        await self._enter(deadline, holder, admitted)
+        begun = time.monotonic()
         try:
             work = asyncio.get_running_loop().run_in_executor(self._executor, function)
         except BaseException:
-            self._leave()
+            self._leave(holder, 0.0)
             raise
         self._deadlines[work] = deadline
-        work.add_done_callback(self._finish)
+        work.add_done_callback(lambda done: self._finish(done, holder, begun))
         return await asyncio.shield(work)
 
     def cancel_all(self) -> None:
@@ -80,43 +105,66 @@ class SearchGate:
         """Give the threads back; does not wait for them."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
-    async def _enter(self, deadline: Deadline, admitted: bool) -> None:
+    async def _enter(self, deadline: Deadline, holder: Holder, admitted: bool) -> None:
         if deadline.passed:
             raise too_late()
-        if self.running < self.slots and not self._waiting:
+        if self.running < self.slots and not self.waiting:
             self.running += 1
+            self._queue.started(holder)
             return
         if not admitted:
-            self.refuse_when_full()
-        turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._waiting.append(turn)
+            self._make_room(holder)
+        turn = self._queue.join(holder, fixed=admitted)
         left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
         try:
             await asyncio.wait({turn}, timeout=left)
         except asyncio.CancelledError:
-            if turn.done():
-                self._leave()
-            else:
-                self._waiting.remove(turn)
+            self._give_up(holder, turn)
             raise
         if not turn.done():
-            self._waiting.remove(turn)
+            self._queue.leave(holder, turn)
             raise too_late()
+        turn.result()
 
-    def _finish(self, done: asyncio.Future[Any]) -> None:
+    def _make_room(self, holder: Holder) -> None:
+        """Raise when the queue is full; for a holder with less than its share take a place from another."""
+        self.refuse_when_full(holder)
+        if self.full:
+            taken = self._queue.take_from_the_greediest(self._queue.places_of(holder) + 1)
+            if taken is None:
+                raise ProblemError("overloaded", "the queue is full", headers={"Retry-After": "1"})
+            taken.set_exception(rate_limited())
+
+    def _give_up(self, holder: Holder, turn: Turn) -> None:
+        """Leave the queue, or hand on the turn that has just come."""
+        if not turn.done():
+            self._queue.leave(holder, turn)
+        elif turn.exception() is None:
+            self._leave(holder, 0.0)
+
+    def _finish(self, done: asyncio.Future[Any], holder: Holder, begun: float) -> None:
         del self._deadlines[done]
         if not done.cancelled():
             done.exception()  # looked at, also where the caller has gone
-        self._leave()
+        self._leave(holder, time.monotonic() - begun)
 
-    def _leave(self) -> None:
+    def _leave(self, holder: Holder, seconds: float) -> None:
         """Hand the slot to the next in the queue, or give it back."""
-        if self._waiting:
-            self._waiting.popleft().set_result(None)
-        else:
+        self._queue.finished(holder, seconds)
+        following = self._queue.next()
+        if following is None:
             self.running -= 1
+        else:
+            following[1].set_result(None)
 
 
 def too_late() -> ProblemError:
     """Return the problem of a deadline that passed before the search started."""
     return ProblemError("deadline_exceeded", "the deadline passed before the search started")
+
+
+def rate_limited() -> ProblemError:
+    """Return the problem of a key that has its share of a full queue."""
+    return ProblemError(
+        "rate_limited", "the queue is full, and this key has its share of it", headers={"Retry-After": "1"}
+    )

@@ -41,6 +41,10 @@ class Metrics:
         self.requests.labels(route, name, str(status)).inc()
         self.request_seconds.labels(route).observe(seconds)
 
+    def count_refusal(self, route: str, status: int) -> None:
+        """Count one request that was refused before the application saw it."""
+        self.requests.labels(route, "POST", str(status)).inc()
+
     def observe_association(self, status: str, usable: bool, seconds: float, hypotheses: int) -> None:
         """Count one answered search."""
         self.verdicts.labels(status, str(usable).lower()).inc()

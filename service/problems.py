@@ -1,4 +1,4 @@
-"""Errors over HTTP: RFC 9457 problems, and the one table that turns exceptions into them.
+"""Errors over HTTP: RFC 9457 problems.
 
 Nothing here repeats what a caller sent: messages are ours, pointers name places, and both are bounded.
 """
@@ -14,12 +14,7 @@ from typing import Any
 import orjson
 from starlette.responses import Response
 
-from association import AssociationError, CancelledError
-from registration import RegistrationError
-from vectorization import VectorizationError
-
 from .schemas.parts import TAGS
-from .schemas.strict import TooLargeError
 
 MEDIA_TYPE = "application/problem+json"
 MAX_ERRORS = 20
@@ -93,6 +88,10 @@ class ProblemError(Exception):
     detail: str
     faults: Sequence[Fault] = ()
     headers: dict[str, str] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Say how to pickle it: it crosses processes, and an exception's own way would lose the headers."""
+        return ProblemError, (self.code, self.detail, self.faults, self.headers)
 
     @property
     def status(self) -> int:
@@ -173,37 +172,6 @@ def invalid(faults: Sequence[Fault]) -> ProblemError:
     """Return the problem of a request that is JSON but not what the route takes."""
     count = "one place is" if len(faults) == 1 else f"{len(faults)} places are"
     return ProblemError("invalid_request", f"{count} wrong; see errors", faults)
-
-
-def _of_library(error: RegistrationError | AssociationError | VectorizationError) -> ProblemError:
-    # The libraries name arguments as the contract does, with dots.
-    pointer = "/" + error.argument.replace(".", "/")
-    if error.index is not None:
-        pointer += f"/{error.index}"
-    return invalid([Fault(pointer, error.message)])
-
-
-def _of_size(error: TooLargeError) -> ProblemError:
-    return ProblemError("too_large", error.detail, [Fault(error.pointer, error.detail)] if error.pointer else ())
-
-
-# The table. First match wins; whatever is not listed is a defect.
-_TABLE: tuple[tuple[type[Exception], Callable[[Any], ProblemError]], ...] = (
-    (ProblemError, lambda error: error),
-    (TooLargeError, _of_size),
-    (RegistrationError, _of_library),
-    (AssociationError, _of_library),
-    (VectorizationError, _of_library),
-    (CancelledError, lambda _: ProblemError("not_ready", "the service is going down")),
-)
-
-
-def problem_of(error: Exception) -> ProblemError | None:
-    """Return the problem that an exception stands for, or None for a defect."""
-    for kind, translate in _TABLE:
-        if isinstance(error, kind):
-            return translate(error)
-    return None
 
 
 def internal() -> ProblemError:

@@ -1,75 +1,163 @@
-"""uvicorn's HTTP protocol with what it leaves out: a time limit for a request's head, and problems for its errors."""
+"""uvicorn's HTTP protocol with what it leaves out: limits in time and size, early refusals, problems for its errors."""
 
 from __future__ import annotations
 
 import asyncio
+import socket
+from http import HTTPStatus
+from typing import Any
 
-import h11
-import orjson
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from .context import taken_or_made
-from .problems import MEDIA_TYPE, ProblemError
+from .doors import Doors
+from .problems import ProblemError
+
+MAX_HEAD = 32_768  # bytes
+UNREAD = 65_536  # bytes; what is left of a refused body up to here is read and dropped, beyond it the connection ends
+LINGER = 1.0  # s that a closed connection still listens: a reset would overtake the answer
+LEEWAY = 0.5  # s for the application to say that a body came too late
+LEAST_READ = 16_384  # bytes that a client takes of an answer within the time that a request may take to arrive
 
 
-def protocol_with_timeout(head_timeout: float) -> type[H11Protocol]:
-    """Return the protocol class for `uvicorn.Config`, which takes a class and no arguments."""
+class _Answered:
+    """Stands for a request that was answered without the application."""
 
-    class TimedProtocol(H11Protocol):
-        """Closes a connection whose request head does not arrive in time."""
+    response_started = response_complete = True
+    disconnected = keep_alive = False
+    message_event = asyncio.Event()
 
-        _head_timer: asyncio.TimerHandle | None = None
+
+def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
+    """Return the protocol class for `uvicorn.Config`, which takes a class and no arguments.
+
+    Parameters
+    ----------
+    doors : Doors
+        Says from a request's head alone whether it is let in.
+    seconds : float
+        That a request may take to arrive, head and body.
+    """
+
+    class GuardedProtocol(HttpToolsProtocol):
+        """Closes what comes too slowly, and refuses before the application and the body where it can."""
+
+        _timer: asyncio.TimerHandle | None = None
+        _write_timer: asyncio.TimerHandle | None = None
+        _unread = 0  # bytes of head so far, while a head is incomplete
+        _in_head = _in_message = _deaf = False
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
-            self._await_head()
+            self._expect_message()
 
         def connection_lost(self, exc: Exception | None) -> None:
-            self._head_arrived()
+            for timer in (self._timer, self._write_timer):
+                if timer is not None:
+                    timer.cancel()
             super().connection_lost(exc)
 
         def data_received(self, data: bytes) -> None:
+            if self._deaf:
+                return
+            self._complete = False
             super().data_received(data)
-            if self.conn.their_state is h11.IDLE:
-                # Part of the next head, or nothing yet: on a kept connection the time runs from its first byte.
-                if self._head_timer is None and self.conn.trailing_data[0]:
-                    self._await_head()
+            if self._in_message or not self._complete:
+                if self._timer is None:
+                    self._expect_message()
+                self._unread = self._unread + len(data) if self._in_head else 0
+                if self._unread > MAX_HEAD:
+                    self.send_400_response("")
+            elif self._timer is not None:
+                self._timer.cancel()
+                self._timer = None
+
+        def on_message_begin(self) -> None:
+            super().on_message_begin()
+            self._in_head = self._in_message = True
+            self.scope["state"]["arrived"] = self.loop.time()
+            if self._timer is not None:
+                self._expect_message()
+
+        def on_headers_complete(self) -> None:
+            self._in_head = False
+            refusal = None
+            if self.cycle is None or self.cycle.response_complete:
+                refusal = doors.refuse(self.parser.get_method(), self.url, self.headers)
+            if refusal is None:
+                super().on_headers_complete()
             else:
-                self._head_arrived()
+                self._refuse(refusal)
+
+        def on_message_complete(self) -> None:
+            self._in_message, self._complete = False, True
+            super().on_message_complete()
 
         def send_400_response(self, msg: str) -> None:
-            self._head_arrived()
-            if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE) or (
-                self.cycle is not None and self.cycle.response_started and not self.cycle.response_complete
-            ):
+            if self.cycle is not None and not self.cycle.response_complete:
                 self.transport.close()
                 return
-            request_id = taken_or_made([])
-            body = orjson.dumps(
-                ProblemError("invalid_http", "this is not HTTP/1.1 as RFC 9112 has it").as_json(request_id)
-            )
-            headers = [
-                ("content-type", MEDIA_TYPE),
-                ("content-length", str(len(body))),
-                ("x-request-id", request_id),
-                ("connection", "close"),
-            ]
-            response = h11.Response(status_code=400, headers=headers, reason=b"Bad Request")
-            for event in (response, h11.Data(data=body), h11.EndOfMessage()):
-                self.transport.write(self.conn.send(event) or b"")
-            self.transport.close()
+            problem = ProblemError("invalid_http", "this is not HTTP/1.1 as RFC 9112 has it, or no method of HTTP")
+            self._write(problem, taken_or_made([]), close=True)
 
-        def _await_head(self) -> None:
-            self._head_timer = self.loop.call_later(head_timeout, self._too_slow)
+        def pause_writing(self) -> None:
+            super().pause_writing()
+            self._watch_reader(self.transport.get_write_buffer_size() + LEAST_READ)
 
-        def _head_arrived(self) -> None:
-            if self._head_timer is not None:
-                self._head_timer.cancel()
-                self._head_timer = None
+        def resume_writing(self) -> None:
+            if self._write_timer is not None:
+                self._write_timer.cancel()
+                self._write_timer = None
+            super().resume_writing()
 
-        def _too_slow(self) -> None:
-            self._head_timer = None
+        def _refuse(self, problem: ProblemError) -> None:
+            sizes = [value for name, value in self.headers if name == b"content-length"]
+            small = len(sizes) == 1 and int(sizes[0]) <= UNREAD and not self.expect_100_continue
+            close = not small or not self.parser.should_keep_alive()
+            self.cycle = _Answered  # type: ignore[assignment]
+            self._write(problem, taken_or_made(self.headers), close=close)
+            if not close:
+                self.on_response_complete()
+
+        def _write(self, problem: ProblemError, request_id: str, *, close: bool) -> None:
+            self.transport.write(_response(problem, request_id, self.server_state.default_headers, close))
+            if close:
+                self._deaf = True
+                self._unset_keepalive_if_required()
+                if self.transport.can_write_eof():
+                    self.transport.write_eof()
+                self.loop.call_later(LINGER, self._close)
+
+        def _expect_message(self) -> None:
+            if self._timer is not None:
+                self._timer.cancel()
+            self._timer = self.loop.call_later(seconds + LEEWAY, self._close)
+
+        def _watch_reader(self, before: int) -> None:
+            left = self.transport.get_write_buffer_size()
+            if left > before - LEAST_READ:
+                self.transport.abort()
+            else:
+                self._write_timer = self.loop.call_later(seconds, self._watch_reader, left)
+
+        def _close(self) -> None:
             if not self.transport.is_closing():
                 self.transport.close()
 
-    return TimedProtocol
+    return GuardedProtocol
+
+
+def limit_unread_answers(listener: socket.socket, seconds: float) -> None:
+    """End connections whose client takes nothing of an answer for so long; where the system can."""
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1e3 * seconds))
+
+
+def _response(problem: ProblemError, request_id: str, default: list[tuple[bytes, bytes]], close: bool) -> bytes:
+    answer: Any = problem.response(request_id)
+    headers = [*default, *answer.raw_headers, (b"x-request-id", request_id.encode("ascii"))]
+    if close:
+        headers.append((b"connection", b"close"))
+    lines = b"".join(b"%b: %b\r\n" % header for header in headers)
+    phrase = HTTPStatus(problem.status).phrase.encode("ascii")
+    return b"HTTP/1.1 %d %b\r\n%b\r\n%b" % (problem.status, phrase, lines, answer.body)

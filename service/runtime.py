@@ -13,12 +13,15 @@ from starlette.requests import Request
 from association import Deadline
 
 from .bodies import BodyReader, parse, validate, wait_for_hang_up
+from .doors import Doors
 from .gate import SearchGate
+from .keys import Keyring
 from .maps import IndexCache, MapStore
 from .metrics import Metrics
 from .problems import ProblemError
 from .settings import Settings
 from .stopwatch import Stopwatch
+from .turns import Holder
 
 T = TypeVar("T")
 M = TypeVar("M", bound=BaseModel)
@@ -36,8 +39,10 @@ class Runtime:
         self.settings = settings
         self.limits = settings.limits()
         self.metrics = Metrics()
-        self.bodies = BodyReader(settings.max_body_bytes, settings.max_bodies_bytes, settings.body_timeout)
+        self.bodies = BodyReader(settings.max_body_bytes, settings.max_bodies_bytes, settings.request_timeout)
         self.gate = SearchGate(settings.searches, settings.queue)
+        self.keyring = Keyring(settings.keys)
+        self.doors = Doors(self.gate, self.keyring, self.metrics)
         self.store = MapStore(settings.url)
         self.cache = IndexCache(settings.cache_bytes, self.metrics)
         self.warm = False
@@ -82,15 +87,15 @@ class Runtime:
         """Run something that takes time but is no search."""
         return await self._in(self._parsers, call)
 
-    def require_ready(self) -> None:
+    def require_ready(self, request: Request) -> None:
         """Refuse, before a body is read, what could not be served."""
         if not self.warm:
             raise ProblemError("not_ready", "the kernels are being compiled")
-        self.gate.refuse_when_full()
+        self.gate.refuse_when_full(holder_of(request))
 
     async def search(self, request: Request, call: Callable[[], T], deadline: Deadline) -> T:
         """Run a search when its turn comes; give up when the client does."""
-        return await self.unless_hung_up(request, self.gate.run(call, deadline), deadline)
+        return await self.unless_hung_up(request, self.gate.run(call, deadline, holder_of(request)), deadline)
 
     async def unless_hung_up(self, request: Request, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
         """Wait for work, or cancel it when the client is gone first.
@@ -123,6 +128,12 @@ class Runtime:
 
     async def _in(self, threads: ThreadPoolExecutor, call: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(threads, call)
+
+
+def holder_of(request: Request) -> Holder:
+    """Return whose key a request came with."""
+    holder: Holder = request.scope["state"]["holder"]
+    return holder
 
 
 def runtime_of(request: Request) -> Runtime:

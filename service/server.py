@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import socket
 import threading
 from types import FrameType
 
@@ -11,11 +12,12 @@ import uvicorn
 
 from .app import create_app
 from .logs import configure
-from .protocol import protocol_with_timeout
+from .protocol import limit_unread_answers, protocol_of
 from .runtime import Runtime
 from .settings import Settings
 
 logger = logging.getLogger("linefix")
+BACKLOG = 512
 GRACE = 6  # s for requests that run when the doors close
 LAST_CALL = 9.5  # s after the signal the process ends whatever still runs
 
@@ -42,15 +44,19 @@ class DrainingServer(uvicorn.Server):
         self.should_exit = True
 
 
-def serve(settings: Settings) -> None:
-    """Run until a signal comes."""
+def serve(settings: Settings) -> int:
+    """Run until a signal comes; return the status to exit with."""
     configure(settings.log_level)
+    try:
+        listener = listen(settings)
+    except OSError as error:
+        logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
+        return 1
     app = create_app(settings)
+    runtime: Runtime = app.state.runtime
     config = uvicorn.Config(
         app,
-        host=settings.host,
-        port=settings.port,
-        http=protocol_with_timeout(settings.head_timeout),
+        http=protocol_of(runtime.doors, settings.request_timeout),
         ws="none",
         lifespan="on",
         log_config=None,
@@ -58,10 +64,26 @@ def serve(settings: Settings) -> None:
         server_header=False,
         timeout_keep_alive=15,
         timeout_graceful_shutdown=GRACE + 1,
-        h11_max_incomplete_event_size=32_768,
-        backlog=512,
+        backlog=BACKLOG,
     )
-    DrainingServer(config, app.state.runtime).run()
+    DrainingServer(config, runtime).run([listener])
+    return 0
+
+
+def listen(settings: Settings) -> socket.socket:
+    """Return a socket that listens on the address that is set.
+
+    Raises
+    ------
+    OSError
+        When the address is taken or is none of this machine's.
+    """
+    family, _, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
+    listener = socket.create_server(address[:2], family=family, backlog=BACKLOG)
+    limit_unread_answers(listener, settings.request_timeout)
+    host, port = listener.getsockname()[:2]
+    logger.info("listening", extra={"host": host, "port": port})
+    return listener
 
 
 def _later(seconds: float, call: object) -> None:

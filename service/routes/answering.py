@@ -69,7 +69,7 @@ _RETRY = {"Retry-After": {"description": "seconds", "schema": {"type": "string"}
 
 EVERYWHERE = ("unauthorized", "forbidden", "internal")
 READS_BODY = ("invalid_json", "request_timeout", "too_large", "unsupported_media_type", "invalid_request")
-SEARCHES = ("not_ready", "overloaded", "deadline_exceeded")
+SEARCHES = ("not_ready", "overloaded", "rate_limited", "deadline_exceeded")
 
 
 def _example(code: str) -> dict[str, Any]:

@@ -16,12 +16,14 @@ from ..context import request_id_of
 from ..finite import require_finite
 from ..lookup import indexed_map
 from ..maps import CachedMap
-from ..problems import internal, problem_of
-from ..runtime import Runtime, runtime_of
+from ..problems import internal
+from ..runtime import Runtime, holder_of, runtime_of
 from ..schemas import examples
 from ..schemas.replies import AssociateAnswer, BatchAnswer
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..searching import map_reference, search
+from ..translation import problem_of
+from ..turns import Holder
 from .answering import EVERYWHERE, READS_BODY, SEARCHES, json_response, problems, sealed, takes
 
 logger = logging.getLogger("linefix")
@@ -39,7 +41,7 @@ ERRORS = (*EVERYWHERE, *READS_BODY, *SEARCHES, "unknown_map", "map_corrupt")
 async def post_associate(request: Request) -> Response:
     """Find where in the map the scan was taken, and say how sure that is."""
     runtime = runtime_of(request)
-    runtime.require_ready()
+    runtime.require_ready(request)
     asked, watch = await runtime.read(request, AssociateRequest)
     deadline = watch.deadline(asked.options.deadline_ms, runtime.settings.max_deadline_ms)
 
@@ -65,16 +67,18 @@ async def post_associate(request: Request) -> Response:
 async def post_batch(request: Request) -> Response:
     """Find several scans in one map; a scan that is wrong is one error item and nothing else."""
     runtime = runtime_of(request)
-    runtime.require_ready()
+    runtime.require_ready(request)
     asked, watch = await runtime.read(request, BatchRequest)
     deadline = watch.deadline(asked.options.deadline_ms, runtime.settings.max_deadline_ms)
 
+    holder = holder_of(request)
+
     async def work() -> dict[str, Any]:
         cached, revision = await runtime.gate.run(
-            lambda: indexed_map(asked.map, runtime.cache, runtime.store), deadline
+            lambda: indexed_map(asked.map, runtime.cache, runtime.store), deadline, holder
         )
         watch.lap("decode")
-        results = await _search_all(runtime, asked, cached, (deadline, request_id_of(request.scope)))
+        results = await _search_all(runtime, asked, cached, (deadline, holder, request_id_of(request.scope)))
         watch.lap("search")
         return {"results": results, "map": map_reference(asked.map, revision), "client_ref": asked.client_ref}
 
@@ -83,10 +87,10 @@ async def post_batch(request: Request) -> Response:
 
 
 async def _search_all(
-    runtime: Runtime, asked: BatchRequest, cached: CachedMap, end: tuple[Deadline, str]
+    runtime: Runtime, asked: BatchRequest, cached: CachedMap, of: tuple[Deadline, Holder, str]
 ) -> list[dict[str, Any]]:
     """Search for every scan, as many at once as there are cores; others' requests get their turns in between."""
-    deadline, request_id = end
+    deadline, holder, request_id = of
     results: list[dict[str, Any]] = [{} for _ in asked.scans]
     todo = iter(range(len(asked.scans)))
 
@@ -94,7 +98,7 @@ async def _search_all(
         for index in todo:
             call = partial(_search_one, runtime, asked, cached, (index, deadline))
             try:
-                found = await runtime.gate.run(call, deadline, admitted=True)
+                found = await runtime.gate.run(call, deadline, holder, admitted=True)
                 results[index] = {"index": index, "status_code": 200, "result": found}
             except CancelledError:
                 raise

@@ -27,7 +27,7 @@ router = APIRouter(tags=["register"])
 async def post_register(request: Request) -> Response:
     """Lay scan segments on the map segments that they are known to belong to."""
     runtime = runtime_of(request)
-    runtime.require_ready()
+    runtime.require_ready(request)
     asked, watch = await runtime.read(request, RegisterRequest)
     deadline = watch.deadline(None, runtime.settings.max_deadline_ms)
 

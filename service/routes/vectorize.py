@@ -26,7 +26,7 @@ router = APIRouter(tags=["vectorize"])
 async def post_vectorize(request: Request) -> Response:
     """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
     runtime = runtime_of(request)
-    runtime.require_ready()
+    runtime.require_ready(request)
     asked, watch = await runtime.read(request, VectorizeRequest)
     deadline = watch.deadline(None, runtime.settings.max_deadline_ms)
 

@@ -19,7 +19,13 @@ class TooLargeError(Exception):
     def __init__(self, pointer: str, limit: int, what: str) -> None:
         super().__init__(f"more than {limit} {what}")
         self.pointer = pointer
+        self.limit = limit
+        self.what = what
         self.detail = f"at most {limit} {what} are taken"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Say how to pickle it: it crosses processes."""
+        return TooLargeError, (self.pointer, self.limit, self.what)
 
 
 class Strict(BaseModel):

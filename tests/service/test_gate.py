@@ -121,6 +121,7 @@ class GoneRequest:
 
     def __init__(self) -> None:
         self.gone = asyncio.Event()
+        self.scope = {"state": {"holder": None}}
 
     async def receive(self) -> dict[str, str]:
         await self.gone.wait()
@@ -169,6 +170,96 @@ def test_everything_that_runs_can_be_told_to_give_up() -> None:
         assert deadline.cancelled
         release.set()
         await work
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_full_queue_is_shared_between_keys() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 3)
+        release = threading.Event()
+        greedy = [asyncio.ensure_future(gate.run(release.wait, soon(), b"greedy")) for _ in range(4)]
+        await until(lambda: gate.waiting == 3)
+        # Alone it may have everything, and beyond that the service is busy.
+        with pytest.raises(ProblemError) as caught:
+            gate.refuse_when_full(b"greedy")
+        assert caught.value.code == "overloaded"
+        modest = [asyncio.ensure_future(gate.run(lambda: "modest", soon(), b"modest")) for _ in range(2)]
+        await until(lambda: greedy[3].done() and greedy[2].done())
+        for given_up in greedy[2:]:
+            assert isinstance(given_up.exception(), ProblemError)
+            assert given_up.exception().code == "rate_limited"  # type: ignore[union-attr]
+        # Now each has its half: neither gets more, and both are told so.
+        for holder in (b"greedy", b"modest"):
+            with pytest.raises(ProblemError) as caught:
+                await gate.run(lambda: None, soon(), holder)
+            assert (caught.value.code, caught.value.response("id").headers["retry-after"]) == ("rate_limited", "1")
+        release.set()
+        assert await asyncio.gather(*greedy[:2], *modest) == [True, True, "modest", "modest"]
+        assert (gate.running, gate.waiting) == (0, 0)
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_turns_go_to_the_key_that_has_used_the_least_time() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 100)
+        order: list[str] = []
+
+        def work(name: str, seconds: float) -> None:
+            order.append(name)
+            time.sleep(seconds)
+
+        release = threading.Event()
+        first = asyncio.ensure_future(gate.run(release.wait, soon(), b"long"))
+        calls = [gate.run(lambda: work("long", 0.03), soon(), b"long") for _ in range(4)]
+        calls += [gate.run(lambda: work("short", 0.001), soon(), b"short") for _ in range(8)]
+        waiting = [asyncio.ensure_future(call) for call in calls]
+        await until(lambda: gate.waiting == 12)
+        release.set()
+        await asyncio.gather(first, *waiting)
+        # Turn by turn the short ones would be done after 16; by time they are done before the second long one.
+        assert order[:2].count("long") <= 1
+        assert order.index("short") < 2
+        assert [name for name in order[:10] if name == "short"] == ["short"] * 8
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_parts_of_what_was_let_in_are_never_taken_away() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 2)
+        release = threading.Event()
+        first = asyncio.ensure_future(gate.run(release.wait, soon(), b"batch"))
+        parts = [asyncio.ensure_future(gate.run(lambda: 1, soon(), b"batch", admitted=True)) for _ in range(4)]
+        await until(lambda: gate.waiting == 4)
+        with pytest.raises(ProblemError) as caught:
+            await gate.run(lambda: 2, soon(), b"other")
+        assert caught.value.code == "overloaded"
+        release.set()
+        assert await asyncio.gather(first, *parts) == [True, 1, 1, 1, 1]
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_turn_that_comes_while_its_caller_leaves_goes_on_to_the_next() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 5)
+        release = threading.Event()
+        first = asyncio.ensure_future(gate.run(release.wait, soon()))
+        second = asyncio.ensure_future(gate.run(lambda: 2, soon()))
+        third = asyncio.ensure_future(gate.run(lambda: 3, soon()))
+        await until(lambda: gate.waiting == 2)
+        release.set()
+        # As soon as the first has ended, and before the second can take its turn.
+        await asyncio.wait({first})
+        second.cancel()
+        assert await third == 3
+        assert (gate.running, gate.waiting) == (0, 0)
         gate.close()
 
     asyncio.run(scenario())

@@ -1,0 +1,77 @@
+"""One key's flood, over HTTP: it is told so, and leaves the others their share."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import numpy as np
+import orjson
+
+
+def searched_for_a_while() -> bytes:
+    """A request that takes some ten milliseconds: nothing in the scan is on the map."""
+    rng = np.random.default_rng(1)
+    begins = rng.uniform(0.0, 50.0, (800, 2))
+    angles = rng.uniform(0.0, np.pi, 800)
+    segments = np.hstack([begins, begins + 2.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+    seen = rng.uniform(-5.0, 5.0, (30, 4))
+    body = {"map": {"segments": segments}, "scan": {"segments": seen}, "options": {"exhaustive": True}}
+    return orjson.dumps(body, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Any]) -> None:
+    running = start_service(keys="flood,robot", searches=1, queue=8)
+    body = searched_for_a_while()
+    answers: Counter[tuple[str, int]] = Counter()
+    waits: set[str | None] = set()
+    lock, begun, enough = threading.Lock(), threading.Event(), threading.Event()
+
+    def ask(key: str) -> None:
+        with httpx.Client(base_url=running.url, headers={"authorization": f"Bearer {key}"}, timeout=60) as client:
+            while not enough.is_set():
+                answer = client.post("/v1/associate", content=body)
+                with lock:
+                    if key == "robot":
+                        begun.set()
+                    if begun.is_set():
+                        answers[key, answer.status_code] += 1
+                    if answer.status_code == 429:
+                        assert answer.json()["code"] == "rate_limited"
+                        waits.add(answer.headers.get("retry-after"))
+                    if answers["flood", 200] + answers["robot", 200] >= 300:
+                        enough.set()
+                if answer.status_code != 200:
+                    enough.wait(0.03)  # these clients share a processor with the service
+
+    threads = [threading.Thread(target=ask, args=(key,)) for key in ["flood"] * 20 + ["robot"] * 4]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    served = answers["flood", 200] + answers["robot", 200]
+    assert answers["robot", 200] >= 0.9 * served / 2, answers
+    assert answers["flood", 429] > 0
+    assert waits == {"1"}
+    # A key with less than its share is never sent away.
+    assert answers["robot", 429] + answers["robot", 503] == 0, answers
+
+
+def test_a_key_alone_has_all_of_the_service(start_service: Callable[..., Any]) -> None:
+    running = start_service(keys="one,other", searches=2, queue=8)
+    body = searched_for_a_while()
+    answers: list[int] = []
+
+    def ask() -> None:
+        headers = {"authorization": "Bearer one"}
+        answers.append(httpx.post(running.url + "/v1/associate", content=body, headers=headers, timeout=60).status_code)
+
+    threads = [threading.Thread(target=ask) for _ in range(10)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert answers == [200] * 10
