@@ -98,7 +98,7 @@ async def _get_ready(runtime: Runtime) -> None:
     except ProblemError as problem:
         # readyz goes on trying; meanwhile it says what is wrong.
         logger.error("the store does not open: %s", problem.detail)
-    await runtime.in_parser(warm_up)
+    await asyncio.gather(runtime.in_parser(warm_up), runtime.in_parser(runtime.parser.start))
     runtime.warm = True
     logger.info("ready")
 

@@ -1,30 +1,15 @@
-"""Reading a request's body: bounded in bytes and in time, gzip unpacked under the same bound."""
+"""Receiving a request's body: bounded in bytes and in time."""
 
 from __future__ import annotations
 
 import asyncio
-import zlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
-from typing import Any, TypeVar
 
-import orjson
-from pydantic import BaseModel, ValidationError
 from starlette.requests import Request
 
-from .problems import ProblemError, faults_of, invalid
-
-M = TypeVar("M", bound=BaseModel)
-_PIECE = 1 << 20
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A body as it arrived."""
-
-    data: bytearray
-    gzipped: bool
+from .parsing import Body, too_large
+from .problems import ProblemError
 
 
 class BodyReader:
@@ -63,7 +48,7 @@ class BodyReader:
             async with asyncio.timeout_at(request.scope["state"].get("arrived", now) + self._timeout):
                 async for piece in request.stream():
                     if len(data) + len(piece) > self._max_bytes:
-                        raise self._too_large()
+                        raise too_large(self._max_bytes)
                     if self.held + len(piece) > self._max_at_once:
                         raise ProblemError(
                             "overloaded", "too many large requests at once", headers={"Connection": "close"}
@@ -80,46 +65,10 @@ class BodyReader:
         finally:
             self.held -= len(data)
 
-    def unpack(self, body: Body) -> bytes | bytearray:
-        """Return the body's bytes, at most as many as are allowed; runs off the event loop.
-
-        Raises
-        ------
-        ProblemError
-            When it is not gzip though it says so, or unpacks to more than is allowed.
-        """
-        if not body.gzipped:
-            return body.data
-        unpacked = bytearray()
-        stream = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
-        packed = memoryview(body.data)
-        try:
-            for begin in range(0, len(packed), _PIECE):
-                rest: bytes | memoryview = packed[begin : begin + _PIECE]
-                while rest and not stream.eof:
-                    unpacked += stream.decompress(rest, self._max_bytes + 1 - len(unpacked))
-                    rest = stream.unconsumed_tail
-                    if len(unpacked) > self._max_bytes:
-                        raise self._too_large()
-                if stream.eof and (stream.unused_data or begin + _PIECE < len(packed)):
-                    raise ProblemError("invalid_json", "something follows the gzip body")
-            unpacked += stream.flush()
-        except zlib.error:
-            raise ProblemError("invalid_json", "the body is not gzip, though Content-Encoding says so") from None
-        if not stream.eof:
-            raise ProblemError("invalid_json", "the gzip body is cut short")
-        return unpacked
-
     def _check_length(self, request: Request) -> None:
         length = request.headers.get("content-length")
         if length is not None and int(length) > self._max_bytes:
-            raise self._too_large()
-
-    def _too_large(self) -> ProblemError:
-        # The rest of the body is of no use: the connection ends with the answer.
-        return ProblemError(
-            "too_large", f"a body has at most {self._max_bytes} bytes, unpacked", headers={"Connection": "close"}
-        )
+            raise too_large(self._max_bytes)
 
 
 def _check_headers(request: Request) -> bool:
@@ -136,37 +85,6 @@ def _check_headers(request: Request) -> bool:
             "unsupported_media_type", "the only content encoding taken is gzip", headers={"Accept-Encoding": "gzip"}
         )
     return bool(encodings)
-
-
-def parse(data: bytes | bytearray) -> Any:
-    """Parse JSON; NaN, infinities, lone surrogates and nesting beyond 1,024 levels are not JSON here.
-
-    Raises
-    ------
-    ProblemError
-        When it is not JSON.
-    """
-    try:
-        return orjson.loads(data)
-    except orjson.JSONDecodeError as error:
-        # The message of the parser speaks of the kind of error and its place, not of the text.
-        raise ProblemError("invalid_json", f"{error.msg} at line {error.lineno} column {error.colno}") from None
-
-
-def validate(model: type[M], value: Any, limits: dict[str, int]) -> M:
-    """Check parsed JSON against a request model.
-
-    Raises
-    ------
-    ProblemError
-        When it is not what the model takes.
-    TooLargeError
-        When an array is longer than `limits` allow.
-    """
-    try:
-        return model.model_validate(value, context=limits)
-    except ValidationError as error:
-        raise invalid(faults_of(error.errors(include_url=False, include_input=False))) from None
 
 
 async def wait_for_hang_up(request: Request) -> None:

@@ -6,41 +6,67 @@ import hashlib
 from functools import partial
 
 import numpy as np
-import orjson
 
 from association import InvalidMapError, MapIndex
 from registration import Segments
 
 from .maps import CachedMap, IndexCache, MapRecord, MapStore
+from .parser_process import ParserProcess
+from .parsing import read_stored
 from .schemas.parts import InlineMap, StoredMap
 from .schemas.requests import MapDocument
 
 MAX_EXTENT = 1e5  # m
+LARGE = 500_000  # bytes; larger documents would hold up everything else for too long
 
 
-def indexed_map(asked: InlineMap | StoredMap, cache: IndexCache, store: MapStore) -> tuple[CachedMap, int | None]:
-    """Return a map ready to be searched, and its revision where it is a stored one.
+class MapLookup:
+    """Finds the map that a request names or holds, indexed.
 
-    Runs off the event loop.
-
-    Raises
-    ------
-    ProblemError
-        When no such map is stored, or it is damaged, or the store does not answer.
-    InvalidSegmentsError, InvalidMapError
-        When the map of the request cannot be searched.
+    Parameters
+    ----------
+    cache : IndexCache
+    store : MapStore
+    parser : ParserProcess
+        Parses large stored maps.
     """
-    if isinstance(asked, InlineMap):
-        # Robots send the same map with every scan: what is in it names it.
-        digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
-        return cache.get((digest, asked.sigma, asked.frame_id), lambda: _index(asked)), None
-    while True:
-        # Looked up before every use, so that a change by another worker is never missed.
-        record = store.record(asked.map_id)
-        try:
-            return cache.get(record, partial(_load, record, store)), record.revision
-        except _ChangedError:
-            continue
+
+    def __init__(self, cache: IndexCache, store: MapStore, parser: ParserProcess) -> None:
+        self._cache = cache
+        self._store = store
+        self._parser = parser
+
+    def indexed(self, asked: InlineMap | StoredMap) -> tuple[CachedMap, int | None]:
+        """Return a map ready to be searched, and its revision where it is a stored one.
+
+        Runs off the event loop.
+
+        Raises
+        ------
+        ProblemError
+            When no such map is stored, or it is damaged, or the store does not answer.
+        InvalidSegmentsError, InvalidMapError
+            When the map of the request cannot be searched.
+        """
+        if isinstance(asked, InlineMap):
+            # Robots send the same map with every scan: what is in it names it.
+            digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
+            return self._cache.get((digest, asked.sigma, asked.frame_id), lambda: _index(asked)), None
+        while True:
+            # Looked up before every use, so that a change by another worker is never missed.
+            record = self._store.record(asked.map_id)
+            try:
+                return self._cache.get(record, partial(self._load, record)), record.revision
+            except _ChangedError:
+                continue
+
+    def _load(self, record: MapRecord) -> CachedMap:
+        stored = self._store.load(record.map_id)
+        if stored.record != record:
+            raise _ChangedError
+        if len(stored.document) > LARGE:
+            return _index(self._parser.call(read_stored, stored.document))
+        return _index(read_stored(stored.document))
 
 
 def checked_segments(document: MapDocument) -> Segments:
@@ -62,13 +88,6 @@ def checked_segments(document: MapDocument) -> Segments:
 
 class _ChangedError(Exception):
     """The map was changed between the look at its revision and its loading."""
-
-
-def _load(record: MapRecord, store: MapStore) -> CachedMap:
-    stored = store.load(record.map_id)
-    if stored.record != record:
-        raise _ChangedError
-    return _index(MapDocument.model_validate(orjson.loads(stored.document)))
 
 
 def _index(asked: InlineMap | MapDocument) -> CachedMap:

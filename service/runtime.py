@@ -5,26 +5,31 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, TypeVar
 
-from pydantic import BaseModel
 from starlette.requests import Request
 
 from association import Deadline
 
-from .bodies import BodyReader, parse, validate, wait_for_hang_up
+from .bodies import BodyReader, wait_for_hang_up
 from .doors import Doors
 from .gate import SearchGate
 from .keys import Keyring
+from .lookup import LARGE, MapLookup
 from .maps import IndexCache, MapStore
 from .metrics import Metrics
+from .parser_process import ParserProcess
+from .parsing import Limits, unpack
 from .problems import ProblemError
 from .settings import Settings
 from .stopwatch import Stopwatch
 from .turns import Holder
 
 T = TypeVar("T")
-M = TypeVar("M", bound=BaseModel)
+Reader = Callable[[bytes | bytearray, Limits], T]
+"""From JSON to what was asked for; a function of a module, so that another process can call it."""
+
 SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
 
 
@@ -45,6 +50,8 @@ class Runtime:
         self.doors = Doors(self.gate, self.keyring, self.metrics)
         self.store = MapStore(settings.url)
         self.cache = IndexCache(settings.cache_bytes, self.metrics)
+        self.parser = ParserProcess()
+        self.lookup = MapLookup(self.cache, self.store, self.parser)
         self.warm = False
         self.draining = False
         self._parsers = ThreadPoolExecutor(2, thread_name_prefix="parse")
@@ -57,17 +64,23 @@ class Runtime:
         self.metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: self.cache.bytes)
         self.metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(self.cache))
 
-    async def read(self, request: Request, model: type[M]) -> tuple[M, Stopwatch]:
-        """Read a body and check it, off the event loop where that takes long; the watch starts when it is there."""
+    async def read(self, request: Request, reader: Reader[T]) -> tuple[T, Stopwatch]:
+        """Read a body and check it, off the event loop where that takes long; the watch starts when it is there.
+
+        A large one is parsed in a turn at the gate, like a search: it takes a core for a while, too.
+        """
         async with self.bodies.reading(request) as body:
             watch = Stopwatch()
-
-            def parsed() -> M:
-                return validate(model, parse(self.bodies.unpack(body)), self.limits)
-
-            if len(body.data) <= SMALL and not body.gzipped:
-                return parsed(), watch
-            return await self._in(self._parsers, parsed), watch
+            data = body.data
+            if body.gzipped:
+                data = await self._in(self._parsers, partial(unpack, body, self.settings.max_body_bytes))
+            if len(data) <= SMALL:
+                return reader(data, self.limits), watch
+            if len(data) <= LARGE:
+                return await self._in(self._parsers, partial(reader, data, self.limits)), watch
+            deadline = watch.deadline(None, self.settings.max_deadline_ms)
+            call = partial(self.parser.call, reader, data, self.limits)
+            return await self.search(request, call, deadline), watch
 
     async def in_store(self, call: Callable[[], T]) -> T:
         """Run a call of the store in a thread of its own."""
@@ -95,7 +108,14 @@ class Runtime:
 
     async def search(self, request: Request, call: Callable[[], T], deadline: Deadline) -> T:
         """Run a search when its turn comes; give up when the client does."""
-        return await self.unless_hung_up(request, self.gate.run(call, deadline, holder_of(request)), deadline)
+        return await self.unless_hung_up(request, self.take_turn(request, call, deadline), deadline)
+
+    async def take_turn(self, request: Request, call: Callable[[], T], deadline: Deadline) -> T:
+        """Run a part of a request when its turn comes; what was let in once is not sent away later."""
+        admitted = request.scope["state"].get("admitted", False)
+        found = await self.gate.run(call, deadline, holder_of(request), admitted=admitted)
+        request.scope["state"]["admitted"] = True
+        return found
 
     async def unless_hung_up(self, request: Request, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
         """Wait for work, or cancel it when the client is gone first.
@@ -122,6 +142,7 @@ class Runtime:
         """Give up what still runs and give everything back."""
         self.gate.cancel_all()
         self.gate.close()
+        self.parser.close()
         for threads in (self._parsers, self._store_threads, self._probe_thread):
             threads.shutdown(wait=False, cancel_futures=True)
         self.store.close()

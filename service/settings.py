@@ -54,6 +54,7 @@ class Settings(BaseSettings):
     searches: int = Field(default_factory=_cores, ge=1, le=1024, description="searches that run at once")
     queue: int = Field(16, ge=0, le=10_000, description="requests that may wait for a search")
     max_body_bytes: int = Field(32_000_000, ge=1_000, le=1_000_000_000, description="of a request, unpacked")
+    max_values: int = Field(2_000_000, ge=1_000, description="numbers, strings, arrays and objects in a request")
     max_bodies_bytes: int = Field(256_000_000, ge=1_000, description="of all requests being read at once")
     max_map_segments: int = Field(200_000, ge=1, description="of one map")
     max_scan_segments: int = Field(2_000, ge=1, description="of one scan")
@@ -83,6 +84,7 @@ class Settings(BaseSettings):
     def limits(self) -> dict[str, int]:
         """Return the limits that arrays are held to, by the names of the validation context."""
         return {
+            "values": self.max_values,
             "map_segments": self.max_map_segments,
             "scan_segments": self.max_scan_segments,
             "beams": self.max_beams,

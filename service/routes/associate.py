@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -11,19 +12,16 @@ from fastapi import APIRouter, Request, Response
 
 from association import CancelledError, Deadline
 
-from ..bodies import validate
 from ..context import request_id_of
 from ..finite import require_finite
-from ..lookup import indexed_map
-from ..maps import CachedMap
+from ..parsing import read_batch, read_model
 from ..problems import internal
-from ..runtime import Runtime, holder_of, runtime_of
+from ..runtime import runtime_of
 from ..schemas import examples
 from ..schemas.replies import AssociateAnswer, BatchAnswer
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..searching import map_reference, search
 from ..translation import problem_of
-from ..turns import Holder
 from .answering import EVERYWHERE, READS_BODY, SEARCHES, json_response, problems, sealed, takes
 
 logger = logging.getLogger("linefix")
@@ -42,11 +40,11 @@ async def post_associate(request: Request) -> Response:
     """Find where in the map the scan was taken, and say how sure that is."""
     runtime = runtime_of(request)
     runtime.require_ready(request)
-    asked, watch = await runtime.read(request, AssociateRequest)
+    asked, watch = await runtime.read(request, partial(read_model, AssociateRequest))
     deadline = watch.deadline(asked.options.deadline_ms, runtime.settings.max_deadline_ms)
 
     def answer() -> bytes:
-        cached, revision = indexed_map(asked.map, runtime.cache, runtime.store)
+        cached, revision = runtime.lookup.indexed(asked.map)
         watch.lap("decode")
         found = search(cached, (asked.scan, asked.prior, asked.options), deadline, runtime.metrics)
         watch.lap("search")
@@ -68,17 +66,21 @@ async def post_batch(request: Request) -> Response:
     """Find several scans in one map; a scan that is wrong is one error item and nothing else."""
     runtime = runtime_of(request)
     runtime.require_ready(request)
-    asked, watch = await runtime.read(request, BatchRequest)
+    (asked, items), watch = await runtime.read(request, read_batch)
     deadline = watch.deadline(asked.options.deadline_ms, runtime.settings.max_deadline_ms)
 
-    holder = holder_of(request)
-
     async def work() -> dict[str, Any]:
-        cached, revision = await runtime.gate.run(
-            lambda: indexed_map(asked.map, runtime.cache, runtime.store), deadline, holder
-        )
+        cached, revision = await runtime.take_turn(request, lambda: runtime.lookup.indexed(asked.map), deadline)
         watch.lap("decode")
-        results = await _search_all(runtime, asked, cached, (deadline, holder, request_id_of(request.scope)))
+
+        def search_one(item: BatchItem | Exception) -> dict[str, Any]:
+            if isinstance(item, Exception):
+                raise item
+            found = search(cached, (item.scan, item.prior, asked.options), deadline, runtime.metrics)
+            require_finite(found)
+            return found
+
+        results = await _answer_all(request, [partial(search_one, item) for item in items], deadline)
         watch.lap("search")
         return {"results": results, "map": map_reference(asked.map, revision), "client_ref": asked.client_ref}
 
@@ -86,19 +88,18 @@ async def post_batch(request: Request) -> Response:
     return json_response(await runtime.in_parser(lambda: sealed(answer, request, watch)))
 
 
-async def _search_all(
-    runtime: Runtime, asked: BatchRequest, cached: CachedMap, of: tuple[Deadline, Holder, str]
+async def _answer_all(
+    request: Request, calls: Sequence[Callable[[], dict[str, Any]]], deadline: Deadline
 ) -> list[dict[str, Any]]:
     """Search for every scan, as many at once as there are cores; others' requests get their turns in between."""
-    deadline, holder, request_id = of
-    results: list[dict[str, Any]] = [{} for _ in asked.scans]
-    todo = iter(range(len(asked.scans)))
+    runtime, request_id = runtime_of(request), request_id_of(request.scope)
+    results: list[dict[str, Any]] = [{} for _ in calls]
+    todo = iter(enumerate(calls))
 
     async def take_turns() -> None:
-        for index in todo:
-            call = partial(_search_one, runtime, asked, cached, (index, deadline))
+        for index, call in todo:
             try:
-                found = await runtime.gate.run(call, deadline, holder, admitted=True)
+                found = await runtime.take_turn(request, call, deadline)
                 results[index] = {"index": index, "status_code": 200, "result": found}
             except CancelledError:
                 raise
@@ -112,15 +113,6 @@ async def _search_all(
 
     await asyncio.gather(*(take_turns() for _ in range(min(runtime.gate.slots, len(results)))))
     return results
-
-
-def _search_one(runtime: Runtime, asked: BatchRequest, cached: CachedMap, turn: tuple[int, Deadline]) -> dict[str, Any]:
-    index, deadline = turn
-    prior = None if asked.priors is None else asked.priors[index]
-    item = validate(BatchItem, {"scan": asked.scans[index], "prior": prior}, runtime.limits)
-    found = search(cached, (item.scan, item.prior, asked.options), deadline, runtime.metrics)
-    require_finite(found)
-    return found
 
 
 def _in_batch(index: int, pointer: str) -> str:

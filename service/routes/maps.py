@@ -10,6 +10,7 @@ from ..etags import demands_of, etag, is_unchanged
 from ..finite import encode
 from ..lookup import checked_segments
 from ..maps.store import Bounds
+from ..parsing import read_map
 from ..runtime import runtime_of
 from ..schemas import examples
 from ..schemas.replies import MapList, MapSummaryAnswer
@@ -49,16 +50,14 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
 async def put_map(request: Request, map_id: MapIdPath) -> Response:
     """Store a map; once answered it survives the loss of process and power."""
     runtime = runtime_of(request)
-    asked, _ = await runtime.read(request, MapDocument)
+    (asked, document), _ = await runtime.read(request, read_map)
 
-    def prepared() -> tuple[bytes, tuple[int, Bounds]]:
+    def summary() -> tuple[int, Bounds]:
         corners = checked_segments(asked).endpoints.reshape(-1, 2)
         low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-        document = {name: getattr(asked, name) for name in ("segments", "sigma", "frame_id", "meta")}
-        sent = {name: value for name, value in document.items() if name in asked.model_fields_set}
-        return encode(sent), (len(asked.segments), (low[0], low[1], high[0], high[1]))
+        return len(asked.segments), (low[0], low[1], high[0], high[1])
 
-    document, (count, bounds) = await runtime.in_parser(prepared)
+    count, bounds = await runtime.in_parser(summary)
     demands = demands_of(request)
     revision, created = await runtime.in_store(lambda: runtime.store.put(map_id, document, (count, bounds), demands))
     answer = {"map_id": map_id, "revision": revision, "segments": count, "bounds": bounds}

@@ -54,7 +54,14 @@ async def version() -> Response:
 async def limits(request: Request) -> Response:
     """Name the limits beyond which a request is refused with 413, or waits no longer."""
     settings = runtime_of(request).settings
-    names = ("max_body_bytes", "max_map_segments", "max_scan_segments", "max_beams", "max_correspondences")
+    names = (
+        "max_body_bytes",
+        "max_values",
+        "max_map_segments",
+        "max_scan_segments",
+        "max_beams",
+        "max_correspondences",
+    )
     more = ("max_batch", "max_deadline_ms", "searches", "queue")
     fixed = {"max_magnitude": 1e9, "min_segment_length": 1e-6, "max_segment_length": 1e4, "max_map_extent": 1e5}
     return json_response(encode({name: getattr(settings, name) for name in (*names, *more)} | fixed))

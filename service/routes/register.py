@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from fastapi import APIRouter, Request, Response
 
 from registration import Segments, register
 
 from ..answers import registration_json
 from ..inputs import measured_of, pairs_of, registration_options_of
+from ..parsing import read_model
 from ..runtime import runtime_of
 from ..schemas import examples
 from ..schemas.replies import RegisterAnswer
@@ -28,7 +31,7 @@ async def post_register(request: Request) -> Response:
     """Lay scan segments on the map segments that they are known to belong to."""
     runtime = runtime_of(request)
     runtime.require_ready(request)
-    asked, watch = await runtime.read(request, RegisterRequest)
+    asked, watch = await runtime.read(request, partial(read_model, RegisterRequest))
     deadline = watch.deadline(None, runtime.settings.max_deadline_ms)
 
     def answer() -> bytes:

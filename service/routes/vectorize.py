@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from fastapi import APIRouter, Request, Response
 
 from vectorization import VectorizationOptions
 
+from ..parsing import read_model
 from ..runtime import runtime_of
 from ..scanning import vectorize_laser, vectorize_points
 from ..schemas import examples
@@ -27,7 +30,7 @@ async def post_vectorize(request: Request) -> Response:
     """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
     runtime = runtime_of(request)
     runtime.require_ready(request)
-    asked, watch = await runtime.read(request, VectorizeRequest)
+    asked, watch = await runtime.read(request, partial(read_model, VectorizeRequest))
     deadline = watch.deadline(None, runtime.settings.max_deadline_ms)
 
     def answer() -> bytes:

@@ -243,6 +243,7 @@ class Limits(Answer):
     """Beyond these a request is refused."""
 
     max_body_bytes: int = Field(description="of a request, unpacked")
+    max_values: int = Field(description="numbers, strings, arrays and objects in a request")
     max_map_segments: int
     max_scan_segments: int
     max_beams: int = Field(description="ranges or points of one scan")
