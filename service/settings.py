@@ -10,6 +10,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from sqlalchemy import URL
+
+from .database_url import database_url
 
 
 def _data_home() -> Path:
@@ -47,7 +50,10 @@ class Settings(BaseSettings):
     host: str = Field("127.0.0.1", description="address to listen on")
     port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
     data_dir: Path = Field(default_factory=_data_home, description="where maps are kept")
-    database_url: str | None = Field(None, description="SQLAlchemy URL; default: SQLite in the data directory")
+    database_url: SecretStr | None = Field(
+        None,
+        description="postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory",
+    )
     keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys, comma separated")
     allow_anonymous: bool = Field(False, description="without keys, listen on other addresses than loopback")
 
@@ -76,10 +82,19 @@ class Settings(BaseSettings):
             return tuple(part.strip() if isinstance(part, str) else part for part in parts if part not in ("", " "))
         return items
 
+    @field_validator("database_url")
+    @classmethod
+    def _usable(cls, value: SecretStr | None) -> SecretStr | None:
+        if value is not None:
+            database_url(value.get_secret_value())
+        return value
+
     @property
-    def url(self) -> str:
-        """Where the store is, as SQLAlchemy wants it."""
-        return self.database_url or f"sqlite:///{self.data_dir / 'maps.sqlite3'}"
+    def url(self) -> URL:
+        """Where the store is."""
+        if self.database_url is not None:
+            return database_url(self.database_url.get_secret_value())
+        return URL.create("sqlite", database=str(self.data_dir / "maps.sqlite3"))
 
     def limits(self) -> dict[str, int]:
         """Return the limits that arrays are held to, by the names of the validation context."""

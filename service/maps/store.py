@@ -2,82 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
+import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
+from contextlib import contextmanager, suppress
 from typing import Any
 
-from sqlalchemy import Connection, Engine, Row, insert, inspect, literal, select, update
-from sqlalchemy.engine import make_url
+from sqlalchemy import URL, Connection, Engine, Row, Select, Table, delete, insert, literal, select, update
 from sqlalchemy.exc import IntegrityError
 
 from ..problems import ProblemError
-from .database import failures_as_problems, maps, metadata, open_engine
+from .database import make_directory, open_engine
+from .failures import failures_as_problems
+from .preconditions import Preconditions
+from .records import ABSENT, Bounds, MapPage, MapRecord, MapSummary, StoredMap, columns_of, digest, is_sealed
+from .schema import upgrade
+from .tables import documents, maps
 
-Bounds = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class MapRecord:
-    """What identifies the content of a stored map."""
-
-    map_id: str
-    revision: int
-    sha256: str
-
-
-@dataclass(frozen=True, slots=True)
-class MapSummary:
-    """A stored map without its content; bounds are ``min_x, min_y, max_x, max_y`` in metres."""
-
-    map_id: str
-    revision: int
-    segments: int
-    bounds: Bounds
-
-
-@dataclass(frozen=True, slots=True)
-class StoredMap:
-    """A stored map: its JSON document to the byte."""
-
-    record: MapRecord
-    document: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Preconditions:
-    """What a writer demands of the present revision.
-
-    Attributes
-    ----------
-    if_match : frozenset of int, or None
-        Revisions of which the present one must be.
-    any_match : bool
-        ``If-Match: *``: there must be a map.
-    if_none_match : frozenset of int, or None
-        Revisions that the present one must not be.
-    none_may_exist : bool
-        ``If-None-Match: *``: there must be no map.
-    """
-
-    if_match: frozenset[int] | None = None
-    any_match: bool = False
-    if_none_match: frozenset[int] | None = None
-    none_may_exist: bool = False
-
-    def check(self, revision: int | None) -> None:
-        """Raise when the present revision, None for no map, is not as demanded."""
-        present = revision is not None
-        refused = (
-            (self.any_match and not present)
-            or (self.if_match is not None and revision not in self.if_match)
-            or (self.none_may_exist and present)
-            or (self.if_none_match is not None and present and revision in self.if_none_match)
-        )
-        if refused:
-            raise ProblemError("revision_conflict", "the map's present revision is not the one demanded")
+logger = logging.getLogger("linefix")
 
 
 class MapStore:
@@ -89,23 +30,15 @@ class MapStore:
         From every method: when the database is full, read-only, busy, damaged or away.
     """
 
-    def __init__(self, url: str) -> None:
-        self._url = make_url(url)
+    def __init__(self, url: URL) -> None:
+        self._url = url
         self._engine: Engine = open_engine(url)
         self._writer = self._engine.execution_options(writes=True)
 
     def open(self) -> None:
-        """Make sure that directory and tables exist."""
-        if self._url.get_backend_name() == "sqlite" and self._url.database:
-            try:
-                Path(self._url.database).parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise ProblemError("read_only", "the directory of the maps cannot be made") from error
-        with failures_as_problems(), self._engine.connect() as connection:
-            there = inspect(connection).has_table(maps.name)
-        if not there:
-            with self._writing() as connection:
-                metadata.create_all(connection)
+        """Make sure that the tables exist and are of this version."""
+        make_directory(self._url)
+        upgrade(self._engine, self._writer)
 
     def close(self) -> None:
         """Close all connections."""
@@ -121,7 +54,7 @@ class MapStore:
     ) -> tuple[int, bool]:
         """Store a map; return its revision, and whether there was none before.
 
-        The transaction is on the disk when this returns.
+        The transaction is on the disk when this returns. A damaged map is replaced as any other.
         """
         try:
             return self._put(map_id, document, summary, demands)
@@ -132,67 +65,64 @@ class MapStore:
     def _put(
         self, map_id: str, document: bytes, summary: tuple[int, Bounds], demands: Preconditions
     ) -> tuple[int, bool]:
-        segments, (min_x, min_y, max_x, max_y) = summary
-        values: dict[str, Any] = {
-            "document": document,
-            "sha256": hashlib.sha256(document).hexdigest(),
-            "segments": segments,
-            "min_x": min_x,
-            "min_y": min_y,
-            "max_x": max_x,
-            "max_y": max_y,
-        }
         with self._writing() as connection:
-            last, exists = _locked(connection, map_id)
+            row = _locked(connection, map_id)
+            last, exists = _last(connection, map_id, row)
             demands.check(last if exists else None)
-            revision = (last or 0) + 1
-            if last is None:
-                connection.execute(insert(maps).values(map_id=map_id, revision=revision, **values))
+            record = MapRecord(map_id, last + 1, digest(document))
+            if row is None:
+                # Not an upsert: of two first writers one has to fail here, and look again.
+                connection.execute(insert(maps).values(**columns_of(record, *summary)))
             else:
-                connection.execute(update(maps).where(maps.c.map_id == map_id).values(revision=revision, **values))
-        return revision, not exists
+                _update(connection, maps, columns_of(record, *summary))
+            content = {"map_id": map_id, "revision": record.revision, "document": document}
+            if not _update(connection, documents, content):
+                connection.execute(insert(documents).values(**content))
+        return record.revision, not exists
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
         """Forget a map; the number of its last revision is kept."""
         with self._writing() as connection:
-            last, exists = _locked(connection, map_id)
+            last, exists = _last(connection, map_id, _locked(connection, map_id))
             demands.check(last if exists else None)
             if not exists:
                 raise unknown_map()
-            connection.execute(update(maps).where(maps.c.map_id == map_id).values(document=None, sha256="", segments=0))
+            _update(connection, maps, columns_of(MapRecord(map_id, last, ABSENT), 0, (0.0, 0.0, 0.0, 0.0)))
+            connection.execute(delete(documents).where(documents.c.map_id == map_id))
 
     def record(self, map_id: str) -> MapRecord:
         """Return what identifies the present content; cheap, asked before every use of a cached index."""
         with self._reading() as connection:
-            columns = (maps.c.revision, maps.c.sha256)
-            row = connection.execute(
-                select(*columns).where(maps.c.map_id == map_id, maps.c.document.is_not(None))
-            ).first()
-        if row is None:
-            raise unknown_map()
-        return MapRecord(map_id, row.revision, row.sha256)
+            return _trusted(_row(connection, map_id, select(maps)))
 
     def load(self, map_id: str) -> StoredMap:
-        """Return a map, its checksum tested."""
+        """Return a map, its checksum tested; a map that fails the test is quarantined."""
+        both = select(maps, documents.c.document, documents.c.revision.label("document_revision"))
         with self._reading() as connection:
-            columns = (maps.c.revision, maps.c.sha256, maps.c.document)
-            row = connection.execute(
-                select(*columns).where(maps.c.map_id == map_id, maps.c.document.is_not(None))
-            ).first()
-        if row is None:
-            raise unknown_map()
-        if hashlib.sha256(row.document).hexdigest() != row.sha256:
-            raise ProblemError("map_corrupt", "the stored map does not match its checksum; put it again")
-        return StoredMap(MapRecord(map_id, row.revision, row.sha256), row.document)
+            row = _row(connection, map_id, both.outerjoin(documents, documents.c.map_id == maps.c.map_id))
+        record = _trusted(row)
+        if row.document_revision != record.revision or digest(row.document) != record.sha256:
+            self._quarantine(record)
+            raise corrupt_map()
+        return StoredMap(record, row.document)
 
-    def list(self, limit: int, after: str) -> tuple[list[MapSummary], str | None]:
-        """Return up to `limit` maps with an id beyond `after`, and where to go on."""
-        columns = [column for column in maps.c if column.name not in ("document", "sha256")]
-        query = select(*columns).where(maps.c.map_id > after, maps.c.document.is_not(None))
+    def list(self, limit: int, after: str) -> MapPage:
+        """Return up to `limit` maps with an id beyond `after`, in the order of their ids' bytes."""
+        query = select(maps).where(maps.c.map_id > after, maps.c.sha256 != ABSENT)
         with self._reading() as connection:
             rows = connection.execute(query.order_by(maps.c.map_id).limit(limit + 1)).all()
-        found = [_summary(row) for row in rows[:limit]]
-        return found, found[-1].map_id if len(rows) > limit else None
+        page = rows[:limit]
+        whole = [_summary(row) for row in page if is_sealed(row) and not row.quarantined]
+        damaged = [row.map_id for row in page if not is_sealed(row) or row.quarantined]
+        return MapPage(whole, damaged, page[-1].map_id if len(rows) > limit else None)
+
+    def _quarantine(self, record: MapRecord) -> None:
+        """Mark a map as corrupt for all workers, also those that have it indexed, until it is put again."""
+        logger.error("map quarantined: it does not match its checksum", extra={"map_id": record.map_id})
+        same = (maps.c.map_id == record.map_id, maps.c.revision == record.revision)
+        # Where nothing can be written the checksum goes on refusing it.
+        with suppress(ProblemError), self._writing() as connection:
+            connection.execute(update(maps).where(*same).values(quarantined=True))
 
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
@@ -210,11 +140,55 @@ def unknown_map() -> ProblemError:
     return ProblemError("unknown_map", "no map is stored under this id")
 
 
-def _locked(connection: Connection, map_id: str) -> tuple[int | None, bool]:
-    """Return the last revision of an id, None for an id never used, and whether a map is there; the row is locked."""
-    columns = (maps.c.revision, maps.c.document.is_not(None).label("there"))
-    row = connection.execute(select(*columns).where(maps.c.map_id == map_id).with_for_update()).first()
-    return (None, False) if row is None else (row.revision, bool(row.there))
+def corrupt_map() -> ProblemError:
+    """Return the problem of a map that is not as it was put."""
+    return ProblemError("map_corrupt", "the stored map does not match its checksum; put it again")
+
+
+def _row(connection: Connection, map_id: str, columns: Select[Any]) -> Row[Any]:
+    """Return some columns of a map's row."""
+    query = columns.where(maps.c.map_id == map_id)
+    row: Row[Any] | None = connection.execute(query).first()
+    if row is None and _document_revision(connection, map_id) is not None:
+        # Put for the first time between the two looks; or else damage hides the row, which is never deleted.
+        row = connection.execute(query).first()
+        if row is None:
+            raise corrupt_map()
+    if row is None or (row.sha256 == ABSENT and is_sealed(row)):
+        raise unknown_map()
+    return row
+
+
+def _trusted(row: Row[Any]) -> MapRecord:
+    if row.quarantined or not is_sealed(row):
+        raise corrupt_map()
+    return MapRecord(row.map_id, row.revision, row.sha256)
+
+
+def _document_revision(connection: Connection, map_id: str) -> Any:
+    return connection.execute(select(documents.c.revision).where(documents.c.map_id == map_id)).scalar()
+
+
+def _locked(connection: Connection, map_id: str) -> Row[Any] | None:
+    """Return a map's row, which nobody else can change before the transaction ends."""
+    row: Row[Any] | None = connection.execute(select(maps).where(maps.c.map_id == map_id).with_for_update()).first()
+    return row
+
+
+def _last(connection: Connection, map_id: str, row: Row[Any] | None) -> tuple[int, bool]:
+    """Return the last revision of an id, 0 for one never used, and whether a map is there."""
+    if row is not None and is_sealed(row):
+        return row.revision, row.sha256 != ABSENT
+    # Of a damaged row neither number can be trusted; above both of them no tag was ever given out, as a rule.
+    said = (None if row is None else row.revision, _document_revision(connection, map_id))
+    numbers = [number for number in said if isinstance(number, int)]
+    return max(numbers, default=0), row is not None or bool(numbers)
+
+
+def _update(connection: Connection, table: Table, values: dict[str, Any]) -> bool:
+    """Write over the row of a map; tell whether there was one."""
+    same = table.c.map_id == values["map_id"]
+    return connection.execute(update(table).where(same).values(**values)).rowcount > 0
 
 
 def _summary(row: Row[Any]) -> MapSummary:

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from ..etags import demands_of, etag, is_unchanged
+from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..finite import encode
 from ..lookup import checked_segments
-from ..maps.store import Bounds
+from ..maps import Bounds
 from ..parsing import read_map
 from ..runtime import runtime_of
 from ..schemas import examples
@@ -50,15 +50,16 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
 async def put_map(request: Request, map_id: MapIdPath) -> Response:
     """Store a map; once answered it survives the loss of process and power."""
     runtime = runtime_of(request)
+    demands = demands_of(request)
     (asked, document), _ = await runtime.read(request, read_map)
 
     def summary() -> tuple[int, Bounds]:
         corners = checked_segments(asked).endpoints.reshape(-1, 2)
-        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        # No negative zeros: not every database keeps them.
+        low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
         return len(asked.segments), (low[0], low[1], high[0], high[1])
 
     count, bounds = await runtime.in_parser(summary)
-    demands = demands_of(request)
     revision, created = await runtime.in_store(lambda: runtime.store.put(map_id, document, (count, bounds), demands))
     answer = {"map_id": map_id, "revision": revision, "segments": count, "bounds": bounds}
     return json_response(encode(answer), 201 if created else 200, {"ETag": etag(revision)})
@@ -78,11 +79,12 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
 async def get_map(request: Request, map_id: MapIdPath) -> Response:
     """Give a map back as it was stored."""
     runtime = runtime_of(request)
+    if is_conditional(request):
+        record = await runtime.in_store(lambda: runtime.store.record(map_id))
+        if is_unchanged(request, record.revision):
+            return Response(status_code=304, headers={"ETag": etag(record.revision)})
     stored = await runtime.in_store(lambda: runtime.store.load(map_id))
-    headers = {"ETag": etag(stored.record.revision)}
-    if is_unchanged(request, stored.record.revision):
-        return Response(status_code=304, headers=headers)
-    return json_response(stored.document, headers=headers)
+    return json_response(stored.document, headers={"ETag": etag(stored.record.revision)})
 
 
 @router.get(
@@ -100,12 +102,12 @@ async def list_maps(
 ) -> Response:
     """List what is stored, by id."""
     runtime = runtime_of(request)
-    found, following = await runtime.in_store(lambda: runtime.store.list(limit, cursor))
+    page = await runtime.in_store(lambda: runtime.store.list(limit, cursor))
     items = [
         {"map_id": item.map_id, "revision": item.revision, "segments": item.segments, "bounds": item.bounds}
-        for item in found
+        for item in page.maps
     ]
-    return json_response(encode({"maps": items, "next": following}))
+    return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 
 @router.delete(

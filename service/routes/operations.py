@@ -41,6 +41,11 @@ async def readyz(request: Request) -> Response:
             await runtime.check_store()
     except TimeoutError:
         raise ProblemError("not_ready", "the store does not answer") from None
+    except ProblemError as problem:
+        # A full, busy or damaged store is for the callers of maps to know; to a balancer it is all the same.
+        if problem.status == 503:
+            raise
+        raise ProblemError("not_ready", problem.detail) from problem
     return json_response(b'{"status":"ok"}')
 
 

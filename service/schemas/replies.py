@@ -222,6 +222,7 @@ class MapList(Answer):
     """One page of maps, by id."""
 
     maps: list[MapSummaryAnswer]
+    corrupt: list[str] = Field(description="ids on this page that are damaged: not served until they are put again")
     next: str | None = Field(description="`cursor` of the next page")
 
 

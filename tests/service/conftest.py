@@ -1,0 +1,51 @@
+"""Databases to keep maps in: SQLite, and PostgreSQL where one answers."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from service.database_url import database_url
+from service.maps import MapStore
+
+SERVER = "LINEFIX_TEST_POSTGRESQL"
+LOCAL = "postgresql://postgres@127.0.0.1:5432/test"
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """The URL of an empty database; on PostgreSQL a schema of its own that is dropped afterwards.
+
+    The server is that of ``LINEFIX_TEST_POSTGRESQL``, which then has to answer, else a local one if there is any.
+    """
+    if request.param == "sqlite":
+        yield f"sqlite:///{tmp_path / 'maps.sqlite3'}"
+        return
+    server = os.environ.get(SERVER, LOCAL)
+    try:
+        connection = psycopg.connect(server, autocommit=True, connect_timeout=3)
+    except psycopg.OperationalError:
+        if SERVER in os.environ:
+            raise
+        pytest.skip("no PostgreSQL answers")
+    schema = f"linefix_test_{secrets.token_hex(6)}"
+    with connection:
+        connection.execute(f"CREATE SCHEMA {schema}")
+        try:
+            yield f"{server}?options=-csearch_path%3D{schema}"
+        finally:
+            connection.execute(f"DROP SCHEMA {schema} CASCADE")
+    connection.close()
+
+
+@pytest.fixture
+def store(database: str) -> Iterator[MapStore]:
+    opened = MapStore(database_url(database))
+    opened.open()
+    yield opened
+    opened.close()

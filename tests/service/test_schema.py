@@ -1,0 +1,142 @@
+"""The tables' migration at start."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import Column, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
+
+from service.database_url import database_url
+from service.maps import MapStore, Preconditions, schema
+from service.maps.database import open_engine
+from service.maps.tables import metadata
+from service.problems import ProblemError
+
+BOX = (4, (0.0, 0.0, 1.0, 1.0))
+# As `create_all` made it before there were migrations.
+OLD = Table(
+    "maps",
+    MetaData(),
+    Column("map_id", String(128), primary_key=True),
+    Column("revision", Integer, nullable=False),
+    Column("document", LargeBinary, nullable=True),
+    Column("sha256", String(64), nullable=False),
+    Column("segments", Integer, nullable=False),
+    *(Column(name, Float, nullable=False) for name in ("min_x", "min_y", "max_x", "max_y")),
+)
+
+
+def an_old_row(map_id: str, revision: int, document: bytes | None, sha256: str) -> dict[str, object]:
+    box = {"min_x": -0.5, "min_y": 1 / 3, "max_x": 1e5, "max_y": 2.0}
+    return {"map_id": map_id, "revision": revision, "document": document, "sha256": sha256, "segments": 4} | box
+
+
+def make_old(database: str) -> None:
+    engine = open_engine(database_url(database))
+    with engine.begin() as connection:
+        OLD.create(connection)
+        for row in (
+            an_old_row("kept", 3, b"document", hashlib.sha256(b"document").hexdigest()),
+            an_old_row("damaged", 2, b"document", hashlib.sha256(b"another").hexdigest()),
+            an_old_row("deleted", 5, None, ""),
+        ):
+            connection.execute(OLD.insert().values(**row))
+    engine.dispose()
+
+
+def check_migrated(store: MapStore) -> None:
+    kept = store.load("kept")
+    assert (kept.record.revision, kept.document) == (3, b"document")
+    assert [item.bounds for item in store.list(10, "").maps if item.map_id == "kept"] == [(-0.5, 1 / 3, 1e5, 2.0)]
+    for name, code in (("damaged", "map_corrupt"), ("deleted", "unknown_map")):
+        with pytest.raises(ProblemError) as caught:
+            store.load(name)
+        assert caught.value.code == code
+    assert store.put("deleted", b"new", BOX, Preconditions()) == (6, True)
+
+
+def test_the_migrations_make_the_tables_that_are_used(store: MapStore) -> None:
+    with store._engine.connect() as connection:
+        options = {"version_table": schema.VERSION_TABLE, "compare_type": True}
+        assert compare_metadata(MigrationContext.configure(connection, opts=options), metadata) == []
+
+
+def test_a_database_from_before_migrations(database: str) -> None:
+    make_old(database)
+    store = MapStore(database_url(database))
+    store.open()
+    check_migrated(store)
+    with store._engine.connect() as connection:
+        options = {"version_table": schema.VERSION_TABLE, "compare_type": True}
+        assert compare_metadata(MigrationContext.configure(connection, opts=options), metadata) == []
+    store.close()
+
+
+@pytest.mark.parametrize("old", [False, True], ids=["empty", "old"])
+def test_workers_that_start_together(database: str, old: bool) -> None:
+    if old:
+        make_old(database)
+    program = (
+        "import sys; from service.database_url import database_url; from service.maps import MapStore; "
+        "store = MapStore(database_url(sys.argv[1])); sys.stdin.read(1); store.open(); store.ping(); store.close()"
+    )
+    workers = [
+        subprocess.Popen([sys.executable, "-c", program, database], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+        for _ in range(4)
+    ]
+    with ThreadPoolExecutor(len(workers)) as threads:
+        errors = list(threads.map(lambda worker: worker.communicate(b"x", timeout=60)[1], workers))
+    assert [worker.returncode for worker in workers] == [0] * len(workers), errors
+    store = MapStore(database_url(database))
+    store.open()
+    if old:
+        check_migrated(store)
+    store.close()
+
+
+def test_a_migration_that_fails_leaves_what_was_there(database: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make_old(database)
+    store = MapStore(database_url(database))
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("the power is gone")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("service.maps.records._seal", fail)
+        with pytest.raises(RuntimeError):
+            store.open()
+    with store._engine.connect() as connection:
+        assert set(inspect(connection).get_table_names()) == {"maps"}
+        assert connection.execute(text("SELECT document FROM maps WHERE map_id = 'kept'")).scalar() == b"document"
+    store.open()
+    check_migrated(store)
+    store.close()
+
+
+def test_a_newer_database_is_refused_and_left_alone(store: MapStore, database: str) -> None:
+    with store._writer.begin() as connection:
+        connection.execute(text(f"UPDATE {schema.VERSION_TABLE} SET version_num = '9999'"))
+    other = MapStore(database_url(database))
+    with pytest.raises(ProblemError) as caught:
+        other.open()
+    assert (caught.value.code, "newer" in caught.value.detail) == ("not_ready", True)
+    other.close()
+
+
+def test_an_up_to_date_database_is_only_read(store: MapStore) -> None:
+    statements: list[str] = []
+
+    def remember(connection: object, cursor: object, statement: str, *_: object) -> None:
+        statements.append(statement)
+
+    event.listen(store._engine, "before_cursor_execute", remember)
+    store.open()
+    assert statements
+    assert all(statement.startswith(("SELECT", "BEGIN", "PRAGMA")) for statement in statements)
+    assert "BEGIN IMMEDIATE" not in statements
