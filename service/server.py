@@ -12,7 +12,7 @@ import uvicorn
 
 from .app import create_app
 from .logs import configure
-from .protocol import limit_unread_answers, protocol_of
+from .protocol import prepare, protocol_of
 from .runtime import Runtime
 from .settings import Settings
 
@@ -80,7 +80,7 @@ def listen(settings: Settings) -> socket.socket:
     """
     family, _, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
     listener = socket.create_server(address[:2], family=family, backlog=BACKLOG)
-    limit_unread_answers(listener, settings.request_timeout)
+    prepare(listener, settings.request_timeout)
     host, port = listener.getsockname()[:2]
     logger.info("listening", extra={"host": host, "port": port})
     return listener

@@ -7,6 +7,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, suppress
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -14,6 +15,8 @@ import orjson
 import pytest
 
 from service.schemas import examples
+from service.server import listen
+from service.settings import Settings
 from tests.conftest import RunningService, start, stop
 
 Connect = Callable[[], AbstractContextManager[socket.socket]]
@@ -187,3 +190,11 @@ def test_one_connection_carries_many_requests(connect: Connect) -> None:
         while answers.count(b"HTTP/1.1 200") < 3 or not answers.endswith(b"}}"):
             answers += connection.recv(65536)
     assert answers.count(b'"status":"ok"') == 3
+
+
+def test_no_part_of_an_answer_is_held_back(tmp_path: Path) -> None:
+    with listen(Settings(port=0, data_dir=tmp_path)) as listener, socket.create_connection(listener.getsockname()):
+        accepted, _ = listener.accept()
+        with accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 9000
