@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import RegistrationOptions, RegistrationResult, RigidTransform, register
 
+from ._accept_kernels import accept_matches
 from .map_index import MapIndex
-from .options import AssociationOptions, Scan
+from .options import AssociationOptions, Estimator, Rotation, Scan
 from .ranking import Ranked
 from .result import Correspondence
 from .scan_rows import ScanRows
@@ -28,47 +30,23 @@ class Accepted:
     ----------
     pairs : (n, 2) scan index and index of the map piece, by scan index
     overlaps : (n,) share of each scan segment's length that lies on pieces of its wall
-    rivals : for each pair the other pieces of its wall that it lies on
+    rivals, rival_starts : pair k lies also on the pieces ``rivals[rival_starts[k]:rival_starts[k + 1]]`` of its wall
     """
 
     pairs: Indices
     overlaps: Floats
-    rivals: tuple[tuple[int, ...], ...]
+    rivals: Indices
+    rival_starts: Indices
 
 
 def accept(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> Accepted:
     """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
-    segments = scan.measured.segments
-    walls = index.walls.rows
-    matched = np.nonzero(best.matches[:, 0] >= 0.0)[0]
-    matched = matched[np.argsort(rows.order[matched])]
-    pairs, overlaps, rivals = [], [], []
-    ends = best.pose.apply(segments.endpoints.reshape(-1, 2, 2))
-    for row in matched:
-        i, w = int(rows.order[row]), int(best.matches[row, 0])
-        pieces = index.pieces[index.piece_starts[w] : index.piece_starts[w + 1]]
-        d = walls[w, :2]
-        low, high = float(ends[i, 0] @ d), float(ends[i, 1] @ d)
-        low, high = min(low, high), max(low, high)
-        along = index.local.endpoints[pieces].reshape(-1, 2, 2) @ d
-        first, last = along.min(axis=1), along.max(axis=1)
-        covered = np.minimum(last, high) - np.maximum(first, low)
-        most = int(np.argmax(covered))
-        pairs.append((i, int(pieces[most])))
-        overlaps.append(_union(np.maximum(first, low), np.minimum(last, high)) / max(high - low, 1e-9))
-        near = [int(p) for p, c in zip(pieces, covered, strict=True) if c > 0.0 and p != pieces[most]]
-        rivals.append(tuple(near[:8]))
-    return Accepted(np.array(pairs, dtype=np.intp).reshape(-1, 2), np.minimum(1.0, overlaps), tuple(rivals))
-
-
-def _union(lows: Floats, highs: Floats) -> float:
-    """Return the length of a union of intervals."""
-    total, reach = 0.0, -math.inf
-    for low, high in sorted(zip(lows.tolist(), highs.tolist(), strict=True)):
-        if high > max(low, reach):
-            total += high - max(low, reach)
-            reach = high
-    return total
+    pose = best.pose
+    found = accept_matches(
+        best.matches, rows.order, scan.measured.segments.endpoints, pose.theta, pose.x, pose.y, index.walls.rows,
+        index.pieces, index.piece_starts, index.local.endpoints,
+    )  # fmt: skip
+    return Accepted(*found)
 
 
 def register_accepted(
@@ -77,8 +55,14 @@ def register_accepted(
     """Fit the pose to a consensus set, as `/v1/register` would; None without pairs."""
     if not len(accepted.pairs):
         return None
-    how = RegistrationOptions(estimator=options.estimator, rotation=options.rotation)
-    return register(index.segments, scan.measured, accepted.pairs, index.sigma, how)
+    return register(
+        index.segments, scan.measured, accepted.pairs, index.sigma, _how(options.estimator, options.rotation)
+    )
+
+
+@lru_cache
+def _how(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
+    return RegistrationOptions(estimator=estimator, rotation=rotation)
 
 
 def place_on_family(
@@ -111,16 +95,8 @@ def place_on_family(
 
 def correspondences(index: MapIndex, accepted: Accepted, registered: RegistrationResult) -> tuple[Correspondence, ...]:
     """Report the consensus set by scan index."""
-    n = index.directed
-    return tuple(
-        Correspondence(
-            scan=int(i),
-            map=int(j) % n,
-            overlap=float(accepted.overlaps[k]),
-            offset=float(registered.offsets[k]),
-            angle=float(registered.angles[k]),
-            weight=float(registered.weights[k]),
-            alternatives=tuple(r % n for r in accepted.rivals[k]),
-        )
-        for k, (i, j) in enumerate(accepted.pairs)
-    )
+    scans, maps = accepted.pairs[:, 0].tolist(), (accepted.pairs[:, 1] % index.directed).tolist()
+    rivals, starts = (accepted.rivals % index.directed).tolist(), accepted.rival_starts.tolist()
+    columns = (accepted.overlaps, registered.offsets, registered.angles, registered.weights)
+    alternatives = (tuple(rivals[begin:end]) for begin, end in pairwise(starts))
+    return tuple(map(Correspondence, scans, maps, *(column.tolist() for column in columns), alternatives))

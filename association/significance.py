@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ._chance_kernels import chance_matches, log_tail
 from .map_index import MapIndex
 from .scan_rows import ScanRows
 
@@ -36,19 +37,10 @@ def significance(index: MapIndex, scan: ScanRows, gates: Floats, score: float) -
     float
         0 to 1; small is good.
     """
-    rows = scan.rows
-    chances = chance_matches(index, rows, gates)
-    gains = rows[:, 12]
-    logs = np.log1p(chances[None] * np.expm1(np.minimum(EXPONENTS[:, None] * gains[None], 600.0))).sum(axis=1)
-    exponent = float(np.min(logs - EXPONENTS * score))
-    places = index.area / (2.0 * gates[1]) ** 2
-    turns = math.tau / (2.0 * gates[3])
-    return min(1.0, max(LEAST, math.exp(min(0.0, exponent + math.log(max(1.0, places * turns))))))
-
-
-def chance_matches(index: MapIndex, rows: Floats, gates: Floats) -> Floats:
-    """Return (n,) the probability that each scan segment lies on a wall at a random pose with agreeing directions."""
     lengths, beyond = index.sorted_lengths
-    usable = beyond[np.searchsorted(lengths, gates[5] * rows[:, 4])]
-    agreeing = index.agreeing_share
-    return np.asarray(np.clip(2.0 * gates[1] * agreeing * usable / index.area, 1e-6, 0.9))
+    offset_gate, angle_gate = float(gates[1]), float(gates[3])
+    chances = chance_matches(scan.rows, lengths, beyond, index.agreeing_share, index.area, gates)
+    exponent = float(log_tail(scan.rows, chances, score, EXPONENTS))
+    places = index.area / (2.0 * offset_gate) ** 2
+    turns = math.tau / (2.0 * angle_gate)
+    return min(1.0, max(LEAST, math.exp(min(0.0, exponent + math.log(max(1.0, places * turns))))))

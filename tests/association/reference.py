@@ -78,3 +78,50 @@ def placements(scan, a, b, walls, slack, tolerance):
             if inside:
                 poses.append((theta, *t))
     return poses
+
+
+def scan_rows(directions, midpoints, lengths, centroids, spreads, sigma, points, floors):
+    """One segment at a time, the longest first; `floors`: variances of map and common error, two least variances."""
+    map_var, common_var, least_offset, least_angle = floors
+    order = sorted(range(len(lengths)), key=lambda i: (-lengths[i], i))
+    gains = [6.0 + 2.0 * min(length, 4.0) for length in lengths]
+    rows = []
+    for k, i in enumerate(order):
+        line_var = sigma[i] ** 2 / points[i]
+        offset_var = max(least_offset, line_var + map_var + 0.02**2)
+        angle_var = max(least_angle, (line_var + common_var) / max(1e-6, spreads[i]) + math.radians(0.6) ** 2)
+        later = sum(gains[j] for j in order[k + 1 :])
+        angle = math.atan2(directions[i][1], directions[i][0])
+        rows.append(
+            [*directions[i], *midpoints[i], lengths[i], angle, *centroids[i], spreads[i], offset_var, angle_var,
+             1.0 / offset_var, gains[i], later, max(1e-8, line_var + map_var), 0.0]
+        )  # fmt: skip
+    return order, np.array(rows)
+
+
+def chance_matches(scan, wall_lengths, agreeing, area, gates):
+    """Add up the walls that are long enough, for one segment after the other."""
+    usable = [sum(length for length in wall_lengths if length >= gates[5] * row[4]) for row in scan]
+    return np.clip([2.0 * gates[1] * agreeing * u / area for u in usable], 1e-6, 0.9)
+
+
+def log_tail(scan, chances, score, exponents):
+    """Chernoff's bound at every exponent, and the least of them."""
+    moments = [np.prod(1.0 - chances + chances * np.exp(t * scan[:, 12])) for t in exponents]
+    return min(math.log(m) - t * score for t, m in zip(exponents, moments, strict=True))
+
+
+def accept_matches(matches, order, scan_endpoints, pose, walls, pieces_of_wall, endpoints):
+    """List (scan index, piece, overlap, other pieces) by scan index; overlaps by counting 1e5 points of a segment."""
+    found = []
+    for i, wall in sorted((int(order[row]), int(match[0])) for row, match in enumerate(matches) if match[0] >= 0.0):
+        d = walls[wall, :2]
+        low, high = sorted(pose.apply(scan_endpoints[i].reshape(2, 2)) @ d)
+        points = low + (high - low) * (np.arange(100_000) + 0.5) / 100_000
+        spans = {p: sorted(endpoints[p].reshape(2, 2) @ d) for p in pieces_of_wall[wall]}
+        covered = {p: min(last, high) - max(first, low) for p, (first, last) in spans.items()}
+        most = max(spans, key=lambda p: (covered[p], -p))
+        on_any = np.any([(points >= first) & (points <= last) for first, last in spans.values()], axis=0)
+        others = [p for p in spans if p != most and covered[p] > 0.0]
+        found.append((i, most, on_any.mean(), others[:8]))
+    return found

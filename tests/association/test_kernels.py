@@ -9,13 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
+from association import _accept_kernels as accepting
+from association import _chance_kernels as chance
 from association import _match_kernels as match
 from association import _plan_kernels as plan
+from association import _scan_kernels as scanning
 from association import _search_kernels as search
 from association._sight_kernels import first_hit
 from association.candidates import _sampled_inliers
 from association.scan_rows import gates, scan_rows
-from registration import RigidTransform, Segments
+from association.significance import EXPONENTS
+from registration import MeasuredSegments, RigidTransform, Segments
 
 from . import reference
 from .scenes import maze, scan_of, seen
@@ -177,3 +181,84 @@ def test_prior_value():
     assert search.prior_value(hard, -3.1, 2.4, 3.2) == search.INSIDE
     assert search.prior_value(hard, 3.1, 2.4, 3.4) == 0.0
     assert search.prior_value(hard, 2.8, 2.0, 3.0) == 0.0
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_fill_rows(seed):
+    rng = np.random.default_rng(seed)
+    segments = Segments.from_array(maze(seed, 9)[[0, 1, 2, 3, 4, 5, 6, 7, 8, 2]])
+    measured = MeasuredSegments.from_segments(
+        segments,
+        rng.uniform(0.0, 0.1, 10),
+        rng.uniform(2.0, 50.0, 10),
+        (segments.midpoints + 0.1, rng.random(10) * 1e-5),
+    )
+    arrays = (
+        segments.directions, segments.midpoints, segments.lengths, measured.centroids, measured.spreads, measured.sigma,
+        measured.points,
+    )  # fmt: skip
+    floors = rng.choice([0.0, 1e-10, 1e-3, 1.0], 4)
+    order, expected = reference.scan_rows(*arrays, floors)
+    np.testing.assert_allclose(scanning.fill_rows(*arrays, np.array(order), *floors), expected, rtol=1e-12)
+    prepared = scan_rows(scan_of(segments.endpoints), 0.0)
+    np.testing.assert_array_equal(prepared.order, order)
+
+
+@given(SEEDS, st.floats(0.0, 400.0))
+@settings(max_examples=30, deadline=None)
+def test_chance_matches_and_log_tail(seed, score):
+    rng, rows, _ = drawn(seed)
+    if not len(rows):
+        return
+    agreeing, area = rng.uniform(0.1, 1.0), 10.0 ** rng.uniform(0.0, 5.0)
+    expected = reference.chance_matches(rows, INDEX.walls.longest, agreeing, area, GATES)
+    chances = chance.chance_matches(rows, *INDEX.sorted_lengths, agreeing, area, GATES)
+    np.testing.assert_allclose(chances, expected, rtol=1e-12)
+    least = chance.log_tail(rows, chances, score, EXPONENTS)
+    assert least == pytest.approx(reference.log_tail(rows, expected, score, EXPONENTS), rel=1e-9, abs=1e-12)
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_accept_matches(seed):
+    """On a map whose walls were drawn in pieces, some of which overlap or come twice."""
+    rng = np.random.default_rng(seed)
+    index, pieces_of_wall = in_pieces(rng)
+    at = RigidTransform(*rng.uniform(8.0, 22.0, 2), rng.uniform(-3.0, 3.0))
+    endpoints, _ = seen(maze(1), at, noise=0.02, cut=0.5, clutter=3, seed=seed, radius=12.0)
+    prepared = scan_rows(scan_of(endpoints), 0.0)
+    pose = np.array([at.theta, at.x - index.origin[0], at.y - index.origin[1]])
+    matches, grid = np.empty((len(endpoints), 5)), (index.grid.starts, index.grid.items, index.grid.shape)
+    match.match_scan(prepared.rows, pose, np.diag([1e-4, 1e-4, 1e-6]), index.walls.rows, *grid, GATES, 0.0, matches)
+    pairs, overlaps, rivals, starts = accepting.accept_matches(
+        matches, prepared.order, endpoints, *pose, index.walls.rows, index.pieces, index.piece_starts,
+        index.local.endpoints,
+    )  # fmt: skip
+    local = RigidTransform(pose[1], pose[2], pose[0])
+    expected = reference.accept_matches(
+        matches, prepared.order, endpoints, local, index.walls.rows, pieces_of_wall, index.local.endpoints
+    )
+    assert len(expected) > 0
+    assert pairs.tolist() == [[i, piece] for i, piece, _, _ in expected]
+    np.testing.assert_allclose(overlaps, [overlap for *_, overlap, _ in expected], atol=1e-4)
+    got = [rivals[starts[k] : starts[k + 1]].tolist() for k in range(len(pairs))]
+    assert got == [others for *_, others in expected]
+
+
+def in_pieces(rng):
+    """Return the maze with walls cut up, pieces overlapping and some coming twice, and the pieces of every wall."""
+    pieces = []
+    for wall in maze(1):
+        a, d = wall[:2], wall[2:] - wall[:2]
+        cuts = np.sort(rng.random(rng.integers(1, 14))).tolist()
+        for begin, end in itertools.pairwise([0.0, *cuts, 1.0]):
+            pieces.append(np.concatenate([a + max(0.0, begin - 0.04) * d, a + end * d]))
+    index = MapIndex.build(Segments.from_array([*pieces, *pieces[::3]]))
+    places = range(len(index.walls.rows))
+    return index, [index.pieces[index.piece_starts[w] : index.piece_starts[w + 1]].tolist() for w in places]
+
+
+def test_union_length():
+    lows, highs = np.array([3.0, 0.0, 0.5, 3.0, 9.0]), np.array([4.0, 2.0, 1.0, 5.0, 9.5])
+    assert [accepting.union_length(lows, highs, count) for count in range(6)] == [0.0, 1.0, 3.0, 3.0, 4.0, 4.5]
