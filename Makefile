@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve bench lock clean
+.PHONY: help demo test lint types layers unit serve bench experiments lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -41,6 +41,9 @@ serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000
 
 bench: $(VENV)/.ready  ## print the table of quality and speed
 	$(BIN)/python -m benchmarks
+
+experiments: $(VENV)/.ready  ## the paper's tables and figures, into out/experiments
+	$(BIN)/python -m experiments
 
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header pyproject.toml -o requirements/runtime.txt
