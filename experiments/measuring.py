@@ -77,6 +77,8 @@ class Measurement:
     def moved(self, by: RigidTransform) -> MeasuredSegments:
         """Return the segments in a frame that sees them moved."""
         s = self.measured
+        if by == RigidTransform(0.0, 0.0, 0.0):
+            return s
         ends = by.apply(s.segments.endpoints.reshape(-1, 2, 2)).reshape(-1, 4)
         moments = by.apply(s.centroids), s.spreads
         return MeasuredSegments.from_segments(Segments.from_array(ends), s.sigma, s.points, moments)

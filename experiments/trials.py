@@ -139,9 +139,10 @@ def _register(trials: Trials, at: tuple[int, int], scan: Measurement, pose: Rigi
     moved_from_scan = _moved_from_scan(condition.setup.origin, scan, pose)
     measured = scan.moved(moved_from_scan)
     trials.pairs[at] = len(scan.pairs)
-    trials.fixed[at] = not register(segments, measured, scan.pairs).degenerate
+    joint = register(segments, measured, scan.pairs)
+    trials.fixed[at] = not joint.degenerate
     for k, name in enumerate(condition.estimators):
-        found = register(segments, measured, scan.pairs, 0.0, ESTIMATORS[name])
+        found = joint if name == "joint" else register(segments, measured, scan.pairs, 0.0, ESTIMATORS[name])
         _note(trials, (*at, k), found)
         if found.pose is None:
             continue
