@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve bench experiments lock clean
+.PHONY: help demo test lint types layers unit serve bench lock overload fuzz clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -42,8 +42,11 @@ serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000
 bench: $(VENV)/.ready  ## print the table of quality and speed
 	$(BIN)/python -m benchmarks
 
-experiments: $(VENV)/.ready  ## the paper's tables and figures, into out/experiments
-	$(BIN)/python -m experiments
+overload: $(VENV)/.ready  ## print what ten times too much load does, and what large maps do meanwhile (5 min)
+	$(BIN)/python -m benchmarks.overload
+
+fuzz: $(VENV)/.ready  ## send 100,000 strange requests
+	FUZZ_LONG_CASES=100000 $(BIN)/python -m pytest -m long tests/service/test_fuzz.py
 
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header pyproject.toml -o requirements/runtime.txt

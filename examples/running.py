@@ -23,7 +23,7 @@ class StartError(Exception):
 
 
 @contextmanager
-def running_service() -> Iterator[tuple[str, int]]:
+def running_service(**settings: object) -> Iterator[tuple[str, int]]:
     """Give the URL and the process id of a service that is ready; it and its data are gone afterwards."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -31,6 +31,7 @@ def running_service() -> Iterator[tuple[str, int]]:
     url = f"http://127.0.0.1:{port}"
     # Settings of the caller's own service have no say here.
     environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    environment |= {f"LINEFIX_{name.upper()}": str(value) for name, value in settings.items()}
     with tempfile.TemporaryDirectory(prefix="linefix-demo-") as folder:
         log = Path(folder) / "log"
         command = [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", str(port)]

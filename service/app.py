@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -99,6 +100,9 @@ async def _get_ready(runtime: Runtime) -> None:
         # readyz goes on trying; meanwhile it says what is wrong.
         logger.error("the store does not open: %s", problem.detail)
     await asyncio.gather(runtime.in_parser(warm_up), runtime.in_parser(runtime.parser.start))
+    # What is there now stays: no need to look through it for garbage ever again.
+    gc.collect()
+    gc.freeze()
     runtime.warm = True
     logger.info("ready")
 

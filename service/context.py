@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
+import random
 import re
-import secrets
 import time
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from .gate import end_announcement
 from .metrics import Metrics
 from .problems import internal
 
@@ -26,7 +27,7 @@ def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
     for name, value in headers:
         if name == b"x-request-id" and _ID.match(value):
             return value.decode("ascii")
-    return secrets.token_hex(16)
+    return f"{random.getrandbits(128):032x}"  # unique, and no secret
 
 
 class RequestContext:
@@ -61,6 +62,7 @@ class RequestContext:
                 raise
             await internal().response(request_id)(scope, receive, send_with_id)
         finally:
+            end_announcement(scope)
             seconds = time.perf_counter() - started
             route = getattr(scope.get("route"), "path", "unmatched")
             self._metrics.observe_request(route, scope["method"], status, seconds)

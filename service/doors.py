@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
+from collections.abc import Callable
+from typing import Any
 
-from .gate import SearchGate
+from .gate import ANNOUNCED, SearchGate
 from .keys import Keyring
 from .metrics import Metrics
 from .problems import ProblemError
@@ -16,24 +18,26 @@ SEARCHING = {
     path.encode("ascii"): path for path in ("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize")
 }
 REPORT_SECONDS = 1.0
+UNHEARD_SECONDS = 0.02
 
 
 class Doors:
     """Sends away what would have to search while the queue is full, in some microseconds each.
 
-    Under a flood the answers "no" are what costs: nothing of a search may be left for them. They are counted one by
-    one, and logged once a second.
+    Under a flood the answers "no" are what costs: nothing of a search may be left for them. They are counted and logged
+    once a second.
     """
 
     def __init__(self, gate: SearchGate, keyring: Keyring, metrics: Metrics) -> None:
         self._gate = gate
         self._keyring = keyring
         self._metrics = metrics
-        self._refused: Counter[tuple[str, str]] = Counter()
+        self._unheard: list[Callable[[], None]] = []
+        self._refused: Counter[tuple[str, str, int]] = Counter()
 
     def refuse(self, method: bytes, url: bytes, headers: list[tuple[bytes, bytes]]) -> ProblemError | None:
         """Return why a request is not let in; None where the application is to answer."""
-        if method != b"POST" or not self._gate.full:
+        if not self._gate.full or method != b"POST":
             return None
         route = SEARCHING.get(url.partition(b"?")[0])
         if route is None:
@@ -43,16 +47,33 @@ class Doors:
         except ProblemError:
             return None  # the application says what is wrong with the key
         if refusal is not None:
-            self._count(route, refusal)
+            if not self._refused:
+                asyncio.get_running_loop().call_later(REPORT_SECONDS, self.report)
+            self._refused[route, refusal.code, refusal.status] += 1
         return refusal
 
-    def _count(self, route: str, refusal: ProblemError) -> None:
-        self._metrics.count_refusal(route, refusal.status)
-        if not self._refused:
-            asyncio.get_running_loop().call_later(REPORT_SECONDS, self._report)
-        self._refused[route, refusal.code] += 1
+    def hear_later(self, listen: Callable[[], None]) -> None:
+        """Leave the connection of who was just sent away for a moment, and then hear all such in one go.
 
-    def _report(self) -> None:
-        for (route, code), count in self._refused.items():
+        To be woken for each by itself costs several times what it takes to refuse.
+        """
+        if not self._unheard:
+            asyncio.get_running_loop().call_later(UNHEARD_SECONDS, self._hear)
+        self._unheard.append(listen)
+
+    def _hear(self) -> None:
+        unheard, self._unheard = self._unheard, []
+        for listen in unheard:
+            listen()
+
+    def announce(self, method: str, path: str, state: dict[str, Any]) -> None:
+        """Note that the body of a request is there, so that no more are let in than find room."""
+        if method == "POST" and path in SEARCHING.values():
+            state[ANNOUNCED] = self._gate.announce()
+
+    def report(self) -> None:
+        """Count and log what was refused since the last time."""
+        for (route, code, status), count in self._refused.items():
+            self._metrics.count_refusals(route, status, count)
             logger.warning("refused", extra={"route": route, "code": code, "count": count})
         self._refused.clear()

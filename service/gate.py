@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, MutableMapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -36,6 +36,7 @@ class SearchGate:
         self._queue = FairQueue()
         self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
         self.running = 0
+        self.announced = 0
 
     @property
     def waiting(self) -> int:
@@ -44,17 +45,22 @@ class SearchGate:
 
     @property
     def full(self) -> bool:
-        """Whether everything is taken, though a holder with less than its share may still be let in."""
-        return self.running >= self.slots and self.running + self.waiting >= self._places
+        """Whether everything is taken or spoken for; a holder with less than its share may still be let in."""
+        return self.running + self.waiting + self.announced >= self._places
+
+    def announce(self) -> Announcement:
+        """Note that a request is on its way to the gate, its body complete."""
+        return Announcement(self)
 
     def refusal(self, holder: Holder = None) -> ProblemError | None:
-        """Return why a request that came now could not even wait, or None when it could.
+        """Return why a request whose body is still to be read is not let in, or None when it is.
 
         A full queue is shared: a holder that has less than its share of the places is let in all the same, and whoever
         has the most gives up one.
         """
-        if not self.full:
-            return None
+        return self._refusal(holder) if self.full else None
+
+    def _refusal(self, holder: Holder) -> ProblemError | None:
         mine = self._queue.places_of(holder)
         holders = self._queue.holders + (mine == 0)
         share = self._places / holders
@@ -62,13 +68,7 @@ class SearchGate:
             return rate_limited()
         if holders > 1 and mine + 1 <= share:
             return None
-        return ProblemError("overloaded", "every core is searching and the queue is full", headers={"Retry-After": "1"})
-
-    def refuse_when_full(self, holder: Holder = None) -> None:
-        """Raise when a request that came now could not even wait."""
-        refusal = self.refusal(holder)
-        if refusal is not None:
-            raise refusal
+        return overloaded()
 
     async def run(
         self, function: Callable[[], T], deadline: Deadline, holder: Holder = None, *, admitted: bool = False
@@ -128,12 +128,15 @@ class SearchGate:
 
     def _make_room(self, holder: Holder) -> None:
         """Raise when the queue is full; for a holder with less than its share take a place from another."""
-        self.refuse_when_full(holder)
-        if self.full:
-            taken = self._queue.take_from_the_greediest(self._queue.places_of(holder) + 1)
-            if taken is None:
-                raise ProblemError("overloaded", "the queue is full", headers={"Retry-After": "1"})
-            taken.set_exception(rate_limited())
+        if self.running + self.waiting < self._places:
+            return
+        refusal = self._refusal(holder)
+        if refusal is not None:
+            raise refusal
+        taken = self._queue.take_from_the_greediest(self._queue.places_of(holder) + 1)
+        if taken is None:
+            raise overloaded()
+        taken.set_exception(rate_limited())
 
     def _give_up(self, holder: Holder, turn: Turn) -> None:
         """Leave the queue, or hand on the turn that has just come."""
@@ -158,9 +161,38 @@ class SearchGate:
             following[1].set_result(None)
 
 
+ANNOUNCED = "announced"
+
+
+class Announcement:
+    """A request on its way from the socket to the gate; without it all that come together would find room."""
+
+    def __init__(self, gate: SearchGate) -> None:
+        self._gate: SearchGate | None = gate
+        gate.announced += 1
+
+    def end(self) -> None:
+        """Say that it is there, or will never come."""
+        if self._gate is not None:
+            self._gate.announced -= 1
+            self._gate = None
+
+
 def too_late() -> ProblemError:
     """Return the problem of a deadline that passed before the search started."""
     return ProblemError("deadline_exceeded", "the deadline passed before the search started")
+
+
+def end_announcement(scope: MutableMapping[str, Any]) -> None:
+    """Say that a request has come to the gate, or never will, if it was announced."""
+    announcement = scope["state"].get(ANNOUNCED)
+    if announcement is not None:
+        announcement.end()
+
+
+def overloaded() -> ProblemError:
+    """Return the problem of a full queue."""
+    return ProblemError("overloaded", "every core is searching and the queue is full", headers={"Retry-After": "1"})
 
 
 def rate_limited() -> ProblemError:

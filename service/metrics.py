@@ -41,9 +41,9 @@ class Metrics:
         self.requests.labels(route, name, str(status)).inc()
         self.request_seconds.labels(route).observe(seconds)
 
-    def count_refusal(self, route: str, status: int) -> None:
-        """Count one request that was refused before the application saw it."""
-        self.requests.labels(route, "POST", str(status)).inc()
+    def count_refusals(self, route: str, status: int, count: int) -> None:
+        """Count requests that were refused before the application saw them."""
+        self.requests.labels(route, "POST", str(status)).inc(count)
 
     def observe_association(self, status: str, usable: bool, seconds: float, hypotheses: int) -> None:
         """Count one answered search."""

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
+from .memory import return_large_blocks
 from .problems import ProblemError
 
 T = TypeVar("T")
@@ -93,6 +94,7 @@ class ParserProcess:
 def _work(pipe: Connection) -> None:
     """Answer calls until the other end is gone, which it also is when the service was killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service, which then ends this
+    return_large_blocks()
     gc.disable()  # parsed JSON has no cycles, and looking for them takes longer than parsing
     while True:
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from functools import lru_cache
 from http import HTTPStatus
 from typing import Any
 
@@ -18,6 +19,9 @@ UNREAD = 65_536  # bytes; what is left of a refused body up to here is read and 
 LINGER = 1.0  # s that a closed connection still listens: a reset would overtake the answer
 LEEWAY = 0.5  # s for the application to say that a body came too late
 LEAST_READ = 16_384  # bytes that a client takes of an answer within the time that a request may take to arrive
+
+
+SOME_ID = "0123456789abcdef" * 2  # stands where the id of a request goes
 
 
 class _Answered:
@@ -91,6 +95,8 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
 
         def on_message_complete(self) -> None:
             self._in_message, self._complete = False, True
+            if not self.cycle.response_complete and not self.pipeline:
+                doors.announce(self.scope["method"], self.scope["path"], self.cycle.scope["state"])
             super().on_message_complete()
 
         def send_400_response(self, msg: str) -> None:
@@ -118,6 +124,8 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
             self._write(problem, taken_or_made(self.headers), close=close)
             if not close:
                 self.on_response_complete()
+                self.flow.pause_reading()
+                doors.hear_later(self._listen)
 
         def _write(self, problem: ProblemError, request_id: str, *, close: bool) -> None:
             self.transport.write(_response(problem, request_id, self.server_state.default_headers, close))
@@ -127,6 +135,10 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
                 if self.transport.can_write_eof():
                     self.transport.write_eof()
                 self.loop.call_later(LINGER, self._close)
+
+        def _listen(self) -> None:
+            if not self.transport.is_closing():
+                self.flow.resume_reading()
 
         def _expect_message(self) -> None:
             if self._timer is not None:
@@ -157,10 +169,21 @@ def prepare(listener: socket.socket, seconds: float) -> None:
 
 
 def _response(problem: ProblemError, request_id: str, default: list[tuple[bytes, bytes]], close: bool) -> bytes:
+    usual = len(request_id) == len(SOME_ID)
+    begin, rest = _rendered(problem.code, problem.detail, SOME_ID if usual else request_id, close)
+    if usual:
+        rest = rest.replace(SOME_ID.encode(), request_id.encode())
+    return begin + b"".join(b"%b: %b\r\n" % header for header in default) + rest
+
+
+@lru_cache(maxsize=64)
+def _rendered(code: str, detail: str, request_id: str, close: bool) -> tuple[bytes, bytes]:
+    """Return the first line of an answer, and what follows the headers that all answers have."""
+    problem = ProblemError(code, detail)
     answer: Any = problem.response(request_id)
-    headers = [*default, *answer.raw_headers, (b"x-request-id", request_id.encode("ascii"))]
+    headers = [*answer.raw_headers, (b"x-request-id", request_id.encode())]
     if close:
         headers.append((b"connection", b"close"))
     lines = b"".join(b"%b: %b\r\n" % header for header in headers)
-    phrase = HTTPStatus(problem.status).phrase.encode("ascii")
-    return b"HTTP/1.1 %d %b\r\n%b\r\n%b" % (problem.status, phrase, lines, answer.body)
+    begin = f"HTTP/1.1 {problem.status} {HTTPStatus(problem.status).phrase}\r\n"
+    return begin.encode(), lines + b"\r\n" + answer.body

@@ -14,7 +14,7 @@ from association import Deadline
 
 from .bodies import BodyReader, wait_for_hang_up
 from .doors import Doors
-from .gate import SearchGate
+from .gate import ANNOUNCED, SearchGate, end_announcement
 from .keys import Keyring
 from .lookup import LARGE, MapLookup
 from .maps import IndexCache, MapStore
@@ -104,7 +104,10 @@ class Runtime:
         """Refuse, before a body is read, what could not be served."""
         if not self.warm:
             raise ProblemError("not_ready", "the kernels are being compiled")
-        self.gate.refuse_when_full(holder_of(request))
+        # One that was announced has been let in by the doors.
+        refusal = None if ANNOUNCED in request.scope["state"] else self.gate.refusal(holder_of(request))
+        if refusal is not None:
+            raise refusal
 
     async def search(self, request: Request, call: Callable[[], T], deadline: Deadline) -> T:
         """Run a search when its turn comes; give up when the client does."""
@@ -112,9 +115,11 @@ class Runtime:
 
     async def take_turn(self, request: Request, call: Callable[[], T], deadline: Deadline) -> T:
         """Run a part of a request when its turn comes; what was let in once is not sent away later."""
-        admitted = request.scope["state"].get("admitted", False)
+        state = request.scope["state"]
+        end_announcement(request.scope)
+        admitted = state.get("admitted", False)
         found = await self.gate.run(call, deadline, holder_of(request), admitted=admitted)
-        request.scope["state"]["admitted"] = True
+        state["admitted"] = True
         return found
 
     async def unless_hung_up(self, request: Request, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:

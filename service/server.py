@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import socket
+import sys
 import threading
 from types import FrameType
 
@@ -12,12 +14,17 @@ import uvicorn
 
 from .app import create_app
 from .logs import configure
+from .memory import return_large_blocks
 from .protocol import prepare, protocol_of
 from .runtime import Runtime
 from .settings import Settings
 
 logger = logging.getLogger("linefix")
 BACKLOG = 512
+# What a search thread waits for Python's global lock, each of the many times that it comes back from a kernel, while
+# the event loop is busy; by default it is 5 ms.
+SWITCH_SECONDS = 0.001
+GARBAGE = (20_000, 10, 10)  # little of what a request makes is cyclic; by default Python looks after each 700 objects
 GRACE = 6  # s for requests that run when the doors close
 LAST_CALL = 9.5  # s after the signal the process ends whatever still runs
 
@@ -47,6 +54,9 @@ class DrainingServer(uvicorn.Server):
 def serve(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
     configure(settings.log_level)
+    return_large_blocks()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    gc.set_threshold(*GARBAGE)
     try:
         listener = listen(settings)
     except OSError as error:
@@ -61,6 +71,7 @@ def serve(settings: Settings) -> int:
         lifespan="on",
         log_config=None,
         access_log=False,
+        proxy_headers=False,
         server_header=False,
         timeout_keep_alive=15,
         timeout_graceful_shutdown=GRACE + 1,

@@ -63,9 +63,9 @@ def test_beyond_the_queue_is_overloaded() -> None:
         first = asyncio.ensure_future(gate.run(release.wait, soon()))
         second = asyncio.ensure_future(gate.run(lambda: 2, soon()))
         await until(lambda: gate.waiting == 1)
-        with pytest.raises(ProblemError) as caught:
-            gate.refuse_when_full()
-        assert caught.value.response("id").headers["retry-after"] == "1"
+        refusal = gate.refusal()
+        assert refusal is not None
+        assert refusal.response("id").headers["retry-after"] == "1"
         with pytest.raises(ProblemError) as caught:
             await gate.run(lambda: 3, soon())
         assert caught.value.code == "overloaded"
@@ -182,9 +182,9 @@ def test_a_full_queue_is_shared_between_keys() -> None:
         greedy = [asyncio.ensure_future(gate.run(release.wait, soon(), b"greedy")) for _ in range(4)]
         await until(lambda: gate.waiting == 3)
         # Alone it may have everything, and beyond that the service is busy.
-        with pytest.raises(ProblemError) as caught:
-            gate.refuse_when_full(b"greedy")
-        assert caught.value.code == "overloaded"
+        refusal = gate.refusal(b"greedy")
+        assert refusal is not None
+        assert refusal.code == "overloaded"
         modest = [asyncio.ensure_future(gate.run(lambda: "modest", soon(), b"modest")) for _ in range(2)]
         await until(lambda: greedy[3].done() and greedy[2].done())
         for given_up in greedy[2:]:
@@ -260,6 +260,23 @@ def test_a_turn_that_comes_while_its_caller_leaves_goes_on_to_the_next() -> None
         second.cancel()
         assert await third == 3
         assert (gate.running, gate.waiting) == (0, 0)
+        gate.close()
+
+    asyncio.run(scenario())
+
+
+def test_no_more_are_let_in_than_find_room() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 1)
+        coming = [gate.announce() for _ in range(2)]
+        assert gate.full
+        assert gate.refusal() is not None
+        for announcement in coming:
+            # Who was let in is not sent away at the gate, though another is still on the way.
+            announcement.end()
+            announcement.end()
+            assert await gate.run(lambda: 1, soon()) == 1
+        assert (gate.announced, gate.full) == (0, False)
         gate.close()
 
     asyncio.run(scenario())

@@ -1,0 +1,19 @@
+"""Giving memory back: large arrays come and go with every large map, and have to leave no holes."""
+
+from __future__ import annotations
+
+import ctypes
+
+_MMAP_THRESHOLD = -3  # of mallopt(3)
+_LARGE = 1 << 20  # bytes
+
+
+def return_large_blocks() -> None:
+    """Have every large block mapped by itself, so that the system has it back when it is freed; glibc only.
+
+    By itself glibc stops doing so with the first large block that is freed, and keeps the heap that they then lie in:
+    three times the memory after some maps of 16 MB.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_MMAP_THRESHOLD, _LARGE)
