@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve bench lock overload fuzz clean
+.PHONY: help demo test lint types layers unit serve bench experiments overload fuzz lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -47,6 +47,9 @@ overload: $(VENV)/.ready  ## print what ten times too much load does, and what l
 
 fuzz: $(VENV)/.ready  ## send 100,000 strange requests
 	FUZZ_LONG_CASES=100000 $(BIN)/python -m pytest -m long tests/service/test_fuzz.py
+
+experiments: $(VENV)/.ready  ## the paper's tables and figures, into out/experiments
+	$(BIN)/python -m experiments
 
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header pyproject.toml -o requirements/runtime.txt

@@ -1,0 +1,171 @@
+"""A scan with its segments and their known correspondences."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import MeasuredSegments, RigidTransform, Segments
+from simulation import Scanner, SimulatedScan, World, scan
+from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
+
+from .scenes import REACH, UNIT, Places
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """How scans are taken, cut into segments, paired and registered.
+
+    The defaults are the experiment; other values test what its numbers depend on, for the paper does not say.
+
+    Attributes
+    ----------
+    cut : "vectorizer" or "walls"
+        By `vectorization`, or at the true ends of each wall with a plain total least squares line through its points.
+    noise : "range" or "point"
+        Gaussian noise of each range, or of both coordinates of each point.
+    purity : float
+        A segment corresponds to the wall that this share of its beams hit, or to none.
+    min_length : float
+        Shorter segments are left out, units.
+    min_points : int
+        Segments of fewer points are left out.
+    origin : "sensor", "middle" or "map"
+        Where the scan frame has its origin when the scan is registered: at the sensor, amid the scan's segments, or
+        where the map has its own (the scan laid on the map by the true pose first).
+    places : "path" or "scattered"
+        Where the scans are taken.
+    """
+
+    cut: Literal["vectorizer", "walls"] = "vectorizer"
+    noise: Literal["range", "point"] = "range"
+    purity: float = 0.9
+    min_length: float = 10.0
+    min_points: int = 4
+    origin: Literal["sensor", "middle", "map"] = "sensor"
+    places: Places = "path"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """A scan.
+
+    Attributes
+    ----------
+    measured : MeasuredSegments
+        In the scan frame, metres.
+    pairs : (n, 2)
+        ``[scan segment, map segment]``.
+    points : (k, 2)
+        The raw points, metres.
+    found : Vectorization or None
+        What the vectorizer said; None where it was not asked.
+    """
+
+    measured: MeasuredSegments
+    pairs: Indices
+    points: Floats
+    found: Vectorization | None
+
+    def moved(self, by: RigidTransform) -> MeasuredSegments:
+        """Return the segments in a frame that sees them moved."""
+        s = self.measured
+        if by == RigidTransform(0.0, 0.0, 0.0):
+            return s
+        ends = by.apply(s.segments.endpoints.reshape(-1, 2, 2)).reshape(-1, 4)
+        moments = by.apply(s.centroids), s.spreads
+        return MeasuredSegments.from_segments(Segments.from_array(ends), s.sigma, s.points, moments)
+
+
+def take(
+    world: World, pose: RigidTransform, noise: tuple[int, float], setup: Setup, rng: np.random.Generator
+) -> Measurement:
+    """Scan a world and find the segments and their walls.
+
+    Parameters
+    ----------
+    world : World
+    pose : RigidTransform
+        map_from_scan, metres.
+    noise : (int, float)
+        Points of the scan, and their standard deviation in units.
+    setup : Setup
+    rng : numpy.random.Generator
+    """
+    count, sigma = noise[0], noise[1] * UNIT
+    by_range = setup.noise == "range"
+    scanner = Scanner.over(math.tau, count, sigma=sigma if by_range else 0.0, range_max=REACH)
+    seen = scan(world.segments, pose, scanner, rng)
+    finite = np.isfinite(seen.ranges)
+    hits, points = seen.hits[finite], seen.points
+    if not by_range:
+        points = points + rng.normal(0.0, sigma, points.shape)
+    if setup.cut == "walls":
+        measured, walls = _cut_at_walls(world.segments, pose, points, hits, (sigma, setup))
+        return Measurement(measured, np.stack([np.arange(len(walls)), walls], axis=1), points, None)
+    options = VectorizationOptions(sigma=sigma, min_points=setup.min_points)
+    found = vectorize(_laser(seen) if by_range else points, options)
+    pairs = _pairs(found.beams, seen.hits if by_range else hits, setup.purity)
+    return Measurement(found.measured, pairs[_kept(found.measured, setup)[pairs[:, 0]]], points, found)
+
+
+def _laser(seen: SimulatedScan) -> LaserScan:
+    scanner = seen.scanner
+    return LaserScan(scanner.angle_min, scanner.angle_increment, seen.ranges, scanner.range_min, scanner.range_max)
+
+
+def _kept(measured: MeasuredSegments, setup: Setup) -> NDArray[np.bool_]:
+    long_enough: NDArray[np.bool_] = measured.segments.lengths >= setup.min_length * UNIT
+    return long_enough & (measured.points >= setup.min_points)
+
+
+def _pairs(beams: Indices, hits: Indices, purity: float) -> Indices:
+    """Return the segments that lie on one wall, by what their beams hit, with that wall."""
+    rows = []
+    for k, (begin, end) in enumerate(beams):
+        span = np.arange(begin, end + 1 if end >= begin else end + 1 + len(hits)) % len(hits)
+        counts = np.bincount(hits[span][hits[span] >= 0])
+        if len(counts) and counts.max() >= purity * counts.sum():
+            rows.append((k, int(counts.argmax())))
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)
+
+
+def _cut_at_walls(
+    map: Segments, pose: RigidTransform, points: Floats, hits: Indices, how: tuple[float, Setup]
+) -> tuple[MeasuredSegments, Indices]:
+    """Fit a total least squares line to the points of every stretch of beams that hit one wall."""
+    sigma, setup = how
+    # Begin where a wall does, so that none is cut by the seam of the turn.
+    shift = int(np.argmax(hits != np.roll(hits, 1)))
+    points, hits = np.roll(points, -shift, axis=0), np.roll(hits, -shift)
+    starts = np.flatnonzero(np.concatenate([[True], hits[1:] != hits[:-1]]))
+    rows: list[Floats] = []
+    sigmas, counts, centroids, spreads, walls = [], [], [], [], []
+    for stretch in np.split(np.arange(len(hits)), starts[1:]):
+        if len(stretch) < setup.min_points:
+            continue
+        own, wall = points[stretch], int(hits[stretch[0]])
+        centre = own.mean(axis=0)
+        direction = np.linalg.svd(own - centre, full_matrices=False)[2][0]
+        along = (own - centre) @ direction
+        if along[-1] < along[0]:
+            direction, along = -direction, -along
+        if along[-1] - along[0] < max(1e-3, setup.min_length * UNIT):
+            continue
+        rows.append(np.concatenate([centre + along[0] * direction, centre + along[-1] * direction]))
+        incidence = np.array([-direction[1], direction[0]]) @ (own / np.linalg.norm(own, axis=1, keepdims=True)).T
+        sigmas.append(sigma * math.sqrt(float(np.mean(incidence**2))) if setup.noise == "range" else sigma)
+        counts.append(float(len(stretch)))
+        centroids.append(centre)
+        spreads.append(float(np.mean(along**2)))
+        walls.append(wall)
+    segments = Segments.from_array(np.array(rows).reshape(-1, 4))
+    moments = np.array(centroids).reshape(-1, 2), np.array(spreads)
+    return MeasuredSegments.from_segments(segments, sigmas, counts, moments), np.array(walls, dtype=np.int64)

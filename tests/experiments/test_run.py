@@ -1,0 +1,63 @@
+"""The quick mode writes every table and figure."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.__main__ import EXPERIMENTS, run
+from experiments.plan import QUICK
+from experiments.unknown import found_place
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = {
+    "constant_time": ["constant_time.csv", "constant_time.png"],
+    "precision": ["precision.csv", "precision.png"],
+    "mean_angles": ["sec45_means.csv", "fig10_means.csv", "fig10_means.png"],
+    "printed": ["printed.csv", "printed.png", "printed_exact.csv", "printed_ambiguity.csv"],
+    "dispersion": ["fig5_environments.csv", "fig5_environments.png", "fig7_dispersion.csv", "fig7_dispersion.png",
+                   "fig8_weighted.csv", "fig8_weighted.png"],
+    "unreliable": ["fig9_reliability.csv", "fig9_reliability.png"],
+    "sweep": ["fig6_errors.csv", "fig6_errors.png", "fig6_slopes.csv", "tab1_weighting.csv", "tab1_weighting.png",
+              "tab2_correlation.csv", "tab2_correlation.png", "bound.csv", "bound_vectorized.png",
+              "bound_cut_at_the_true_corners.png"],
+    "hypotheses": ["hypotheses.csv", "hypotheses.png", "definitions_tab1.csv", "definitions_tab2.csv"],
+    "unknown": ["unknown.csv", "unknown.png"],
+    "basin": ["basin.csv", "basin.png"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_the_quick_mode_writes_tables_without_gaps_and_figures(name, tmp_path):
+    run([name], QUICK, tmp_path, 1)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(FILES[name])
+    for path in tmp_path.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
+        assert path.stat().st_size > 5_000
+    for path in tmp_path.glob("*.csv"):
+        head, *rows = csv.reader(path.read_text(encoding="utf-8").splitlines())
+        assert rows
+        assert all(len(row) == len(head) for row in rows)
+
+
+def test_two_processes_give_the_numbers_of_one(tmp_path):
+    for processes in (1, 2):
+        run(["unreliable"], QUICK, tmp_path / str(processes), processes)
+    one, two = ((tmp_path / str(k) / "fig9_reliability.csv").read_text() for k in (1, 2))
+    assert one == two
+
+
+def test_the_command_names_what_it_does_not_know(tmp_path):
+    command = [sys.executable, "-m", "experiments", "fig99", "--out", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "no such experiment: fig99" in done.stderr
+
+
+def test_a_place_is_found_within_25_units_and_5_degrees():
+    assert found_place((24.0, 0.08))
+    assert not found_place((26.0, 0.0))
+    assert not found_place((0.0, 0.09))
+    assert not found_place((float("nan"), float("nan")))

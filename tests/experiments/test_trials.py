@@ -1,0 +1,175 @@
+"""The trials and what is averaged over them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from experiments.accuracy import (
+    Means,
+    correlation,
+    correlation_over_poses,
+    correlation_over_scans,
+    correlation_pooled,
+    correlation_within_poses,
+    gain,
+    mean_of_pairs,
+    means,
+    over_bound,
+    slopes,
+)
+from experiments.hypotheses import gains_defined_otherwise
+from experiments.measuring import Setup
+from experiments.trials import ESTIMATORS, Condition, Trials, of_world, run
+
+ALL = tuple(ESTIMATORS)
+CORNERS = Setup(cut="walls", min_points=3, min_length=0.0)
+
+
+def made(condition, errors, ambiguity, fixed=None, weights=None):
+    errors = np.asarray(errors, float)
+    shape = errors.shape[:3]
+    return Trials(
+        condition,
+        errors=errors,
+        own_errors=2.0 * errors,
+        ambiguity=np.asarray(ambiguity, float),
+        weights=np.ones(shape) if weights is None else weights,
+        reliability=np.ones(shape),
+        pairs=np.full(shape[:2], 5),
+        fixed=np.ones(shape[:2], bool) if fixed is None else fixed,
+        bounds=np.tile(np.diag([8.0, 8.0, 4.0]), (shape[0], 1, 1)),
+    )
+
+
+def drawn(seed=0, poses=4, scans=6):
+    rng = np.random.default_rng(seed)
+    condition = Condition("CutSquare", 300, 3.0, scans, 1)
+    return made(condition, rng.normal(size=(poses, scans, 2, 3)), rng.uniform(1.0, 2.0, (poses, scans, 2, 2)))
+
+
+def test_means_and_gains_of_known_numbers():
+    errors = np.zeros((1, 2, 2, 3))
+    errors[0, :, 0] = [[3.0, 4.0, 0.2], [0.0, 0.0, 0.0]]
+    errors[0, :, 1] = [[3.0, 0.0, 0.1], [0.0, 0.0, 0.0]]
+    ambiguity = np.array([[[[8.0, 4.0], [2.0, 1.0]], [[0.0, 0.0], [0.0, 0.0]]]])
+    trials = made(Condition("CutSquare", 300, 3.0, 2, 1), errors, ambiguity)
+    before = means(trials, "unweighted")
+    assert (before.D_t, before.A_t, before.A_alpha) == (12.5, 4.0, 2.0)
+    assert before.D_alpha == pytest.approx(0.02)
+    ratios = gain([trials, trials])
+    assert (ratios.D_t, ratios.D_alpha) == (pytest.approx(9 / 25), pytest.approx(1 / 4))
+    assert (ratios.A_t, ratios.A_alpha) == (pytest.approx(1 / 4), pytest.approx(1 / 4))
+
+
+def test_scans_that_fix_no_pose_do_not_count():
+    trials = drawn()
+    fixed = trials.fixed.copy()
+    fixed[0, 0] = False
+    wild = trials.errors.copy()
+    wild[0, 0] = 1e6
+    spoilt = dataclasses.replace(trials, errors=wild, fixed=fixed)
+    assert means(spoilt, "unweighted").D_t < 10.0
+    assert over_bound(spoilt, "unweighted")[0] < 10.0
+
+
+def test_correlation_over_scans_poses_and_within():
+    a = np.array([[1.0, 2.0, 3.0], [11.0, 12.0, 13.0], [21.0, 22.0, 23.0]])
+    # Within each pose the error falls as the ambiguity grows; over the poses it grows.
+    d = np.array([[3.0, 2.0, 1.0], [13.0, 12.0, 11.0], [23.0, 22.0, 21.0]])
+    errors = np.zeros((3, 3, 2, 3))
+    errors[..., 0, 0] = errors[..., 1, 0] = np.sqrt(d)
+    errors[..., 0, 2] = np.sqrt(a)
+    errors[..., 1, 2] = np.sqrt(a)
+    ambiguity = np.repeat(np.repeat(a[:, :, None, None], 2, axis=2), 2, axis=3)
+    trials = made(Condition("CutSquare", 300, 3.0, 3, 1), errors, ambiguity)
+    assert correlation_within_poses(trials, "unweighted") == (pytest.approx(-1.0), pytest.approx(1.0))
+    assert correlation_over_poses(trials, "weighted")[0] == pytest.approx(1.0)
+    expected = np.corrcoef(a.ravel(), d.ravel())[0, 1]
+    assert correlation_over_scans(trials, "unweighted")[0] == pytest.approx(expected)
+    assert correlation_pooled([trials, trials], "unweighted")[0] == pytest.approx(expected)
+
+
+def test_correlations_of_nothing_are_no_numbers():
+    assert np.isnan(correlation(np.array([1.0, 2.0, np.nan]), np.array([1.0, 2.0, 3.0])))
+    assert np.isnan(correlation(np.ones(5), np.arange(5.0)))
+    assert mean_of_pairs([(1.0, np.nan), (3.0, np.nan)])[0] == 2.0
+    assert np.isnan(mean_of_pairs([(1.0, np.nan), (3.0, np.nan)])[1])
+
+
+def test_slopes_are_the_powers_of_points_and_noise():
+    def with_means(points, sigma):
+        value = 7.0 * points**-1.0 * sigma**2.0
+        errors = np.zeros((1, 1, 2, 3))
+        errors[..., 0] = errors[..., 2] = np.sqrt(value)
+        return made(Condition("CutSquare", points, sigma, 1, 1), errors, np.full((1, 1, 2, 2), value))
+
+    found = slopes([with_means(p, s) for p in (100, 300, 1000) for s in (1.0, 3.0)], "unweighted")
+    for name in Means.__slots__:
+        assert found[name] == (pytest.approx(-1.0), pytest.approx(2.0))
+
+
+def test_over_the_bound():
+    errors = np.zeros((2, 3, 2, 3))
+    errors[..., 0], errors[..., 2] = 8.0, 6.0
+    trials = made(Condition("CutSquare", 300, 3.0, 3, 1), errors, np.ones((2, 3, 2, 2)))
+    assert over_bound(trials, "unweighted") == (pytest.approx(2.0), pytest.approx(3.0))
+
+
+def test_other_readings_of_table_1():
+    trials = drawn()
+    weights = np.ones((4, 6, 2))
+    weights[..., 1] = 50.0
+    found = gains_defined_otherwise([dataclasses.replace(trials, weights=weights)])
+    plain = found["geometric mean over conditions"]
+    assert found["arithmetic mean over conditions"].D_t == pytest.approx(plain.D_t)
+    assert found["sums over conditions"].A_t == pytest.approx(plain.A_t)
+    assert found["roots of the mean squares"].D_t == pytest.approx(np.sqrt(plain.D_t))
+    assert found["weights not divided by their sum"].A_t == pytest.approx(50.0 * plain.A_t)
+    assert found["error of the transform, not of the sensor"].D_t == pytest.approx(plain.D_t)
+
+
+def test_the_same_condition_gives_the_same_scans_whatever_is_estimated():
+    one = run(Condition("CutSquare", 200, 3.0, 2, 5, CORNERS))
+    again = run(Condition("CutSquare", 200, 3.0, 2, 5, CORNERS, estimators=("joint", "weighted")))
+    np.testing.assert_array_equal(one.errors[:, :, one.of("weighted")], again.errors[:, :, again.of("weighted")])
+    other = run(Condition("CutSquare", 200, 3.0, 2, 6, CORNERS))
+    assert not np.array_equal(one.errors, other.errors)
+    assert of_world([one, other], "CutSquare") == [one, other]
+    assert of_world([one], "Pillars") == []
+
+
+def test_the_joint_estimator_does_not_care_for_the_origin_and_the_papers_does():
+    found = {
+        o: run(Condition("Oblique", 300, 3.0, 2, 1, Setup(cut="walls", origin=o), ALL))
+        for o in ("sensor", "middle", "map")
+    }
+    joint = found["sensor"].of("joint")
+    for origin in ("middle", "map"):
+        np.testing.assert_allclose(found[origin].errors[:, :, joint], found["sensor"].errors[:, :, joint], atol=1e-6)
+        papers = found["sensor"].of("unweighted")
+        assert np.abs(found[origin].errors[:, :, papers] - found["sensor"].errors[:, :, papers]).max() > 0.1
+    # Rotation is found first, and knows of no origin.
+    heading = [found[o].errors[:, :, 0, 2] for o in ("sensor", "map")]
+    np.testing.assert_allclose(*heading, atol=1e-9)
+
+
+def test_the_joint_estimator_reaches_the_bound_where_the_papers_does_not():
+    trials = run(Condition("CutSquare", 300, 3.0, 40, 1, CORNERS, ALL))
+    position, heading = over_bound(trials, "joint")
+    # A plain total least squares line does not know that noise along the ray counts with the cosine of incidence.
+    assert 0.9 < position < 1.2
+    assert 0.9 < heading < 1.2
+    assert over_bound(trials, "unweighted")[0] > 1.3
+    assert trials.fixed.all()
+
+
+def test_error_falls_with_points_and_noise_and_weighting_helps_most_in_pillars():
+    few, many, noisy = (
+        run(Condition("CutSquare", p, s, 8, 1, CORNERS)) for p, s in ((150, 1.0), (1200, 1.0), (150, 10.0))
+    )
+    for name in Means.__slots__:
+        assert getattr(means(many, "unweighted"), name) < 0.3 * getattr(means(few, "unweighted"), name)
+        assert getattr(means(noisy, "unweighted"), name) > 30.0 * getattr(means(few, "unweighted"), name)
+    gains = [gain([run(Condition(n, 300, 3.0, 8, 1, CORNERS))]).D_t for n in ("Pillars", "Oblique", "CutSquare")]
+    assert gains[0] < gains[1] < gains[2] < 1.0
