@@ -129,3 +129,25 @@ def grid_cells(endpoints, radius, x0, y0, cell, columns, rows, sectors, n_sector
         starts[c] = starts[c - 1]
     starts[0] = 0
     return starts, items
+
+
+@njit(cache=True, nogil=True)
+def direction_raster(endpoints, radius, x0, y0, cell, columns, rows, sectors):
+    """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of. Returns (rows * columns,) of bits."""
+    bits = np.zeros(columns * rows, dtype=np.uint16)
+    for i in range(len(endpoints)):
+        x1 = endpoints[i, 0]
+        y1 = endpoints[i, 1]
+        x2 = endpoints[i, 2]
+        y2 = endpoints[i, 3]
+        bit = np.uint16(1 << sectors[i])
+        first = max(0, int((min(x1, x2) - radius - x0) / cell))
+        last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))
+        for column in range(first, last + 1):
+            low = x0 + column * cell
+            ya, yb = _column_span(x1, y1, x2, y2, radius, low, low + cell)
+            bottom = max(0, int((ya - y0) / cell))
+            top = min(rows - 1, int((yb - y0) / cell))
+            for row in range(bottom, top + 1):
+                bits[row * columns + column] |= bit
+    return bits

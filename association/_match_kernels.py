@@ -13,7 +13,8 @@ from numba import njit
 from registration._kernels import joint_add, joint_information, joint_solve
 
 # Columns of `walls` (m, 8), one cache line a wall: 0, 1 unit direction; 2 offset along the left normal; 3, 4 abscissae
-# of begin and end along the direction; 5 angle.
+# of begin and end along the direction; 5 angle; 6, 7 the walls before and after it on its run (collinear, across a
+# doorway) or -1.
 # Columns of `scan` (n, 16), the most telling segments first: 0, 1 unit direction; 2, 3 midpoint; 4 length; 5 angle;
 # 6, 7 centroid; 8 spread; 9, 10 variance of offset and angle; 11 weight; 12 gain; 13 sum of the gains of later rows;
 # 14 variance of the offset without the model's slack.
@@ -24,7 +25,11 @@ SCAN_COLUMNS = 16
 
 REACH = 0.4  # m; the grid lists a wall in the cells this near to it, so gates end here
 MAX_ANGLE_GATE = 0.35  # rad
+BRIDGING = (
+    3.0  # m; only a longer segment may bridge a gap between walls, a short one is more likely to be clutter there
+)
 MIN_PIVOT = 1e-12
+SECTORS = 16  # a power of two; of directions, in the lists by direction; 0 degrees is the middle of one
 MAX_STEP = 1.0  # m; a consensus set that moves its pose farther than that, or
 MAX_TURN = 0.2  # rad, is not the one that the pose was proposed for
 SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
@@ -75,6 +80,7 @@ def match_scan(scan, pose, covariance, walls, starts, items, shape, gates, thres
         fx = (x - shape[0]) * per_cell
         fy = (y - shape[1]) * per_cell
         length = scan[i, 4]
+        half = 0.5 * length
         best_cost = 1e300
         matches[i, 0] = -1.0
         matches[i, 3] = 0.0
@@ -88,7 +94,30 @@ def match_scan(scan, pose, covariance, walls, starts, items, shape, gates, thres
                 if abs(offset) > offset_gate or wx * dx + wy * dy < cos_gate:
                     continue
                 along = wx * x + wy * y
-                covered = min(walls[w, 4], along + 0.5 * length) - max(walls[w, 3], along - 0.5 * length)
+                low = max(walls[w, 3] - along, -half)
+                high = min(walls[w, 4] - along, half)
+                covered = high - low
+                # What bridges a doorway lies on the walls on both sides of it; the gap between speaks against that.
+                v = int(walls[w, 6]) if low > -half and length > BRIDGING else -1
+                while v >= 0:
+                    along = walls[v, 0] * x + walls[v, 1] * y
+                    edge = walls[v, 4] - along
+                    if edge <= -half:
+                        break
+                    covered -= low - edge
+                    low = max(walls[v, 3] - along, -half)
+                    covered += edge - low
+                    v = int(walls[v, 6]) if low > -half else -1
+                v = int(walls[w, 7]) if high < half and length > BRIDGING else -1
+                while v >= 0:
+                    along = walls[v, 0] * x + walls[v, 1] * y
+                    edge = walls[v, 3] - along
+                    if edge >= half:
+                        break
+                    covered -= edge - high
+                    high = min(walls[v, 4] - along, half)
+                    covered += high - edge
+                    v = int(walls[v, 7]) if high < half else -1
                 overlap = min(1.0, covered / length)
                 cost = abs(offset) / offset_gate + 1.0 - overlap
                 if overlap >= gates[5] and cost < best_cost:
@@ -101,6 +130,46 @@ def match_scan(scan, pose, covariance, walls, starts, items, shape, gates, thres
         if total + scan[i, 13] < threshold:
             return -1.0
     return total
+
+
+@njit(cache=True, nogil=True)
+def angle_spreads(scan, theta_var, gates, spreads):
+    """Write the angle gate of every scan segment at a pose with that variance, in sectors."""
+    for i in range(len(scan)):
+        gate = min(gates[4], max(gates[3], gates[0] * math.sqrt(scan[i, 10] + theta_var)))
+        spreads[i] = gate * (SECTORS / (2.0 * math.pi))
+
+
+@njit(cache=True, nogil=True)
+def may_score(scan, pose, spreads, raster_shape, bits, threshold):
+    """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
+
+    Never wrong when it says no, and a tenth of the price of `match_scan`. `spreads` as of `angle_spreads`.
+    """
+    c = math.cos(pose[0])
+    s = math.sin(pose[0])
+    per_cell = 1.0 / raster_shape[2]
+    left = (pose[1] - raster_shape[0]) * per_cell
+    bottom = (pose[2] - raster_shape[1]) * per_cell
+    columns = int(raster_shape[3])
+    turned = (pose[0] + math.pi) * (SECTORS / (2.0 * math.pi)) + 0.5
+    c *= per_cell
+    s *= per_cell
+    total = 0.0
+    for i in range(len(scan)):
+        fx = c * scan[i, 2] - s * scan[i, 3] + left
+        fy = s * scan[i, 2] + c * scan[i, 3] + bottom
+        if fx >= 0.0 and fy >= 0.0 and fx < raster_shape[3] and fy < raster_shape[4]:
+            here = bits[int(fy) * columns + int(fx)]
+            if here != 0:
+                middle = turned + scan[i, 5] * (SECTORS / (2.0 * math.pi))
+                for raw in range(math.floor(middle - spreads[i]), math.floor(middle + spreads[i]) + 1):
+                    if (here >> (raw & (SECTORS - 1))) & 1:
+                        total += scan[i, 12]
+                        break
+        if total + scan[i, 13] < threshold:
+            return False
+    return True
 
 
 @njit(cache=True, nogil=True)

@@ -5,16 +5,22 @@ import math
 import numpy as np
 from numba import njit
 
-from ._search_kernels import BASE_SLACK, BASE_SLACK_SHARE, HARD_PRIOR, MIN_CROSSING_BASE, search_base
+from ._search_kernels import HARD_PRIOR, MIN_CROSSING_BASE, least_length, search_base
 
 REUSE = 0.3  # what a base is worth less for each earlier use of one of its segments
 
-# Measured costs, in tests of a wall: of a base, an anchor, a metre of slide, a hypothesis.
-COST_BASE = 100.0
-COST_ANCHOR = 12.0
-COST_SLIDE = 5.0
-COST_HYPOTHESIS = 30.0
-HYPOTHESIS_SCALE = 1.6  # observed over expected number of hypotheses, median
+# Measured costs, nanoseconds: of a base, a wall that it may slide on, a metre of slide, a hypothesis.
+COST_BASE = 2000.0
+COST_ANCHOR = 60.0
+COST_SLIDE = 3.0
+COST_HYPOTHESIS = 480.0
+# Observed over expected number of hypotheses: short walls stand beside long ones, at corners and doors, so that a base
+# with a short segment fits more often than lengths alone say, and one across at a small angle less often.
+HYPOTHESIS_SCALE = 2.0
+SHORT_POWER = -0.7  # of the length of the shorter segment, metres
+SHORT_LENGTH = 0.1
+SINE_POWER = 0.3
+GAIN_POWER = 3.0  # of the lesser gain: long segments are clutter less often
 
 
 @njit(cache=True, nogil=True)
@@ -28,8 +34,7 @@ def slack_tables(scan, count, bin_starts, longest, summed):
     slides = np.zeros((count, bins))
     fitting = np.zeros(count)
     for i in range(count):
-        length = scan[i, 4]
-        need = length - 2.0 * (BASE_SLACK + BASE_SLACK_SHARE * length)
+        need = least_length(scan[i, 4])
         for b in range(bins):
             low = bin_starts[b]
             high = bin_starts[b + 1]
@@ -75,11 +80,12 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
             expected = 0.0
             for b in range(bins):
                 expected += slides[i, b] * smooth[j, (b + shift) % bins]
-            expected *= HYPOTHESIS_SCALE / (area * sine)
+            expected *= HYPOTHESIS_SCALE / area * sine**SINE_POWER
+            expected *= (min(scan[i, 4], scan[j, 4]) + SHORT_LENGTH) ** SHORT_POWER
             cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
             pairs[k, 0] = i if sweep_i <= sweep_j else j
             pairs[k, 1] = j if sweep_i <= sweep_j else i
-            merits[k] = math.log(min(scan[i, 12], scan[j, 12]) / cost)
+            merits[k] = GAIN_POWER * math.log(min(scan[i, 12], scan[j, 12])) - math.log(cost)
             k += 1
     return pairs[:k], merits[:k]
 
@@ -161,9 +167,9 @@ BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
 @njit(cache=True, nogil=True)
 def advance(
-    scan, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates, rules, prior,
-    found, count, best, progress, pairs, merits, uses, residual, bound, best_gains, missing, inliers, miss, exhaustive,
-    budget,
+    scan, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items, sector_shape,
+    gates, rules, prior, found, count, best, progress, pairs, merits, uses, residual, bound, best_gains, missing,
+    inliers, miss, exhaustive, budget,
 ):  # fmt: skip
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
@@ -182,8 +188,8 @@ def advance(
         a = pairs[progress[4], 0]
         b = pairs[progress[4], 1]
         spent += search_base(
-            scan, a, b, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates,
-            rules, prior, found, count, best, progress, budget - spent,
+            scan, a, b, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items,
+            sector_shape, gates, rules, prior, found, count, best, progress, budget - spent,
         )  # fmt: skip
         if progress[1] > 0:
             return BUDGET

@@ -5,13 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
-from ._match_kernels import match_scan, refine, turning, wrap
+from ._match_kernels import SECTORS, angle_spreads, match_scan, may_score, refine, turning, wrap
 
 BASE_SLACK = 0.2  # m; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length
-SECTORS = (
-    16  # a power of two; of directions, in the lists of the walls that a sweep may meet; 0 degrees is the middle of one
-)
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base
 MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base
 
@@ -31,7 +28,8 @@ PRIOR_SIZE = 10
 SOFT_FLOOR = -20.0  # nats; the most that a soft prior speaks against a pose
 INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those outside
 
-COST_HYPOTHESIS = 50  # in tests of a wall
+COST_REJECTED = 10  # in tests of a wall
+COST_HYPOTHESIS = 50
 COST_REFINE = 800
 
 
@@ -123,14 +121,20 @@ def end_slack(length):
     return BASE_SLACK + BASE_SLACK_SHARE * length
 
 
+@njit(inline="always")
+def least_length(length):
+    """How long a wall is at least under a scan segment of a base."""
+    return length - 2.0 * end_slack(length)
+
+
 @njit(cache=True, nogil=True)
-def anchors(length, walls, bin_starts, out):
-    """List the walls long enough for a scan segment of `length` metres."""
+def anchors(length, runs, bin_starts, out):
+    """List the runs long enough for a scan segment of `length` metres."""
     n = 0
-    need = length - 2.0 * end_slack(length)
+    need = least_length(length)
     for b in range(len(bin_starts) - 1):
         for w in range(bin_starts[b], bin_starts[b + 1]):
-            if walls[w, 4] - walls[w, 3] < need:
+            if runs[w, 4] - runs[w, 3] < need:
                 break
             out[n] = w
             n += 1
@@ -138,41 +142,41 @@ def anchors(length, walls, bin_starts, out):
 
 
 @njit(cache=True, nogil=True)
-def base_pose(scan, a, b, walls, wa, wb, pose):
+def base_pose(scan, a, b, runs, wa, wb, pose):
     """Write the pose that puts both midpoints on their lines and splits the misfit of the angles by their variances.
 
     Returns whether both segments then lie within the ends of their walls, up to their slack.
     """
-    gap = wrap(walls[wb, 5] - walls[wa, 5] - scan[b, 5] + scan[a, 5])
-    theta = walls[wa, 5] - scan[a, 5] + gap * scan[a, 10] / (scan[a, 10] + scan[b, 10])
+    gap = wrap(runs[wb, 5] - runs[wa, 5] - scan[b, 5] + scan[a, 5])
+    theta = runs[wa, 5] - scan[a, 5] + gap * scan[a, 10] / (scan[a, 10] + scan[b, 10])
     c = math.cos(theta)
     s = math.sin(theta)
-    det = walls[wa, 0] * walls[wb, 1] - walls[wa, 1] * walls[wb, 0]
+    det = runs[wa, 0] * runs[wb, 1] - runs[wa, 1] * runs[wb, 0]
     # n . t = p - n . R m for both, with n = (-d_y, d_x).
     ax = c * scan[a, 2] - s * scan[a, 3]
     ay = s * scan[a, 2] + c * scan[a, 3]
     bx = c * scan[b, 2] - s * scan[b, 3]
     by = s * scan[b, 2] + c * scan[b, 3]
-    ra = walls[wa, 2] + walls[wa, 1] * ax - walls[wa, 0] * ay
-    rb = walls[wb, 2] + walls[wb, 1] * bx - walls[wb, 0] * by
-    tx = (ra * walls[wb, 0] - rb * walls[wa, 0]) / det
-    ty = (ra * walls[wb, 1] - rb * walls[wa, 1]) / det
+    ra = runs[wa, 2] + runs[wa, 1] * ax - runs[wa, 0] * ay
+    rb = runs[wb, 2] + runs[wb, 1] * bx - runs[wb, 0] * by
+    tx = (ra * runs[wb, 0] - rb * runs[wa, 0]) / det
+    ty = (ra * runs[wb, 1] - rb * runs[wa, 1]) / det
     pose[0] = theta
     pose[1] = tx
     pose[2] = ty
-    along = walls[wa, 0] * (ax + tx) + walls[wa, 1] * (ay + ty)
+    along = runs[wa, 0] * (ax + tx) + runs[wa, 1] * (ay + ty)
     half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
-    if along - half < walls[wa, 3] or along + half > walls[wa, 4]:
+    if along - half < runs[wa, 3] or along + half > runs[wa, 4]:
         return False
-    along = walls[wb, 0] * (bx + tx) + walls[wb, 1] * (by + ty)
+    along = runs[wb, 0] * (bx + tx) + runs[wb, 1] * (by + ty)
     half = 0.5 * scan[b, 4] - end_slack(scan[b, 4])
-    return along - half >= walls[wb, 3] and along + half <= walls[wb, 4]
+    return along - half >= runs[wb, 3] and along + half <= runs[wb, 4]
 
 
 @njit(cache=True, nogil=True)
 def try_pose(
-    scan, gx, gy, theta_var, pose, walls, starts, items, shape, gates, rules, prior, found, count, best, progress,
-    matches, sums, information, covariance,
+    scan, gx, gy, theta_var, pose, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found, count,
+    best, progress, spreads, matches, sums, information, covariance,
 ):  # fmt: skip
     """Score a proposed pose, held at the lever ``(gx, gy)`` from the sensor; keep it if it is among the best.
 
@@ -180,6 +184,8 @@ def try_pose(
     """
     progress[2] += 1
     floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
+    if not may_score(scan, pose, spreads, raster_shape, bits, floor):
+        return COST_REJECTED
     turning(theta_var, gx, gy, covariance)
     if match_scan(scan, pose, covariance, walls, starts, items, shape, gates, floor, matches) < 0.0:
         return COST_HYPOTHESIS
@@ -191,12 +197,12 @@ def try_pose(
 
 @njit(cache=True, nogil=True)
 def search_base(
-    scan, a, b, walls, bin_starts, starts, items, shape, sector_starts, sector_items, sector_shape, gates, rules, prior,
-    found, count, best, progress, budget,
+    scan, a, b, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items,
+    sector_shape, gates, rules, prior, found, count, best, progress, budget,
 ):  # fmt: skip
-    """Go through all pairs of walls that fit the base of scan segments `a`, which slides, and `b`.
+    """Go through all pairs of runs that fit the base of scan segments `a`, which slides, and `b`.
 
-    A wall under `a` fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` then
+    A run under `a` fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` then
     sweeps. The final angle splits the misfit of both, so that b turns about a by up to `swing` metres: the ends are
     tested loosely until then. Goes on from the anchor where `progress` stands and stops when `budget` tests are used
     up. Returns the tests that it took; ``progress[P_ANCHOR]`` is back at 0 when the base is done.
@@ -209,11 +215,13 @@ def search_base(
     sums = np.empty(18)
     information = np.empty((3, 3))
     covariance = np.empty((3, 3))
-    anchor_list = np.empty(len(walls), dtype=np.int32)
-    n_anchors = anchors(scan[a, 4], walls, bin_starts, anchor_list)
+    anchor_list = np.empty(len(runs), dtype=np.int32)
+    n_anchors = anchors(scan[a, 4], runs, bin_starts, anchor_list)
     va = scan[a, 10]
     vb = scan[b, 10]
     theta_var = va * vb / (va + vb)
+    spreads = np.empty(n)
+    angle_spreads(scan, theta_var, gates, spreads)
     tolerance = min(gates[4], max(gates[3], gates[0] * math.sqrt(va + vb)))
     cos_tolerance = 1.0 - 0.5 * tolerance * tolerance
     turn = scan[b, 5] - scan[a, 5]
@@ -241,18 +249,18 @@ def search_base(
         wa = anchor_list[progress[1]]
         progress[1] += 1
         spent += 5
-        dx = walls[wa, 0]
-        dy = walls[wa, 1]
-        at = walls[wa, 3] + half_a
-        high = walls[wa, 4] - half_a
+        dx = runs[wa, 0]
+        dy = runs[wa, 1]
+        at = runs[wa, 3] + half_a
+        high = runs[wa, 4] - half_a
         # Rotation that lays a on the wall, and the direction that b then has.
         c = dx * adx + dy * ady
         s = dy * adx - dx * ady
         tdx = c * bdx - s * bdy
         tdy = s * bdx + c * bdy
         # Midpoint of b with a's midpoint at abscissa 0 of its wall; the slide is that abscissa.
-        x = c * mx - s * my - dy * walls[wa, 2]
-        y = s * mx + c * my + dx * walls[wa, 2]
+        x = c * mx - s * my - dy * runs[wa, 2]
+        y = s * mx + c * my + dx * runs[wa, 2]
         fx = (x + at * dx - x0) * per_cell
         fy = (y + at * dy - y0) * per_cell
         column = math.floor(fx)
@@ -264,7 +272,7 @@ def search_base(
         next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
         next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
         # The sectors that the direction of b may lie in, one or two.
-        turned = (walls[wa, 5] + turn + math.pi) * per_radian + 0.5
+        turned = (runs[wa, 5] + turn + math.pi) * per_radian + 0.5
         first_sector = math.floor(turned - spread)
         last_sector = math.floor(turned + spread)
         while at <= high:
@@ -276,24 +284,25 @@ def search_base(
                     for k in range(sector_starts[place], sector_starts[place + 1]):
                         wb = sector_items[k]
                         spent += 1
-                        wx = walls[wb, 0]
-                        wy = walls[wb, 1]
+                        wx = runs[wb, 0]
+                        wy = runs[wb, 1]
                         across = wx * dy - wy * dx
                         if wx * tdx + wy * tdy < cos_tolerance or abs(across) < MIN_CROSSING:
                             continue
-                        slide = (walls[wb, 2] - wx * y + wy * x) / across
+                        slide = (runs[wb, 2] - wx * y + wy * x) / across
                         # A wall is listed in several cells: it counts where the crossing is.
                         if slide < at or slide >= until or slide > high:
                             continue
                         along = wx * (x + slide * dx) + wy * (y + slide * dy)
-                        if along - half_b < walls[wb, 3] or along + half_b > walls[wb, 4]:
+                        if along - half_b < runs[wb, 3] or along + half_b > runs[wb, 4]:
                             continue
-                        if base_pose(scan, a, b, walls, wa, wb, pose):
+                        if base_pose(scan, a, b, runs, wa, wb, pose):
                             gx = c * pin_x - s * pin_y
                             gy = s * pin_x + c * pin_y
                             spent += try_pose(
-                                scan, gx, gy, theta_var, pose, walls, starts, items, shape, gates, rules, prior, found,
-                                count, best, progress, matches, sums, information, covariance,
+                                scan, gx, gy, theta_var, pose, walls, starts, items, shape, raster_shape, bits, gates,
+                                rules, prior, found, count, best, progress, spreads, matches, sums, information,
+                                covariance,
                             )  # fmt: skip
             at = until
             if next_x < next_y:
@@ -311,9 +320,10 @@ def search_base(
 
 @njit(cache=True, nogil=True)
 def search_slides(
-    scan, a, walls, bin_starts, starts, items, shape, gates, rules, prior, found, count, best, progress, spacing
-):
-    """Lay scan segment `a` on every wall that is long enough, at slides `spacing` metres apart, and keep the best.
+    scan, a, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found, count, best,
+    progress, spacing,
+):  # fmt: skip
+    """Lay scan segment `a` on every run that is long enough, at slides `spacing` metres apart, and keep the best.
 
     For scans without a base: what is found is a family of poses, fixed across the walls and free along them.
     """
@@ -323,15 +333,17 @@ def search_slides(
     sums = np.empty(18)
     information = np.empty((3, 3))
     covariance = np.empty((3, 3))
-    anchor_list = np.empty(len(walls), dtype=np.int32)
-    n_anchors = anchors(scan[a, 4], walls, bin_starts, anchor_list)
+    spreads = np.empty(n)
+    angle_spreads(scan, scan[a, 10], gates, spreads)
+    anchor_list = np.empty(len(runs), dtype=np.int32)
+    n_anchors = anchors(scan[a, 4], runs, bin_starts, anchor_list)
     for k in range(n_anchors):
         w = anchor_list[k]
         half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
-        low = walls[w, 3] + half
-        high = walls[w, 4] - half
+        low = runs[w, 3] + half
+        high = runs[w, 4] - half
         steps = max(1, math.ceil((high - low) / spacing))
-        theta = walls[w, 5] - scan[a, 5]
+        theta = runs[w, 5] - scan[a, 5]
         c = math.cos(theta)
         s = math.sin(theta)
         gx = c * scan[a, 2] - s * scan[a, 3]
@@ -340,9 +352,9 @@ def search_slides(
         for j in range(steps):
             slide = low + (j + 0.5) / steps * (high - low)
             pose[0] = theta
-            pose[1] = walls[w, 0] * slide - walls[w, 1] * walls[w, 2] - gx
-            pose[2] = walls[w, 1] * slide + walls[w, 0] * walls[w, 2] - gy
+            pose[1] = runs[w, 0] * slide - runs[w, 1] * runs[w, 2] - gx
+            pose[2] = runs[w, 1] * slide + runs[w, 0] * runs[w, 2] - gy
             try_pose(
-                scan, gx, gy, var, pose, walls, starts, items, shape, gates, rules, prior, found, count, best, progress,
-                matches, sums, information, covariance,
+                scan, gx, gy, var, pose, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found,
+                count, best, progress, spreads, matches, sums, information, covariance,
             )  # fmt: skip

@@ -73,14 +73,15 @@ def first_hit(x, y, dx, dy, limit, walls, starts, items, shape):
 
 
 @njit(cache=True, nogil=True)
-def count_blockers(scan, matches, viewpoint, pose, walls, starts, items, shape, tolerance, to_matched, to_clutter):
+def count_blockers(
+    scan, matches, viewpoint, pose, walls, starts, items, shape, tolerance, to_matched, to_clutter, touched
+):  # fmt: skip
     """Count for every wall the rays to segments that pass through it more than `tolerance` metres before their end.
 
     ``to_matched[w]`` counts rays to segments of the consensus set, ``to_clutter[w]`` those to the others; both (m,) are
-    overwritten.
+    0 before. Returns how many walls that are, listed in `touched` (m,).
     """
-    to_matched[:] = 0
-    to_clutter[:] = 0
+    count = 0
     c = math.cos(pose[0])
     s = math.sin(pose[0])
     x = c * viewpoint[0] - s * viewpoint[1] + pose[1]
@@ -100,46 +101,40 @@ def count_blockers(scan, matches, viewpoint, pose, walls, starts, items, shape, 
             if limit > 0.0:
                 _, w = first_hit(x, y, gx / distance, gy / distance, limit, walls, starts, items, shape)
                 if w >= 0:
+                    if to_matched[w] + to_clutter[w] == 0:
+                        touched[count] = w
+                        count += 1
                     if matches[i, 0] >= 0.0:
                         to_matched[w] += 1
                     else:
                         to_clutter[w] += 1
+    return count
 
 
 @njit(cache=True, nogil=True)
-def sight_penalty(to_matched, to_clutter, walls):
-    """Return what the walls that should have blocked the view speak against a pose, nats, at least 0.
+def sight_penalty(to_matched, to_clutter, touched, count, walls):
+    """Return what the walls that should have blocked the view speak against a pose, nats, at least 0; clear the counts.
 
     A wall counts once, however many rays pass, and by its length: short ones on a map made by a robot are often people
     and carts that have gone since. Rays to clutter prove less than rays to the consensus set, yet many walls between
     the sensor and what it saw are unlikely at the right pose.
     """
     total = 0.0
-    for w in range(len(to_matched)):
-        if to_matched[w] > 0 or to_clutter[w] > 0:
-            length = min(BLOCKING_LENGTH, walls[w, 4] - walls[w, 3])
-            total += BLOCKED * length * min(1.0, to_matched[w] / BLOCKING_RAYS)
-            total += BLOCKED_CLUTTER * length * min(1.0, to_clutter[w] / BLOCKING_RAYS)
+    for k in range(count):
+        w = touched[k]
+        length = min(BLOCKING_LENGTH, walls[w, 4] - walls[w, 3])
+        total += BLOCKED * length * min(1.0, to_matched[w] / BLOCKING_RAYS)
+        total += BLOCKED_CLUTTER * length * min(1.0, to_clutter[w] / BLOCKING_RAYS)
+        to_matched[w] = 0
+        to_clutter[w] = 0
     return total
 
 
 @njit(cache=True, nogil=True)
 def rank(
-    scan,
-    poses,
-    walls,
-    starts,
-    items,
-    shape,
-    gates,
-    viewpoint,
-    sighted,
-    scores,
-    covariances,
-    shares,
-    reliabilities,
+    scan, poses, walls, starts, items, shape, gates, viewpoint, sighted, scores, covariances, shares, reliabilities,
     matches,
-):
+):  # fmt: skip
     """Refine the candidate poses (k, 3) in place and score them with the lines of sight.
 
     Writes scores (k,) in nats, covariances (k, 3, 3) of (x, y, theta), the matched share of the scan's length (k,), the
@@ -149,6 +144,7 @@ def rank(
     information = np.empty((3, 3))
     to_matched = np.zeros(len(walls), dtype=np.int64)
     to_clutter = np.zeros(len(walls), dtype=np.int64)
+    touched = np.empty(len(walls), dtype=np.int64)
     best = 0.0
     length = 0.0
     for i in range(len(scan)):
@@ -172,18 +168,9 @@ def rank(
         shares[k] = found / length
         # The candidates come best first: what is far behind is no rival, its score may stay too good.
         if sighted and scores[k] > best - FAR_BEHIND:
-            count_blockers(
-                scan,
-                matches[k],
-                viewpoint,
-                poses[k],
-                walls,
-                starts,
-                items,
-                shape,
-                SIGHT_TOLERANCE,
-                to_matched,
-                to_clutter,
-            )
-            scores[k] -= sight_penalty(to_matched, to_clutter, walls)
+            blockers = count_blockers(
+                scan, matches[k], viewpoint, poses[k], walls, starts, items, shape, SIGHT_TOLERANCE, to_matched,
+                to_clutter, touched,
+            )  # fmt: skip
+            scores[k] -= sight_penalty(to_matched, to_clutter, touched, blockers, walls)
             best = max(best, scores[k])

@@ -116,7 +116,7 @@ def find_candidates(
     CancelledError
         When the deadline was cancelled.
     """
-    walls, grid, sectors = index.walls, index.grid, index.sectors
+    walls, runs, grid, sectors, raster = index.walls, index.runs, index.grid, index.sectors, index.raster
     gate = gates(options)
     kept, share = (KEPT_FOR_BEAMS, KEEP_SHARE_FOR_BEAMS) if for_beams else (KEPT, KEEP_SHARE)
     rules = np.array([share, DISTINCT_DISTANCE, DISTINCT_ANGLE, RIVAL_SHARE])
@@ -124,7 +124,7 @@ def find_candidates(
     found, count, best = np.zeros((kept, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64), np.zeros(BEST_SIZE)
     rows = scan.rows
     n = min(len(rows), BASE_SEGMENTS)
-    pairs, merits = plan_bases(rows, n, walls.bin_starts, walls.longest, walls.summed, index.area)
+    pairs, merits = plan_bases(rows, n, runs.bin_starts, runs.longest, runs.summed, index.area)
     progress = np.array([0, 0, 0, 0, -1])
     uses, residual, bound = np.zeros(n), rows[:, 12].copy(), np.array([rows[:, 12].sum()])
     inliers = _sampled_inliers(n)
@@ -134,9 +134,10 @@ def find_candidates(
     stopped = EXHAUSTED if len(pairs) == 0 else BUDGET
     while stopped == BUDGET and not deadline.passed:
         stopped = advance(
-            rows, walls.rows, walls.bin_starts, grid.starts, grid.items, grid.shape, sectors.starts, sectors.items,
-            sectors.shape, gate, rules, flat_prior, found, count, best, progress, pairs, merits, uses, residual, bound,
-            best_gains, missing, inliers, miss, options.exhaustive, CHUNK,
+            rows, runs.rows, runs.bin_starts, walls.rows, grid.starts, grid.items, grid.shape, raster.shape,
+            raster.bits, sectors.starts, sectors.items, sectors.shape, gate, rules, flat_prior, found, count, best,
+            progress, pairs, merits, uses, residual, bound, best_gains, missing, inliers, miss, options.exhaustive,
+            CHUNK,
         )  # fmt: skip
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
@@ -144,8 +145,8 @@ def find_candidates(
     rules[1] = 0.9 * spacing
     for a in _sliding_segments(rows, (share if for_beams else RIVAL_SHARE) * best[0]):
         search_slides(
-            rows, a, walls.rows, walls.bin_starts, grid.starts, grid.items, grid.shape, gate, rules,
-            flat_prior, slides, slide_count, best, progress, spacing,
+            rows, a, runs.rows, runs.bin_starts, walls.rows, grid.starts, grid.items, grid.shape, raster.shape,
+            raster.bits, gate, rules, flat_prior, slides, slide_count, best, progress, spacing,
         )  # fmt: skip
     found = np.concatenate([found[: count[0]], slides[: slide_count[0]]])
     if deadline.cancelled:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,21 +13,22 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from ._map_kernels import collinear_groups, grid_cells
-from ._match_kernels import REACH
-from ._search_kernels import SECTORS
+from ._map_kernels import collinear_groups, direction_raster, grid_cells
+from ._match_kernels import REACH, SECTORS
 from .errors import InvalidMapError
 
 Floats = NDArray[np.float64]
 
 MAX_EXTENT = 1e5  # m
 MERGE_GAP = 0.3  # m; a doorway is wider, the joint between two pieces of one wall is not
+RUN_GAP = 1.5  # m; a scan segment may bridge a doorway
 MERGE_LATERAL = 0.03  # m
 MERGE_ANGLE = math.radians(2.0)
 DIRECTION_BINS = 90
 CELL = 1.0  # m
 SWEEP_CELL = 2.0  # m
 SWEEP_REACH = 0.02  # m; rounding
+RASTER_CELL = 0.5  # m
 MAX_CELLS = 4_000_000
 
 
@@ -36,7 +38,7 @@ class Walls(NamedTuple):
     Attributes
     ----------
     rows : (m, 8) direction x and y, offset along the left normal, abscissae of begin and end along the direction
-        (metres), angle (radians in (-pi, pi]), two unused; see `_match_kernels`
+        (metres), angle (radians in (-pi, pi]), the walls before and after it on its run or -1; see `_match_kernels`
     bin_starts : (DIRECTION_BINS + 1,) where each bin begins
     longest : (m,) their lengths, metres
     summed : (m + 1,) running sum of `longest`
@@ -62,6 +64,19 @@ class Grid(NamedTuple):
     items: NDArray[np.int32]
 
 
+class Raster(NamedTuple):
+    """Which directions the walls near a place have: the quickest way to see that a segment cannot lie there.
+
+    Attributes
+    ----------
+    shape : (5,) as of `Grid`
+    bits : (rows * columns,) bit s of a cell is set where a wall of direction sector s comes within `REACH` of it
+    """
+
+    shape: Floats
+    bits: NDArray[np.uint16]
+
+
 @dataclass(frozen=True)
 class MapIndex:
     """What is computed once per map; immutable, shared between threads.
@@ -83,10 +98,13 @@ class MapIndex:
     wall_of_piece : (n,) the wall that each segment is part of
     pieces, piece_starts : wall w consists of segments ``pieces[piece_starts[w]:piece_starts[w + 1]]``
     walls : Walls
+    runs : Walls
+        The walls joined across doorways: where a scan segment may lie that bridges one.
     grid : Grid
         Walls within `REACH` of each cell, whatever their direction: what lies at a point?
     sectors : Grid
-        Walls on each cell by direction, `SECTORS` of them: which walls of that direction does a sweep meet?
+        Runs on each cell by direction, `SECTORS` of them: which runs of that direction does a sweep meet?
+    raster : Raster
     """
 
     segments: Segments
@@ -98,8 +116,10 @@ class MapIndex:
     pieces: NDArray[np.int32]
     piece_starts: NDArray[np.int64]
     walls: Walls
+    runs: Walls
     grid: Grid
     sectors: Grid
+    raster: Raster
 
     @classmethod
     def build(cls, segments: Segments, sigma: float = 0.0) -> MapIndex:
@@ -130,10 +150,13 @@ class MapIndex:
     @classmethod
     def _of(cls, segments: Segments, sigma: float, origin: Floats, directed: int) -> MapIndex:
         local = segments.shifted(-origin)
-        walls, wall_of_piece = _merge(local)
+        walls, wall_of_piece = _merge(local, MERGE_GAP)
+        runs, run_of_wall = _merge(Segments.from_array(_ends(walls)), RUN_GAP)
+        _link(walls, run_of_wall)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
-        return cls(segments, sigma, origin, local, directed, wall_of_piece, order, starts, walls, *_grids(walls))
+        grids = _grids(walls, runs)
+        return cls(segments, sigma, origin, local, directed, wall_of_piece, order, starts, walls, runs, *grids)
 
     @cached_property
     def undirected(self) -> MapIndex:
@@ -164,15 +187,18 @@ class MapIndex:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        walls, grid = self.walls, self.grid
-        arrays: list[NDArray[Any]] = [self.wall_of_piece, self.pieces, self.piece_starts, *walls, *grid, *self.sectors]
+        tables: list[tuple[NDArray[Any], ...]] = [self.walls, self.runs, self.grid, self.sectors, self.raster]
+        arrays = [self.wall_of_piece, self.pieces, self.piece_starts, *itertools.chain.from_iterable(tables)]
         geometry = 2 * 11 * 8 * len(self.segments)
         return geometry + sum(a.nbytes for a in arrays)
 
 
-def _merge(local: Segments) -> tuple[Walls, NDArray[np.int32]]:
-    """Put one line through each group of collinear pieces; a group that is not straight stays in pieces."""
-    labels = collinear_groups(local.endpoints, local.directions, MERGE_GAP, MERGE_LATERAL, math.cos(MERGE_ANGLE))
+def _merge(local: Segments, gap: float) -> tuple[Walls, NDArray[np.int32]]:
+    """Put one line through each group of collinear pieces up to `gap` apart; a group that is not straight stays apart.
+
+    Returns the lines, and the one that each piece is part of.
+    """
+    labels = collinear_groups(local.endpoints, local.directions, gap, MERGE_LATERAL, math.cos(MERGE_ANGLE))
     _, wall, counts = np.unique(labels, return_inverse=True, return_counts=True)
     m = len(counts)
 
@@ -207,7 +233,7 @@ def _merge(local: Segments) -> tuple[Walls, NDArray[np.int32]]:
     bins = direction_bin(angles)
     order = np.lexsort((np.arange(m), begins - ends, bins))
     starts = np.searchsorted(bins[order], np.arange(DIRECTION_BINS + 1))
-    rows = np.column_stack([d, offsets, begins, ends, angles, np.zeros((m, 2))])[order]
+    rows = np.column_stack([d, offsets, begins, ends, angles, np.full((m, 2), -1.0)])[order]
     longest = (ends - begins)[order]
     summed = np.concatenate([[0.0], np.cumsum(longest)])
     place = np.empty(m, dtype=np.int32)
@@ -215,29 +241,54 @@ def _merge(local: Segments) -> tuple[Walls, NDArray[np.int32]]:
     return Walls(np.ascontiguousarray(rows), starts, longest, summed), place[wall]
 
 
+def _link(walls: Walls, run: NDArray[np.int32]) -> None:
+    """Name in each wall's row its neighbours on its run, (m,)."""
+    order = np.lexsort((walls.rows[:, 3], run))
+    before, after = order[:-1], order[1:]
+    same = run[before] == run[after]
+    walls.rows[after[same], 6] = before[same]
+    walls.rows[before[same], 7] = after[same]
+
+
 def direction_bin(angles: Floats) -> NDArray[np.intp]:
     """Return the direction bin of each angle, radians in (-pi, pi]."""
     return np.minimum(((angles + np.pi) * (DIRECTION_BINS / math.tau)).astype(np.intp), DIRECTION_BINS - 1)
 
 
-def _grids(walls: Walls) -> tuple[Grid, Grid]:
-    dx, dy, offset, begin, end, angle = walls.rows.T[:6]
+def _grids(walls: Walls, runs: Walls) -> tuple[Grid, Grid, Raster]:
+    ends, sector = _ends(walls), _sectors(walls)
+    shape = _shape(ends, RASTER_CELL, REACH, MAX_CELLS)
+    raster = Raster(shape, direction_raster(ends, REACH, *shape[:3], int(shape[3]), int(shape[4]), sector))
+    near = _grid(ends, np.zeros(len(ends), dtype=np.int64), 1, (CELL, REACH))
+    return near, _grid(_ends(runs), _sectors(runs), SECTORS, (SWEEP_CELL, SWEEP_REACH)), raster
+
+
+def _ends(walls: Walls) -> Floats:
+    """Return (m, 4) begin and end, metres in the index frame."""
+    dx, dy, offset, begin, end = walls.rows.T[:5]
     a = np.column_stack([dx * begin - dy * offset, dy * begin + dx * offset])
     b = np.column_stack([dx * end - dy * offset, dy * end + dx * offset])
-    ends = np.hstack([a, b])
-    none = np.zeros(len(ends), dtype=np.int64)
-    sector = np.floor((angle + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int64) % SECTORS
-    return _grid(ends, none, 1, (CELL, REACH)), _grid(ends, sector, SECTORS, (SWEEP_CELL, SWEEP_REACH))
+    return np.hstack([a, b])
+
+
+def _sectors(walls: Walls) -> NDArray[np.int64]:
+    """Return the sector of each direction, of `SECTORS`."""
+    return np.floor((walls.rows[:, 5] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int64) % SECTORS
 
 
 def _grid(ends: Floats, sector: NDArray[np.int64], sectors: int, sizes: tuple[float, float]) -> Grid:
-    """Lay a grid of cells of ``sizes[0]`` metres, or larger ones where the extent asks for it."""
+    """Lay a grid of cells of ``sizes[0]`` metres over what is within ``sizes[1]`` of the walls."""
     size, reach = sizes
+    shape = _shape(ends, size, reach, MAX_CELLS / sectors)
+    starts, items = grid_cells(ends, reach, *shape[:3], int(shape[3]), int(shape[4]), sector, sectors)
+    return Grid(shape, starts, items)
+
+
+def _shape(ends: Floats, size: float, reach: float, most: float) -> Floats:
+    """Return x0, y0, cell size, columns and rows of cells of `size` metres, or larger ones where `most` asks for it."""
     corners = ends.reshape(-1, 2)
     low = corners.min(axis=0) - reach - size
     extent = corners.max(axis=0) + reach + size - low
-    most = MAX_CELLS / sectors
     cell = max(size, math.sqrt(extent[0] * extent[1] / most), extent.max() / most)
     columns, rows = (math.ceil(e / cell) for e in extent)
-    starts, items = grid_cells(ends, reach, low[0], low[1], cell, columns, rows, sector, sectors)
-    return Grid(np.array([low[0], low[1], cell, columns, rows]), starts, items)
+    return np.array([low[0], low[1], cell, columns, rows])

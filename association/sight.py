@@ -20,7 +20,7 @@ def missing_walls(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> 
     pose = np.array([best.pose.theta, best.pose.x, best.pose.y])
     count_blockers(
         rows.rows, best.matches, np.array(scan.viewpoint), pose, index.walls.rows, index.grid.starts, index.grid.items,
-        index.grid.shape, SIGHT_TOLERANCE, to_matched, to_clutter,
+        index.grid.shape, SIGHT_TOLERANCE, to_matched, to_clutter, np.empty(m, dtype=np.int64),
     )  # fmt: skip
     # A wall that holds part of the consensus set was seen, and at a grazing angle rays to its neighbour pass its end.
     seen = best.matches[:, 0].astype(np.intp)

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from association._match_kernels import BRIDGING
+
 
 def first_hit(x, y, dx, dy, limit, walls):
     """Go through all walls."""
@@ -31,12 +33,28 @@ def match_segment(row, theta, tx, ty, offset_gate, cos_gate, min_overlap, walls)
         offset = normal @ middle - wall[2]
         along = along_wall @ middle
         covered = min(wall[4], along + row[4] / 2) - max(wall[3], along - row[4] / 2)
+        if row[4] > BRIDGING:
+            covered += bridged(walls, wall, middle, row[4])
         overlap = min(1.0, covered / row[4])
         cost = abs(offset) / offset_gate + 1.0 - overlap
         passes = along_wall @ d >= cos_gate and abs(offset) <= offset_gate and overlap >= min_overlap
         if passes and cost < least:
             found, least = (w, offset, d[0] * wall[1] - d[1] * wall[0], overlap), cost
     return found
+
+
+def bridged(walls, wall, middle, length):
+    """Return what the other walls of the run add, less the gaps up to them."""
+    total = 0.0
+    for side, sign in ((6, -1.0), (7, 1.0)):
+        edge, v = sign * (wall[3 if sign < 0 else 4] - wall[:2] @ middle), int(wall[side])
+        while v >= 0:
+            begin, end = sorted(sign * (walls[v, 3:5] - walls[v, :2] @ middle))
+            if begin >= length / 2:
+                break
+            total += min(end, length / 2) - begin - (begin - edge)
+            edge, v = end, int(walls[v, side])
+    return total
 
 
 def match_scan(scan, pose, covariance, walls, gates):

@@ -76,6 +76,36 @@ def test_match_scan(seed):
     assert got(total + 1e-6) == -1.0
 
 
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_may_score_bounds_the_score(seed):
+    """What the raster says is out of reach no matching reaches, and it says so of some wrong poses."""
+    rng, rows, pose = drawn(seed)
+    far = pose + rng.normal(size=3) * [0.3, 3.0, 3.0]
+    root = rng.normal(size=(3, 3)) * [[0.05], [0.05], [0.01]]
+    covariance, matches, spreads = root @ root.T, np.empty((len(rows), 5)), np.empty(len(rows))
+    match.angle_spreads(rows, covariance[2, 2], GATES, spreads)
+    for at in (pose, far):
+        total = match.match_scan(rows, at, covariance, INDEX.walls.rows, *GRID, GATES, 0.0, matches)
+        assert match.may_score(rows, at, spreads, *INDEX.raster, total - 1e-9)
+    assert not match.may_score(rows, pose + [0.0, 1e3, 0.0], spreads, *INDEX.raster, 1e-9)
+
+
+def test_a_long_segment_bridges_a_doorway():
+    """It lies on the walls on both sides; the gap counts against it, and a wider one is none that it bridges."""
+    for gap, overlap in ((1.0, 4.0 / 6.0), (2.0, 0.5)):
+        walls = [[0.0, 0.0, 3.0, 0.0], [3.0 + gap, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]]
+        index = MapIndex.build(Segments.from_array(walls))
+        prepared = scan_rows(scan_of(np.array([[0.0, 0.0, 6.0, 0.0]])), 0.0)
+        pose = np.array([0.0, *-index.origin])
+        matches = np.empty((1, 5))
+        match.match_scan(
+            prepared.rows, pose, np.zeros((3, 3)), index.walls.rows, index.grid.starts, index.grid.items,
+            index.grid.shape, GATES, 0.0, matches,
+        )  # fmt: skip
+        assert matches[0, 3] == pytest.approx(overlap)
+
+
 def test_turning_holds_the_pin():
     """Of a pose that turns about a point the covariance of that point's place is 0."""
     covariance = np.empty((3, 3))
@@ -115,11 +145,12 @@ def test_a_base_is_swept_whole(seed):
     def slack(length):
         return search.BASE_SLACK + search.BASE_SLACK_SHARE * length
 
-    expected = reference.placements(rows, a, b, INDEX.walls.rows, slack, tolerance)
+    runs = INDEX.runs
+    expected = reference.placements(rows, a, b, runs.rows, slack, tolerance)
     progress = np.zeros(5, dtype=np.int64)
     rules = np.array([0.65, 0.3, 0.1, 0.9])
     search.search_base(
-        rows, a, b, INDEX.walls.rows, INDEX.walls.bin_starts, *GRID, *SECTORS, GATES, rules,
+        rows, a, b, runs.rows, runs.bin_starts, INDEX.walls.rows, *GRID, *INDEX.raster, *SECTORS, GATES, rules,
         np.zeros(10), np.zeros((64, 5)), np.zeros(1, dtype=np.int64), np.array([1e9, 0.0, 0.0]), progress, 10**9,
     )  # fmt: skip
     assert progress[2] == len(expected)
