@@ -23,6 +23,7 @@ from vectorization import VectorizationError
 from .context import RequestContext, request_id_of
 from .keys import KeyGuard
 from .openapi import describe
+from .part import WHOLE, Part
 from .problems import ProblemError, faults_of, internal, invalid
 from .routes import associate, maps, operations, pages, register, vectorize
 from .runtime import HangUpError, Runtime
@@ -36,21 +37,23 @@ logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do
 
 
-def create_app(settings: Settings) -> FastAPI:
+def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     """Return an application that has not started anything yet.
 
     Parameters
     ----------
     settings : Settings
+    part : Part
+        Which of several processes this is.
     """
-    runtime = Runtime(settings)
+    runtime = Runtime(settings, part)
     app = FastAPI(
         title="Linefix",
         version=VERSION,
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
-        lifespan=partial(_lifespan, runtime=runtime),
+        lifespan=partial(_lifespan, runtime=runtime, part=part),
     )
     app.state.runtime = runtime
     for module in (register, associate, vectorize, maps, operations, pages):
@@ -83,12 +86,16 @@ def create_app(settings: Settings) -> FastAPI:
 
 
 @asynccontextmanager
-async def _lifespan(app: FastAPI, runtime: Runtime) -> AsyncIterator[None]:
-    warming = asyncio.create_task(_get_ready(runtime))
+async def _lifespan(app: FastAPI, runtime: Runtime, part: Part) -> AsyncIterator[None]:
+    tasks = [asyncio.create_task(_get_ready(runtime)), asyncio.create_task(runtime.metrics.refresh_now_and_then())]
+    if part.replaces:
+        await tasks[0]
     try:
         yield
     finally:
-        warming.cancel()
+        for task in tasks:
+            task.cancel()
+        runtime.doors.report()
         runtime.close()
 
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from .settings import Settings
+
+logger = logging.getLogger("linefix")
 USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve --help lists every setting."
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
 # this when they are loaded, so before anything imports numpy.
@@ -44,9 +50,29 @@ def serve(arguments: Sequence[str]) -> int:
     except SettingsError as error:
         print(f"linefix: {error}", file=sys.stderr)
         return 2
-    from .server import serve as run
-
     return run(settings)
+
+
+def run(settings: Settings) -> int:
+    """Run until a signal comes; return the status to exit with."""
+    from .listening import listen
+    from .logs import configure
+
+    configure(settings.log_level)
+    try:
+        listener = listen(settings)
+    except OSError as error:
+        logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
+        return 1
+    if settings.workers > 1:
+        # What computes is not loaded into the process that only looks after the others.
+        from .workers import Workers
+
+        return Workers(settings, listener).run()
+    from .part import WHOLE
+    from .server import answer
+
+    return answer(settings, listener, WHOLE)
 
 
 def main() -> None:

@@ -8,12 +8,13 @@ from collections.abc import Callable, MutableMapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-from association import Deadline
+from association import CancelledError, Deadline
 
 from .problems import ProblemError
 from .turns import FairQueue, Holder, Turn
 
 T = TypeVar("T")
+HEARING_SECONDS = 0.5  # s that a search has to notice that it shall end
 
 
 class SearchGate:
@@ -37,6 +38,7 @@ class SearchGate:
         self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
         self.running = 0
         self.announced = 0
+        self._over: asyncio.Future[None] | None = None
 
     @property
     def waiting(self) -> int:
@@ -84,6 +86,8 @@ class SearchGate:
         ProblemError
             When the queue is full, or the deadline passes before the turn comes, or the place went to somebody who has
             fewer.
+        CancelledError
+            When everything is told to give up.
         """
         await self._enter(deadline, holder, admitted)
         begun = time.monotonic()
@@ -94,16 +98,28 @@ class SearchGate:
             raise
         self._deadlines[work] = deadline
         work.add_done_callback(lambda done: self._finish(done, holder, begun))
-        return await asyncio.shield(work)
+        if self._over is None:
+            self._over = asyncio.get_running_loop().create_future()
+        either: set[asyncio.Future[Any]] = {work, self._over}
+        await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+        if work.done():
+            return work.result()
+        raise CancelledError
 
     def cancel_all(self) -> None:
-        """Tell everything that runs to give up."""
+        """Tell everything that runs to give up, and soon wait no longer for what does not hear, as indexing a map."""
         for deadline in self._deadlines.values():
             deadline.cancel()
+        if self._over is not None:
+            self._over.get_loop().call_later(HEARING_SECONDS, self._end, self._over)
 
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
         self._executor.shutdown(wait=False, cancel_futures=True)
+
+    def _end(self, over: asyncio.Future[None]) -> None:
+        if not over.done():
+            over.set_result(None)
 
     async def _enter(self, deadline: Deadline, holder: Holder, admitted: bool) -> None:
         if deadline.passed:

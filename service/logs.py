@@ -38,7 +38,7 @@ def configure(level: str) -> None:
             "formatters": {"json": {"()": JsonFormatter}},
             "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
             "root": {"level": level.upper(), "handlers": ["stderr"]},
-            # Numba tells every pass of its compiler at debug.
-            "loggers": {"numba": {"level": "WARNING"}},
+            # Numba tells every pass of its compiler at debug, Alembic each start that nothing had to be done.
+            "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},
         }
     )

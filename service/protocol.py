@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 from functools import lru_cache
 from http import HTTPStatus
 from typing import Any
@@ -157,15 +156,6 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
                 self.transport.close()
 
     return GuardedProtocol
-
-
-def prepare(listener: socket.socket, seconds: float) -> None:
-    """Set what accepted connections inherit: no delay, and an end when a client takes nothing of an answer for long."""
-    # asyncio does this for sockets whose protocol number is given, which that of an accepted one is not. Without it the
-    # second part of an answer waits 40 ms for the client to acknowledge the first.
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):
-        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1e3 * seconds))
 
 
 def _response(problem: ProblemError, request_id: str, default: list[tuple[bytes, bytes]], close: bool) -> bytes:

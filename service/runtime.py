@@ -21,6 +21,7 @@ from .maps import IndexCache, MapStore
 from .metrics import Metrics
 from .parser_process import ParserProcess
 from .parsing import Limits, unpack
+from .part import WHOLE, Part
 from .problems import ProblemError
 from .settings import Settings
 from .stopwatch import Stopwatch
@@ -40,16 +41,20 @@ class HangUpError(Exception):
 class Runtime:
     """The parts of an application, made by `create_app`, opened and closed with its lifespan."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, part: Part = WHOLE) -> None:
         self.settings = settings
         self.limits = settings.limits()
         self.metrics = Metrics()
-        self.bodies = BodyReader(settings.max_body_bytes, settings.max_bodies_bytes, settings.request_timeout)
-        self.gate = SearchGate(settings.searches, settings.queue)
+        self.bodies = BodyReader(
+            settings.max_body_bytes,
+            max(settings.max_body_bytes, part.share(settings.max_bodies_bytes)),
+            settings.request_timeout,
+        )
+        self.gate = SearchGate(part.share(settings.searches), part.share(settings.queue))
         self.keyring = Keyring(settings.keys)
         self.doors = Doors(self.gate, self.keyring, self.metrics)
         self.store = MapStore(settings.url)
-        self.cache = IndexCache(settings.cache_bytes, self.metrics)
+        self.cache = IndexCache(part.share(settings.cache_bytes), self.metrics)
         self.parser = ParserProcess()
         self.lookup = MapLookup(self.cache, self.store, self.parser)
         self.warm = False

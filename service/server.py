@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import logging
 import os
+import signal
 import socket
 import sys
 import threading
@@ -13,14 +15,14 @@ from types import FrameType
 import uvicorn
 
 from .app import create_app
-from .logs import configure
+from .listening import BACKLOG
 from .memory import return_large_blocks
-from .protocol import prepare, protocol_of
+from .part import Part
+from .protocol import protocol_of
 from .runtime import Runtime
 from .settings import Settings
 
 logger = logging.getLogger("linefix")
-BACKLOG = 512
 # What a search thread waits for Python's global lock, each of the many times that it comes back from a kernel, while
 # the event loop is busy; by default it is 5 ms.
 SWITCH_SECONDS = 0.001
@@ -35,34 +37,50 @@ class DrainingServer(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, runtime: Runtime) -> None:
         super().__init__(config)
         self._runtime = runtime
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, and know the loop that the end is to be arranged in."""
+        self._loop = asyncio.get_running_loop()
+        await super().startup(sockets)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Begin to drain; a second signal ends the process at once."""
-        if self._runtime.draining:
+        if self._runtime.draining or self._loop is None:
             self.should_exit = True
             self.force_exit = True
             return
         self._runtime.draining = True
-        _later(self._runtime.settings.drain_seconds, self._close_doors)
-        _later(self._runtime.settings.drain_seconds + GRACE, self._runtime.gate.cancel_all)
-        _later(LAST_CALL, _end)
+        self._loop.call_soon_threadsafe(self._drain, self._loop)
+        # In a thread of its own: it comes even when the loop hangs.
+        last = threading.Timer(LAST_CALL, os._exit, (1,))
+        last.daemon = True
+        last.start()
+
+    def _drain(self, loop: asyncio.AbstractEventLoop) -> None:
+        seconds = self._runtime.settings.drain_seconds
+        loop.call_later(seconds, self._close_doors)
+        loop.call_later(seconds + GRACE, self._runtime.gate.cancel_all)
 
     def _close_doors(self) -> None:
         self.should_exit = True
 
 
-def serve(settings: Settings) -> int:
-    """Run until a signal comes; return the status to exit with."""
-    configure(settings.log_level)
+class WorkerServer(DrainingServer):
+    """One of several: Ctrl-C reaches them all, and is for the process above them to pass on."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Begin to drain when the process above says so."""
+        if sig != signal.SIGINT:
+            super().handle_exit(sig, frame)
+
+
+def answer(settings: Settings, listener: socket.socket, part: Part) -> int:
+    """Answer requests in this process until a signal comes; does not return when it could not be ended cleanly."""
     return_large_blocks()
     sys.setswitchinterval(SWITCH_SECONDS)
     gc.set_threshold(*GARBAGE)
-    try:
-        listener = listen(settings)
-    except OSError as error:
-        logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
-        return 1
-    app = create_app(settings)
+    app = create_app(settings, part)
     runtime: Runtime = app.state.runtime
     config = uvicorn.Config(
         app,
@@ -77,32 +95,10 @@ def serve(settings: Settings) -> int:
         timeout_graceful_shutdown=GRACE + 1,
         backlog=BACKLOG,
     )
-    DrainingServer(config, runtime).run([listener])
+    server = (DrainingServer if part.of == 1 else WorkerServer)(config, runtime)
+    server.run([listener])
+    if runtime.gate.running:
+        # A thread that indexes a map cannot be interrupted, and Python would wait for it.
+        logging.shutdown()
+        os._exit(0)
     return 0
-
-
-def listen(settings: Settings) -> socket.socket:
-    """Return a socket that listens on the address that is set.
-
-    Raises
-    ------
-    OSError
-        When the address is taken or is none of this machine's.
-    """
-    family, _, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
-    listener = socket.create_server(address[:2], family=family, backlog=BACKLOG)
-    prepare(listener, settings.request_timeout)
-    host, port = listener.getsockname()[:2]
-    logger.info("listening", extra={"host": host, "port": port})
-    return listener
-
-
-def _later(seconds: float, call: object) -> None:
-    assert callable(call)
-    timer = threading.Timer(seconds, call)
-    timer.daemon = True
-    timer.start()
-
-
-def _end() -> None:
-    os._exit(1)

@@ -57,6 +57,7 @@ class Settings(BaseSettings):
     keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys, comma separated")
     allow_anonymous: bool = Field(False, description="without keys, listen on other addresses than loopback")
 
+    workers: int = Field(1, ge=1, le=256, description="processes that share the port, the searches and the queue")
     searches: int = Field(default_factory=_cores, ge=1, le=1024, description="searches that run at once")
     queue: int = Field(16, ge=0, le=10_000, description="requests that may wait for a search")
     max_body_bytes: int = Field(32_000_000, ge=1_000, le=1_000_000_000, description="of a request, unpacked")
@@ -136,4 +137,6 @@ def read_settings(arguments: Sequence[str]) -> Settings:
             f"refusing to listen on {settings.host} without keys: set LINEFIX_KEYS, or LINEFIX_ALLOW_ANONYMOUS=1 to "
             "let anyone who reaches the port use the service"
         )
+    if settings.workers > settings.searches:
+        raise SettingsError(f"workers: at most as many as searches, of which there are {settings.searches}")
     return settings

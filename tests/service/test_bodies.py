@@ -14,8 +14,8 @@ import httpx
 import orjson
 import pytest
 
+from service.listening import listen
 from service.schemas import examples
-from service.server import listen
 from service.settings import Settings
 from tests.conftest import RunningService, start, stop
 
