@@ -20,7 +20,7 @@ from association import AssociationError, CancelledError
 from registration import RegistrationError
 from vectorization import VectorizationError
 
-from .context import RequestContext, request_id_of
+from .context import RequestContext, note, request_id_of
 from .keys import KeyGuard
 from .openapi import describe
 from .part import WHOLE, Part
@@ -119,6 +119,7 @@ async def _refuse(request: Request, error: Exception) -> Response:
     if problem is None:
         logger.error("a defect", exc_info=error, extra={"request_id": request_id_of(request.scope)})
         problem = internal()
+    note(request.scope, code=problem.code)
     return problem.response(request_id_of(request.scope))
 
 

@@ -22,6 +22,11 @@ def request_id_of(scope: Scope) -> str:
     return str(scope["state"]["request_id"])
 
 
+def note(scope: Scope, **fields: object) -> None:
+    """Have something more in the log's line of a request."""
+    scope["state"].setdefault("noted", {}).update(fields)
+
+
 def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
     """Return the caller's ``X-Request-Id`` where it is plain and short, else a new one."""
     for name, value in headers:
@@ -74,5 +79,6 @@ class RequestContext:
                     "route": route,
                     "status": status,
                     "ms": round(1e3 * seconds, 3),
+                    **scope["state"].get("noted", {}),
                 },
             )

@@ -47,6 +47,9 @@ class Metrics:
         self.hypotheses = Counter("linefix_hypotheses", "Poses that were tried", registry=made)
         self.cache_hits = Counter("linefix_map_cache_hits", "Maps found indexed", registry=made)
         self.cache_misses = Counter("linefix_map_cache_misses", "Maps that had to be indexed", registry=made)
+        self.map_changes = Counter(
+            "linefix_map_changes", "Stored maps created, replaced, deleted", ("change",), registry=made
+        )
         build = Gauge("linefix_build_info", "Version", ("version",), registry=made, multiprocess_mode="livemax")
         build.labels(VERSION).set(1)
         self.watch("linefix_resident_bytes", "Memory of the workers", _resident_bytes)

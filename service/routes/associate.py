@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -12,7 +13,7 @@ from fastapi import APIRouter, Request, Response
 
 from association import CancelledError, Deadline
 
-from ..context import request_id_of
+from ..context import note, request_id_of
 from ..finite import require_finite
 from ..parsing import read_batch, read_model
 from ..problems import internal
@@ -49,6 +50,7 @@ async def post_associate(request: Request) -> Response:
         found = search(cached, (asked.scan, asked.prior, asked.options), deadline, runtime.metrics)
         watch.lap("search")
         found["map"] = map_reference(asked.map, revision)
+        note(request.scope, map=found["map"], verdict=found["status"], usable=found["usable"])
         found["client_ref"] = asked.client_ref
         return sealed(found, request, watch)
 
@@ -82,7 +84,10 @@ async def post_batch(request: Request) -> Response:
 
         results = await _answer_all(request, [partial(search_one, item) for item in items], deadline)
         watch.lap("search")
-        return {"results": results, "map": map_reference(asked.map, revision), "client_ref": asked.client_ref}
+        named = map_reference(asked.map, revision)
+        verdicts = Counter(item["result"]["status"] if "result" in item else item["status_code"] for item in results)
+        note(request.scope, map=named, verdicts={str(verdict): count for verdict, count in verdicts.items()})
+        return {"results": results, "map": named, "client_ref": asked.client_ref}
 
     answer = await runtime.unless_hung_up(request, work(), deadline)
     return json_response(await runtime.in_parser(lambda: sealed(answer, request, watch)))

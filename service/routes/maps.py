@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
+from ..context import note
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..finite import encode
 from ..lookup import checked_segments
@@ -61,6 +62,8 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
 
     count, bounds = await runtime.in_parser(summary)
     revision, created = await runtime.in_store(lambda: runtime.store.put(map_id, document, (count, bounds), demands))
+    runtime.metrics.map_changes.labels("created" if created else "replaced").inc()
+    note(request.scope, map={"map_id": map_id, "revision": revision})
     answer = {"map_id": map_id, "revision": revision, "segments": count, "bounds": bounds}
     return json_response(encode(answer), 201 if created else 200, {"ETag": etag(revision)})
 
@@ -125,4 +128,6 @@ async def delete_map(request: Request, map_id: MapIdPath) -> Response:
     runtime = runtime_of(request)
     demands = demands_of(request)
     await runtime.in_store(lambda: runtime.store.delete(map_id, demands))
+    runtime.metrics.map_changes.labels("deleted").inc()
+    note(request.scope, map={"map_id": map_id})
     return Response(status_code=204)

@@ -1,0 +1,74 @@
+"""What an operator sees: counts, the log, and a dashboard that asks only for what there is."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from service.schemas import examples
+
+DASHBOARD = json.loads((Path(__file__).parents[2] / "deploy" / "grafana.json").read_text())
+
+
+def asked_for() -> dict[str, str]:
+    """Every expression of the dashboard, by the panel that it is in."""
+    return {
+        f"{panel['title']} {target['refId']}": target["expr"]
+        for panel in DASHBOARD["panels"]
+        for target in panel["targets"]
+    }
+
+
+def exercise(client: httpx.Client) -> str:
+    """Do everything once that is counted, and return the counts."""
+    client.put("/v1/maps/seen", json=examples.MAP)
+    client.post("/v1/associate", json={**examples.ASSOCIATE, "map": {"map_id": "seen"}})
+    client.delete("/v1/maps/seen")
+    return client.get("/metrics").text
+
+
+def test_the_dashboard_asks_for_what_there_is(client: httpx.Client) -> None:
+    text = exercise(client)
+    there = set(re.findall(r"^(linefix_\w+)", text, re.MULTILINE))
+    labels = {name: set(re.findall(r'(\w+)="', line)) for name, line in re.findall(r"^(linefix_\w+)(\S*)", text, re.M)}
+    assert len(asked_for()) >= 13
+    for place, expression in asked_for().items():
+        names = re.findall(r"linefix_\w+", expression)
+        assert names, place
+        assert set(names) <= there, place
+        for label in re.findall(r"by \(([^)]*)\)", expression):
+            assert set(label.replace(" ", "").split(",")) <= labels[names[0]], place
+
+
+def test_the_dashboard_shows_all_that_is_counted(client: httpx.Client) -> None:
+    families = set(re.findall(r"^# TYPE (linefix_\w+) ", exercise(client), re.MULTILINE))
+    expressions = " ".join(asked_for().values())
+    forgotten = {name for name in families if not name.endswith("_created") and name not in expressions}
+    assert not forgotten
+
+
+def test_the_log_names_request_map_and_verdict(start_service: Callable[..., Any]) -> None:
+    running = start_service()
+    stored = {**examples.ASSOCIATE, "map": {"map_id": "hq-3"}}
+    running.client.put("/v1/maps/hq-3", json=examples.MAP)
+    running.client.post("/v1/associate", json=stored, headers={"x-request-id": "robot-7"})
+    running.client.post("/v1/associate", json=examples.ASSOCIATE, headers={"x-request-id": "inline"})
+    batch = {**examples.BATCH, "map": {"map_id": "hq-3"}, "scans": [{"segments": examples.SEEN}, {}], "priors": None}
+    running.client.post("/v1/associate:batch", json=batch, headers={"x-request-id": "batch"})
+    running.client.post("/v1/associate", json={}, headers={"x-request-id": "wrong"})
+    lines = [json.loads(line) for line in running.log().splitlines()]
+    by_id = {line["request_id"]: line for line in lines if line["message"] == "request"}
+    for line in by_id.values():
+        assert {"time", "level", "method", "route", "status", "ms"} <= line.keys()
+    reference = {"map_id": "hq-3", "revision": 1}
+    told = by_id["robot-7"]
+    assert (told["map"], told["verdict"], told["usable"], told["status"]) == (reference, "ok", True, 200)
+    assert (by_id["inline"]["map"], by_id["inline"]["verdict"]) == (None, "ok")
+    assert (by_id["batch"]["map"], by_id["batch"]["verdicts"]) == (reference, {"ok": 1, "422": 1})
+    assert (by_id["wrong"]["status"], by_id["wrong"]["code"]) == (422, "invalid_request")
+    assert any(line.get("route") == "/v1/maps/{map_id}" and line["map"] == reference for line in by_id.values())
