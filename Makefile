@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve bench experiments overload fuzz lock clean
+.PHONY: help demo test lint types layers unit serve bench experiments overload endings fuzz lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -44,6 +44,9 @@ bench: $(VENV)/.ready  ## print the table of quality and speed
 
 overload: $(VENV)/.ready  ## print what ten times too much load does, and what large maps do meanwhile (5 min)
 	$(BIN)/python -m benchmarks.overload
+
+endings: $(VENV)/.ready  ## print how soon hang-ups, slow clients, killed workers and drains end (5 min)
+	$(BIN)/python -m benchmarks.endings
 
 fuzz: $(VENV)/.ready  ## send 100,000 strange requests
 	FUZZ_CASES=100000 $(BIN)/python -m pytest -s tests/service/test_fuzz.py

@@ -111,6 +111,7 @@ async def _get_ready(runtime: Runtime) -> None:
     gc.collect()
     gc.freeze()
     runtime.warm = True
+    runtime.metrics.refresh()
     logger.info("ready")
 
 

@@ -63,11 +63,17 @@ class Runtime:
         self._store_threads = ThreadPoolExecutor(4, thread_name_prefix="store")
         self._probe_thread = ThreadPoolExecutor(1, thread_name_prefix="probe")
         self._looking: asyncio.Future[None] | None = None
+        self.metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: self.takes_requests)
         self.metrics.watch("linefix_searches_running", "Searches that run", lambda: self.gate.running)
         self.metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: self.gate.waiting)
         self.metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: self.bodies.held)
         self.metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: self.cache.bytes)
         self.metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(self.cache))
+
+    @property
+    def takes_requests(self) -> bool:
+        """Whether it is neither warming up nor going down."""
+        return self.warm and not self.draining
 
     async def read(self, request: Request, reader: Reader[T]) -> tuple[T, Stopwatch]:
         """Read a body and check it, off the event loop where that takes long; the watch starts when it is there.

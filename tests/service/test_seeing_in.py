@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,10 @@ def test_the_log_names_request_map_and_verdict(start_service: Callable[..., Any]
     batch = {**examples.BATCH, "map": {"map_id": "hq-3"}, "scans": [{"segments": examples.SEEN}, {}], "priors": None}
     running.client.post("/v1/associate:batch", json=batch, headers={"x-request-id": "batch"})
     running.client.post("/v1/associate", json={}, headers={"x-request-id": "wrong"})
+    give_up = time.monotonic() + 30
+    # A line is written after its answer is sent.
+    while '"request_id":"wrong"' not in running.log() and time.monotonic() < give_up:
+        time.sleep(0.01)
     lines = [json.loads(line) for line in running.log().splitlines()]
     by_id = {line["request_id"]: line for line in lines if line["message"] == "request"}
     for line in by_id.values():
