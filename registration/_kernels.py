@@ -14,6 +14,8 @@ import math
 import numpy as np
 from numba import njit
 
+from ._pair_kernels import CENTROID_X, CENTROID_Y, DX, DY, MAP_DX, MAP_DY, MAP_X, MAP_Y, SPREAD
+
 JOINT_SIZE = 18
 
 # Places of the upper triangle of Q, rows and columns in the order cos, sin, t_x, t_y, 1.
@@ -167,27 +169,6 @@ def joint_information(sums, theta, out):
 
 
 @njit(cache=True, nogil=True)
-def joint_sums(normals, offsets, centroids, directions, spreads, weights):
-    """Return the joint sums of n pairs, map line i with scan segment i."""
-    sums = np.zeros(JOINT_SIZE)
-    for i in range(len(weights)):
-        joint_add(
-            sums,
-            normals[i, 0],
-            normals[i, 1],
-            offsets[i],
-            centroids[i, 0],
-            centroids[i, 1],
-            directions[i, 0],
-            directions[i, 1],
-            spreads[i],
-            weights[i],
-            1.0,
-        )
-    return sums
-
-
-@njit(cache=True, nogil=True)
 def accumulate(sums, k, high, low):
     """Add ``high + low`` to entry k of compensated sums, rows value and error, in double-double arithmetic.
 
@@ -219,21 +200,15 @@ def joint_add_compensated(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign)
 
 
 @njit(cache=True, nogil=True)
-def joint_sums_compensated(normals, offsets, centroids, directions, spreads, weights):
-    """Return the compensated joint sums of n pairs, (2, `JOINT_SIZE`)."""
+def joint_sums_compensated(rows, weights):
+    """Return the compensated joint sums of pairs, (2, `JOINT_SIZE`); see `_pair_kernels` for `rows`."""
     sums = np.zeros((2, JOINT_SIZE))
-    for i in range(len(weights)):
-        joint_add_compensated(
-            sums,
-            normals[i, 0],
-            normals[i, 1],
-            offsets[i],
-            centroids[i, 0],
-            centroids[i, 1],
-            directions[i, 0],
-            directions[i, 1],
-            spreads[i],
-            weights[i],
-            1.0,
-        )
+    for i in range(len(rows)):
+        if weights[i] > 0.0:
+            nx = -rows[i, MAP_DY]
+            ny = rows[i, MAP_DX]
+            joint_add_compensated(
+                sums, nx, ny, nx * rows[i, MAP_X] + ny * rows[i, MAP_Y], rows[i, CENTROID_X], rows[i, CENTROID_Y],
+                rows[i, DX], rows[i, DY], rows[i, SPREAD], weights[i], 1.0,
+            )  # fmt: skip
     return sums

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from ._kernels import PARALLEL_RATIO, accumulate
+from ._pair_kernels import DX, DY, MAP_DX, MAP_DY, MAP_X, MAP_Y, X, Y
 
 ONE_STEP_SIZE = 12
 
@@ -45,21 +46,17 @@ def one_step_add(sums, vx, vy, gap, dx, dy, alpha_ref, weight, sign):
 
 
 @njit(cache=True, nogil=True)
-def one_step_sums(map_directions, gaps, directions, alpha_ref, weights):
-    """Return the compensated sums of n pairs."""
+def one_step_sums(rows, x, y, alpha_ref, weights):
+    """Return the compensated sums of pairs about a reference; see `_pair_kernels` for `rows`."""
     sums = np.zeros((2, ONE_STEP_SIZE))
-    for i in range(len(weights)):
-        one_step_add(
-            sums,
-            map_directions[i, 0],
-            map_directions[i, 1],
-            gaps[i],
-            directions[i, 0],
-            directions[i, 1],
-            alpha_ref,
-            weights[i],
-            1.0,
-        )
+    for i in range(len(rows)):
+        if weights[i] > 0.0:
+            vx = rows[i, MAP_DX]
+            vy = rows[i, MAP_DY]
+            # Eq. (1), sign corrected: p_S - p_D; the printed p_D - p_S returns exactly -T.
+            p_map = vx * (rows[i, MAP_Y] - y) - vy * (rows[i, MAP_X] - x)
+            p_scan = rows[i, DX] * rows[i, Y] - rows[i, DY] * rows[i, X]
+            one_step_add(sums, vx, vy, p_map - p_scan, rows[i, DX], rows[i, DY], alpha_ref, weights[i], 1.0)
     return sums
 
 
@@ -115,3 +112,13 @@ def one_step_moved(sums, dx, dy, turn):
     out[1, SVERSINE] = 0.0
     out[1, SSINE] = 0.0
     return out
+
+
+@njit(cache=True, nogil=True)
+def one_step_costs(sums, dx, dy, turn):
+    """Return the costs at the reference moved by ``(dx, dy)`` and turned by `turn`, each at least 0.
+
+    Of the translation, ``sum w r^2``; of the rotation by Mitsuta, ``sum w a^2``, and by Wahba, ``2 sum w (1 - cos a)``.
+    """
+    moved = one_step_moved(sums, dx, dy, turn)
+    return max(0.0, moved[0, SC]), max(0.0, moved[0, SA2]), max(0.0, 2.0 * moved[0, SVERSINE])

@@ -2,49 +2,33 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _pair_kernels as kernels
 from .errors import InvalidArgumentError
 from .segments import MeasuredSegments, Segments
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-MIN_SIGMA = 1e-12  # m; a smaller one that is not 0 counts as this, so that its square is not lost
+Point = Floats | tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correspondences:
-    """n pairs; row i of every array belongs to pair i.
+    """n pairs, a row each.
 
     Build with :meth:`of`, which validates. Map quantities are in the map frame, the others in the scan frame.
 
     Attributes
     ----------
-    map_directions : (n, 2) unit vectors
-    map_midpoints : (n, 2) metres
-    map_lengths : (n,) metres
-    directions : (n, 2) unit vectors
-    midpoints : (n, 2) metres
-    lengths : (n,) metres
-    centroids : (n, 2) mean of the points behind each scan segment, metres
-    spreads : (n,) their second moment along it, m^2
-    variances : (n,) of each scan segment's offset, ``sigma^2 / points``, m^2
+    rows : (n, 14)
+        What the properties show, the columns named in `_pair_kernels`.
     """
 
-    map_directions: Floats
-    map_midpoints: Floats
-    map_lengths: Floats
-    directions: Floats
-    midpoints: Floats
-    lengths: Floats
-    centroids: Floats
-    spreads: Floats
-    variances: Floats
+    rows: Floats
 
     @classmethod
     def of(cls, map_segments: Segments, scan: MeasuredSegments, pairs: ArrayLike) -> Correspondences:
@@ -63,23 +47,22 @@ class Correspondences:
             When `pairs` is not such an array or an index is out of range; argument ``correspondences`` with the index
             of the first row at fault.
         """
-        rows = _checked_pairs(pairs, len(scan), len(map_segments))
-        i, j = rows[:, 0], rows[:, 1]
-        segments = scan.segments
+        chosen = _checked_pairs(pairs, len(scan), len(map_segments))
+        m, s = map_segments, scan.segments
         return cls(
-            map_segments.directions[j],
-            map_segments.midpoints[j],
-            map_segments.lengths[j],
-            segments.directions[i],
-            segments.midpoints[i],
-            segments.lengths[i],
-            scan.centroids[i],
-            scan.spreads[i],
-            floored_sigma(scan.sigma[i]) ** 2 / scan.points[i],
-        )
+            kernels.gather(
+                chosen, m.directions, m.midpoints, m.lengths, s.directions, s.midpoints, s.lengths, scan.centroids,
+                scan.spreads, scan.sigma, scan.points,
+            )
+        )  # fmt: skip
 
     def __len__(self) -> int:
-        return len(self.lengths)
+        return len(self.rows)
+
+    @property
+    def map_directions(self) -> Floats:
+        """Unit directions of the map segments, (n, 2)."""
+        return self.rows[:, kernels.MAP_DX : kernels.MAP_DY + 1]
 
     @property
     def map_normals(self) -> Floats:
@@ -87,55 +70,84 @@ class Correspondences:
         return _left(self.map_directions)
 
     @property
+    def map_midpoints(self) -> Floats:
+        """Midpoints of the map segments, (n, 2) metres."""
+        return self.rows[:, kernels.MAP_X : kernels.MAP_Y + 1]
+
+    @property
     def map_offsets(self) -> Floats:
         """Signed distances of the map lines from the map frame's origin, (n,) metres."""
         return _dots(self.map_normals, self.map_midpoints)
+
+    @property
+    def map_lengths(self) -> Floats:
+        """Lengths of the map segments, (n,) metres."""
+        return self.rows[:, kernels.MAP_LENGTH]
+
+    @property
+    def directions(self) -> Floats:
+        """Unit directions of the scan segments, (n, 2)."""
+        return self.rows[:, kernels.DX : kernels.DY + 1]
+
+    @property
+    def midpoints(self) -> Floats:
+        """Midpoints of the scan segments, (n, 2) metres."""
+        return self.rows[:, kernels.X : kernels.Y + 1]
 
     @property
     def offsets(self) -> Floats:
         """Signed distances of the scan lines from the scan frame's origin, (n,) metres."""
         return _dots(_left(self.directions), self.midpoints)
 
+    @property
+    def lengths(self) -> Floats:
+        """Lengths of the scan segments, (n,) metres."""
+        return self.rows[:, kernels.LENGTH]
+
+    @property
+    def centroids(self) -> Floats:
+        """Means of the points behind the scan segments, (n, 2) metres."""
+        return self.rows[:, kernels.CENTROID_X : kernels.CENTROID_Y + 1]
+
+    @property
+    def spreads(self) -> Floats:
+        """Second moments of those points along the scan segments, (n,) m^2."""
+        return self.rows[:, kernels.SPREAD]
+
+    @property
+    def variances(self) -> Floats:
+        """Variances of the scan segments' offsets, ``sigma^2 / points``, (n,) m^2."""
+        return self.rows[:, kernels.VARIANCE]
+
     def angles(self, theta: float) -> Floats:
         """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
-        c, s = math.cos(theta), math.sin(theta)
-        d = self.directions @ np.array([[c, s], [-s, c]])
-        angles: Floats = np.arctan2(_dots(_left(d), self.map_directions), _dots(d, self.map_directions))
+        angles: Floats = kernels.relative_angles(self.rows, theta)
         return angles
 
     def runs_against(self, theta: float) -> NDArray[np.bool_]:
         """Tell which scan segments, turned by `theta`, run against their map segments."""
-        return np.abs(self.angles(theta)) > 0.5 * math.pi
+        return np.abs(self.angles(theta)) > 0.5 * np.pi
 
     def take(self, rows: NDArray[np.bool_] | Indices | slice) -> Correspondences:
         """Return some of the pairs."""
-        return Correspondences(*(getattr(self, f.name)[rows] for f in fields(self)))
+        return Correspondences(self.rows[rows])
 
     def turned(self, rows: NDArray[np.bool_]) -> Correspondences:
         """Return the pairs with the scan segments of `rows` running the other way."""
-        return replace(self, directions=np.where(rows[:, None], -self.directions, self.directions))
+        turned = Correspondences(self.rows.copy())
+        turned.directions[rows] *= -1.0
+        return turned
 
-    def about(self, map_origin: Floats, scan_origin: Floats) -> Correspondences:
+    def about(self, map_origin: Point, scan_origin: Point) -> Correspondences:
         """Return the pairs in frames that have been moved to two new origins, each (2,) metres in its old frame."""
-        return replace(
-            self,
-            map_midpoints=self.map_midpoints - map_origin,
-            midpoints=self.midpoints - scan_origin,
-            centroids=self.centroids - scan_origin,
+        (map_x, map_y), (scan_x, scan_y) = map_origin, scan_origin
+        return Correspondences(
+            kernels.moved_origins(self.rows, float(map_x), float(map_y), float(scan_x), float(scan_y))
         )
 
 
-def floored_sigma(sigma: ArrayLike) -> Floats:
-    """Return standard deviations, metres, with those between 0 and 1e-12 m raised to 1e-12 m."""
-    s = np.asarray(sigma, dtype=np.float64)
-    return np.where(s > 0.0, np.maximum(s, MIN_SIGMA), 0.0)
-
-
 def _left(directions: Floats) -> Floats:
-    normals = np.empty_like(directions)
-    np.negative(directions[:, 1], out=normals[:, 0])
-    normals[:, 1] = directions[:, 0]
-    return normals
+    return np.stack([-directions[:, 1], directions[:, 0]], axis=1)
 
 
 def _dots(a: Floats, b: Floats) -> Floats:
@@ -156,10 +168,10 @@ def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices
         broken = rows.dtype.kind == "f" and (rows != np.floor(rows)).any(axis=1)
         index = int(np.argmax(broken)) if np.any(broken) else None
         raise InvalidArgumentError(f"expected integers, got {rows.dtype}", argument="correspondences", index=index)
+    chosen = np.ascontiguousarray(rows, dtype=np.intp)
     for column, count, what in ((0, scan_count, "scan"), (1, map_count, "map")):
-        bad = (rows[:, column] < 0) | (rows[:, column] >= count)
-        if bad.any():
-            index = int(np.argmax(bad))
+        index = kernels.first_outside(chosen, column, count)
+        if index >= 0:
             raise InvalidArgumentError(
                 f"expected a {what} index from 0 to {count - 1}, got {rows[index, column]}"
                 if count
@@ -167,4 +179,4 @@ def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices
                 argument="correspondences",
                 index=index,
             )
-    return rows.astype(np.intp)
+    return chosen

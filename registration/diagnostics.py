@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .correspondences import Correspondences
-from .estimate import Fit, Problem, rotation_matrix
+from ._matrix_kernels import carried, invert3
+from ._pair_kernels import residuals
+from .estimate import Fit, Problem
 from .joint import JointSums
-from .one_step import OneStepSums
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .transform import RigidTransform
@@ -37,9 +37,29 @@ def no_answer(options: RegistrationOptions) -> RegistrationResult:
     )
 
 
-def residuals(pairs: Correspondences, fit: Fit) -> tuple[Floats, Floats]:
-    """Return offsets at the midpoints in metres and angles in radians, (n,) each, of pairs about both middles."""
-    return _offsets(pairs, pairs.midpoints, fit), pairs.angles(fit.theta)
+@dataclass(frozen=True, slots=True, eq=False)
+class Residuals:
+    """What a fit leaves.
+
+    Attributes
+    ----------
+    offsets, angles : (n,)
+        At the midpoints, metres, and radians; of all pairs.
+    chi2, rms_offset, rms_angle : float
+        Of the pairs that count.
+    """
+
+    offsets: Floats
+    angles: Floats
+    chi2: float
+    rms_offset: float
+    rms_angle: float
+
+    @classmethod
+    def of(cls, problem: Problem, fit: Fit) -> Residuals:
+        """Evaluate them."""
+        at, weights = fit.local_from_centred, problem.weights
+        return cls(*residuals(problem.centred.rows, weights.used, weights.information, at.theta, at.x, at.y))
 
 
 def covariance_of(problem: Problem, fit: Fit) -> Floats:
@@ -48,72 +68,38 @@ def covariance_of(problem: Problem, fit: Fit) -> Floats:
     The inverse of the information matrix ``F`` when the weights are the information; else, for pairs weighted ``w`` of
     information ``i``, ``F(w)^-1 F(w^2 / i) F(w)^-1``.
     """
-    weights, pairs = problem.weights, problem.centred
-    covariance = _inverse(JointSums.of_set(pairs, weights.used).information(fit.theta))
+    weights, theta = problem.weights, fit.local_from_scan.theta
+    covariance = invert3(fit.sums.information(theta))
     if weights.information is not weights.used:
-        scatter = JointSums.of_set(pairs, weights.used**2 / weights.information).information(fit.theta)
+        scatter = JointSums.of_set(problem.centred, weights.used**2 / weights.information).information(theta)
         covariance = covariance @ scatter @ covariance
     # From the middle of the scan segments to the origin of the scan frame.
-    x, y = rotation_matrix(fit.theta) @ problem.scan_origin
-    lever = np.array([[1.0, 0.0, y], [0.0, 1.0, -x], [0.0, 0.0, 1.0]])
-    moved: Floats = lever @ covariance @ lever.T
-    return 0.5 * (moved + moved.T)
+    lever = RigidTransform(0.0, 0.0, theta).compose(problem.scan_from_centred)
+    moved: Floats = carried(covariance, lever.x, lever.y)
+    return moved
 
 
-def diagnose(problem: Problem, fit: Fit, options: RegistrationOptions) -> RegistrationDiagnostics:
-    """Evaluate chi2, the residuals' size and the paper's measures at a fit."""
-    pairs = problem.centred
-    offsets, angles = residuals(pairs, fit)
-    at_centroids = _offsets(pairs, pairs.centroids, fit)
-    chi2 = problem.weights.information @ (at_centroids**2 + pairs.spreads * np.sin(angles) ** 2)
-
-    x, y = fit.local_translation(problem)
-    sums = problem.one_step_sums(float(x), float(y))
+def diagnose(problem: Problem, fit: Fit, residuals: Residuals, options: RegistrationOptions) -> RegistrationDiagnostics:
+    """Put the residuals' size and the paper's measures at a fit together."""
+    at = fit.local_from_scan
+    sums = problem.one_step_sums(at.x, at.y)
+    local_from_map = problem.map_from_local.inverse()
 
     def ambiguity(at: RigidTransform) -> Ambiguity:
-        return _ambiguity(sums, at, options)
+        translation, rotation = sums.costs(at, options.rotation)
+        return Ambiguity(options.k_translation * translation, options.k_rotation * rotation)
 
-    def moved(at: RigidTransform) -> RigidTransform:
-        """Take a transform into the caller's map frame to the recentred one."""
-        return RigidTransform(at.x - float(problem.map_origin[0]), at.y - float(problem.map_origin[1]), at.theta)
-
-    at_pose = ambiguity(RigidTransform(float(x), float(y), fit.theta))
+    at_pose, elsewhere = ambiguity(at), options.evaluate_at
     return RegistrationDiagnostics(
         ambiguity=at_pose,
-        ambiguity_before=ambiguity(moved(RigidTransform(0.0, 0.0, 0.0))),
-        ambiguity_at=None if options.evaluate_at is None else ambiguity(moved(options.evaluate_at)),
+        ambiguity_before=ambiguity(local_from_map),
+        ambiguity_at=None if elsewhere is None else ambiguity(local_from_map.compose(elsewhere)),
         similarity=1.0 / at_pose.total if at_pose.total > sys.float_info.min else None,
         reliability=sums.reliability,
         determinant=sums.determinant,
-        chi2=float(chi2),
-        dof=2 * len(pairs) - (2 if fit.freedom.parallel else 3),
-        rms_offset=_rms(offsets),
-        rms_angle=_rms(angles),
-        n=len(pairs),
+        chi2=residuals.chi2,
+        dof=2 * problem.count - (2 if fit.freedom.parallel else 3),
+        rms_offset=residuals.rms_offset,
+        rms_angle=residuals.rms_angle,
+        n=problem.count,
     )
-
-
-def _ambiguity(sums: OneStepSums, at: RigidTransform, options: RegistrationOptions) -> Ambiguity:
-    return Ambiguity(
-        options.k_translation * sums.translation_cost(at),
-        options.k_rotation * sums.rotation_cost(at, options.rotation),
-    )
-
-
-def _offsets(pairs: Correspondences, points: Floats, fit: Fit) -> Floats:
-    """Return the signed distances of moved scan points from their map lines, (n,) metres."""
-    moved = points @ rotation_matrix(fit.theta).T + fit.translation
-    distances: Floats = np.einsum("ij,ij->i", pairs.map_normals, moved - pairs.map_midpoints)
-    return distances
-
-
-def _inverse(information: Floats) -> Floats:
-    """Invert a positive definite matrix of unlike units, scaled to a unit diagonal first."""
-    scale = 1.0 / np.sqrt(np.diag(information))
-    weighted = np.outer(scale, scale)
-    inverse: Floats = np.linalg.inv(information * weighted) * weighted
-    return inverse
-
-
-def _rms(values: Floats) -> float:
-    return math.sqrt(float(np.mean(values**2)))

@@ -2,57 +2,72 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._pair_kernels import middles
 from .correspondences import Correspondences
 from .joint import JointSums
 from .observability import Freedom, find_freedom
 from .one_step import OneStepSums
 from .options import RegistrationOptions, Rotation
+from .orientation import choose_rotation
 from .transform import RigidTransform
 from .weights import PairWeights
 
 Floats = NDArray[np.float64]
 
 
-def rotation_matrix(theta: float) -> Floats:
-    """Return the (2, 2) matrix that turns by `theta` radians, Eq. (12)."""
-    c, s = math.cos(theta), math.sin(theta)
-    return np.array([[c, -s], [s, c]])
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """What an estimator is given: n > 0 pairs of positive weight.
+    """What an estimator is given: pairs, one of a positive weight at least.
 
     Attributes
     ----------
     pairs : Correspondences
-        In the scan's own frame, and in a map frame whose origin is in the middle of the map segments.
+        In the scan's own frame, and in a *local* map frame whose origin is in the middle of the map segments.
     centred : Correspondences
         The pairs about the middles of both sets: what the joint sums are taken of, to lose no digits.
     weights : PairWeights
-    map_origin : (2,)
-        That origin, in the caller's map frame, metres.
-    scan_origin : (2,)
-        The middle of the scan segments, in the scan frame, metres.
+    map_from_local, scan_from_centred : RigidTransform
+        Shifts by those middles, metres.
+    count : int
+        How many pairs count.
     reference_angle : float
         Wahba's angle, radians: where angles wrap is opposite to it.
+    unique : bool
+        Only one way to turn the segments round fits; always so where directions mean something.
     """
 
     pairs: Correspondences
     centred: Correspondences
     weights: PairWeights
-    map_origin: Floats
-    scan_origin: Floats
+    map_from_local: RigidTransform
+    scan_from_centred: RigidTransform
+    count: int
     reference_angle: float
+    unique: bool
+
+    @classmethod
+    def of(cls, given: Correspondences, weights: PairWeights, *, oriented: bool) -> Problem:
+        """Recentre, and turn segments round where directions mean nothing."""
+        map_x, map_y, scan_x, scan_y, count = middles(given.rows, weights.used)
+        local = given.about((map_x, map_y), (0.0, 0.0))
+        centred = local.about((0.0, 0.0), (scan_x, scan_y))
+        unique = True
+        if not oriented:
+            judged = weights.used if weights.noise is None else weights.noise
+            theta, unique = choose_rotation(centred, judged, is_noise=weights.noise is not None)
+            against = centred.runs_against(theta)
+            local, centred = local.turned(against), centred.turned(against)
+        angle = OneStepSums.of_set(local, weights.used).solve("wahba")[0].theta
+        shifts = RigidTransform(map_x, map_y, 0.0), RigidTransform(scan_x, scan_y, 0.0)
+        return cls(local, centred, weights, *shifts, count, angle, unique)
 
     def one_step_sums(self, x: float, y: float) -> OneStepSums:
-        """Return the paper's sums about a transform, here of the recentred map frame."""
+        """Return the paper's sums about a transform, local from scan."""
         return OneStepSums.of_set(self.pairs, self.weights.used, RigidTransform(x, y, self.reference_angle))
 
     def angle(self, rotation: Rotation) -> float:
@@ -66,36 +81,38 @@ class Fit:
 
     Attributes
     ----------
-    theta : float
-        Radians.
-    translation : (2,)
-        Of the transform between the frames about the middles of both sets, metres.
+    local_from_scan : RigidTransform
+    local_from_centred : RigidTransform
+        The same between the frames about the middles of both sets.
     freedom : Freedom
+    sums : JointSums
+        About those middles, with the estimator's weights.
     """
 
-    theta: float
-    translation: Floats
+    local_from_scan: RigidTransform
+    local_from_centred: RigidTransform
     freedom: Freedom
-
-    def local_translation(self, problem: Problem) -> Floats:
-        """Return the translation from the scan's own frame into the recentred map frame, metres."""
-        return self.translation - rotation_matrix(self.theta) @ problem.scan_origin
+    sums: JointSums
 
     def moved_least(self, problem: Problem) -> Fit:
         """Return the fit whose translation in the caller's frames is shortest along the free direction."""
-        direction = self.freedom.direction
-        if direction is None:
+        if self.freedom.direction is None:
             return self
-        along = float(direction @ (self.local_translation(problem) + problem.map_origin))
-        slack = self.freedom.slack
-        return replace(self, translation=self.translation - min(slack, max(-slack, along)) * direction)
+        (x, y), slack = self.freedom.direction, self.freedom.slack
+        pose = problem.map_from_local.compose(self.local_from_scan)
+        back = -min(slack, max(-slack, x * pose.x + y * pose.y))
+        slide = RigidTransform(back * x, back * y, 0.0)
+        moved = slide.compose(self.local_from_scan), slide.compose(self.local_from_centred)
+        return Fit(*moved, self.freedom, self.sums)
 
 
 def fit_joint(problem: Problem, options: RegistrationOptions) -> Fit:
     """Fit rotation and translation together; the same wherever the two frames have their origins."""
     sums = JointSums.of_set(problem.centred, problem.weights.used)
-    theta, translation, _ = sums.solve(problem.angle(options.rotation))
-    return Fit(theta, translation, _freedom(problem, sums, theta)).moved_least(problem)
+    theta, (x, y), _ = sums.solve(problem.angle(options.rotation))
+    local_from_centred = RigidTransform(float(x), float(y), theta)
+    local_from_scan = local_from_centred.compose(problem.scan_from_centred.inverse())
+    return Fit(local_from_scan, local_from_centred, _freedom(problem, sums, theta), sums).moved_least(problem)
 
 
 def fit_one_step(problem: Problem, options: RegistrationOptions) -> Fit:
@@ -108,12 +125,14 @@ def fit_one_step(problem: Problem, options: RegistrationOptions) -> Fit:
     at = RigidTransform(0.0, 0.0, theta)
     for _ in range(2):
         at, observable = problem.one_step_sums(at.x, at.y).solve(options.rotation)
-    translation = np.array([at.x, at.y]) + rotation_matrix(theta) @ problem.scan_origin
-    freedom = _freedom(problem, JointSums.of_set(problem.centred, problem.weights.used), theta)
+    at = RigidTransform(at.x, at.y, theta)
+    sums = JointSums.of_set(problem.centred, problem.weights.used)
+    freedom = _freedom(problem, sums, theta)
+    fit = Fit(at, at.compose(problem.scan_from_centred), freedom, sums)
     if observable:
         # The paper has an answer, so that one is given.
-        return Fit(theta, translation, replace(freedom, slack=0.0))
-    return Fit(theta, translation, freedom).moved_least(problem)
+        return replace(fit, freedom=replace(freedom, slack=0.0))
+    return fit.moved_least(problem)
 
 
 def _freedom(problem: Problem, sums: JointSums, theta: float) -> Freedom:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtri
 
 from . import _kernels as kernels
+from ._matrix_kernels import eigen2
+from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
 
 Floats = NDArray[np.float64]
@@ -44,17 +45,8 @@ class JointSums:
 
     @classmethod
     def of_set(cls, pairs: Correspondences, weights: ArrayLike) -> JointSums:
-        """Sum over all pairs, `weights` (n,) in 1/m^2."""
-        return cls(
-            kernels.joint_sums_compensated(
-                pairs.map_normals,
-                pairs.map_offsets,
-                pairs.centroids,
-                pairs.directions,
-                pairs.spreads,
-                np.asarray(weights, dtype=np.float64),
-            )
-        )
+        """Sum over all pairs, `weights` (n,) in 1/m^2; those of weight 0 do not count."""
+        return cls(kernels.joint_sums_compensated(pairs.rows, np.ascontiguousarray(weights, dtype=np.float64)))
 
     @classmethod
     def of_pair(cls, pairs: Correspondences, index: int, weight: float) -> JointSums:
@@ -92,10 +84,13 @@ class JointSums:
         return round(float(self.values[kernels.COUNT]))
 
     @property
-    def normal_matrix(self) -> Floats:
-        """``sum w n n'`` of the map normals, (2, 2): the information of a translation when the rotation is known."""
-        xx, xy, yy = self.values[[kernels.XX, kernels.XY, kernels.YY]]
-        return np.array([[xx, xy], [xy, yy]])
+    def normal_moments(self) -> tuple[float, float, float]:
+        """``sum w n n'`` of the map normals, its elements xx, xy and yy.
+
+        The information of a translation when the rotation is known.
+        """
+        v = self.values
+        return float(v[kernels.XX]), float(v[kernels.XY]), float(v[kernels.YY])
 
     @property
     def parallel(self) -> bool:
@@ -103,15 +98,15 @@ class JointSums:
 
         For two lines that is what it says; for more, whether their spread is one that the noise gives parallel lines in
         99.73 % of cases. The mean squared sine between the map lines and their common direction is the smaller
-        eigenvalue of `normal_matrix` over its trace; the information that the pairs have of angles is the sum of
+        eigenvalue of ``sum w n n'`` over its trace; the information that the pairs have of angles is the sum of
         ``w s``, which the length of Wahba's resultant stands for. Weights must be 1 / variance.
         """
         if self.count < 2:
             return True
-        small = float(np.linalg.eigvalsh(self.normal_matrix)[0])
+        xx, xy, yy = self.normal_moments
+        small, *_ = eigen2(xx, xy, yy)
         resultant = math.hypot(self.values[kernels.WAHBA_COS], self.values[kernels.WAHBA_SIN])
-        spread = small * resultant / float(np.trace(self.normal_matrix))
-        return spread <= float(chdtri(self.count - 1, THREE_SIGMA_TAIL))
+        return bool(small * resultant / (xx + yy) <= chi_square_quantile(self.count - 1, THREE_SIGMA_TAIL))
 
     def solve(self, start: float) -> tuple[float, Floats, bool]:
         """Minimise the cost.
@@ -143,3 +138,11 @@ class JointSums:
         out = np.empty((3, 3))
         kernels.joint_information(self.values, float(theta), out)
         return out
+
+    def marginal(self, theta: float) -> tuple[float, float, float]:
+        """Return what is known of the translation when the rotation is not, its elements xx, xy and yy.
+
+        The Schur complement of the rotation in `information`, which must not be 0 there.
+        """
+        (xx, xy, xt), (_, yy, yt), (_, _, tt) = self.information(theta).tolist()
+        return xx - xt * xt / tt, xy - xt * yt / tt, yy - yt * yt / tt

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ._kernels import PARALLEL_RATIO
+from ._matrix_kernels import eigen2, is_regular3
 from .joint import JointSums
-
-Floats = NDArray[np.float64]
 
 MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
 SLACK = 3.0  # standard deviations that a fit may move and still be one
@@ -26,7 +22,7 @@ class Freedom:
     degenerate : bool
     parallel : bool
         All directions are the same to within rounding or noise, and a degree of freedom is lost.
-    direction : (2,) unit vector in the map frame, or None
+    direction : (float, float), unit vector in the map frame, or None
         Along which the translation is free; None when nothing is, or when it is the rotation (segments that are taken
         to have no spread, all through one point).
     slack : float
@@ -36,7 +32,7 @@ class Freedom:
 
     degenerate: bool
     parallel: bool = False
-    direction: Floats | None = None
+    direction: tuple[float, float] | None = None
     slack: float = 0.0
 
 
@@ -56,39 +52,28 @@ def find_freedom(used: JointSums, noise: JointSums | None, theta: float) -> Free
     theta : float
         The rotation, radians.
     """
-    small, axes = np.linalg.eigh(used.normal_matrix)
-    if small[0] <= PARALLEL_RATIO * small[1]:
-        return Freedom(True, True, _signed(axes[:, 0]), math.inf)
+    small, big, *axis = eigen2(*used.normal_moments)
+    if small <= PARALLEL_RATIO * big:
+        return Freedom(True, True, _signed(*axis), math.inf)
     if noise is not None and noise.parallel:
-        axis = _signed(np.linalg.eigh(noise.normal_matrix)[1][:, 0])
-        return Freedom(True, True, axis, _slack(noise, axis))
-    if _singular(used.information(theta)):
+        _, _, *axis = eigen2(*noise.normal_moments)
+        return Freedom(True, True, _signed(*axis), _slack(noise, *axis))
+    if not is_regular3(used.information(theta), PARALLEL_RATIO):
         return Freedom(True)
     if noise is not None:
-        # What is known of the translation when the rotation is not: the Schur complement.
-        information = noise.information(theta)
-        coupling = information[:2, 2]
-        marginal, axes = np.linalg.eigh(information[:2, :2] - np.outer(coupling, coupling) / information[2, 2])
-        if marginal[0] < MAX_DEVIATION**-2:
-            axis = _signed(axes[:, 0])
-            return Freedom(True, False, axis, _slack(noise, axis))
+        # What is known of the translation when the rotation is not.
+        least, _, *axis = eigen2(*noise.marginal(theta))
+        if least < MAX_DEVIATION**-2:
+            return Freedom(True, False, _signed(*axis), _slack(noise, *axis))
     return Freedom(False)
 
 
-def _singular(information: Floats) -> bool:
-    """Tell whether a direction of (x, y, theta) is free, whatever the units."""
-    diagonal = np.diag(information)
-    if diagonal.min() <= 0.0:
-        return True
-    scale = 1.0 / np.sqrt(diagonal)
-    return float(np.linalg.eigvalsh(information * np.outer(scale, scale))[0]) <= PARALLEL_RATIO
-
-
-def _slack(sums: JointSums, axis: Floats) -> float:
-    curvature = float(axis @ sums.normal_matrix @ axis)
+def _slack(sums: JointSums, x: float, y: float) -> float:
+    xx, xy, yy = sums.normal_moments
+    curvature = x * (xx * x + xy * y) + y * (xy * x + yy * y)
     return SLACK / math.sqrt(curvature) if curvature > 0.0 else math.inf
 
 
-def _signed(axis: Floats) -> Floats:
+def _signed(x: float, y: float) -> tuple[float, float]:
     """Of the two opposite unit vectors return the one that points to the right, or straight up."""
-    return -axis if axis[0] < -1e-12 or (abs(axis[0]) <= 1e-12 and axis[1] < 0.0) else axis
+    return (-x, -y) if x < -1e-12 or (abs(x) <= 1e-12 and y < 0.0) else (x, y)

@@ -46,14 +46,9 @@ class OneStepSums:
 
     @classmethod
     def of_set(cls, pairs: Correspondences, weights: ArrayLike, reference: RigidTransform = IDENTITY) -> OneStepSums:
-        """Sum over all pairs, `weights` (n,)."""
-        # Eq. (1), sign corrected: p_S - p_D; the printed p_D - p_S returns exactly -T.
-        to_map = pairs.map_midpoints - [reference.x, reference.y]
-        gaps = np.einsum("ij,ij->i", pairs.map_normals, to_map) - pairs.offsets
-        sums = kernels.one_step_sums(
-            pairs.map_directions, gaps, pairs.directions, reference.theta, np.asarray(weights, dtype=np.float64)
-        )
-        return cls(sums, reference)
+        """Sum over all pairs, `weights` (n,); those of weight 0 do not count."""
+        at, checked = reference, np.ascontiguousarray(weights, dtype=np.float64)
+        return cls(kernels.one_step_sums(pairs.rows, at.x, at.y, at.theta, checked), reference)
 
     @classmethod
     def of_pair(
@@ -130,14 +125,18 @@ class OneStepSums:
 
         Eq. (19) as printed holds at the optimum and at T = 0 only; this form holds everywhere.
         """
-        return max(0.0, float(self.about(at).values[kernels.SC]))
+        return self.costs(at, "wahba")[0]
 
     def rotation_cost(self, at: RigidTransform, rotation: Rotation) -> float:
         """Return ``A_alpha / k_alpha`` at any transform.
 
         For Mitsuta the form of Eq. (17) that holds everywhere and not at the optimum alone; for Wahba Eqs. (13), (18).
         """
-        moved = self.about(RigidTransform(self.reference.x, self.reference.y, at.theta)).values
-        if rotation == "wahba":
-            return max(0.0, 2.0 * float(moved[kernels.SVERSINE]))
-        return max(0.0, float(moved[kernels.SA2]))
+        return self.costs(at, rotation)[1]
+
+    def costs(self, at: RigidTransform, rotation: Rotation) -> tuple[float, float]:
+        """Return both `translation_cost` and `rotation_cost`."""
+        old = self.reference
+        turn = wrap_angle(at.theta - old.theta)
+        translation, mitsuta, wahba = kernels.one_step_costs(self.compensated, at.x - old.x, at.y - old.y, turn)
+        return translation, wahba if rotation == "wahba" else mitsuta

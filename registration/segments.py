@@ -184,7 +184,7 @@ class MeasuredSegments:
 
 
 def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argument: str) -> Floats:
-    array = np.array(values, dtype=np.float64)
+    array = np.array(values, dtype=np.float64, order="C")
     if array.size == 0 and shape[0] == 0:
         array = array.reshape(shape)
     if array.shape != shape:

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtri
+from numpy.typing import ArrayLike
 
+from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
-from .diagnostics import covariance_of, diagnose, no_answer, residuals
+from .diagnostics import Residuals, covariance_of, diagnose, no_answer
 from .estimate import Problem, fit_joint, fit_one_step
-from .one_step import OneStepSums
 from .options import RegistrationOptions
-from .orientation import choose_rotation
 from .result import RegistrationResult
 from .segments import MeasuredSegments, Segments
-from .transform import RigidTransform
-from .weights import PairWeights, weigh
-
-Floats = NDArray[np.float64]
+from .weights import weigh
 
 TAIL = 0.001  # chance that chi2 of right pairs is larger; an answer beyond it is not usable
 DEFAULT_OPTIONS = RegistrationOptions()
@@ -61,49 +55,21 @@ def register(
     if not len(given):
         return no_answer(options)
 
-    problem, centred, unique = _pose_problem(given, weights, oriented=options.oriented)
+    problem = Problem.of(given, weights, oriented=options.oriented)
     fit = (fit_joint if options.estimator == "joint" else fit_one_step)(problem, options)
-    degenerate = fit.freedom.degenerate or not unique
+    degenerate = fit.freedom.degenerate or not problem.unique
 
-    x, y = fit.local_translation(problem) + problem.map_origin
-    offsets, angles = residuals(centred, fit)
-    diagnostics = diagnose(problem, fit, options)
+    residuals = Residuals.of(problem, fit)
+    diagnostics = diagnose(problem, fit, residuals, options)
     has_covariance = not degenerate and options.estimator == "joint"
-    direction = fit.freedom.direction
     return RegistrationResult(
         degenerate=degenerate,
-        usable=not degenerate and diagnostics.chi2 <= float(chdtri(diagnostics.dof, TAIL)),
-        pose=RigidTransform(float(x), float(y), fit.theta),
+        usable=not degenerate and diagnostics.chi2 <= chi_square_quantile(diagnostics.dof, TAIL),
+        pose=problem.map_from_local.compose(fit.local_from_scan),
         covariance=covariance_of(problem, fit) if has_covariance else None,
-        unobservable=None if direction is None else (float(direction[0]), float(direction[1])),
-        offsets=offsets,
-        angles=angles,
+        unobservable=fit.freedom.direction,
+        offsets=residuals.offsets,
+        angles=residuals.angles,
         weights=weights.used,
         diagnostics=diagnostics,
     )
-
-
-def _pose_problem(
-    given: Correspondences, weights: PairWeights, *, oriented: bool
-) -> tuple[Problem, Correspondences, bool]:
-    """Recentre, and turn segments round where directions mean nothing.
-
-    Returns the problem without the pairs of weight 0, all pairs about the middles of both sets, and whether only one
-    way to turn them fits.
-    """
-    active = weights.used > 0.0
-    counted = weights.take(active)
-    map_origin = given.map_midpoints[active].mean(axis=0)
-    scan_origin = given.centroids[active].mean(axis=0)
-    local = given.about(map_origin, np.zeros(2))
-    centred = local.about(np.zeros(2), scan_origin)
-    unique = True
-    if not oriented:
-        is_noise = counted.noise is not None
-        judged = counted.used if counted.noise is None else counted.noise
-        theta, unique = choose_rotation(centred.take(active), judged, is_noise=is_noise)
-        against = centred.runs_against(theta)
-        local, centred = local.turned(against), centred.turned(against)
-    pairs = local.take(active)
-    reference = OneStepSums.of_set(pairs, counted.used).solve("wahba")[0].theta
-    return Problem(pairs, centred.take(active), counted, map_origin, scan_origin, reference), centred, unique

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .correspondences import Correspondences, floored_sigma
+from ._pair_kernels import MIN_SIGMA, inverse_variances
+from .correspondences import Correspondences
 from .errors import InvalidArgumentError
 from .options import RegistrationOptions
 
@@ -20,7 +21,7 @@ MAX_SIGMA = 1e3  # m
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairWeights:
-    """Weights of n pairs.
+    """Weights of n pairs; a pair that does not count has 0 in each.
 
     Attributes
     ----------
@@ -37,13 +38,6 @@ class PairWeights:
     information: Floats
     noise: Floats | None
 
-    def take(self, rows: NDArray[np.bool_]) -> PairWeights:
-        """Return those of some pairs."""
-        used = self.used[rows]
-        information = used if self.information is self.used else self.information[rows]
-        noise = used if self.noise is self.used else None if self.noise is None else self.noise[rows]
-        return PairWeights(used, information, noise)
-
 
 def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions) -> PairWeights:
     """Weigh pairs as `options` say.
@@ -56,11 +50,12 @@ def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions
     """
     if not (math.isfinite(map_sigma) and 0.0 <= map_sigma <= MAX_SIGMA):
         raise InvalidArgumentError(f"expected a number from 0 to {MAX_SIGMA:g}", argument="map.sigma")
-    variances = pairs.variances + floored_sigma(map_sigma) ** 2
-    noise = 1.0 / variances if (variances > 0.0).all() else None
+    floored = max(float(map_sigma), MIN_SIGMA) if map_sigma > 0.0 else 0.0
+    inverses, known = inverse_variances(pairs.rows, floored**2)
+    noise = inverses if known else None
     if options.weights is not None:
         given = _checked_weights(options.weights, len(pairs))
-        return PairWeights(given, given, noise)
+        return PairWeights(given, given, None if noise is None else np.where(given > 0.0, noise, 0.0))
     if options.weighting == "information":
         if noise is None:
             raise InvalidArgumentError(

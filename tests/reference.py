@@ -14,6 +14,18 @@ def rotation(theta):
     return np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
 
 
+def pair_rows(map_segments, scan, pairs):
+    """What is known of each pair, in the order of `registration._pair_kernels`."""
+    rows = []
+    for i, j in pairs:
+        m, s = map_segments, scan.segments
+        sigma = max(scan.sigma[i], 1e-12) if scan.sigma[i] > 0.0 else 0.0
+        of_map = [*m.directions[j], *m.midpoints[j], m.lengths[j]]
+        of_scan = [*s.directions[i], *s.midpoints[i], s.lengths[i], *scan.centroids[i], scan.spreads[i]]
+        rows.append([*of_map, *of_scan, sigma**2 / scan.points[i]])
+    return np.array(rows)
+
+
 # Joint estimator -----------------------------------------------------------------------------------------------------
 
 
