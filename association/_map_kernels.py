@@ -90,12 +90,15 @@ def _column_span(x1, y1, x2, y2, radius, low, high):
 
 
 @njit(cache=True, nogil=True)
-def grid_cells(endpoints, radius, x0, y0, cell, columns, rows, sectors, n_sectors):
+def grid_cells(endpoints, radius, shape, sectors, n_sectors):
     """List for every cell of a uniform grid and every sector the walls that come within `radius` of the cell.
 
-    `sectors` (m,): which of the `n_sectors` a wall is listed under. Returns ``(starts, items)``: place
+    `shape` (5,): x0, y0, cell size, columns, rows. `sectors` (m,): which of the `n_sectors` a wall is listed under.
+    Returns ``(starts, items)``: place
     ``c = (row * columns + column) * n_sectors + sector`` holds ``items[starts[c]:starts[c + 1]]``.
     """
+    x0, y0, cell = shape[0], shape[1], shape[2]
+    columns, rows = int(shape[3]), int(shape[4])
     places = columns * rows * n_sectors
     starts = np.zeros(places + 1, dtype=np.int64)
     items = np.zeros(0, dtype=np.int32)
@@ -132,8 +135,10 @@ def grid_cells(endpoints, radius, x0, y0, cell, columns, rows, sectors, n_sector
 
 
 @njit(cache=True, nogil=True)
-def direction_raster(endpoints, radius, x0, y0, cell, columns, rows, sectors):
+def direction_raster(endpoints, radius, shape, sectors):
     """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of. Returns (rows * columns,) of bits."""
+    x0, y0, cell = shape[0], shape[1], shape[2]
+    columns, rows = int(shape[3]), int(shape[4])
     bits = np.zeros(columns * rows, dtype=np.uint16)
     for i in range(len(endpoints)):
         x1 = endpoints[i, 0]

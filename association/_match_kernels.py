@@ -25,9 +25,7 @@ SCAN_COLUMNS = 16
 
 REACH = 0.4  # m; the grid lists a wall in the cells this near to it, so gates end here
 MAX_ANGLE_GATE = 0.35  # rad
-BRIDGING = (
-    3.0  # m; only a longer segment may bridge a gap between walls, a short one is more likely to be clutter there
-)
+BRIDGING = 3.0  # m; only a longer segment may bridge a gap between walls: a short one may well be clutter there
 MIN_PIVOT = 1e-12
 SECTORS = 16  # a power of two; of directions, in the lists by direction; 0 degrees is the middle of one
 MAX_STEP = 1.0  # m; a consensus set that moves its pose farther than that, or

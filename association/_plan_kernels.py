@@ -5,8 +5,9 @@ import math
 import numpy as np
 from numba import njit
 
-from ._search_kernels import HARD_PRIOR, MIN_CROSSING_BASE, least_length, search_base
+from ._search_kernels import MIN_CROSSING_BASE, least_length, search_base
 
+TELLING = 0.25  # m; how far a base may lay the other segments off, root mean square
 REUSE = 0.3  # what a base is worth less for each earlier use of one of its segments
 
 # Measured costs, nanoseconds: of a base, a wall that it may slide on, a metre of slide, a hypothesis.
@@ -161,6 +162,23 @@ def fewest_segments(best_gains, beyond, needed):
     return max(len(best_gains), 2)
 
 
+@njit(cache=True, nogil=True)
+def is_telling(scan, a, b):
+    """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
+
+    Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
+    """
+    variance = scan[a, 10] * scan[b, 10] / (scan[a, 10] + scan[b, 10])
+    x = 0.5 * (scan[a, 2] + scan[b, 2])
+    y = 0.5 * (scan[a, 3] + scan[b, 3])
+    total = 0.0
+    gain = 0.0
+    for i in range(len(scan)):
+        total += scan[i, 12] * ((scan[i, 2] - x) ** 2 + (scan[i, 3] - y) ** 2)
+        gain += scan[i, 12]
+    return variance * total <= TELLING**2 * gain
+
+
 # Why `advance` came back.
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
@@ -194,10 +212,11 @@ def advance(
         if progress[1] > 0:
             return BUDGET
         progress[4] = -1
-        cover(residual, bound, a, b)
         needed = rules[3] * best[0]
-        miss[0] = strike(missing, inliers, a, b, fewest_segments(best_gains, beyond, needed))
-        if not exhaustive and prior[0] != HARD_PRIOR:
+        if is_telling(scan, a, b):
+            cover(residual, bound, a, b)
+            miss[0] = strike(missing, inliers, a, b, fewest_segments(best_gains, beyond, needed))
+        if not exhaustive:
             if bound[0] < needed:
                 return PROVEN
             if miss[0] <= miss[1]:

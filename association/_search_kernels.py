@@ -18,8 +18,10 @@ PROGRESS_SIZE = 4
 
 # Columns of `found` (k, 5): value (score and prior together), theta, x, y, score.
 FOUND_COLUMNS = 5
-# Places of `best`: highest value found; least value on a full list; highest score within a hard prior's window.
-BEST_SIZE = 3
+# Places of `best`: highest value found; least value on a full list.
+BEST_SIZE = 2
+WINDOW_MARGIN = 0.5  # m, and
+WINDOW_TURN = 0.1  # rad; what lies farther outside a hard prior's window is not refined into it
 # Places of `rules`: share of the best value that a pose must reach to be kept; distance and angle of distinct poses.
 RULES_SIZE = 3
 # Places of `prior`: kind, x, y, theta, then xx, xy, xt, yy, yt, tt of the information matrix, or radius and angle.
@@ -96,23 +98,21 @@ def keep(found, count, best, pose, score, value, distance, angle):
 @njit(inline="always")
 def floor_of(rules, best, bonus):
     """Return the score that a pose must reach to be kept, given what the prior says of it."""
-    if bonus >= INSIDE:
-        return max(rules[0] * best[2], best[1] - bonus)
-    return max(rules[0] * best[0] - bonus, best[1] - bonus)
+    return max(rules[0] * best[0], best[1]) - bonus
 
 
 @njit(cache=True, nogil=True)
 def offer(found, count, best, rules, prior, pose, score):
     """Keep a refined pose if it is worth it."""
     bonus = prior_value(prior, pose[0], pose[1], pose[2])
+    if prior[0] == HARD_PRIOR:
+        if bonus < INSIDE:
+            return
+        bonus = 0.0
     if score <= 0.0 or score < floor_of(rules, best, bonus):
         return
     keep(found, count, best, pose, score, score + bonus, rules[1], rules[2])
-    if bonus >= INSIDE:
-        best[2] = max(best[2], score)
-        best[0] = max(best[0], score)
-    else:
-        best[0] = max(best[0], score + bonus)
+    best[0] = max(best[0], score + bonus)
 
 
 @njit(inline="always")
@@ -183,7 +183,15 @@ def try_pose(
     Returns what it cost, in tests of a wall.
     """
     progress[2] += 1
-    floor = floor_of(rules, best, prior_value(prior, pose[0], pose[1], pose[2]))
+    bonus = prior_value(prior, pose[0], pose[1], pose[2])
+    if prior[0] == HARD_PRIOR:
+        bonus = 0.0
+        if (
+            math.hypot(pose[1] - prior[1], pose[2] - prior[2]) > prior[4] + WINDOW_MARGIN
+            or abs(wrap(pose[0] - prior[3])) > prior[5] + WINDOW_TURN
+        ):
+            return COST_REJECTED
+    floor = floor_of(rules, best, bonus)
     if not may_score(scan, pose, spreads, raster_shape, bits, floor):
         return COST_REJECTED
     turning(theta_var, gx, gy, covariance)
@@ -245,6 +253,13 @@ def search_base(
     per_radian = SECTORS / (2.0 * math.pi)
     spread = tolerance * per_radian
     spent = len(bin_starts)
+    # A hard prior says about where the midpoint of a is.
+    windowed = prior[0] == HARD_PRIOR
+    widest = prior[5] + WINDOW_TURN + tolerance
+    nearest_x = math.cos(prior[3]) * scan[a, 2] - math.sin(prior[3]) * scan[a, 3] + prior[1]
+    nearest_y = math.sin(prior[3]) * scan[a, 2] + math.cos(prior[3]) * scan[a, 3] + prior[2]
+    lever = 2.0 * math.hypot(scan[a, 2], scan[a, 3]) * math.sin(0.5 * min(widest, math.pi))
+    window = prior[4] + WINDOW_MARGIN + lever + swing
     while progress[1] < n_anchors:
         wa = anchor_list[progress[1]]
         progress[1] += 1
@@ -253,6 +268,13 @@ def search_base(
         dy = runs[wa, 1]
         at = runs[wa, 3] + half_a
         high = runs[wa, 4] - half_a
+        if windowed:
+            away = dx * nearest_y - dy * nearest_x - runs[wa, 2]
+            if abs(away) > window or abs(wrap(runs[wa, 5] - scan[a, 5] - prior[3])) > widest:
+                continue
+            along = dx * nearest_x + dy * nearest_y
+            at = max(at, along - window)
+            high = min(high, along + window)
         # Rotation that lays a on the wall, and the direction that b then has.
         c = dx * adx + dy * ady
         s = dy * adx - dx * ady

@@ -116,6 +116,29 @@ def find_candidates(
     CancelledError
         When the deadline was cancelled.
     """
+    if not isinstance(prior, HardPrior):
+        return _search(index, scan, prior, (options, deadline), for_beams=for_beams)
+    # A window is searched by itself; the whole map shows whether a clearly better pose lies outside.
+    within = _search(index, scan, prior, (options, deadline), for_beams=for_beams)
+    anywhere = _search(index, scan, None, (options, deadline), for_beams=for_beams)
+    one, other = within.report, anywhere.report
+    report = SearchReport(
+        complete=one.complete and other.complete,
+        exhaustive=one.exhaustive and other.exhaustive,
+        confidence=min(one.confidence, other.confidence),
+        bases=one.bases + other.bases,
+        hypotheses=one.hypotheses + other.hypotheses,
+        verified=one.verified + other.verified,
+        seed=options.seed,
+    )
+    return Candidates(np.concatenate([within.poses, anywhere.poses]), report)
+
+
+def _search(
+    index: MapIndex, scan: ScanRows, prior: Prior | None, how: tuple[AssociationOptions, Deadline], *, for_beams: bool
+) -> Candidates:
+    """Search the map, or the window of a hard prior."""
+    options, deadline = how
     walls, runs, grid, sectors, raster = index.walls, index.runs, index.grid, index.sectors, index.raster
     gate = gates(options)
     kept, share = (KEPT_FOR_BEAMS, KEEP_SHARE_FOR_BEAMS) if for_beams else (KEPT, KEEP_SHARE)
@@ -142,6 +165,8 @@ def find_candidates(
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
     spacing = SLIDE_SPACING_FOR_BEAMS if for_beams else SLIDE_SPACING
+    if isinstance(prior, HardPrior):
+        spacing = min(spacing, prior.radius)
     rules[1] = 0.9 * spacing
     for a in _sliding_segments(rows, (share if for_beams else RIVAL_SHARE) * best[0]):
         search_slides(

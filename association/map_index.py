@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -188,7 +187,8 @@ class MapIndex:
     def nbytes(self) -> int:
         """Memory held, bytes."""
         tables: list[tuple[NDArray[Any], ...]] = [self.walls, self.runs, self.grid, self.sectors, self.raster]
-        arrays = [self.wall_of_piece, self.pieces, self.piece_starts, *itertools.chain.from_iterable(tables)]
+        arrays: list[NDArray[Any]] = [self.wall_of_piece, self.pieces, self.piece_starts]
+        arrays += [array for table in tables for array in table]
         geometry = 2 * 11 * 8 * len(self.segments)
         return geometry + sum(a.nbytes for a in arrays)
 
@@ -258,7 +258,7 @@ def direction_bin(angles: Floats) -> NDArray[np.intp]:
 def _grids(walls: Walls, runs: Walls) -> tuple[Grid, Grid, Raster]:
     ends, sector = _ends(walls), _sectors(walls)
     shape = _shape(ends, RASTER_CELL, REACH, MAX_CELLS)
-    raster = Raster(shape, direction_raster(ends, REACH, *shape[:3], int(shape[3]), int(shape[4]), sector))
+    raster = Raster(shape, direction_raster(ends, REACH, shape, sector))
     near = _grid(ends, np.zeros(len(ends), dtype=np.int64), 1, (CELL, REACH))
     return near, _grid(_ends(runs), _sectors(runs), SECTORS, (SWEEP_CELL, SWEEP_REACH)), raster
 
@@ -280,7 +280,7 @@ def _grid(ends: Floats, sector: NDArray[np.int64], sectors: int, sizes: tuple[fl
     """Lay a grid of cells of ``sizes[0]`` metres over what is within ``sizes[1]`` of the walls."""
     size, reach = sizes
     shape = _shape(ends, size, reach, MAX_CELLS / sectors)
-    starts, items = grid_cells(ends, reach, *shape[:3], int(shape[3]), int(shape[4]), sector, sectors)
+    starts, items = grid_cells(ends, reach, shape, sector, sectors)
     return Grid(shape, starts, items)
 
 

@@ -76,10 +76,9 @@ def rank_candidates(
     prior, options = priors
     scored = _score(index, scan, rows, candidates.poses, options)
     if scan.beams is not None and len(candidates.poses):
-        scored = _weigh_beams(index, scan, rows, scored, options)
+        scored = _weigh_beams(index, scan, rows, scored, priors)
     poses, scores = scored.poses, scored.scores
-    flat = encode_prior(prior, index.origin)
-    values = scores + np.array([prior_value(flat, *pose) for pose in poses])
+    values = scores if prior is None else scores + _prior_values(index, prior, poses)
     ranked: list[Ranked] = []
     most = max(LEAST_DISTINCT, options.max_alternatives + 1)
     for i in _distinct(poses, scored.covariances, np.where(scores > 0.0, values, -np.inf), most):
@@ -152,15 +151,28 @@ def _score(index: MapIndex, scan: Scan, rows: ScanRows, at: Floats, options: Ass
     return scored
 
 
-def _weigh_beams(index: MapIndex, scan: Scan, rows: ScanRows, scored: _Scored, options: AssociationOptions) -> _Scored:
+def _weigh_beams(
+    index: MapIndex, scan: Scan, rows: ScanRows, scored: _Scored, priors: tuple[Prior | None, AssociationOptions]
+) -> _Scored:
     """Add what the raw beams say to the scores, and move the best poses to where the beams fit."""
+    prior, options = priors
     by_few = scored.scores + _beam_scores(index, scan, scored.poses, FEW_BEAMS, 0)
     best = np.argsort(-by_few, kind="stable")[:BEAM_FINALISTS]
+    if isinstance(prior, HardPrior):
+        # What lies within the window is looked at, however good the poses outside are.
+        within = np.argsort(-(by_few + _prior_values(index, prior, scored.poses)), kind="stable")[:BEAM_FINALISTS]
+        best = np.concatenate([within, best[~np.isin(best, within)]])
     poses = scored.poses[best]
     evidence = _beam_scores(index, scan, poses, MOST_BEAMS, len(poses))
     final = _score(index, scan, rows, poses, options)
     final.scores[:] = np.where(final.scores > 0.0, final.scores + evidence, 0.0)
     return final
+
+
+def _prior_values(index: MapIndex, prior: Prior | None, poses: Floats) -> Floats:
+    """Return what the prior says of each pose, nats."""
+    flat = encode_prior(prior, index.origin)
+    return np.array([prior_value(flat, *pose) for pose in poses])
 
 
 def _beam_scores(index: MapIndex, scan: Scan, poses: Floats, most: int, refined: int) -> Floats:

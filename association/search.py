@@ -14,9 +14,9 @@ from .options import AssociationOptions, Deadline, Prior, Scan
 from .ranking import Ranked, rank_candidates
 from .result import Alternative, AssociationDiagnostics, AssociationResult, AssociationWarning, SearchReport, Status
 from .scan_rows import gates, scan_rows
-from .sight import missing_walls
+from .sight import agreement, missing_walls
 from .significance import significance
-from .verdict import Verdict, judge
+from .verdict import Evidence, Verdict, judge
 
 Floats = NDArray[np.float64]
 
@@ -64,7 +64,8 @@ def associate(
     chance = 1.0 if best is None else significance(index, rows, gates(options), float(best.matches[:, 4].sum()))
     accepted = None if best is None else accept(index, scan, rows, best)
     registered = None if accepted is None else register_accepted(index, scan, accepted, options)
-    verdict = judge(ranked, registered, with_beams=beams)
+    shown = 0.0 if best is None else agreement(index, scan, rows, best)
+    verdict = judge(ranked, registered, Evidence(rows.rows[:, 4], shown, beams))
     if best is None or accepted is None or registered is None or verdict.status is Status.NO_MATCH:
         return _no_match(scan, ranked, verdict, candidates.report, (index, options))
     matched = set(accepted.pairs[:, 0].tolist())

@@ -15,12 +15,23 @@ from .result import Status
 
 Floats = NDArray[np.float64]
 
-# Chance that the first explanation or a twin of it is right: a logistic model of `features`, by maximum likelihood over
-# floor plans and logs in their own maps and, at three tenths of the weight, in those of others.
-# `python -m benchmarks.calibration` fits such a model on half of the buildings and reports both on the other half.
-COEFFICIENTS = (-6.076, 0.173, -0.170, 10.67, 0.788, -0.806, -3.331, -0.408)
+# Chance that the first explanation or a twin of it is right: logistic models of `features`, by maximum likelihood over
+# floor plans and logs; `python -m benchmarks.calibration` fits them, and reports them cross-validated over buildings.
+# The first for scans that are known to be of this map. The second also over scans of other buildings, at three tenths
+# of the weight: what it says decides about going by an answer.
+COEFFICIENTS = (
+    -1.208, 0.1682, -0.1348, 1.7, 0.439, 0.1106, -5.78, 0.2937, -2.842, -0.427, 4.346, -0.7584, -8.8, -0.1783,
+    -0.006462,
+)  # fmt: skip
+CAUTIOUS = (
+    2.868, 0.1932, 0.1134, -0.6385, 0.01539, 0.538, -5.489, 0.4785, -2.934, -0.2976, 3.595, -1.312, -20.32, -2.243,
+    -0.02681,
+)  # fmt: skip
+# With raw beams, which tell a wrong place by themselves, one model of the first eight features does for both.
 COEFFICIENTS_WITH_BEAMS = (-5.931, 0.090, 0.341, 4.763, 0.832, 0.095, -3.275, -0.018)
 DEVIATION = 6  # place among the features
+MANY = 8  # matched segments, from which on the misfit says as much as it can
+NEARLY_ALL = 0.85  # of the scan's length
 MAX_LEAD = 40.0  # nats
 CROWD_TEMPERATURE = 4.0  # nats
 LEAST_CROWD = -12.0
@@ -28,10 +39,30 @@ LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as likely as one to e
 
 USABLE_PROBABILITY = 0.94
+USABLE_CAUTIOUS = 0.94  # of the same, where other buildings are reckoned with
 NO_MATCH_PROBABILITY = 0.03  # of the first explanation or a twin of it
 CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
 FAR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
 MAX_DEVIATION = 0.5  # m; beyond it the weakest direction counts as not fixed
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What is known beside the explanations.
+
+    Attributes
+    ----------
+    lengths : (n,)
+        Of the scan segments, metres, in the order of the matches.
+    agreement : float
+        Share of directions in which the scan shows what the map does, 0 to 1.
+    with_beams : bool
+        Whether raw beams are in the scores.
+    """
+
+    lengths: Floats
+    agreement: float
+    with_beams: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +76,7 @@ class Verdict:
     contradicted: bool
 
 
-def judge(ranked: list[Ranked], registered: RegistrationResult | None, *, with_beams: bool) -> Verdict:
+def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence: Evidence) -> Verdict:
     """Weigh the best explanation against the others and against none being right.
 
     Parameters
@@ -54,8 +85,7 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, *, with_b
         As ordered by `rank_candidates`; may be empty.
     registered : RegistrationResult or None
         Of the best one's pairs.
-    with_beams : bool
-        Whether raw beams are in the scores.
+    evidence : Evidence
     """
     inside = [r for r in ranked if r.inside]
     if not inside or registered is None:
@@ -64,45 +94,69 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, *, with_b
     better_elsewhere = any(r.score > best.score + CONTRADICTION for r in ranked if r is not best)
     contradicted = better_elsewhere or best.value - best.score < FAR
     others = inside[1:]
-    lead = best.value - others[0].value if others else best.value
-    x = features(best, others)
-    coefficients = np.array(COEFFICIENTS_WITH_BEAMS if with_beams else COEFFICIENTS)
-    probability = _logistic(float(x @ coefficients)) * twin_share(best, others)
+    x, share = features(best, others, evidence), twin_share(best, others)
+    coefficients, cautious = COEFFICIENTS, CAUTIOUS
+    if evidence.with_beams:
+        x, coefficients, cautious = x[: len(COEFFICIENTS_WITH_BEAMS)], COEFFICIENTS_WITH_BEAMS, COEFFICIENTS_WITH_BEAMS
+    probability = _logistic(float(x @ np.array(coefficients))) * share
+    careful = _logistic(float(x @ np.array(cautious))) * share
     # Whether anything explains the scan is another question than whether it fixes the position.
     x[DEVIATION] = 0.0
-    explained = _logistic(float(x @ coefficients))
+    explained = _logistic(float(x @ np.array(coefficients)))
     if contradicted:
         probability = min(probability, 0.5)
-    margin = lead if others else None
+    margin = best.value - others[0].value if others else None
     runner_up = max(0.0, others[0].value / best.value) if others and best.value > 0.0 else None
     if explained < NO_MATCH_PROBABILITY:
         status = Status.NO_MATCH
     elif is_degenerate(registered):
         status = Status.DEGENERATE
-    elif probability < USABLE_PROBABILITY:
+    elif probability < USABLE_PROBABILITY or careful < USABLE_CAUTIOUS:
         status = Status.AMBIGUOUS
     else:
         status = Status.OK
     return Verdict(status, probability, margin, runner_up, contradicted)
 
 
-def features(best: Ranked, others: list[Ranked]) -> Floats:
+def features(best: Ranked, others: list[Ranked], evidence: Evidence) -> Floats:
     """Return what the probability depends on.
 
     Returns
     -------
-    (8,)
+    (15,)
         1; lead over the best other explanation, nats; minus the log of the others' tempered evidence; matched share of
         the scan's length; square root of the number of matched segments; square root of their length, sqrt(m); standard
-        deviation of the position along its weakest direction, up to 1 m; log of the misfit.
+        deviation of the position along its weakest direction, up to 1 m; log of the misfit; one over that number; the
+        longest segment that is not matched, m; the agreement of what is seen with the map; the log of the misfit times
+        the number over `MANY`; the share beyond `NEARLY_ALL`; square root of the length that is not matched, sqrt(m);
+        the square of the third.
     """
     lead = best.value - others[0].value if others else best.value
     crowd = math.log(_evidence(best, others, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
-    count = int((best.matches[:, 0] >= 0.0).sum())
+    matched = best.matches[:, 0] >= 0.0
+    count = int(matched.sum())
+    unmatched = evidence.lengths[~matched]
     deviation = math.sqrt(float(np.linalg.eigvalsh(best.covariance[:2, :2])[1]))
     misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
-    seen = [best.share, math.sqrt(count), math.sqrt(best.length)]
-    return np.array([1.0, min(lead, MAX_LEAD), -crowd, *seen, min(deviation, 1.0), misfit])
+    return np.array(
+        [
+            1.0,
+            min(lead, MAX_LEAD),
+            -crowd,
+            best.share,
+            math.sqrt(count),
+            math.sqrt(best.length),
+            min(deviation, 1.0),
+            misfit,
+            1.0 / max(1, count),
+            float(unmatched.max(initial=0.0)),
+            evidence.agreement,
+            misfit * min(count, MANY) / MANY,
+            max(0.0, best.share - NEARLY_ALL),
+            math.sqrt(float(unmatched.sum())),
+            crowd**2,
+        ]
+    )
 
 
 def twin_share(best: Ranked, others: list[Ranked]) -> float:

@@ -1,10 +1,12 @@
-"""Fits the verdict's probability on half of the buildings and reports it on the other half.
+"""Fits the verdict's two probabilities, and reports them by cross-validation over buildings.
 
 The chance that the best explanation is right is a logistic function of `association.verdict.features`, shared between
-explanations that are about as good. Scans of floor plans (three levels of clutter), every second scan of each log, and
-scans that were searched in the map of another building, where nothing is right. Buildings go to a half by a hash.
+explanations that are about as good. Scans of floor plans (three levels of clutter) and logs, and scans that were
+searched in the map of another building, where nothing is right: these count next to nothing for the one probability,
+which is about scans of this map, and more for the other, which an answer has to pass too before a robot goes by it.
+What is reported of an answer comes from a fit without its building, or without its log; the coefficients come from all.
 
-``python -m benchmarks.calibration [--stride 1] [--strangers 0.3]``
+``python -m benchmarks.calibration [--stride 1]``
 """
 
 from __future__ import annotations
@@ -21,9 +23,18 @@ from association.accept import accept, register_accepted
 from association.candidates import find_candidates
 from association.ranking import rank_candidates
 from association.scan_rows import scan_rows
-from association.verdict import COEFFICIENTS, TWIN_TEMPERATURE, features, is_degenerate
+from association.sight import agreement
+from association.verdict import (
+    CAUTIOUS,
+    COEFFICIENTS,
+    TWIN_TEMPERATURE,
+    USABLE_PROBABILITY,
+    Evidence,
+    features,
+    is_degenerate,
+)
 
-from .collection import Collection, MapKey, Query, held_out
+from .collection import Collection, MapKey, Query, fold
 from .outcomes import OPTIONS, is_right, other_map, progress
 from .queries import floor_plans, logs
 from .reliability import print_bins
@@ -31,7 +42,9 @@ from .table import print_table
 
 RIDGE = 1e-2  # on standardised coefficients, in units of one answer
 TEMPERATURES = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)  # nats
-THRESHOLDS = (0.9, 0.91, 0.92, 0.93, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99)
+THRESHOLDS = (0.8, 0.85, 0.88, 0.9, 0.92, 0.94, 0.96)
+STRANGERS = 0.02  # weight of a scan of another building
+STRANGERS_CAUTIOUS = 0.3
 GROUPS = ("scan", "scan_30", "scan_50", "logs", "strangers")
 
 
@@ -43,15 +56,15 @@ class Example:
     ----------
     group : str
         One of `GROUPS`.
-    held : bool
-        Of the half that is reported on.
+    fold : int
+        It is reported on by a fit without that one.
     x : (k,) features
     gaps : (n,) how much less than the best the other explanations are worth, nats, 0 or less
     right, degenerate : bool
     """
 
     group: str
-    held: bool
+    fold: int
     x: np.ndarray
     gaps: np.ndarray
     right: bool
@@ -71,8 +84,9 @@ def explain(index: MapIndex, query: Query, group: str, collection: Collection, *
         return None
     right = own and is_right(registered.pose, query.pose, collection)
     gaps = np.minimum(0.0, [r.value - ranked[0].value for r in ranked[1:]])
-    x = features(ranked[0], ranked[1:])
-    return Example(group, held_out(query.map), x, gaps, right, is_degenerate(registered))
+    evidence = Evidence(rows.rows[:, 4], agreement(index, scan, rows, ranked[0]), False)
+    x = features(ranked[0], ranked[1:], evidence)
+    return Example(group, fold(query.map), x, gaps, right, is_degenerate(registered))
 
 
 def collect(stride: int) -> list[Example]:
@@ -88,7 +102,7 @@ def collect(stride: int) -> list[Example]:
     for k, log in enumerate(of_logs):
         other = of_logs[(k + 1) % len(of_logs)]
         key: MapKey = next(iter(other.maps))
-        for n, query in enumerate(log.queries[::2]):
+        for n, query in enumerate(log.queries):
             found.append(explain(log.index(query.map), query, "logs", log, own=True))
             if n % 4 == 0:
                 found.append(explain(other.index(key), query, "strangers", log, own=False))
@@ -117,9 +131,9 @@ def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:
     return np.array([strangers if e.group == "strangers" else 1.0 for e in examples])
 
 
-def log_loss(model: Model, examples: Sequence[Example], strangers: float) -> float:
+def log_loss(probabilities: np.ndarray, examples: Sequence[Example], strangers: float) -> float:
     """Return the mean of minus the log of the chance given to what happened, nats."""
-    p = np.clip(model.probabilities(examples), 1e-12, 1.0 - 1e-12)
+    p = np.clip(probabilities, 1e-12, 1.0 - 1e-12)
     right = np.array([e.right for e in examples])
     weights = _weights(examples, strangers)
     return float(-(weights * np.where(right, np.log(p), np.log1p(-p))).sum() / weights.sum())
@@ -149,49 +163,60 @@ def fit(examples: Sequence[Example], strangers: float, temperature: float) -> Mo
     return Model(w, temperature)
 
 
-def print_thresholds(title: str, model: Model, examples: Sequence[Example]) -> None:
-    """Print for several thresholds the usable share by group and how many of those are wrong."""
-    p = model.probabilities(examples)
+def cross_validated(examples: Sequence[Example], strangers: float, temperature: float) -> np.ndarray:
+    """Return for each answer the probability by a fit to the other folds."""
+    folds = np.array([e.fold for e in examples])
+    out = np.zeros(len(examples))
+    for here in np.unique(folds):
+        model = fit([e for e in examples if e.fold != here], strangers, temperature)
+        out[folds == here] = model.probabilities([e for e in examples if e.fold == here])
+    return out
+
+
+def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: Sequence[Example]) -> None:
+    """Print for several thresholds of the cautious model the usable share by group and how many of those are wrong."""
     cells = []
     for threshold in THRESHOLDS:
         row = [f"{threshold:g}"]
         for group in GROUPS:
-            mine = [(e, q) for e, q in zip(examples, p, strict=True) if e.group == group]
-            usable = [e.right for e, q in mine if q >= threshold and not e.degenerate]
+            mine = [k for k, e in enumerate(examples) if e.group == group]
+            passed = [k for k in mine if p[k] >= USABLE_PROBABILITY and careful[k] >= threshold]
+            usable = [examples[k].right for k in passed if not examples[k].degenerate]
             row.append(f"{len(usable) / len(mine):.3f} ({usable.count(False)} wrong)" if mine else "")
         cells.append(row)
     print_table(title, ("usable from", *GROUPS), cells)
 
 
-def report(title: str, model: Model, examples: Sequence[Example], strangers: float) -> None:
-    """Print how a model does on some answers."""
-    print(f"\n{title}: log-loss {log_loss(model, examples, strangers):.4f} over {len(examples)} answers")
-    own = [e for e in examples if e.group != "strangers"]
-    print_bins(f"{title}, scans in their own map", model.probabilities(own), np.array([e.right for e in own]))
-    print_thresholds(f"{title}, usable share", model, examples)
+def report(title: str, p: np.ndarray, careful: np.ndarray, examples: Sequence[Example]) -> None:
+    """Print how two probabilities of each answer do."""
+    losses = [f"{log_loss(q, examples, w):.4f}" for q, w in ((p, STRANGERS), (careful, STRANGERS_CAUTIOUS))]
+    print(f"\n{title}: log-loss {losses[0]}, cautious {losses[1]}, over {len(examples)} answers")
+    own = np.array([e.group != "strangers" for e in examples])
+    right = np.array([e.right for e in examples])
+    print_bins(f"{title}, scans in their own map", p[own], right[own])
+    print_thresholds(f"{title}, usable share", p, careful, examples)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stride", type=int, default=1, help="take one in so many queries")
-    parser.add_argument("--strangers", type=float, default=0.3, help="weight of a scan of another building")
     args = parser.parse_args()
     examples = collect(args.stride)
-    half = [e for e in examples if not e.held]
-    rest = [e for e in examples if e.held]
     cells = []
-    models = [fit(half, args.strangers, temperature) for temperature in TEMPERATURES]
-    for model in models:
-        losses = [log_loss(model, part, args.strangers) for part in (half, rest)]
-        cells.append((f"{model.temperature:g}", *(f"{v:.4f}" for v in losses)))
-    print_table("Temperature of the twins", ("nats", "log-loss, fitted half", "log-loss, held-out half"), cells)
-    best = min(models, key=lambda model: log_loss(model, half, args.strangers))
-    print("\nCOEFFICIENTS = (" + ", ".join(f"{v:.4g}" for v in best.coefficients) + ")")
-    print(f"TWIN_TEMPERATURE = {best.temperature:g}")
-    report("Fitted, on the held-out half", best, rest, args.strangers)
-    current = Model(np.array(COEFFICIENTS), TWIN_TEMPERATURE)
-    if len(current.coefficients) == len(best.coefficients):
-        report("As in association/verdict.py, on the held-out half", current, rest, args.strangers)
+    for temperature in TEMPERATURES:
+        losses = [
+            log_loss(cross_validated(examples, strangers, temperature), examples, strangers)
+            for strangers in (STRANGERS, STRANGERS_CAUTIOUS)
+        ]
+        cells.append((f"{temperature:g}", *(f"{v:.4f}" for v in losses)))
+    print_table("Temperature of the twins, cross-validated log-loss", ("nats", "probability", "cautious"), cells)
+    for name, strangers in (("COEFFICIENTS", STRANGERS), ("CAUTIOUS", STRANGERS_CAUTIOUS)):
+        model = fit(examples, strangers, TWIN_TEMPERATURE)
+        print(f"\n{name} = (" + ", ".join(f"{v:.4g}" for v in model.coefficients) + ")")
+    tried = [cross_validated(examples, w, TWIN_TEMPERATURE) for w in (STRANGERS, STRANGERS_CAUTIOUS)]
+    report("Cross-validated", tried[0], tried[1], examples)
+    current = [Model(np.array(c), TWIN_TEMPERATURE).probabilities(examples) for c in (COEFFICIENTS, CAUTIOUS)]
+    report("As in association/verdict.py", current[0], current[1], examples)
 
 
 if __name__ == "__main__":

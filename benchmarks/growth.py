@@ -17,10 +17,10 @@ from association import MapIndex, Scan, associate
 from registration import Correspondences, JointSums, MeasuredSegments, RigidTransform, Segments
 from simulation import OfficePlan
 
-from .collection import SIGMA
+from .collection import FLOOR_PLANS, SIGMA
 from .drawn import NEAR, campus_of_offices, cluttered_scan, nearby, take_scan
 from .outcomes import OPTIONS, offset, progress
-from .queries import FAMILIES, data_found, floor_plans
+from .queries import data_found, floor_plans
 from .table import Row, at_most, mean, print_rows, print_table, quantile
 
 PAIRS = (10, 100, 1_000, 10_000, 100_000, 1_000_000)
@@ -75,7 +75,7 @@ def campus(size: int) -> Segments:
         plan = OfficePlan(rooms=8, corridors=3)
         world = campus_of_offices(rng, 1 + size // 250, plan)
         return world.segments.take(np.arange(min(size, len(world.segments))))
-    plans = [s.endpoints for key, s in sorted(floor_plans().maps.items()) if key[0] in FAMILIES]
+    plans = [s.endpoints for key, s in sorted(floor_plans().maps.items()) if key[0] in FLOOR_PLANS]
     if size < 1000:
         plans = [p for p in plans if len(p) <= size]
     pieces: list[np.ndarray] = []

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 
 from association import Status
 
-from .collection import LEVELS, held_out
+from .collection import LEVELS
 from .outcomes import Outcome, offset, other_logs, run, strangers
 from .queries import LOGS, floor_plans, logs
 from .reliability import print_reliability, reliability_row
@@ -176,14 +176,9 @@ def localization(only: set[str], stride: int, *, listing: bool) -> list[Row]:
     print_statuses(groups)
     everything = [o for outcomes in groups.values() for o in outcomes]
     print_reliability("Probability", everything)
-    held = [o for o in everything if held_out(o.query.map)]
-    print_reliability("Probability, the half that calibration leaves out", held)
     told(
         "Probability, greatest distance from the observed share in points",
-        [
-            reliability_row("probability, all answers", everything),
-            reliability_row("probability, the half that calibration leaves out", held),
-        ],
+        [reliability_row("probability, all answers", everything)],
     )
     if listing:
         print_wrong("Usable but wrong", everything)

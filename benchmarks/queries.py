@@ -15,11 +15,10 @@ import numpy as np
 
 from registration import RigidTransform, Segments
 
-from .collection import LEVELS, Collection, Query
+from .collection import FLOOR_PLANS, LEVELS, Collection, Query
 from .drawn import drawn_offices
 
 DATA = Path(os.environ.get("LINEFIX_BENCH_DATA") or Path(__file__).parents[1] / ".." / "shared" / "data")
-FAMILIES = ("apartments", "public_buildings", "campus_buildings")
 LOGS = ("intel", "seattle", "freiburg-079", "fhw", "acapulco", "edmonton")
 
 
@@ -34,7 +33,7 @@ def floor_plans(stride: int = 1) -> Collection:
         return drawn_offices(max(1, 60 // stride))
     maps = {
         (family, plan["id"]): Segments.from_array(plan["segments"])
-        for family in FAMILIES
+        for family in FLOOR_PLANS
         for plan in _load("floorplans", family)
     }
     queries = [

@@ -1,9 +1,11 @@
 """Slow, obviously right twins of the search's kernels."""
 
+import itertools
 import math
 
 import numpy as np
 
+from association import _agreement_kernels as agreeing
 from association._match_kernels import BRIDGING
 
 
@@ -143,3 +145,37 @@ def accept_matches(matches, order, scan_endpoints, pose, walls, pieces_of_wall, 
         others = [p for p in spans if p != most and covered[p] > 0.0]
         found.append((i, most, on_any.mean(), others[:8]))
     return found
+
+
+def agreement(scan, viewpoint, pose, walls):
+    """Compare along each ray the first scan segment with the first wall."""
+    theta, at = pose[0], np.array(viewpoint)
+    turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+    place = turn @ at + pose[1:]
+    angles = math.tau * (np.arange(agreeing.RAYS) + 0.5) / agreeing.RAYS
+    lines = np.zeros((len(scan), 5))
+    lines[:, :2] = scan[:, :2]
+    lines[:, 2] = scan[:, 0] * scan[:, 3] - scan[:, 1] * scan[:, 2]
+    middle = np.einsum("ij,ij->i", scan[:, :2], scan[:, 2:4])
+    lines[:, 3], lines[:, 4] = middle - scan[:, 4] / 2, middle + scan[:, 4] / 2
+    seen = [first_hit(*at, math.cos(a), math.sin(a), math.inf, lines)[0] for a in angles]
+    farthest = max(math.hypot(*(row[2:4] - at)) + row[4] / 2 for row in scan)
+    looked = [k for k, d in enumerate(seen) if d < math.inf]
+    gaps = [
+        ((after - before - 1) % len(seen) + 1, before) for before, after in itertools.pairwise([*looked, looked[0]])
+    ]
+    widest, before = max(gaps, key=lambda gap: gap[0])
+    blind = {(before + k) % len(seen) for k in range(1, widest)} if widest > len(seen) / 4 else set()
+    agree = against = 0
+    for k, (angle, distance) in enumerate(zip(angles, seen, strict=True)):
+        d = np.array([math.cos(angle + theta), math.sin(angle + theta)])
+        reach, w = first_hit(*place, *d, max(25.0, 1.5 * farthest), walls)
+        if k in blind or w < 0:
+            continue
+        if distance < math.inf:
+            agree += abs(distance - reach) < 0.2 + 0.02 * distance
+            against += reach <= distance - 0.2 - 0.02 * distance
+        else:
+            sine = abs(walls[w][0] * d[1] - walls[w][1] * d[0])
+            against += reach < min(farthest, 15.0) and walls[w][4] - walls[w][3] > 0.8 and sine > 0.3
+    return agree / (agree + against) if agree + against else agreeing.NEUTRAL

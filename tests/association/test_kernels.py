@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
 from association import _accept_kernels as accepting
+from association import _agreement_kernels as agreeing
 from association import _chance_kernels as chance
 from association import _match_kernels as match
 from association import _plan_kernels as plan
@@ -88,7 +89,28 @@ def test_may_score_bounds_the_score(seed):
     for at in (pose, far):
         total = match.match_scan(rows, at, covariance, INDEX.walls.rows, *GRID, GATES, 0.0, matches)
         assert match.may_score(rows, at, spreads, *INDEX.raster, total - 1e-9)
-    assert not match.may_score(rows, pose + [0.0, 1e3, 0.0], spreads, *INDEX.raster, 1e-9)
+    away = np.array([0.0, 1e3, 0.0])
+    assert not match.may_score(rows, pose + away, spreads, *INDEX.raster, 1e-9)
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_agreement(seed):
+    rng, rows, pose = drawn(seed)
+    viewpoint = rng.uniform(-0.3, 0.3, 2)
+    for at in (pose, pose + rng.normal(size=3) * [0.3, 3.0, 3.0]):
+        got = agreeing.agreement(rows, *viewpoint, *at, INDEX.walls.rows, *GRID)
+        assert got == pytest.approx(reference.agreement(rows, viewpoint, at, INDEX.walls.rows))
+
+
+def test_agreement_of_the_true_pose_is_whole_and_of_half_a_turn_is_not():
+    at = RigidTransform(14.0, 15.0, 0.4)
+    rows = scan_rows(scan_of(seen(maze(1), at, radius=12.0)[0]), 0.0).rows
+    place = at.x - INDEX.origin[0], at.y - INDEX.origin[1]
+    here = agreeing.agreement(rows, 0.0, 0.0, at.theta, *place, INDEX.walls.rows, *GRID)
+    turned = agreeing.agreement(rows, 0.0, 0.0, at.theta + math.pi, *place, INDEX.walls.rows, *GRID)
+    assert here > 0.9
+    assert turned < 0.6
 
 
 def test_a_long_segment_bridges_a_doorway():
