@@ -304,9 +304,9 @@ def in_pieces(rng):
     pieces = []
     for wall in maze(1):
         a, d = wall[:2], wall[2:] - wall[:2]
-        cuts = np.sort(rng.random(rng.integers(1, 14))).tolist()
-        for begin, end in itertools.pairwise([0.0, *cuts, 1.0]):
-            pieces.append(np.concatenate([a + max(0.0, begin - 0.04) * d, a + end * d]))
+        cuts = np.sort(rng.choice(19, rng.integers(1, 14), replace=False) + 1.0).tolist()
+        for begin, end in itertools.pairwise([0.0, *cuts, 20.0]):
+            pieces.append(np.concatenate([a + max(0.0, begin - 0.8) / 20.0 * d, a + end / 20.0 * d]))
     index = MapIndex.build(Segments.from_array([*pieces, *pieces[::3]]))
     places = range(len(index.walls.rows))
     return index, [index.pieces[index.piece_starts[w] : index.piece_starts[w + 1]].tolist() for w in places]
