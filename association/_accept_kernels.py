@@ -8,6 +8,8 @@ import math
 import numpy as np
 from numba import njit
 
+from ._sight_kernels import BLOCKING_RAYS, SIGHT_TOLERANCE, count_blockers
+
 MAX_RIVALS = 8  # of one pair
 MIN_EXTENT = 1e-9  # m; what a segment along a wall counts as at least
 
@@ -95,3 +97,42 @@ def accept_matches(matches, order, scan_endpoints, theta, x, y, walls, pieces, p
         rival_starts[pair + 1] = stop_at
         pair += 1
     return pairs, overlaps, rivals[: rival_starts[found]], rival_starts
+
+
+@njit(cache=True, nogil=True)
+def missing_pieces(
+    scan, matches, viewpoint_x, viewpoint_y, theta, x, y, walls, starts, items, shape, pieces, piece_starts
+):
+    """List the pieces of walls that rays to the consensus set pass through, of which nothing was seen."""
+    viewpoint = np.empty(2)
+    viewpoint[0] = viewpoint_x
+    viewpoint[1] = viewpoint_y
+    pose = np.empty(3)
+    pose[0] = theta
+    pose[1] = x
+    pose[2] = y
+    to_matched = np.zeros(len(walls), dtype=np.int64)
+    to_clutter = np.zeros(len(walls), dtype=np.int64)
+    touched = np.empty(len(walls), dtype=np.int64)
+    blockers = count_blockers(
+        scan, matches, viewpoint, pose, walls, starts, items, shape, SIGHT_TOLERANCE, to_matched, to_clutter, touched
+    )
+    # A wall that holds part of the consensus set was seen, and at a grazing angle rays to its neighbour pass its end.
+    for i in range(len(scan)):
+        w = int(matches[i, 0])
+        if w >= 0:
+            to_matched[w] = 0
+    count = 0
+    for k in range(blockers):
+        w = touched[k]
+        if 2 * to_matched[w] >= BLOCKING_RAYS:
+            count += piece_starts[w + 1] - piece_starts[w]
+    missing = np.empty(count, dtype=np.intp)
+    count = 0
+    for k in range(blockers):
+        w = touched[k]
+        if 2 * to_matched[w] >= BLOCKING_RAYS:
+            for place in range(piece_starts[w], piece_starts[w + 1]):
+                missing[count] = pieces[place]
+                count += 1
+    return missing

@@ -179,3 +179,22 @@ def agreement(scan, viewpoint, pose, walls):
             sine = abs(walls[w][0] * d[1] - walls[w][1] * d[0])
             against += reach < min(farthest, 15.0) and walls[w][4] - walls[w][3] > 0.8 and sine > 0.3
     return agree / (agree + against) if agree + against else agreeing.NEUTRAL
+
+
+def missing_pieces(scan, matches, viewpoint, pose, walls, pieces_of_wall):
+    """Send a ray every quarter of a metre, at most twelve, to each matched segment; two that pass a wall tell."""
+    passed = dict.fromkeys(range(len(walls)), 0)
+    eye = pose.apply(viewpoint)
+    for row, match in zip(scan, matches, strict=True):
+        if match[0] < 0.0:
+            continue
+        rays = min(12, max(1, math.ceil(row[4] / 0.25)))
+        for share in (np.arange(rays) + 0.5) / rays - 0.5:
+            gap = pose.apply(row[2:4] + share * max(0.0, row[4] - 0.12) * row[:2]) - eye
+            distance = math.hypot(*gap)
+            if distance > 0.2:
+                _, wall = first_hit(*eye, *(gap / distance), distance - 0.2, walls)
+                if wall >= 0:
+                    passed[wall] += 1
+    seen = {int(match[0]) for match in matches}
+    return sorted(p for w, count in passed.items() if count >= 2 and w not in seen for p in pieces_of_wall[w])

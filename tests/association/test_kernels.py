@@ -315,3 +315,23 @@ def in_pieces(rng):
 def test_union_length():
     lows, highs = np.array([3.0, 0.0, 0.5, 3.0, 9.0]), np.array([4.0, 2.0, 1.0, 5.0, 9.5])
     assert [accepting.union_length(lows, highs, count) for count in range(6)] == [0.0, 1.0, 3.0, 3.0, 4.0, 4.5]
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_missing_pieces(seed):
+    rng = np.random.default_rng(seed)
+    index, pieces_of_wall = in_pieces(rng)
+    at = RigidTransform(*rng.uniform(8.0, 22.0, 2), rng.uniform(-3.0, 3.0))
+    endpoints, _ = seen(maze(1), at, seed=seed, radius=8.0)
+    rows = scan_rows(scan_of(endpoints), 0.0).rows
+    pose = RigidTransform(at.x - index.origin[0], at.y - index.origin[1], at.theta)
+    matches = np.full((len(rows), 5), -1.0)
+    matches[:, 0] = np.where(rng.random(len(rows)) < 0.8, rng.integers(0, len(index.walls.rows), len(rows)), -1)
+    viewpoint = rng.normal(size=2)
+    got = accepting.missing_pieces(
+        rows, matches, *viewpoint, pose.theta, pose.x, pose.y, index.walls.rows, index.grid.starts, index.grid.items,
+        index.grid.shape, index.pieces, index.piece_starts,
+    )  # fmt: skip
+    expected = reference.missing_pieces(rows, matches, viewpoint, pose, index.walls.rows, pieces_of_wall)
+    assert sorted(got.tolist()) == expected
