@@ -95,14 +95,15 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
     contradicted = better_elsewhere or best.value - best.score < FAR
     others = inside[1:]
     x, share = features(best, others, evidence), twin_share(best, others)
-    coefficients, cautious = COEFFICIENTS, CAUTIOUS
+    coefficients, cautious = np.array(COEFFICIENTS), np.array(CAUTIOUS)
     if evidence.with_beams:
-        x, coefficients, cautious = x[: len(COEFFICIENTS_WITH_BEAMS)], COEFFICIENTS_WITH_BEAMS, COEFFICIENTS_WITH_BEAMS
-    probability = _logistic(float(x @ np.array(coefficients))) * share
-    careful = _logistic(float(x @ np.array(cautious))) * share
+        coefficients = cautious = np.array(COEFFICIENTS_WITH_BEAMS)
+        x = x[: len(coefficients)]
+    probability = _logistic(float(x @ coefficients)) * share
+    careful = _logistic(float(x @ cautious)) * share
     # Whether anything explains the scan is another question than whether it fixes the position.
     x[DEVIATION] = 0.0
-    explained = _logistic(float(x @ np.array(coefficients)))
+    explained = _logistic(float(x @ coefficients))
     if contradicted:
         probability = min(probability, 0.5)
     margin = best.value - others[0].value if others else None
