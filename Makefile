@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve bench experiments overload endings fuzz lock clean
+.PHONY: help demo test lint types layers unit serve bench experiments peers overload endings fuzz lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -54,9 +54,18 @@ fuzz: $(VENV)/.ready  ## send 100,000 strange requests
 experiments: $(VENV)/.ready  ## the paper's tables and figures, into out/experiments
 	$(BIN)/python -m experiments
 
+$(VENV)-peers/.peers: requirements/peers.txt
+	$(MAKE) VENV=$(VENV)-peers $(VENV)-peers/.ready
+	$(VENV)-peers/bin/python -m pip install --quiet --disable-pip-version-check -r requirements/peers.txt
+	@touch $@
+
+peers: $(VENV)-peers/.peers  ## print Linefix beside other solvers, installed apart from the rest
+	$(VENV)-peers/bin/python -m benchmarks peers
+
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header pyproject.toml -o requirements/runtime.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --group dev pyproject.toml -o requirements/dev.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group peers -o requirements/peers.txt
 
 clean:  ## remove what the other targets made
 	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

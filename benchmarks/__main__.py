@@ -11,6 +11,7 @@ from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
 from .localization import localization
 from .lookalikes import lookalikes
+from .peers import peers, versions
 from .queries import DATA, data_found
 from .ranges import ranges
 from .table import Row, machine, print_rows
@@ -55,6 +56,11 @@ def _ranges(quick: int) -> list[Row]:
     return rows
 
 
+def _peers(quick: int) -> list[Row]:
+    print(f"\nPeers: {versions()}")
+    return peers(quick)
+
+
 TABLES: dict[str, Callable[[int], list[Row]]] = {
     "localization": _localization,
     "estimators": _estimators,
@@ -62,6 +68,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "growth": _growth,
     "vectorization": _vectorization,
     "ranges": _ranges,
+    "peers": _peers,
 }
 
 

@@ -1,4 +1,4 @@
-"""How times grow: constant-time sums with the number of pairs, the search with the size of the map.
+"""How times grow: constant-time sums with the pairs, the search with the map, the scan and the share of clutter.
 
 ``python -m benchmarks.growth [--queries 30] [--sizes 200,2000,20000,200000]``
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from simulation import OfficePlan
 from .collection import FLOOR_PLANS, SIGMA
 from .drawn import NEAR, campus_of_offices, cluttered_scan, nearby, take_scan
 from .outcomes import OPTIONS, offset, progress
+from .pictures import Curve, draw_growth
 from .queries import data_found, floor_plans
 from .table import Row, at_most, mean, print_rows, print_table, quantile
 
@@ -29,6 +30,9 @@ TIMES = {200: (0.3, 1.0), 2_000: (1.0, 5.0), 20_000: (5.0, 20.0), 200_000: (40.0
 INDEX_SECONDS, INDEX_MEGABYTES = 5.0, 500.0  # of the greatest map
 SCAN_SEGMENTS = 25
 CLUTTER = 0.3
+SCANS = (6, 12, 25, 40)  # segments
+CLUTTERS = (0.0, 0.15, 0.3, 0.5, 0.7)
+SWEPT = 2_000  # map segments for the growth over scan and clutter
 SEED = 20190901
 LANE = 400.0  # m; where a row of the campus ends
 APART = 5.0  # m between plans
@@ -45,10 +49,10 @@ def best_time(action: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def sums_cells(counts: tuple[int, ...]) -> list[tuple[str, ...]]:
+def sums_times(counts: tuple[int, ...]) -> list[tuple[float, float, float]]:
     """Time adding a pair to sums over many, solving, and summing anew; microseconds."""
     rng = np.random.default_rng(SEED)
-    cells = []
+    times = []
     for count in counts:
         middles, angles = rng.uniform(-20.0, 20.0, (count + 1, 2)), rng.uniform(-math.pi, math.pi, count + 1)
         half = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -60,8 +64,8 @@ def sums_cells(counts: tuple[int, ...]) -> list[tuple[str, ...]]:
         add = best_time(lambda sums=sums, pairs=pairs, k=count: sums.add(pairs, k, 1e4), 300)
         solve = best_time(lambda sums=sums: sums.solve(0.0), 300)
         anew = best_time(lambda e=everything, w=weights: JointSums.of_set(e, w), 30 if count < 100_000 else 5)
-        cells.append((f"{count:,}", f"{1e6 * add:.1f}", f"{1e6 * solve:.1f}", f"{1e6 * anew:,.1f}"))
-    return cells
+        times.append((1e6 * add, 1e6 * solve, 1e6 * anew))
+    return times
 
 
 def campus(size: int) -> Segments:
@@ -99,16 +103,18 @@ def campus(size: int) -> Segments:
     return Segments.from_array(np.vstack(pieces))
 
 
-def draw_query(segments: Segments, rng: np.random.Generator) -> tuple[RigidTransform, Segments]:
-    """Scan the campus from a free place where enough is seen, and keep some 25 segments, 30 % of them clutter."""
-    mapped_count = round(SCAN_SEGMENTS * (1.0 - CLUTTER))
+def draw_query(
+    segments: Segments, rng: np.random.Generator, count: int = SCAN_SEGMENTS, share: float = CLUTTER
+) -> tuple[RigidTransform, Segments]:
+    """Scan the campus from a free place where enough is seen; keep some `count` segments, `share` of them clutter."""
+    mapped_count, slack = round(count * (1.0 - share)), round(0.2 * count)
     while True:
         pose = _free_pose(segments, rng)
-        scan, mapped = cluttered_scan(segments, pose, CLUTTER, rng)
+        scan, mapped = cluttered_scan(segments, pose, share, rng)
         on_map, clutter = np.flatnonzero(mapped), np.flatnonzero(~mapped)
-        if len(on_map) >= mapped_count - 5 and len(clutter) >= 5:
+        if len(on_map) >= mapped_count - slack and len(clutter) >= min(slack, round(count * share)):
             on_map = on_map[:mapped_count]
-            clutter = clutter[: round(len(on_map) * CLUTTER / (1.0 - CLUTTER))]
+            clutter = clutter[: round(len(on_map) * share / (1.0 - share))]
             return pose, scan.take(rng.permutation(np.concatenate([on_map, clutter])))
 
 
@@ -145,8 +151,8 @@ class Growth:
     megabytes: float
 
 
-def grow(size: int, queries: int) -> Growth:
-    """Index a campus and search it."""
+def grow(size: int, queries: int, count: int = SCAN_SEGMENTS, share: float = CLUTTER) -> Growth:
+    """Index a campus and search it for scans of so many segments, a share of them clutter."""
     rng = np.random.default_rng(SEED)
     segments = campus(size)
     start = time.thread_time()
@@ -154,7 +160,7 @@ def grow(size: int, queries: int) -> Growth:
     build = time.thread_time() - start
     cpu, passed, hypotheses, right, wrong, counts = [], [], [], [], 0, []
     for k in range(queries + 2):
-        pose, scan = draw_query(segments, rng)
+        pose, scan = draw_query(segments, rng, count, share)
         sent = Scan(MeasuredSegments.from_segments(scan, SIGMA))
         began = time.perf_counter(), time.thread_time()
         result = associate(index, sent, None, OPTIONS)
@@ -168,22 +174,22 @@ def grow(size: int, queries: int) -> Growth:
         cpu.append(1e3 * times[1])
         hypotheses.append(result.search.hypotheses)
         counts.append(len(scan))
-        progress(f"{size:,} segments", k - 1, queries)
+        progress(f"{size:,} segments, {count} of {share:.0%} clutter", k - 1, queries)
     return Growth(
         len(segments), quantile(cpu, 0.5), quantile(cpu, 0.95), quantile(passed, 0.5), quantile(hypotheses, 0.5),
         mean(right), wrong, mean(counts), build, index.nbytes / 1e6,
     )  # fmt: skip
 
 
-def print_growth(found: list[Growth]) -> None:
+def print_growth(title: str, what: str, values: Sequence[str], found: list[Growth]) -> None:
     cells = [
-        (f"{g.segments:,}", f"{g.median:.2f}", f"{g.p95:.2f}", f"{g.passed:.2f}", f"{g.hypotheses:,.0f}",
+        (value, f"{g.median:.2f}", f"{g.p95:.2f}", f"{g.passed:.2f}", f"{g.hypotheses:,.0f}",
          f"{g.right:.2f}", str(g.wrong_usable), f"{g.scan:.0f}", f"{g.build:.2f}", f"{g.megabytes:.1f}")
-        for g in found
+        for value, g in zip(values, found, strict=True)
     ]  # fmt: skip
-    head = ("map segments", "median ms", "p95 ms", "median ms passed", "hypotheses", "right first", "usable, wrong",
+    head = (what, "median ms", "p95 ms", "median ms passed", "hypotheses", "right first", "usable, wrong",
             "scan segments", "index s", "index MB")  # fmt: skip
-    print_table("Search over the size of the map", head, cells)
+    print_table(title, head, cells)
 
 
 def growth_rows(found: list[Growth]) -> list[Row]:
@@ -201,12 +207,30 @@ def growth_rows(found: list[Growth]) -> list[Row]:
 
 
 def growth(queries: int, sizes: tuple[int, ...], pairs: tuple[int, ...] = PAIRS) -> list[Row]:
-    """Run both, print their tables and return the rows that were judged."""
+    """Run all, print their tables, draw the picture and return the rows that were judged."""
+    times = sums_times(pairs)
     head = ("pairs in the sums", "add one, us", "solve, us", "sum anew, us")
-    print_table("Constant-time sums of the joint estimator", head, sums_cells(pairs))
+    cells = [(f"{k:,}", *(f"{t:,.1f}" for t in row)) for k, row in zip(pairs, times, strict=True)]
+    print_table("Constant-time sums of the joint estimator", head, cells)
     grow(sizes[0], 2)  # index and search are compiled
     found = [grow(size, queries) for size in sizes]
-    print_growth(found)
+    print_growth("Search over the size of the map", "map segments", [f"{g.segments:,}" for g in found], found)
+    scans = [grow(SWEPT, queries, count=count) for count in SCANS]
+    print_growth(f"Search over the size of the scan, {SWEPT:,} map segments", "wanted", list(map(str, SCANS)), scans)
+    clutters = [grow(SWEPT, queries, share=share) for share in CLUTTERS]
+    print_growth(
+        f"Search over the clutter, {SWEPT:,} map segments", "clutter", [f"{c:.0%}" for c in CLUTTERS], clutters
+    )
+    draw_growth(
+        [
+            Curve("map segments", [g.segments for g in found], [(g.median, g.p95) for g in found],
+                  {size: goal for size, goal in TIMES.items() if size in sizes}),
+            Curve("scan segments", [g.scan for g in scans], [(g.median, g.p95) for g in scans]),
+            Curve("share of clutter", CLUTTERS, [(g.median, g.p95) for g in clutters]),
+        ],
+        [(g.segments, g.build, g.megabytes) for g in found],
+        list(zip(pairs, times, strict=True)),
+    )  # fmt: skip
     rows = growth_rows(found)
     print_rows("Growth", rows)
     return rows

@@ -10,6 +10,7 @@ import numpy as np
 from association import Status
 
 from .outcomes import Outcome
+from .pictures import draw_reliability
 from .table import Row, at_most, mean, print_table
 
 BINS = 10
@@ -40,7 +41,9 @@ def bins(probabilities: np.ndarray, right: np.ndarray) -> list[tuple[int, float,
 
 
 def print_reliability(title: str, outcomes: Sequence[Outcome]) -> None:
-    _print(title, reliability(outcomes))
+    found = reliability(outcomes)
+    _print(title, found)
+    draw_reliability("reliability-" + title.lower().replace(",", "").replace(" ", "-"), title, found, TELLING)
 
 
 def print_bins(title: str, probabilities: np.ndarray, right: np.ndarray) -> None:
