@@ -20,7 +20,7 @@ from .adapters import PEERS, Answer
 from .scenes import Cell, PeerQuery
 
 LIMIT = 1.0  # s of processor time for a query
-PATIENCE = 60.0  # s that pass; for a map, and for a process that neither works nor ends
+PATIENCE = 600.0  # s that pass; for kernels to be compiled, a map to be prepared, a process that does nothing
 GLANCE = 0.02  # s between two looks at what a process has used
 GIVE_UP = 4  # queries of a cell out of time, from which the rest of them is not asked
 DISTANCE, ANGLE = 0.3, 3.0  # m and degrees that an answer may be off

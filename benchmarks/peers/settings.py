@@ -54,6 +54,14 @@ SETTINGS: dict[tuple[str, str], dict[str, Any]] = {
         "options": CornerOptions(seen_reach=3.0, known_reach=1.0, turn=4.0, slack=0.15, most=1000, headings=8),
     },
     ("gicp", "standard"): {"spacing": 0.2, "rounds": (1.0, 0.5, 0.2), "kind": "PLANE_ICP"},
+    ("gicp", "hard"): {"spacing": 0.2, "rounds": (1.0, 0.3), "kind": "PLANE_ICP"},
+    ("gicp", "extreme"): {"spacing": 0.1, "rounds": (1.0, 0.3), "kind": "GICP"},
+    ("gicp", "plans"): {"spacing": 0.2, "rounds": (1.0, 0.5, 0.2), "kind": "GICP"},
+    ("clipper", "standard"): {
+        "reach": 0.04,
+        "twist": 2.0,
+        "options": CornerOptions(seen_reach=0.7, known_reach=0.05, turn=3.0, slack=0.15, most=2000, headings=8),
+    },
     ("skimage", "standard"): {
         "threshold": 0.2,
         "trials": 1000,
@@ -63,6 +71,21 @@ SETTINGS: dict[tuple[str, str], dict[str, Any]] = {
         "threshold": 0.5,
         "trials": 1000,
         "options": CornerOptions(seen_reach=1.5, known_reach=2.0, turn=5.0, slack=0.1, most=10000, headings=0),
+    },
+    ("skimage", "extreme"): {
+        "threshold": 0.2,
+        "trials": 3000,
+        "options": CornerOptions(seen_reach=1.5, known_reach=0.5, turn=8.0, slack=0.1, most=3000, headings=0),
+    },
+    ("skimage", "plans"): {
+        "threshold": 0.5,
+        "trials": 300,
+        "options": CornerOptions(seen_reach=1.5, known_reach=0.05, turn=3.0, slack=0.15, most=3000, headings=0),
+    },
+    ("clipper", "hard"): {
+        "reach": 0.15,
+        "twist": 4.0,
+        "options": CornerOptions(seen_reach=1.5, known_reach=1.0, turn=8.0, slack=0.15, most=2000, headings=0),
     },
 }
 
