@@ -136,10 +136,12 @@ def killed_workers() -> list[Row]:
             while count(port, "linefix_workers_ready") < 2:
                 asked += 1
                 failed += ask(port, orjson.dumps(examples.ASSOCIATE)) != 200
+                time.sleep(0.02)  # a robot's pace: who starts needs a processor
             seconds.append(time.monotonic() - begun)
             time.sleep(10.0)  # one that dies again at once is started again later
     return [
         at_most(f"a killed worker is replaced, longest of {TRIES}, s", max(seconds), REPLACED_S, form=".2f"),
+        Row("the same, median, s", f"{np.median(seconds):.2f}"),
         Row(f"requests meanwhile on new connections, failed of {asked}", str(failed)),
     ]
 
