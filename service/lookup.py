@@ -17,6 +17,7 @@ from .schemas.parts import InlineMap, StoredMap
 from .schemas.requests import MapDocument
 
 MAX_EXTENT = 1e5  # m
+INDEXED_BYTES = 600  # that a segment takes once it is indexed, about
 LARGE = 500_000  # bytes; larger documents would hold up everything else for too long
 
 
@@ -51,7 +52,7 @@ class MapLookup:
         if isinstance(asked, InlineMap):
             # Robots send the same map with every scan: what is in it names it.
             digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
-            return self._cache.get((digest, asked.sigma, asked.frame_id), lambda: _index(asked)), None
+            return self._cache.get((digest, asked.sigma, asked.frame_id), lambda: self._index(asked)), None
         while True:
             # Looked up before every use, so that a change by another worker is never missed.
             record = self._store.record(asked.map_id)
@@ -65,8 +66,15 @@ class MapLookup:
         if stored.record != record:
             raise _ChangedError
         if len(stored.document) > LARGE:
-            return _index(self._parser.call(read_stored, stored.document))
-        return _index(read_stored(stored.document))
+            return self._index(self._parser.call(read_stored, stored.document))
+        return self._index(read_stored(stored.document))
+
+    def _index(self, asked: InlineMap | MapDocument) -> CachedMap:
+        # The old goes before the new comes: two of the largest at once would be a quarter of a gigabyte.
+        self._cache.make_room(INDEXED_BYTES * len(asked.segments))
+        segments = Segments.from_array(asked.segments, argument="map.segments")
+        index = MapIndex.build(segments, asked.sigma)
+        return CachedMap(index, asked.frame_id, index.nbytes)
 
 
 def checked_segments(document: MapDocument) -> Segments:
@@ -88,9 +96,3 @@ def checked_segments(document: MapDocument) -> Segments:
 
 class _ChangedError(Exception):
     """The map was changed between the look at its revision and its loading."""
-
-
-def _index(asked: InlineMap | MapDocument) -> CachedMap:
-    segments = Segments.from_array(asked.segments, argument="map.segments")
-    index = MapIndex.build(segments, asked.sigma)
-    return CachedMap(index, asked.frame_id, index.nbytes)

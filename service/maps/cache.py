@@ -56,6 +56,11 @@ class IndexCache:
         self._metrics.cache_misses.inc()
         return self._build(key, promise, build)
 
+    def make_room(self, size: int) -> None:
+        """Drop what was used the longest ago until so much more would fit; before something large is built."""
+        with self._lock:
+            self._drop_until(self._max_bytes - size)
+
     def _build(self, key: Hashable, promise: Future[CachedMap], build: Callable[[], CachedMap]) -> CachedMap:
         try:
             made = build()
@@ -75,6 +80,9 @@ class IndexCache:
             return
         self._ready[key] = made
         self.bytes += made.bytes
-        while self.bytes > self._max_bytes:
+        self._drop_until(self._max_bytes)
+
+    def _drop_until(self, most: int) -> None:
+        while self._ready and self.bytes > most:
             _, dropped = self._ready.popitem(last=False)
             self.bytes -= dropped.bytes

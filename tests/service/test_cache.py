@@ -34,6 +34,17 @@ def test_the_least_recently_used_goes_first() -> None:
     assert built == ["b"]
 
 
+def test_room_is_made_before_something_is_built() -> None:
+    cache = IndexCache(100, Metrics())
+    for name in "abc":
+        cache.get(name, lambda: a_map(30))
+    cache.make_room(40)
+    assert (len(cache), cache.bytes) == (2, 60)
+    cache.get("c", lambda: pytest.fail("is there"))
+    cache.make_room(1000)
+    assert (len(cache), cache.bytes) == (0, 0)
+
+
 def test_what_is_too_large_is_used_and_not_kept() -> None:
     cache = IndexCache(10, Metrics())
     assert cache.get("a", lambda: a_map(30)).bytes == 30
