@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from .gate import ANNOUNCED, SearchGate
@@ -66,10 +67,11 @@ class Doors:
         for listen in unheard:
             listen()
 
-    def announce(self, method: str, path: str, state: dict[str, Any]) -> None:
+    def announce(self, scope: Mapping[str, Any]) -> None:
         """Note that the body of a request is there, so that no more are let in than find room."""
-        if method == "POST" and path in SEARCHING.values():
-            state[ANNOUNCED] = self._gate.announce()
+        if scope["method"] == "POST" and scope["path"] in SEARCHING.values():
+            with suppress(ProblemError):  # which the application tells
+                scope["state"][ANNOUNCED] = self._gate.announce(self._keyring.holder(scope["headers"]))
 
     def report(self) -> None:
         """Count and log what was refused since the last time."""

@@ -50,9 +50,16 @@ class SearchGate:
         """Whether everything is taken or spoken for; a holder with less than its share may still be let in."""
         return self.running + self.waiting + self.announced >= self._places
 
-    def announce(self) -> Announcement:
+    def announce(self, holder: Holder = None) -> Announcement:
         """Note that a request is on its way to the gate, its body complete."""
-        return Announcement(self)
+        self.announced += 1
+        self._queue.expect(holder)
+        return Announcement(self, holder)
+
+    def arrived(self, holder: Holder) -> None:
+        """Note that one that was announced is there, or will never come."""
+        self.announced -= 1
+        self._queue.expect_no_longer(holder)
 
     def refusal(self, holder: Holder = None) -> ProblemError | None:
         """Return why a request whose body is still to be read is not let in, or None when it is.
@@ -183,14 +190,14 @@ ANNOUNCED = "announced"
 class Announcement:
     """A request on its way from the socket to the gate; without it all that come together would find room."""
 
-    def __init__(self, gate: SearchGate) -> None:
+    def __init__(self, gate: SearchGate, holder: Holder) -> None:
         self._gate: SearchGate | None = gate
-        gate.announced += 1
+        self._holder = holder
 
     def end(self) -> None:
         """Say that it is there, or will never come."""
         if self._gate is not None:
-            self._gate.announced -= 1
+            self._gate.arrived(self._holder)
             self._gate = None
 
 

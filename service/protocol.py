@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from functools import lru_cache
 from http import HTTPStatus
-from typing import Any
+from typing import Any, cast
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
@@ -95,7 +95,7 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
         def on_message_complete(self) -> None:
             self._in_message, self._complete = False, True
             if not self.cycle.response_complete and not self.pipeline:
-                doors.announce(self.scope["method"], self.scope["path"], self.cycle.scope["state"])
+                doors.announce(cast("dict[str, Any]", self.cycle.scope))
             super().on_message_complete()
 
         def send_400_response(self, msg: str) -> None:

@@ -14,13 +14,14 @@ Turn = asyncio.Future[None]
 class FairQueue:
     """Waiting turns, one line per holder; the holder that has used the least time is served first.
 
-    A holder counts as active while it has something waiting or running. One that comes anew starts where the least
-    served of the active ones is: it neither pays for old use nor has credit from the time it was away.
+    A holder counts as active while it has something waiting, running or on its way. One that comes anew starts where
+    the least served of the active ones is: it neither pays for old use nor has credit from the time it was away.
     """
 
     def __init__(self) -> None:
         self._lines: dict[Holder, deque[Turn]] = {}
         self._running: Counter[Holder] = Counter()
+        self._coming: Counter[Holder] = Counter()
         self._used: dict[Holder, float] = {}
         self._fixed: set[Turn] = set()
         self.waiting = 0
@@ -31,8 +32,18 @@ class FairQueue:
         return len(self._used)
 
     def places_of(self, holder: Holder) -> int:
-        """Return how many turns of a holder wait or run."""
-        return len(self._lines.get(holder, ())) + self._running[holder]
+        """Return how many turns of a holder wait, run, or are on their way."""
+        return len(self._lines.get(holder, ())) + self._running[holder] + self._coming[holder]
+
+    def expect(self, holder: Holder) -> None:
+        """Note that something of a holder is on its way."""
+        self._activate(holder)
+        self._coming[holder] += 1
+
+    def expect_no_longer(self, holder: Holder) -> None:
+        """Note that it has come, or will not."""
+        self._coming[holder] -= 1
+        self._forget_idle(holder)
 
     def join(self, holder: Holder, *, fixed: bool) -> Turn:
         """Return a turn at the end of the holder's line; a fixed one is never taken away again."""
@@ -96,4 +107,4 @@ class FairQueue:
 
     def _forget_idle(self, holder: Holder) -> None:
         if not self.places_of(holder):
-            del self._used[holder], self._running[holder]
+            del self._used[holder], self._running[holder], self._coming[holder]

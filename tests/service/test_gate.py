@@ -280,3 +280,23 @@ def test_no_more_are_let_in_than_find_room() -> None:
         gate.close()
 
     asyncio.run(scenario())
+
+
+def test_who_is_on_the_way_counts_for_the_key_it_comes_with() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 3)
+        flood = [gate.announce(b"flood") for _ in range(4)]
+        greedy = gate.refusal(b"flood")
+        assert greedy is not None
+        assert greedy.code == "overloaded"
+        assert gate.refusal(b"robot") is None
+        robot = gate.announce(b"robot")
+        greedy = gate.refusal(b"flood")
+        assert greedy is not None
+        assert greedy.code == "rate_limited"
+        for announcement in (*flood, robot):
+            announcement.end()
+        assert gate.refusal(b"flood") is None
+        gate.close()
+
+    asyncio.run(scenario())
