@@ -8,12 +8,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from .constant_time import constant_time
+from .crumbs import crumbs
 from .dispersion import dispersion
 from .hypotheses import hypotheses
 from .mean_angles import mean_angles
 from .plan import FULL, QUICK, Plan
 from .precision import precision
 from .printed import printed
+from .raw_beams import raw_beams
 from .running import Runner, runner
 from .sweep import sweep
 from .unknown import basin, unknown
@@ -28,7 +30,9 @@ EXPERIMENTS: dict[str, Callable[[Plan, Runner, Path], None]] = {
     "dispersion": dispersion,
     "unreliable": unreliable,
     "sweep": sweep,
+    "crumbs": crumbs,
     "hypotheses": hypotheses,
+    "raw_beams": raw_beams,
     "unknown": unknown,
     "basin": basin,
 }

@@ -26,7 +26,7 @@ HEAD = (
 
 def dispersion(plan: Plan, runner: Runner, out: Path) -> None:
     """Take the scans of Fig. 7 and 8 and write them; and Fig. 5."""
-    figure = new_figure(10.0, 3.5)
+    figure = new_figure(10.0, 4.0)
     for axes, name in zip(figure.subplots(1, 3), NAMES, strict=True):
         draw_world(axes, name, name)
     save(figure, out / "fig5_environments.png")

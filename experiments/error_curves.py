@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,46 +10,38 @@ from matplotlib.axes import Axes
 
 from .accuracy import means, slopes
 from .output import GREEN, GREY, Cell, new_figure, save, write_table
-from .scenes import NAMES
 from .trials import ESTIMATORS, Trials, of_world
 
+ERRORS_HEAD = ("segments", "estimator", "points", "sigma", "D_t", "A_t", "D_alpha", "A_alpha", "pairs")
+SLOPES_HEAD = ("segments", "estimator", "mean", "power_of_points", "power_of_sigma")
 
-def error_curves(all_trials: Sequence[Trials], out: Path) -> None:
-    """Write Fig. 6 with every environment's numbers, drawn for CutSquare."""
+
+def error_curves(sources: Mapping[str, Sequence[Trials]], out: Path) -> None:
+    """Write Fig. 6, which is of CutSquare."""
+    own = {source: of_world(all_trials, "CutSquare") for source, all_trials in sources.items()}
     rows: list[Sequence[Cell]] = []
-    for trials in all_trials:
-        c = trials.condition
-        for estimator in ESTIMATORS:
-            m = means(trials, estimator)
-            numbers = m.D_t, m.A_t, m.D_alpha, m.A_alpha, float(trials.pairs.mean()), float(1.0 - trials.fixed.mean())
-            rows.append([c.world, estimator, c.points, c.sigma, *numbers])
-    head: tuple[str, ...] = (
-        "environment",
-        "estimator",
-        "points",
-        "sigma",
-        "D_t",
-        "A_t",
-        "D_alpha",
-        "A_alpha",
-        "pairs",
-        "not_fixed",
-    )
-    write_table(out / "fig6_errors.csv", head, rows)
     powers: list[Sequence[Cell]] = []
-    for name in NAMES:
+    for source, all_trials in own.items():
         for estimator in ESTIMATORS:
-            for what, (a, b) in slopes(of_world(all_trials, name), estimator).items():
-                powers.append([name, estimator, what, a, b])
-    head = ("environment", "estimator", "mean", "power_of_points", "power_of_sigma")
-    write_table(out / "fig6_slopes.csv", head, powers)
-    figure = new_figure(10.0, 4.2)
-    for axes, kind in zip(figure.subplots(1, 2), ("t", "alpha"), strict=True):
-        _error_curves(axes, of_world(all_trials, "CutSquare"), kind)
+            for trials in all_trials:
+                m = means(trials, estimator)
+                condition = trials.condition.points, trials.condition.sigma
+                rows.append(
+                    [source, estimator, *condition, m.D_t, m.A_t, m.D_alpha, m.A_alpha, float(trials.pairs.mean())]
+                )
+            for what, (a, b) in slopes(all_trials, estimator).items():
+                powers.append([source, estimator, what, a, b])
+    write_table(out / "fig6_errors.csv", ERRORS_HEAD, rows)
+    write_table(out / "fig6_slopes.csv", SLOPES_HEAD, powers)
+    figure = new_figure(10.0, 7.4)
+    grid = figure.subplots(2, 2, sharex=True, sharey="col")
+    for row, (source, all_trials) in zip(grid, own.items(), strict=True):
+        for axes, kind in zip(row, ("t", "alpha"), strict=True):
+            _error_curves(axes, all_trials, kind, source)
     save(figure, out / "fig6_errors.png")
 
 
-def _error_curves(axes: Axes, all_trials: Sequence[Trials], kind: str) -> None:
+def _error_curves(axes: Axes, all_trials: Sequence[Trials], kind: str, source: str) -> None:
     """Draw A in green over the error in grey, brought to one scale as the paper's are."""
     found = {(t.condition.sigma, t.condition.points): means(t, "unweighted") for t in all_trials}
     ratios = [np.log(getattr(m, f"A_{kind}") / getattr(m, f"D_{kind}")) for m in found.values()]
@@ -68,4 +60,4 @@ def _error_curves(axes: Axes, all_trials: Sequence[Trials], kind: str) -> None:
     axes.set_xticks(ticks, [str(p) for p in ticks])
     axes.set_xticks([], minor=True)
     axes.set_xlim(ticks[0] * 0.93, ticks[-1] * 1.35)
-    axes.set(title=f"CutSquare, {what}, unweighted", xlabel="points per scan", ylabel=f"{what}, {unit}")
+    axes.set(title=f"CutSquare, {what}, unweighted, {source}", xlabel="points per scan", ylabel=f"{what}, {unit}")

@@ -168,9 +168,9 @@ def _draw(found: dict[tuple[str, str], list[Trials]], out: Path) -> None:
         _rows_of_points(grid[1, column], values)
         grid[0, column].set(title=name, xlim=(0.0, 1.1), xlabel="weighted over unweighted")
         grid[1, column].set(xlim=(0.0, 1.05), xlabel="correlation over scans, unweighted")
-    for axes in grid[:, 0]:
+    for axes, corner in zip(grid[:, 0], ("lower left", "upper left"), strict=True):
         axes.set_yticks(range(len(rows)), rows, fontsize=7)
-        axes.legend(fontsize=6.5, loc="lower left", facecolor="white", frameon=True, edgecolor="none")
+        axes.legend(fontsize=6.5, loc=corner, facecolor="white", frameon=True, edgecolor="none")
     grid[0, 0].invert_yaxis()
     figure.supxlabel("marks: measured; dashed lines: the paper", fontsize=8)
     save(figure, out / "hypotheses.png")

@@ -65,6 +65,8 @@ class Measurement:
         ``[scan segment, map segment]``.
     points : (k, 2)
         The raw points, metres.
+    seen : SimulatedScan
+        What the scanner gave.
     found : Vectorization or None
         What the vectorizer said; None where it was not asked.
     """
@@ -72,6 +74,7 @@ class Measurement:
     measured: MeasuredSegments
     pairs: Indices
     points: Floats
+    seen: SimulatedScan
     found: Vectorization | None
 
     def moved(self, by: RigidTransform) -> MeasuredSegments:
@@ -109,11 +112,11 @@ def take(
         points = points + rng.normal(0.0, sigma, points.shape)
     if setup.cut == "walls":
         measured, walls = _cut_at_walls(world.segments, pose, points, hits, (sigma, setup))
-        return Measurement(measured, np.stack([np.arange(len(walls)), walls], axis=1), points, None)
+        return Measurement(measured, np.stack([np.arange(len(walls)), walls], axis=1), points, seen, None)
     options = VectorizationOptions(sigma=sigma, min_points=setup.min_points)
     found = vectorize(_laser(seen) if by_range else points, options)
     pairs = _pairs(found.beams, seen.hits if by_range else hits, setup.purity)
-    return Measurement(found.measured, pairs[_kept(found.measured, setup)[pairs[:, 0]]], points, found)
+    return Measurement(found.measured, pairs[_kept(found.measured, setup)[pairs[:, 0]]], points, seen, found)
 
 
 def _laser(seen: SimulatedScan) -> LaserScan:
@@ -146,26 +149,30 @@ def _cut_at_walls(
     shift = int(np.argmax(hits != np.roll(hits, 1)))
     points, hits = np.roll(points, -shift, axis=0), np.roll(hits, -shift)
     starts = np.flatnonzero(np.concatenate([[True], hits[1:] != hits[:-1]]))
-    rows: list[Floats] = []
-    sigmas, counts, centroids, spreads, walls = [], [], [], [], []
-    for stretch in np.split(np.arange(len(hits)), starts[1:]):
-        if len(stretch) < setup.min_points:
-            continue
-        own, wall = points[stretch], int(hits[stretch[0]])
-        centre = own.mean(axis=0)
-        direction = np.linalg.svd(own - centre, full_matrices=False)[2][0]
-        along = (own - centre) @ direction
-        if along[-1] < along[0]:
-            direction, along = -direction, -along
-        if along[-1] - along[0] < max(1e-3, setup.min_length * UNIT):
-            continue
-        rows.append(np.concatenate([centre + along[0] * direction, centre + along[-1] * direction]))
-        incidence = np.array([-direction[1], direction[0]]) @ (own / np.linalg.norm(own, axis=1, keepdims=True)).T
-        sigmas.append(sigma * math.sqrt(float(np.mean(incidence**2))) if setup.noise == "range" else sigma)
-        counts.append(float(len(stretch)))
-        centroids.append(centre)
-        spreads.append(float(np.mean(along**2)))
-        walls.append(wall)
-    segments = Segments.from_array(np.array(rows).reshape(-1, 4))
-    moments = np.array(centroids).reshape(-1, 2), np.array(spreads)
-    return MeasuredSegments.from_segments(segments, sigmas, counts, moments), np.array(walls, dtype=np.int64)
+    counts = np.diff([*starts, len(hits)])
+    many = counts >= setup.min_points
+    # The stretches of too few points are taken out first: two points have a line, one has none.
+    kept = np.repeat(many, counts)
+    points, walls, counts = points[kept], hits[starts[many]], counts[many]
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+
+    def means(values: Floats) -> Floats:
+        return np.asarray(np.add.reduceat(values, starts) / counts)
+
+    centroids = np.stack([means(points[:, 0]), means(points[:, 1])], axis=1)
+    x, y = (points - np.repeat(centroids, counts, axis=0)).T
+    angles = 0.5 * np.arctan2(2.0 * means(x * y), means(x * x) - means(y * y))
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    last = starts + counts - 1
+    backward = directions[:, 0] * (x[last] - x[starts]) + directions[:, 1] * (y[last] - y[starts]) < 0.0
+    directions[backward] *= -1.0
+    of_point = np.repeat(directions, counts, axis=0)
+    along = x * of_point[:, 0] + y * of_point[:, 1]
+    ends = [centroids + along[k][:, None] * directions for k in (starts, last)]
+    across = points[:, 1] * of_point[:, 0] - points[:, 0] * of_point[:, 1]
+    incidence = np.sqrt(means(across**2 / (points**2).sum(axis=1)))
+    sigmas = sigma * incidence if setup.noise == "range" else np.full(len(counts), sigma)
+    good = along[last] - along[starts] >= max(1e-3, setup.min_length * UNIT)
+    moments = centroids[good], means(along**2)[good]
+    segments = Segments.from_array(np.hstack(ends)[good])
+    return MeasuredSegments.from_segments(segments, sigmas[good], counts[good].astype(float), moments), walls[good]

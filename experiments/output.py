@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,11 +11,13 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from PIL import Image
 
 # Okabe and Ito's colours, told apart by every kind of colour vision.
 INK, GREY, MAP = "#1b1f24", "#8a929c", "#a9b1ba"
 BLUE, ORANGE, GREEN, VERMILION, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
 DPI = 100
+COLOURS = 96  # of a PNG
 DIGITS = 5
 
 Cell = str | int | float
@@ -53,8 +56,11 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, the same bytes for the same picture."""
-    figure.savefig(path, metadata={"Software": None})
+    """Write a figure as PNG of few colours, which is a third of the size: the same bytes for the same picture."""
+    full = io.BytesIO()
+    figure.savefig(full, metadata={"Software": None})
+    with Image.open(full) as image:
+        image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def bars(axes: Axes, groups: Sequence[str], series: Sequence[tuple[str, Sequence[float], str]], form: str) -> None:

@@ -40,10 +40,10 @@ class Plan:
     points: tuple[int, ...] = (100, 150, 200, 300, 500, 700, 1000, 1500)
     sigmas: tuple[float, ...] = (1.0, 3.0, 10.0)
     test_points: tuple[int, ...] = (300, 1000)
-    test_scans: int = 40
-    search_scans: int = 25
+    test_scans: int = 20
+    search_scans: int = 20
     basin_scans: int = 2
-    basin_steps: int = 9
+    basin_steps: int = 7
     draws: int = 20_000
     counts: tuple[int, ...] = (10, 100, 1_000, 10_000, 100_000, 1_000_000)
     seed: int = SEED

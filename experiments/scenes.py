@@ -65,6 +65,36 @@ def poses(name: str, places: Places = "path") -> tuple[RigidTransform, ...]:
     return tuple(found)
 
 
+def expected_ranges(
+    segments: Segments, hits: NDArray[np.int64], angles: Floats, pose: RigidTransform
+) -> tuple[Floats, Floats]:
+    """Return what beams measure that hit known walls, and the derivatives.
+
+    Parameters
+    ----------
+    segments : Segments
+    hits : (m,)
+        The wall of each beam.
+    angles : (m,)
+        Of the beams in the scan frame, radians.
+    pose : RigidTransform
+
+    Returns
+    -------
+    ranges : (m,) metres
+    jacobian : (m, 3)
+        By x and y in metres and by the heading.
+    """
+    directions = angles + pose.theta
+    rays = np.stack([np.cos(directions), np.sin(directions)], axis=1)
+    normals = segments.normals[hits]
+    # A range is (p - n . t) / (n . ray): its derivative by t is -n over the cosine, and by theta that of the ray.
+    cosines = np.einsum("ij,ij->i", normals, rays)
+    across = np.einsum("ij,ij->i", normals, rays @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    ranges = (segments.offsets[hits] - normals @ np.array([pose.x, pose.y])) / cosines
+    return ranges, np.column_stack([-normals / cosines[:, None], -ranges * across / cosines])
+
+
 def bound(name: str, pose: RigidTransform, points: int, sigma: float) -> Floats:
     """Return the Cramer-Rao bound of (x, y, theta) from all beams of a scan whose walls are known.
 
@@ -84,11 +114,6 @@ def bound(name: str, pose: RigidTransform, points: int, sigma: float) -> Floats:
     """
     segments = world(name).segments
     seen = scan(segments, pose, Scanner.over(math.tau, points, sigma=0.0, range_max=REACH))
-    angles = seen.angles + pose.theta
-    rays = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    normals = segments.normals[seen.hits]
-    # A range is (p - n . t) / (n . ray): its derivative by t is -n over the cosine, and by theta that of the ray.
-    cosines = np.einsum("ij,ij->i", normals, rays)
-    across = np.einsum("ij,ij->i", normals, rays @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
-    jacobian = np.column_stack([-normals / cosines[:, None], -seen.ranges / UNIT * across / cosines])
+    _, jacobian = expected_ranges(segments, seen.hits, seen.angles, pose)
+    jacobian[:, 2] /= UNIT
     return np.asarray(np.linalg.inv(jacobian.T @ jacobian / sigma**2))

@@ -33,7 +33,7 @@ def sweep(plan: Plan, runner: Runner, out: Path) -> None:
         "vectorized": runner.map("scans, vectorized", run, conditions(plan, Setup())),
         "cut at the true corners": runner.map("scans, cut at the true corners", run, conditions(plan, TRUE_CORNERS)),
     }
-    error_curves(sources["vectorized"], out)
+    error_curves(sources, out)
     gain_table(sources, out)
     correlation_table(sources, out)
     efficiency(sources, out)

@@ -183,8 +183,8 @@ def basin(plan: Plan, runner: Runner, out: Path) -> None:
         for (row, column), value in np.ndenumerate(cells):
             axes.text(column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=6.5,
                       color="white" if value > 0.6 else "black")  # fmt: skip
-        axes.set_xticks(range(len(distances)), [f"{d:g}" for d in distances])
-        axes.set_yticks(range(len(angles)), [f"{a:g}" for a in angles])
+        axes.set_xticks(range(len(distances)), [f"{d:.0f}" for d in distances])
+        axes.set_yticks(range(len(angles)), [f"{a:.0f}" for a in angles])
         axes.grid(visible=False)
         axes.set(title=f"{name}: ICP right, %\nsearch, without a start: {100 * share:.0f} %")
         axes.set_xlabel("start off by, units")
