@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve bench experiments peers overload endings fuzz lock clean
+.PHONY: help demo test lint types layers unit serve faults bench experiments peers overload endings fuzz lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -38,6 +38,9 @@ unit: $(VENV)/.ready
 
 serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000
 	$(BIN)/python -m service
+
+faults: $(VENV)/.ready  ## kill, fill, flip, drain and load for hours: the long forms of tests/faults
+	$(BIN)/python -m pytest -s -m long tests/faults --soak-minutes $(or $(MINUTES),30)
 
 bench: $(VENV)/.ready  ## print the table of quality and speed
 	$(BIN)/python -m benchmarks

@@ -20,6 +20,10 @@ START_SECONDS = 120.0  # the first start may have to compile every kernel
 STOP_SECONDS = 15.0
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--soak-minutes", type=float, default=30.0, help="how long the mixed load of tests/faults lasts")
+
+
 @dataclass(frozen=True)
 class RunningService:
     """A service in a process of its own, on a loopback port."""
@@ -40,7 +44,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def start(data_dir: Path, **settings: object) -> RunningService:
+def start(data_dir: Path, *, probe: str = "/readyz", **settings: object) -> RunningService:
     port = free_port()
     environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
     environment |= {f"LINEFIX_{name.upper()}": str(value) for name, value in settings.items()}
@@ -54,11 +58,11 @@ def start(data_dir: Path, **settings: object) -> RunningService:
         if process.poll() is not None:
             raise RuntimeError(f"the service ended with {process.returncode}: {service.log()}")
         try:
-            if service.client.get("/readyz").status_code == 200:
+            if service.client.get(probe).status_code == 200:
                 return service
         except httpx.TransportError:
             pass
-        time.sleep(0.05)
+        time.sleep(0.02)
     stop(service)
     raise RuntimeError(f"the service did not become ready: {service.log()}")
 

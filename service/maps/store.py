@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, delete, insert, literal, select, update
 from sqlalchemy.exc import IntegrityError
 
 from ..problems import ProblemError
 from .database import make_directory, open_engine
-from .failures import failures_as_problems
+from .failures import DAMAGED, failures_as_problems
 from .preconditions import Preconditions
 from .records import ABSENT, Bounds, MapPage, MapRecord, MapSummary, StoredMap, columns_of, digest, is_sealed
 from .schema import upgrade
 from .tables import documents, maps
 
+T = TypeVar("T")
 logger = logging.getLogger("linefix")
 
 
@@ -34,11 +35,13 @@ class MapStore:
         self._url = url
         self._engine: Engine = open_engine(url)
         self._writer = self._engine.execution_options(writes=True)
+        self._opened = False
 
     def open(self) -> None:
-        """Make sure that the tables exist and are of this version."""
+        """Make sure that the tables exist and are of this version; the other methods do it where nobody has."""
         make_directory(self._url)
         upgrade(self._engine, self._writer)
+        self._opened = True
 
     def close(self) -> None:
         """Close all connections."""
@@ -56,11 +59,7 @@ class MapStore:
 
         The transaction is on the disk when this returns. A damaged map is replaced as any other.
         """
-        try:
-            return self._put(map_id, document, summary, demands)
-        except IntegrityError:
-            # Another worker put the same id for the first time between our look and our insert: now there is a row.
-            return self._put(map_id, document, summary, demands)
+        return self._twice(lambda: self._put(map_id, document, summary, demands))
 
     def _put(
         self, map_id: str, document: bytes, summary: tuple[int, Bounds], demands: Preconditions
@@ -78,10 +77,16 @@ class MapStore:
             content = {"map_id": map_id, "revision": record.revision, "document": document}
             if not _update(connection, documents, content):
                 connection.execute(insert(documents).values(**content))
+            # Where the tables themselves are damaged a row may not come back as it was written: no commit then.
+            if _trusted(_row(connection, map_id, select(maps))) != record:
+                raise corrupt_map()
         return record.revision, not exists
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
         """Forget a map; the number of its last revision is kept."""
+        self._twice(lambda: self._delete(map_id, demands))
+
+    def _delete(self, map_id: str, demands: Preconditions) -> None:
         with self._writing() as connection:
             last, exists = _last(connection, map_id, _locked(connection, map_id))
             demands.check(last if exists else None)
@@ -126,13 +131,34 @@ class MapStore:
 
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
+        if not self._opened:
+            self.open()
         with failures_as_problems(), self._engine.begin() as connection:
             yield connection
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
+        if not self._opened:
+            self.open()
         with failures_as_problems(), self._writer.begin() as connection:
             yield connection
+
+    def _twice(self, write: Callable[[], T]) -> T:
+        """Write, and once more where the first attempt failed for what may be past."""
+        try:
+            return write()
+        except IntegrityError:
+            # Another worker put the same id for the first time between our look and our insert: now there is a row.
+            try:
+                return write()
+            except IntegrityError as error:
+                raise ProblemError(*DAMAGED) from error
+        except ProblemError as problem:
+            if problem.code != "read_only":
+                raise
+            # A connection made while nothing could be written stays so when the disk, or the server, is mended.
+            self._engine.dispose()
+            return write()
 
 
 def unknown_map() -> ProblemError:

@@ -48,6 +48,15 @@ def test_a_map_lives_through_its_revisions(store: MapStore) -> None:
     assert store.put("m", b"three", BOX, ANY) == (3, True)
 
 
+def test_whoever_comes_first_makes_the_tables(database: str) -> None:
+    for first in (lambda store: store.list(1, ""), lambda store: store.put("m", b"one", BOX, ANY)):
+        store = MapStore(database_url(database))
+        first(store)
+        store.close()
+    with opened(database) as store:
+        assert store.load("m").document == b"one"
+
+
 def test_a_listing_is_in_the_order_of_bytes(store: MapStore) -> None:
     names = ["a", "B", "a.1", "a-1", "_", "Z", "a1", "A", "9"]
     for name in names:

@@ -1,0 +1,129 @@
+"""Flipped bits in the file of the database: a map comes back as it was put, or is named; never changed, never lost."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.database_url import database_url
+from service.maps import MapStore, Preconditions
+from service.problems import ProblemError
+from service.schemas import examples
+
+BOX = (4, (-1.5, 0.0, 1.0, 1e5))
+# Small ones lie among the rows, large ones on pages of their own.
+DOCUMENTS = {f"map-{i}": random.Random(i).randbytes(200 if i % 3 else 3000) for i in range(12)}
+
+
+def put_all(store: MapStore) -> None:
+    for _ in range(2):
+        for name, document in DOCUMENTS.items():
+            store.put(name, document, BOX, Preconditions())
+    store.put("gone", b"x", BOX, Preconditions())
+    store.delete("gone", Preconditions())
+
+
+def attempt(call: Callable[[], Any]) -> Any:
+    """Return what a call returns, or the code of its problem; anything else is a defect."""
+    try:
+        return call()
+    except ProblemError as problem:
+        return problem.code
+
+
+def look(store: MapStore) -> Counter[str]:
+    """Count what becomes of every map; a wrong one fails."""
+    seen: Counter[str] = Counter()
+    for name, document in DOCUMENTS.items():
+        found = attempt(lambda name=name: store.load(name))
+        if isinstance(found, str):
+            assert found == "map_corrupt", (name, found)
+            seen["named"] += 1
+        else:
+            assert (found.document, found.record.revision) == (document, 2), name
+            seen["whole"] += 1
+    assert attempt(lambda: store.load("gone")) in ("unknown_map", "map_corrupt")
+    page = attempt(lambda: store.list(100, ""))
+    if isinstance(page, str):
+        assert page == "map_corrupt"
+    else:
+        for item in page.maps:
+            assert (item.revision, item.segments, item.bounds) == (2, *BOX), item
+    return seen
+
+
+def heal(store: MapStore) -> Counter[str]:
+    """Put every map that is damaged again, and see whether that helped."""
+    seen: Counter[str] = Counter()
+    for name, document in DOCUMENTS.items():
+        if attempt(lambda name=name: store.load(name)) != "map_corrupt":
+            continue
+        put = attempt(lambda name=name, document=document: store.put(name, document, BOX, Preconditions()))
+        if isinstance(put, str):
+            assert put == "map_corrupt"
+            seen["not healed"] += 1
+        else:
+            assert put[0] > 2
+            assert store.load(name).document == document
+            seen["healed"] += 1
+    return seen
+
+
+@pytest.mark.parametrize("flips", [400, pytest.param(10_000, marks=pytest.mark.long)])
+def test_a_flipped_bit_changes_no_map(tmp_path: Path, flips: int) -> None:
+    path = tmp_path / "maps.sqlite3"
+    url = database_url(f"sqlite:///{path}")
+    store = MapStore(url)
+    put_all(store)
+    store.close()
+    good = path.read_bytes()
+    draw = random.Random(flips)
+    total: Counter[str] = Counter()
+    for _ in range(flips):
+        place, bit = draw.randrange(len(good)), 1 << draw.randrange(8)
+        path.write_bytes(good[:place] + bytes([good[place] ^ bit]) + good[place + 1 :])
+        store = MapStore(url)
+        try:
+            seen = look(store)
+            total += seen
+            if seen["named"]:
+                total["flips with effect"] += 1
+                total += heal(store)
+        except Exception as error:
+            error.add_note(f"bit {bit} of byte {place}")
+            raise
+        finally:
+            store.close()
+    print(f"\n{flips} flips in {len(good)} bytes, {dict(total)}")
+    assert total["named"] > 0
+    assert total["healed"] > total["not healed"]
+
+
+def test_a_flipped_bit_in_a_large_map(start_service: Callable[..., Any], tmp_path: Path) -> None:
+    running = start_service()
+    client = running.client
+    large = {"segments": examples.WALLS * 3000, "meta": "needle"}
+    for name in ("large", "whole"):
+        assert client.put(f"/v1/maps/{name}", json=large).status_code == 201
+    path = tmp_path / "maps.sqlite3"
+    data = bytearray(path.read_bytes())
+    data[data.index(b"needle")] ^= 1
+    path.write_bytes(data)
+    # From a process that has no page of it in memory.
+    other = start_service(database_url=f"sqlite:///{path}")
+    damaged = [name for name in ("large", "whole") if other.client.get(f"/v1/maps/{name}").status_code != 200]
+    assert len(damaged) == 1
+    url = f"/v1/maps/{damaged[0]}"
+    assert other.client.get(url).json()["code"] == "map_corrupt"
+    body = {"map": {"map_id": damaged[0]}, "scan": {"segments": examples.SEEN}}
+    for each in (other.client, client):
+        answer = each.post("/v1/associate", json=body)
+        assert (answer.status_code, answer.json()["code"]) == (409, "map_corrupt")
+    assert client.put(url, json=large).status_code == 200
+    assert other.client.get(url).json() == large
+    assert other.client.get("/v1/maps").json()["corrupt"] == []
