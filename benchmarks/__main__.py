@@ -14,6 +14,7 @@ from .lookalikes import lookalikes
 from .peers import peers, versions
 from .queries import DATA, data_found
 from .ranges import ranges
+from .sums import sums
 from .table import Row, machine, print_rows
 
 DEFAULT = ("localization", "estimators", "lookalikes")
@@ -61,6 +62,13 @@ def _peers(quick: int) -> list[Row]:
     return peers(quick)
 
 
+def _sums(quick: int) -> list[Row]:
+    changes = 1_000_000 // quick
+    rows = sums(changes)
+    print_rows(f"Sums after {changes:,} additions and removals, relative to fresh ones", rows)
+    return rows
+
+
 TABLES: dict[str, Callable[[int], list[Row]]] = {
     "localization": _localization,
     "estimators": _estimators,
@@ -69,6 +77,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "vectorization": _vectorization,
     "ranges": _ranges,
     "peers": _peers,
+    "sums": _sums,
 }
 
 
