@@ -8,7 +8,6 @@ from pathlib import Path
 
 from alembic import command
 from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, inspect, text
 
@@ -51,8 +50,9 @@ def upgrade(engine: Engine, writer: Engine) -> None:
 
 
 def _version(connection: Connection) -> str | None:
-    context = MigrationContext.configure(connection, opts={"version_table": VERSION_TABLE})
-    version = context.get_current_revision()
+    # Not through Alembic, which writes two lines to the log whenever it looks.
+    found = inspect(connection).has_table(VERSION_TABLE)
+    version = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar() if found else None
     if version is not None and version not in _known():
         raise ProblemError("not_ready", "the database was made by a newer version of the service")
     return version

@@ -70,7 +70,7 @@ class Mix:
         return client.post("/v1/associate", json=body)
 
     def _put(self, client: httpx.Client) -> httpx.Response:
-        count = self._draw.choice([6, 60, 600, 600, 6000, 6000, 60_000])
+        count = self._draw.choice([6, 60, 600, 600, 6000, 6000, 20_000])
         body = {"segments": rooms(count, self._draw.randrange(5)), "meta": self._draw.random()}
         return client.put(f"/v1/maps/{self._name()}", json=body)
 
