@@ -60,7 +60,7 @@ def steps(log: Path, folder: Path) -> list[str]:
 
 @pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 def test_a_write_is_on_the_disk_before_it_is_acknowledged(start_service: Callable[..., Any], tmp_path: Path) -> None:
-    running = start_service()
+    running = start_service(probe="/livez")  # maps are served before the kernels are warm
     log = tmp_path / "calls"
     with traced(running.process.pid, log):
         for document in (examples.MAP, {"segments": examples.WALLS * 500}):
