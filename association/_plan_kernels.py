@@ -8,6 +8,7 @@ from numba import njit
 from ._search_kernels import MIN_CROSSING_BASE, least_length, search_base
 
 TELLING = 0.25  # m; how far a base may lay the other segments off, root mean square
+UNTELLING = 0.1  # what a base is worth less that lays them farther off
 REUSE = 0.3  # what a base is worth less for each earlier use of one of its segments
 
 # Measured costs, nanoseconds: of a base, a wall that it may slide on, a metre of slide, a hypothesis.
@@ -52,6 +53,23 @@ def slack_tables(scan, count, bin_starts, longest, summed):
 
 
 @njit(cache=True, nogil=True)
+def is_telling(scan, a, b):
+    """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
+
+    Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
+    """
+    variance = scan[a, 10] * scan[b, 10] / (scan[a, 10] + scan[b, 10])
+    x = 0.5 * (scan[a, 2] + scan[b, 2])
+    y = 0.5 * (scan[a, 3] + scan[b, 3])
+    total = 0.0
+    gain = 0.0
+    for i in range(len(scan)):
+        total += scan[i, 12] * ((scan[i, 2] - x) ** 2 + (scan[i, 3] - y) ** 2)
+        gain += scan[i, 12]
+    return variance * total <= TELLING**2 * gain
+
+
+@njit(cache=True, nogil=True)
 def plan_bases(scan, count, bin_starts, longest, summed, area):
     """List the non-parallel pairs of the first `count` scan segments with their logarithmic merit.
 
@@ -87,6 +105,8 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
             pairs[k, 0] = i if sweep_i <= sweep_j else j
             pairs[k, 1] = j if sweep_i <= sweep_j else i
             merits[k] = GAIN_POWER * math.log(min(scan[i, 12], scan[j, 12])) - math.log(cost)
+            if not is_telling(scan, i, j):
+                merits[k] += math.log(UNTELLING)
             k += 1
     return pairs[:k], merits[:k]
 
@@ -160,23 +180,6 @@ def fewest_segments(best_gains, beyond, needed):
             return max(m, 2)
         total += best_gains[m]
     return max(len(best_gains), 2)
-
-
-@njit(cache=True, nogil=True)
-def is_telling(scan, a, b):
-    """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
-
-    Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
-    """
-    variance = scan[a, 10] * scan[b, 10] / (scan[a, 10] + scan[b, 10])
-    x = 0.5 * (scan[a, 2] + scan[b, 2])
-    y = 0.5 * (scan[a, 3] + scan[b, 3])
-    total = 0.0
-    gain = 0.0
-    for i in range(len(scan)):
-        total += scan[i, 12] * ((scan[i, 2] - x) ** 2 + (scan[i, 3] - y) ** 2)
-        gain += scan[i, 12]
-    return variance * total <= TELLING**2 * gain
 
 
 # Why `advance` came back.
