@@ -59,8 +59,8 @@ SETTINGS: dict[tuple[str, str], dict[str, Any]] = {
     ("gicp", "plans"): {"spacing": 0.2, "rounds": (1.0, 0.5, 0.2), "kind": "GICP"},
     ("clipper", "standard"): {
         "reach": 0.04,
-        "twist": 2.0,
-        "options": CornerOptions(seen_reach=0.7, known_reach=0.05, turn=3.0, slack=0.15, most=2000, headings=8),
+        "twist": 3.0,
+        "options": CornerOptions(seen_reach=0.7, known_reach=0.05, turn=3.0, slack=0.1, most=1000, headings=4),
     },
     ("skimage", "standard"): {
         "threshold": 0.2,
@@ -83,9 +83,34 @@ SETTINGS: dict[tuple[str, str], dict[str, Any]] = {
         "options": CornerOptions(seen_reach=1.5, known_reach=0.05, turn=3.0, slack=0.15, most=3000, headings=0),
     },
     ("clipper", "hard"): {
-        "reach": 0.15,
-        "twist": 4.0,
-        "options": CornerOptions(seen_reach=1.5, known_reach=1.0, turn=8.0, slack=0.15, most=2000, headings=0),
+        "reach": 0.08,
+        "twist": 3.0,
+        "options": CornerOptions(seen_reach=1.5, known_reach=0.5, turn=4.0, slack=0.1, most=1000, headings=4),
+    },
+    ("open3d", "standard"): {
+        "threshold": 0.2,
+        "trials": 20000,
+        "options": CornerOptions(seen_reach=0.3, known_reach=1.0, turn=3.0, slack=0.15, most=1000, headings=4),
+    },
+    ("open3d", "hard"): {
+        "threshold": 0.3,
+        "trials": 20000,
+        "options": CornerOptions(seen_reach=1.5, known_reach=2.0, turn=5.0, slack=0.25, most=1000, headings=8),
+    },
+    ("open3d", "extreme"): {
+        "threshold": 0.3,
+        "trials": 5000,
+        "options": CornerOptions(seen_reach=3.0, known_reach=2.0, turn=4.0, slack=0.1, most=1000, headings=4),
+    },
+    ("open3d", "plans"): {
+        "threshold": 0.2,
+        "trials": 5000,
+        "options": CornerOptions(seen_reach=1.5, known_reach=1.0, turn=3.0, slack=0.1, most=3000, headings=4),
+    },
+    ("clipper", "extreme"): {
+        "reach": 0.08,
+        "twist": 3.0,
+        "options": CornerOptions(seen_reach=3.0, known_reach=2.0, turn=5.0, slack=0.1, most=1000, headings=0),
     },
 }
 
