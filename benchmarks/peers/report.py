@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from importlib.metadata import PackageNotFoundError, version
 
+from ..outcomes import progress
 from ..table import Row, at_least, at_most, mean, print_rows, print_table, quantile
 from .adapters import PEERS
 from .picture import draw
@@ -45,7 +45,7 @@ def run(key: str, cells: list[Cell]) -> list[list[Attempt]] | None:
     """Ask a peer everything; None, and a line that says why, where it is missing."""
     found: list[list[Attempt]] = []
     racer, made = None, None
-    for cell in cells:
+    for k, cell in enumerate(cells):
         wanted = settings(key, cell.level)
         if racer is None or wanted != made:
             if racer is not None:
@@ -56,8 +56,7 @@ def run(key: str, cells: list[Cell]) -> list[list[Attempt]] | None:
                 print(f"{PEERS[key].name} is left out: {reason}")
                 return None
         found.append(list(attempts(racer, cell)))
-        if sys.stderr.isatty():
-            print(f"\r{PEERS[key].name}: {cell.name:40s}", end="", file=sys.stderr, flush=True)
+        progress(f"{PEERS[key].name}, cells", k + 1, len(cells))
     if racer is not None:
         racer.close()
     return found
@@ -73,9 +72,9 @@ def judged(cells: list[Cell], found: Found, own: str, others: list[str]) -> list
         name = f"{cell.name}{', guess' if PEERS[own].local else ''}"
         share = {key: mean(a.right for a in found[key][k]) for key in [own, *rivals]}
         time = {key: quantile((a.ms for a in found[key][k]), 0.5) for key in [own, *rivals]}
-        rows.append(at_least(f"{name}: right", share[own], max(share[key] for key in rivals)))
+        rows.append(at_least(f"{name}: right", round(share[own], 3), round(max(share[key] for key in rivals), 3)))
         near = [time[key] for key in rivals if share[key] >= share[own] - NEAR]
-        rows.append(at_most(f"{name}: median ms", time[own], min(near) if near else None, form=".2f"))
+        rows.append(at_most(f"{name}: median ms", time[own], round(min(near), 3) if near else None, form=".3f"))
     return rows
 
 
