@@ -80,7 +80,15 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
     bins = len(bin_starts) - 1
     total = np.zeros(count)
     smooth = np.empty((count, bins))
+    taken = np.empty(bins, dtype=np.int64)
+    n_taken = 0
+    for b in range(bins):
+        if bin_starts[b + 1] > bin_starts[b]:
+            taken[n_taken] = b
+            n_taken += 1
+    short = np.empty(count)
     for i in range(count):
+        short[i] = (scan[i, 4] + SHORT_LENGTH) ** SHORT_POWER
         for b in range(bins):
             total[i] += slides[i, b]
             smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, (b + 1) % bins]
@@ -97,10 +105,10 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
             sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]
             shift = round(turn / (2.0 * math.pi / bins))
             expected = 0.0
-            for b in range(bins):
+            for t in range(n_taken):
+                b = taken[t]
                 expected += slides[i, b] * smooth[j, (b + shift) % bins]
-            expected *= HYPOTHESIS_SCALE / area * sine**SINE_POWER
-            expected *= (min(scan[i, 4], scan[j, 4]) + SHORT_LENGTH) ** SHORT_POWER
+            expected *= HYPOTHESIS_SCALE / area * sine**SINE_POWER * max(short[i], short[j])
             cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
             pairs[k, 0] = i if sweep_i <= sweep_j else j
             pairs[k, 1] = j if sweep_i <= sweep_j else i

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ._match_kernels import refine
+from ._match_kernels import invert3, refine, wrap
 
 RAY_SPACING = 0.25  # m, between the points of a segment that rays are sent to
 SIGHT_TOLERANCE = 0.2  # m; a wall this near before the end of a ray does not block it
@@ -174,3 +174,40 @@ def rank(
             )  # fmt: skip
             scores[k] -= sight_penalty(to_matched, to_clutter, touched, blockers, walls)
             best = max(best, scores[k])
+
+
+@njit(cache=True, nogil=True)
+def distinct(poses, covariances, order, most, rules):
+    """Pick from `order`, the best first, at most `most` poses (k, 3) without those that a better one stands for.
+
+    A pose stands for those that are near, within ``rules[0]`` metres and ``rules[1]`` radians, and for those that its
+    own covariance does not tell from it, at less than ``rules[2]`` squared deviations: a family along a corridor is one
+    explanation. Returns the places in `poses`.
+    """
+    kept = np.empty(min(most, len(order)), dtype=np.int64)
+    informations = np.empty((len(kept), 3, 3))
+    known = np.empty(len(kept), dtype=np.bool_)
+    count = 0
+    for i in order:
+        if count == len(kept):
+            break
+        stands = False
+        for k in range(count):
+            better = kept[k]
+            x = poses[i, 1] - poses[better, 1]
+            y = poses[i, 2] - poses[better, 2]
+            turn = wrap(poses[i, 0] - poses[better, 0])
+            if math.sqrt(x * x + y * y) < rules[0] and abs(turn) < rules[1]:
+                stands = True
+                break
+            f = informations[k]
+            square = f[0, 0] * x * x + f[1, 1] * y * y + f[2, 2] * turn * turn
+            square += 2.0 * (f[0, 1] * x * y + f[0, 2] * x * turn + f[1, 2] * y * turn)
+            if known[k] and square < rules[2]:
+                stands = True
+                break
+        if not stands:
+            kept[count] = i
+            known[count] = invert3(covariances[i], informations[count])
+            count += 1
+    return kept[:count]

@@ -12,7 +12,7 @@ from registration import RigidTransform
 
 from ._beam_kernels import rank_beams
 from ._search_kernels import INSIDE, prior_value
-from ._sight_kernels import rank
+from ._sight_kernels import distinct, rank
 from .candidates import DISTINCT_ANGLE, DISTINCT_DISTANCE, Candidates, encode_prior
 from .map_index import MapIndex
 from .options import AssociationOptions, HardPrior, Prior, Scan
@@ -104,25 +104,11 @@ def rank_candidates(
 
 
 def _distinct(poses: Floats, covariances: Floats, values: Floats, most: int) -> list[int]:
-    """Order the best `most` poses (k, 3) by value, ties by index, without those that a better one stands for.
-
-    A pose stands for those that are near, and for those that its own covariance does not tell from it: a family along
-    a corridor is one explanation.
-    """
-    order = [int(i) for i in np.argsort(-values, kind="stable") if np.isfinite(values[i])]
-    left = np.array(order, dtype=np.intp)
-    informations = np.linalg.inv(covariances) if len(order) else covariances
-    kept: list[int] = []
-    while len(left) and len(kept) < most:
-        i = int(left[0])
-        kept.append(i)
-        step = np.empty((len(left), 3))
-        step[:, :2] = poses[left, 1:] - poses[i, 1:]
-        step[:, 2] = np.remainder(poses[left, 0] - poses[i, 0] + math.pi, math.tau) - math.pi
-        near = (np.hypot(step[:, 0], step[:, 1]) < DISTINCT_DISTANCE) & (np.abs(step[:, 2]) < DISTINCT_ANGLE)
-        near |= ((step @ informations[i]) * step).sum(axis=1) < SAME_FAMILY
-        near[0] = True
-        left = left[~near]
+    """Order the best `most` poses (k, 3) by value, ties by index, without those that a better one stands for."""
+    order = np.argsort(-values, kind="stable")
+    order = order[: int(np.isfinite(values).sum())]
+    rules = np.array([DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY])
+    kept: list[int] = distinct(poses, covariances, order, most, rules).tolist()
     return kept
 
 

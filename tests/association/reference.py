@@ -198,3 +198,20 @@ def missing_pieces(scan, matches, viewpoint, pose, walls, pieces_of_wall):
                     passed[wall] += 1
     seen = {int(match[0]) for match in matches}
     return sorted(p for w, count in passed.items() if count >= 2 and w not in seen for p in pieces_of_wall[w])
+
+
+def distinct(poses, covariances, order, most, rules):
+    """Take the best pose, strike what it stands for, and so on."""
+    left, kept = list(order), []
+    while left and len(kept) < most:
+        best = left[0]
+        kept.append(best)
+        information = np.linalg.inv(covariances[best])
+        rest = []
+        for i in left[1:]:
+            step = np.array([*(poses[i, 1:] - poses[best, 1:]), math.remainder(poses[i, 0] - poses[best, 0], math.tau)])
+            near = math.hypot(step[0], step[1]) < rules[0] and abs(step[2]) < rules[1]
+            if not near and step @ information @ step >= rules[2]:
+                rest.append(i)
+        left = rest
+    return kept

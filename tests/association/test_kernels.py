@@ -16,7 +16,7 @@ from association import _match_kernels as match
 from association import _plan_kernels as plan
 from association import _scan_kernels as scanning
 from association import _search_kernels as search
-from association._sight_kernels import first_hit
+from association._sight_kernels import distinct, first_hit
 from association.candidates import _sampled_inliers
 from association.scan_rows import gates, scan_rows
 from association.significance import EXPONENTS
@@ -176,6 +176,19 @@ def test_a_base_is_swept_whole(seed):
         np.zeros(10), np.zeros((64, 5)), np.zeros(1, dtype=np.int64), np.array([1e9, 0.0, 0.0]), progress, 10**9,
     )  # fmt: skip
     assert progress[2] == len(expected)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_distinct(seed):
+    rng = np.random.default_rng(seed)
+    poses = rng.choice(rng.uniform(-4.0, 4.0, (12, 3)), 40) + rng.normal(size=(40, 3)) * 0.2
+    roots = rng.normal(size=(40, 3, 3)) * rng.choice([0.02, 0.3], (40, 1, 1))
+    covariances, order = roots @ roots.transpose(0, 2, 1) + 1e-4 * np.eye(3), rng.permutation(40)
+    rules = np.array([0.3, 0.1, 12.8])
+    for most in (5, 40):
+        got = distinct(poses, covariances, order, most, rules)
+        assert got.tolist() == reference.distinct(poses, covariances, order, most, rules)
 
 
 def test_invert3():
