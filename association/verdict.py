@@ -20,18 +20,20 @@ Floats = NDArray[np.float64]
 # The first for scans that are known to be of this map. The second also over scans of other buildings, at three tenths
 # of the weight: what it says decides about going by an answer.
 COEFFICIENTS = (
-    -1.208, 0.1682, -0.1348, 1.7, 0.439, 0.1106, -5.78, 0.2937, -2.842, -0.427, 4.346, -0.7584, -8.8, -0.1783,
-    -0.006462,
+    -1.355, 0.1677, -0.122, 1.926, 0.5116, 0.003968, -5.767, 0.3141, -2.644, -0.5231, 4.393, -0.7998,
+    -9.091, -0.124, -0.007346,
 )  # fmt: skip
 CAUTIOUS = (
-    2.868, 0.1932, 0.1134, -0.6385, 0.01539, 0.538, -5.489, 0.4785, -2.934, -0.2976, 3.595, -1.312, -20.32, -2.243,
-    -0.02681,
+    3.493, 0.1901, 0.12, -0.6127, -0.1404, 0.5051, -5.541, 0.4722, -3.307, -0.5378, 3.68, -1.264,
+    -21.53, -2.179, -0.0269,
 )  # fmt: skip
 # With raw beams, which tell a wrong place by themselves, one model of the first eight features does for both.
 COEFFICIENTS_WITH_BEAMS = (-5.931, 0.090, 0.341, 4.763, 0.832, 0.095, -3.275, -0.018)
 DEVIATION = 6  # place among the features
 MANY = 8  # matched segments, from which on the misfit says as much as it can
 NEARLY_ALL = 0.85  # of the scan's length
+LONGEST_UNMATCHED = 4.0  # m; a longer segment
+MOST_UNMATCHED = 16.0  # m; and more clutter say no more
 MAX_LEAD = 40.0  # nats
 CROWD_TEMPERATURE = 4.0  # nats
 LEAST_CROWD = -12.0
@@ -128,9 +130,9 @@ def features(best: Ranked, others: list[Ranked], evidence: Evidence) -> Floats:
         1; lead over the best other explanation, nats; minus the log of the others' tempered evidence; matched share of
         the scan's length; square root of the number of matched segments; square root of their length, sqrt(m); standard
         deviation of the position along its weakest direction, up to 1 m; log of the misfit; one over that number; the
-        longest segment that is not matched, m; the agreement of what is seen with the map; the log of the misfit times
-        the number over `MANY`; the share beyond `NEARLY_ALL`; square root of the length that is not matched, sqrt(m);
-        the square of the third.
+        longest segment that is not matched, up to 4 m; the agreement of what is seen with the map; the log of the
+        misfit times the number over `MANY`; the share beyond `NEARLY_ALL`; square root of the length that is not
+        matched, up to 4 sqrt(m); the square of the third.
     """
     lead = best.value - others[0].value if others else best.value
     crowd = math.log(_evidence(best, others, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
@@ -150,11 +152,11 @@ def features(best: Ranked, others: list[Ranked], evidence: Evidence) -> Floats:
             min(deviation, 1.0),
             misfit,
             1.0 / max(1, count),
-            float(unmatched.max(initial=0.0)),
+            min(float(unmatched.max(initial=0.0)), LONGEST_UNMATCHED),
             evidence.agreement,
             misfit * min(count, MANY) / MANY,
             max(0.0, best.share - NEARLY_ALL),
-            math.sqrt(float(unmatched.sum())),
+            math.sqrt(min(float(unmatched.sum()), MOST_UNMATCHED)),
             crowd**2,
         ]
     )
