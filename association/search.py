@@ -65,7 +65,7 @@ def associate(
     accepted = None if best is None else accept(index, scan, rows, best)
     registered = None if accepted is None else register_accepted(index, scan, accepted, options)
     shown = 0.0 if best is None else agreement(index, scan, rows, best)
-    verdict = judge(ranked, registered, Evidence(rows.rows[:, 4], shown, beams))
+    verdict = judge(ranked, registered, Evidence(rows.rows[:, 4], shown, chance, beams))
     if best is None or accepted is None or registered is None or verdict.status is Status.NO_MATCH:
         return _no_match(scan, ranked, verdict, candidates.report, (index, options))
     matched = set(accepted.pairs[:, 0].tolist())

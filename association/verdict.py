@@ -43,6 +43,7 @@ TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as
 USABLE_PROBABILITY = 0.94
 USABLE_CAUTIOUS = 0.94  # of the same, where other buildings are reckoned with
 NO_MATCH_PROBABILITY = 0.03  # of the first explanation or a twin of it
+CHANCE = 1e-3  # where chance scores as high more often, other buildings are reckoned with in that too
 CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
 FAR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
 MAX_DEVIATION = 0.5  # m; beyond it the weakest direction counts as not fixed
@@ -58,12 +59,15 @@ class Evidence:
         Of the scan segments, metres, in the order of the matches.
     agreement : float
         Share of directions in which the scan shows what the map does, 0 to 1.
+    significance : float
+        Probability that chance scores as high.
     with_beams : bool
         Whether raw beams are in the scores.
     """
 
     lengths: Floats
     agreement: float
+    significance: float
     with_beams: bool
 
 
@@ -106,6 +110,8 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
     # Whether anything explains the scan is another question than whether it fixes the position.
     x[DEVIATION] = 0.0
     explained = _logistic(float(x @ coefficients))
+    if evidence.significance > CHANCE:
+        explained = min(explained, _logistic(float(x @ cautious)))
     if contradicted:
         probability = min(probability, 0.5)
     margin = best.value - others[0].value if others else None

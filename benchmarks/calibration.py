@@ -84,7 +84,7 @@ def explain(index: MapIndex, query: Query, group: str, collection: Collection, *
         return None
     right = own and is_right(registered.pose, query.pose, collection)
     gaps = np.minimum(0.0, [r.value - ranked[0].value for r in ranked[1:]])
-    evidence = Evidence(rows.rows[:, 4], agreement(index, scan, rows, ranked[0]), False)
+    evidence = Evidence(rows.rows[:, 4], agreement(index, scan, rows, ranked[0]), 0.0, False)
     x = features(ranked[0], ranked[1:], evidence)
     return Example(group, fold(query.map), x, gaps, right, is_degenerate(registered))
 
