@@ -212,7 +212,7 @@ def growth(queries: int, sizes: tuple[int, ...], pairs: tuple[int, ...] = PAIRS)
     head = ("pairs in the sums", "add one, us", "solve, us", "sum anew, us")
     cells = [(f"{k:,}", *(f"{t:,.1f}" for t in row)) for k, row in zip(pairs, times, strict=True)]
     print_table("Constant-time sums of the joint estimator", head, cells)
-    grow(sizes[0], 2)  # index and search are compiled
+    grow(sizes[0], 10)  # index and search are compiled
     found = [grow(size, queries) for size in sizes]
     print_growth("Search over the size of the map", "map segments", [f"{g.segments:,}" for g in found], found)
     scans = [grow(SWEPT, queries, count=count) for count in SCANS]
