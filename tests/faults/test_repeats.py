@@ -1,0 +1,68 @@
+"""The same request has the same answer to the bit: again and again, from any worker, whatever the number of threads."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import httpx
+import numpy as np
+import orjson
+import pytest
+
+from service.schemas import examples
+from service.warmup import room_ranges
+
+TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+LASER = {"angle_min": -np.pi, "angle_increment": np.pi / 180.0, "range_max": 30.0, "ranges": room_ranges(TURN).tolist()}
+BODIES = {
+    "/v1/associate": [
+        examples.ASSOCIATE,
+        {"map": examples.ASSOCIATE["map"], "scan": {"laser": LASER, "sigma": 0.01}, "options": {"exhaustive": True, "seed": 7}},
+    ],
+    "/v1/associate:batch": [examples.BATCH],
+    "/v1/register": [examples.REGISTER],
+    "/v1/vectorize": [{"laser": LASER}],
+}
+THREADS = ("1", "2", "4")
+
+
+def without_times(answer: Any) -> Any:
+    """Return an answer without what differs by contract."""
+    if isinstance(answer, dict):
+        return {name: without_times(value) for name, value in answer.items() if name not in ("request_id", "timing_ms")}
+    return [without_times(item) for item in answer] if isinstance(answer, list) else answer
+
+
+@pytest.mark.parametrize("repeats", [30, pytest.param(1000, marks=pytest.mark.long)])
+def test_the_same_answer_to_the_bit(
+    start_service: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Any, repeats: int
+) -> None:
+    services = []
+    for count in THREADS:
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+            monkeypatch.setenv(name, count)
+        folder = tmp_path / count
+        folder.mkdir()
+        services.append(start_service(folder, workers=2, searches=2, queue=64))
+
+    def asked(client: httpx.Client) -> Iterator[tuple[str, bytes]]:
+        for path, bodies in BODIES.items():
+            for number, body in enumerate(bodies):
+                answer = client.post(path, json=body)
+                assert answer.status_code == 200, answer.text
+                yield f"{path} {number}", orjson.dumps(without_times(answer.json()))
+
+    def ask(turn: int) -> list[tuple[str, bytes]]:
+        # A new connection each time: any worker may take it.
+        with httpx.Client(base_url=services[turn % len(services)].url, timeout=60.0) as client:
+            return list(asked(client))
+
+    with ThreadPoolExecutor(4) as threads:
+        seen = Counter(pair for pairs in threads.map(ask, range(repeats)) for pair in pairs)
+    kinds = {name for name, _ in seen}
+    print(f"\n{repeats} repeats of {len(kinds)} requests, two workers, {', '.join(THREADS)} threads: ", end="")
+    print(f"{len(seen)} different answers")
+    assert len(seen) == len(kinds) == sum(map(len, BODIES.values()))
