@@ -70,6 +70,10 @@ def test_corners_fit_where_they_are_and_not_where_a_segment_would_stick_out() ->
     # The long wall first, then the short one: two of the four corners of a rectangle.
     assert len(found) == 2
     assert any(np.allclose(row[:2], [4.0, 0.0]) for row in found.known)
+    for stretched in ([[-1.0, 0, 4, 0], [4, 0, 4, 3]], [[0, 0, 4.3, 0], [4, 0, 4, 3]], [[0, 0, 4, 0], [4, -0.3, 4, 3]],
+                      [[0, 0, 4, 0], [4, 0, 4, 4.5]]):  # fmt: skip
+        (found,) = match(np.array(stretched), known, CornerOptions(headings=0))
+        assert len(found) == 0, stretched
 
 
 def test_points_give_their_pose_back_and_the_better_pose_is_chosen() -> None:
