@@ -41,7 +41,9 @@ LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 TWIN_TEMPERATURE = 1.5  # nats; how far apart two explanations score that are as likely as one to e
 
 USABLE_PROBABILITY = 0.94
-USABLE_CAUTIOUS = 0.94  # of the same, where other buildings are reckoned with
+USABLE_CAUTIOUS = 0.92  # of the same, where other buildings are reckoned with
+USABLE_BY_CHANCE = 0.98  # likewise, where chance alone scores as high with that probability:
+LIKELY_BY_CHANCE = 0.3
 NO_MATCH_PROBABILITY = 0.03  # of the first explanation or a twin of it
 CHANCE = 1e-3  # where chance scores as high more often, other buildings are reckoned with in that too
 CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
@@ -120,11 +122,18 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
         status = Status.NO_MATCH
     elif is_degenerate(registered):
         status = Status.DEGENERATE
-    elif probability < USABLE_PROBABILITY or careful < USABLE_CAUTIOUS:
+    elif probability < USABLE_PROBABILITY or careful < _bar(evidence):
         status = Status.AMBIGUOUS
     else:
         status = Status.OK
     return Verdict(status, probability, margin, runner_up, contradicted)
+
+
+def _bar(evidence: Evidence) -> float:
+    """Return what the cautious probability has to reach."""
+    if evidence.with_beams:
+        return USABLE_PROBABILITY
+    return USABLE_BY_CHANCE if evidence.significance > LIKELY_BY_CHANCE else USABLE_CAUTIOUS
 
 
 def features(best: Ranked, others: list[Ranked], evidence: Evidence) -> Floats:

@@ -20,7 +20,11 @@ LASER = {"angle_min": -np.pi, "angle_increment": np.pi / 180.0, "range_max": 30.
 BODIES = {
     "/v1/associate": [
         examples.ASSOCIATE,
-        {"map": examples.ASSOCIATE["map"], "scan": {"laser": LASER, "sigma": 0.01}, "options": {"exhaustive": True, "seed": 7}},
+        {
+            "map": examples.ASSOCIATE["map"],
+            "scan": {"laser": LASER, "sigma": 0.01},
+            "options": {"exhaustive": True, "seed": 7},
+        },
     ],
     "/v1/associate:batch": [examples.BATCH],
     "/v1/register": [examples.REGISTER],
