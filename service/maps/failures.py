@@ -53,6 +53,9 @@ def failures_as_problems() -> Iterator[None]:
         yield
     except NoConnectionError as error:
         raise ProblemError(*BUSY) from error
+    except UnicodeDecodeError as error:
+        # The statements are right: a name that is no text is damage, which Python's driver cannot even tell.
+        raise ProblemError(*DAMAGED) from error
     except DBAPIError as error:
         found = _of_sqlite(error.orig) if isinstance(error.orig, sqlite3.Error) else _of_postgresql(error)
         if found is None:

@@ -57,9 +57,16 @@ class MapStore:
     ) -> tuple[int, bool]:
         """Store a map; return its revision, and whether there was none before.
 
-        The transaction is on the disk when this returns. A damaged map is replaced as any other.
+        The transaction is on the disk when this returns, and was read back. A damaged map is replaced as any other.
         """
-        return self._twice(lambda: self._put(map_id, document, summary, demands))
+        written = self._twice(lambda: self._put(map_id, document, summary, demands))
+        # From damaged tables others may read other rows than who wrote them sees: no promise then.
+        try:
+            self.load(map_id)
+        except ProblemError as problem:
+            if problem.code != "unknown_map":  # deleted by another meanwhile
+                raise
+        return written
 
     def _put(
         self, map_id: str, document: bytes, summary: tuple[int, Bounds], demands: Preconditions
@@ -77,8 +84,9 @@ class MapStore:
             content = {"map_id": map_id, "revision": record.revision, "document": document}
             if not _update(connection, documents, content):
                 connection.execute(insert(documents).values(**content))
-            # Where the tables themselves are damaged a row may not come back as it was written: no commit then.
-            if _trusted(_row(connection, map_id, select(maps))) != record:
+            # Where the tables themselves are damaged rows may not come back as they were written: no commit then.
+            back = _whole(connection, map_id)
+            if _trusted(back) != record or not _matches(back, record):
                 raise corrupt_map()
         return record.revision, not exists
 
@@ -102,11 +110,10 @@ class MapStore:
 
     def load(self, map_id: str) -> StoredMap:
         """Return a map, its checksum tested; a map that fails the test is quarantined."""
-        both = select(maps, documents.c.document, documents.c.revision.label("document_revision"))
         with self._reading() as connection:
-            row = _row(connection, map_id, both.outerjoin(documents, documents.c.map_id == maps.c.map_id))
+            row = _whole(connection, map_id)
         record = _trusted(row)
-        if row.document_revision != record.revision or digest(row.document) != record.sha256:
+        if not _matches(row, record):
             self._quarantine(record)
             raise corrupt_map()
         return StoredMap(record, row.document)
@@ -169,6 +176,17 @@ def unknown_map() -> ProblemError:
 def corrupt_map() -> ProblemError:
     """Return the problem of a map that is not as it was put."""
     return ProblemError("map_corrupt", "the stored map does not match its checksum; put it again")
+
+
+def _whole(connection: Connection, map_id: str) -> Row[Any]:
+    """Return a map's row with its document."""
+    both = select(maps, documents.c.document, documents.c.revision.label("document_revision"))
+    return _row(connection, map_id, both.outerjoin(documents, documents.c.map_id == maps.c.map_id))
+
+
+def _matches(row: Row[Any], record: MapRecord) -> bool:
+    """Tell whether the document that came with a row is the one that its record names."""
+    return bool(row.document_revision == record.revision and digest(row.document) == record.sha256)
 
 
 def _row(connection: Connection, map_id: str, columns: Select[Any]) -> Row[Any]:
