@@ -8,6 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ._match_kernels import BRIDGING
 from ._sight_kernels import BLOCKING_RAYS, SIGHT_TOLERANCE, count_blockers
 
 MAX_RIVALS = 8  # of one pair
@@ -29,23 +30,43 @@ def union_length(lows, highs, count):
     return total
 
 
+@njit(inline="always")
+def first_wall(walls, w, bridging):
+    """Return the first wall of the run that wall `w` is on, or itself where nothing may bridge a doorway."""
+    while bridging and walls[w, 6] >= 0:
+        w = int(walls[w, 6])
+    return w
+
+
 @njit(cache=True, nogil=True)
 def accept_matches(matches, order, scan_endpoints, theta, x, y, walls, pieces, piece_starts, endpoints):
     """Pick for every matched scan segment the piece of its wall that it lies on most, of equal ones the first.
 
     `order` (n,) is the scan index of each row of `matches`; the pose is in the index frame. Returns, by scan index,
-    pairs (k, 2) of scan index and piece; the share of each segment that lies on pieces of its wall (k,); and the other
-    pieces that it lies on: of pair i ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
+    pairs (k, 2) of scan index and piece; the share of each segment that lies on pieces of its wall, or of its run where
+    it may bridge doorways (k,); and the other pieces that it lies on: of pair i
+    ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
     """
     n = len(order)
     wall_of = np.full(n, -1)
+    bridging = np.zeros(n, dtype=np.bool_)
     most_pieces = 0
     found = 0
     for row in range(n):
         w = int(matches[row, 0])
         if w >= 0:
-            wall_of[order[row]] = w
-            most_pieces = max(most_pieces, piece_starts[w + 1] - piece_starts[w])
+            i = order[row]
+            length = math.hypot(
+                scan_endpoints[i, 2] - scan_endpoints[i, 0], scan_endpoints[i, 3] - scan_endpoints[i, 1]
+            )
+            bridging[i] = length > BRIDGING
+            w = first_wall(walls, w, bridging[i])
+            wall_of[i] = w
+            under = 0
+            while w >= 0:
+                under += piece_starts[w + 1] - piece_starts[w]
+                w = int(walls[w, 7]) if bridging[i] else -1
+            most_pieces = max(most_pieces, under)
             found += 1
     pairs = np.empty((found, 2), dtype=np.intp)
     overlaps = np.empty(found)
@@ -72,20 +93,22 @@ def accept_matches(matches, order, scan_endpoints, theta, x, y, walls, pieces, p
         best = -math.inf
         most = -1
         count = 0
-        for k in range(piece_starts[w], piece_starts[w + 1]):
-            p = pieces[k]
-            first = endpoints[p, 0] * dx + endpoints[p, 1] * dy
-            last = endpoints[p, 2] * dx + endpoints[p, 3] * dy
-            start = max(min(first, last), low)
-            stop = min(max(first, last), high)
-            if stop - start > best:
-                best = stop - start
-                most = p
-            if stop > start:
-                lows[count] = start
-                highs[count] = stop
-                covering[count] = p
-                count += 1
+        while w >= 0:
+            for k in range(piece_starts[w], piece_starts[w + 1]):
+                p = pieces[k]
+                first = endpoints[p, 0] * dx + endpoints[p, 1] * dy
+                last = endpoints[p, 2] * dx + endpoints[p, 3] * dy
+                start = max(min(first, last), low)
+                stop = min(max(first, last), high)
+                if stop - start > best or (stop - start == best and p < most):
+                    best = stop - start
+                    most = p
+                if stop > start:
+                    lows[count] = start
+                    highs[count] = stop
+                    covering[count] = p
+                    count += 1
+            w = int(walls[w, 7]) if bridging[i] else -1
         pairs[pair, 0] = i
         pairs[pair, 1] = most
         overlaps[pair] = min(1.0, union_length(lows, highs, count) / max(high - low, MIN_EXTENT))

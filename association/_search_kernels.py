@@ -20,6 +20,7 @@ PROGRESS_SIZE = 4
 FOUND_COLUMNS = 5
 # Places of `best`: highest value found; least value on a full list.
 BEST_SIZE = 2
+WHOLE_OVERLAP = 0.5  # least overlap from which the raster of directions can be asked
 WINDOW_MARGIN = 0.5  # m, and
 WINDOW_TURN = 0.1  # rad; what lies farther outside a hard prior's window is not refined into it
 # Places of `rules`: share of the best value that a pose must reach to be kept; distance and angle of distinct poses.
@@ -192,7 +193,7 @@ def try_pose(
         ):
             return COST_REJECTED
     floor = floor_of(rules, best, bonus)
-    if not may_score(scan, pose, spreads, raster_shape, bits, floor):
+    if gates[5] >= WHOLE_OVERLAP and not may_score(scan, pose, spreads, raster_shape, bits, floor):
         return COST_REJECTED
     turning(theta_var, gx, gy, covariance)
     if match_scan(scan, pose, covariance, walls, starts, items, shape, gates, floor, matches) < 0.0:
@@ -364,12 +365,18 @@ def search_slides(
         half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
         low = runs[w, 3] + half
         high = runs[w, 4] - half
-        steps = max(1, math.ceil((high - low) / spacing))
         theta = runs[w, 5] - scan[a, 5]
         c = math.cos(theta)
         s = math.sin(theta)
         gx = c * scan[a, 2] - s * scan[a, 3]
         gy = s * scan[a, 2] + c * scan[a, 3]
+        if prior[0] == HARD_PRIOR:
+            middle = runs[w, 0] * (prior[1] + gx) + runs[w, 1] * (prior[2] + gy)
+            low = max(low, middle - prior[4])
+            high = min(high, middle + prior[4])
+            if low > high or abs(wrap(theta - prior[3])) > prior[5] + WINDOW_TURN:
+                continue
+        steps = max(1, math.ceil((high - low) / spacing))
         var = scan[a, 10]
         for j in range(steps):
             slide = low + (j + 0.5) / steps * (high - low)

@@ -29,8 +29,8 @@ class Accepted:
     Attributes
     ----------
     pairs : (n, 2) scan index and index of the map piece, by scan index
-    overlaps : (n,) share of each scan segment's length that lies on pieces of its wall
-    rivals, rival_starts : pair k lies also on the pieces ``rivals[rival_starts[k]:rival_starts[k + 1]]`` of its wall
+    overlaps : (n,) share of each scan segment's length that lies on pieces of its wall, or run where it is long
+    rivals, rival_starts : pair k lies also on the pieces ``rivals[rival_starts[k]:rival_starts[k + 1]]``
     """
 
     pairs: Indices

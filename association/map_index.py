@@ -69,7 +69,8 @@ class Raster(NamedTuple):
     Attributes
     ----------
     shape : (5,) as of `Grid`
-    bits : (rows * columns,) bit s of a cell is set where a wall of direction sector s comes within `REACH` of it
+    bits : (rows * columns,) bit s of a cell is set where a wall or a run, over its doorways, of direction sector s
+        comes within `REACH` of it
     """
 
     shape: Floats
@@ -256,11 +257,14 @@ def direction_bin(angles: Floats) -> NDArray[np.intp]:
 
 
 def _grids(walls: Walls, runs: Walls) -> tuple[Grid, Grid, Raster]:
-    ends, sector = _ends(walls), _sectors(walls)
-    shape = _shape(ends, RASTER_CELL, REACH, MAX_CELLS)
-    raster = Raster(shape, direction_raster(ends, REACH, shape, sector))
+    ends, sector, run_ends, run_sector = _ends(walls), _sectors(walls), _ends(runs), _sectors(runs)
     near = _grid(ends, np.zeros(len(ends), dtype=np.int64), 1, (CELL, REACH))
-    return near, _grid(_ends(runs), _sectors(runs), SECTORS, (SWEEP_CELL, SWEEP_REACH)), raster
+    swept = _grid(run_ends, run_sector, SECTORS, (SWEEP_CELL, SWEEP_REACH))
+    # The line of a run may pass its walls by as much as they were merged with.
+    both, reach = np.vstack([ends, run_ends]), REACH + MERGE_LATERAL
+    shape = _shape(both, RASTER_CELL, reach, MAX_CELLS)
+    bits = direction_raster(both, reach, shape, np.concatenate([sector, run_sector]))
+    return near, swept, Raster(shape, bits)
 
 
 def _ends(walls: Walls) -> Floats:

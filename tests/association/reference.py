@@ -138,7 +138,13 @@ def accept_matches(matches, order, scan_endpoints, pose, walls, pieces_of_wall, 
         d = walls[wall, :2]
         low, high = sorted(pose.apply(scan_endpoints[i].reshape(2, 2)) @ d)
         points = low + (high - low) * (np.arange(100_000) + 0.5) / 100_000
-        spans = {p: sorted(endpoints[p].reshape(2, 2) @ d) for p in pieces_of_wall[wall]}
+        run = [wall]
+        if math.dist(scan_endpoints[i, :2], scan_endpoints[i, 2:]) > BRIDGING:
+            while walls[run[0], 6] >= 0:
+                run.insert(0, int(walls[run[0], 6]))
+            while walls[run[-1], 7] >= 0:
+                run.append(int(walls[run[-1], 7]))
+        spans = {p: sorted(endpoints[p].reshape(2, 2) @ d) for w in run for p in pieces_of_wall[w]}
         covered = {p: min(last, high) - max(first, low) for p, (first, last) in spans.items()}
         most = max(spans, key=lambda p: (covered[p], -p))
         on_any = np.any([(points >= first) & (points <= last) for first, last in spans.values()], axis=0)

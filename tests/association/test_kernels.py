@@ -128,6 +128,23 @@ def test_a_long_segment_bridges_a_doorway():
         assert matches[0, 3] == pytest.approx(overlap)
 
 
+def test_a_pose_over_a_doorway_may_score():
+    """The raster has the direction of a run also where its walls are farther away than they are listed."""
+    prepared = scan_rows(scan_of(np.array([[0.0, 0.0, 6.0, 0.0]])), 0.0)
+    spreads, matches = np.empty(1), np.empty((1, 5))
+    match.angle_spreads(prepared.rows, 0.0, GATES, spreads)
+    for jamb in np.linspace(3.0, 3.5, 11):
+        walls = [[0.0, 0.0, jamb, 0.0], [jamb + 1.45, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]]
+        index = MapIndex.build(Segments.from_array(walls))
+        for slide in np.linspace(-3.0, 6.0, 46):
+            pose = np.array([0.0, slide - index.origin[0], -index.origin[1]])
+            total = match.match_scan(
+                prepared.rows, pose, np.zeros((3, 3)), index.walls.rows, index.grid.starts, index.grid.items,
+                index.grid.shape, GATES, 0.0, matches,
+            )  # fmt: skip
+            assert match.may_score(prepared.rows, pose, spreads, *index.raster, total - 1e-9), (jamb, slide)
+
+
 def test_turning_holds_the_pin():
     """Of a pose that turns about a point the covariance of that point's place is 0."""
     covariance = np.empty((3, 3))

@@ -244,3 +244,24 @@ def test_results_are_values():
     result = associate(ROOM_INDEX, scan_of(seen(ROOM, INSIDE)[0]))
     with pytest.raises(dataclasses.FrozenInstanceError):
         result.usable = False
+
+
+def test_a_segment_across_a_doorway_is_reported_on_both_walls():
+    """The pair is the piece that it lies on most; the overlap is that with all of the run."""
+    walls = np.array([[0, 0, 3, 0], [4, 0, 9, 0], [9, 0, 9, 6], [9, 6, 0, 6], [0, 6, 0, 0]], dtype=float)
+    index = MapIndex.build(Segments.from_array(walls))
+    seen_walls = np.array([[1.0, 0, 8.0, 0], [9, 1, 9, 5], [8, 6, 2, 6], [0, 5, 0, 1]])
+    result = associate(index, scan_of(seen_walls), prior=HardPrior(pose(0.0, 0.0, 0.0), 1.0, 0.3))
+    across = next(c for c in result.correspondences if c.scan == 0)
+    assert (across.map, across.alternatives) == (1, (0,))
+    assert across.overlap == pytest.approx(6.0 / 7.0, abs=1e-6)
+
+
+def test_a_tiny_window_does_not_make_the_search_long():
+    """Walls are tried at places within it, not all along at steps of its size."""
+    endpoints, _ = seen(maze(1), poses_of(0), noise=0.01, cut=0.2, seed=0, radius=8.0)
+    counts = [
+        associate(MAZE_INDEX, scan_of(endpoints), HardPrior(poses_of(0), radius, 0.1)).search.hypotheses
+        for radius in (1.0, 1e-4)
+    ]
+    assert max(counts) < 1000
