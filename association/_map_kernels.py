@@ -90,17 +90,16 @@ def _column_span(x1, y1, x2, y2, radius, low, high):
 
 
 @njit(cache=True, nogil=True)
-def grid_cells(endpoints, radius, shape, sectors, n_sectors):
-    """List for every cell of a uniform grid and every sector the walls that come within `radius` of the cell.
+def grid_cells(endpoints, radius, shape):
+    """List for every cell of a uniform grid the walls that come within `radius` of the cell.
 
-    `shape` (5,): x0, y0, cell size, columns, rows. `sectors` (m,): which of the `n_sectors` a wall is listed under.
-    Returns ``(starts, items)``: place
-    ``c = (row * columns + column) * n_sectors + sector`` holds ``items[starts[c]:starts[c + 1]]``.
+    `shape` (5,): x0, y0, cell size, columns, rows. Returns ``(starts, items)``: cell ``c = row * columns + column``
+    holds ``items[starts[c]:starts[c + 1]]``, in ascending order.
     """
     x0, y0, cell = shape[0], shape[1], shape[2]
     columns, rows = int(shape[3]), int(shape[4])
-    places = columns * rows * n_sectors
-    starts = np.zeros(places + 1, dtype=np.int64)
+    places = columns * rows
+    starts = np.zeros(places + 1, dtype=np.int32)
     items = np.zeros(0, dtype=np.int32)
     for counting in (True, False):
         if not counting:
@@ -123,7 +122,7 @@ def grid_cells(endpoints, radius, shape, sectors, n_sectors):
                 bottom = max(0, int((ya - y0) / cell))
                 top = min(rows - 1, int((yb - y0) / cell))
                 for row in range(bottom, top + 1):
-                    c = (row * columns + column) * n_sectors + sectors[i]
+                    c = row * columns + column
                     if not counting:
                         items[starts[c]] = i
                     starts[c] += 1

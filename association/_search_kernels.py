@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ._match_kernels import SECTORS, angle_spreads, match_scan, may_score, refine, turning, wrap
+from ._match_kernels import SECTOR_BITS, SECTORS, angle_spreads, match_scan, may_score, refine, turning, wrap
 
 BASE_SLACK = 0.2  # m; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length
@@ -297,36 +297,36 @@ def search_base(
         # The sectors that the direction of b may lie in, one or two.
         turned = (runs[wa, 5] + turn + math.pi) * per_radian + 0.5
         first_sector = math.floor(turned - spread)
-        last_sector = math.floor(turned + spread)
+        more_sectors = math.floor(turned + spread) - first_sector
         while at <= high:
             until = min(next_x, next_y)
             if 0 <= column < columns and 0 <= row < rows:
-                here = (row * columns + column) * SECTORS
-                for raw in range(first_sector, last_sector + 1):
-                    place = here + (raw & (SECTORS - 1))
-                    for k in range(sector_starts[place], sector_starts[place + 1]):
-                        wb = sector_items[k]
-                        spent += 1
-                        wx = runs[wb, 0]
-                        wy = runs[wb, 1]
-                        across = wx * dy - wy * dx
-                        if wx * tdx + wy * tdy < cos_tolerance or abs(across) < MIN_CROSSING:
-                            continue
-                        slide = (runs[wb, 2] - wx * y + wy * x) / across
-                        # A wall is listed in several cells: it counts where the crossing is.
-                        if slide < at or slide >= until or slide > high:
-                            continue
-                        along = wx * (x + slide * dx) + wy * (y + slide * dy)
-                        if along - half_b < runs[wb, 3] or along + half_b > runs[wb, 4]:
-                            continue
-                        if base_pose(scan, a, b, runs, wa, wb, pose):
-                            gx = c * pin_x - s * pin_y
-                            gy = s * pin_x + c * pin_y
-                            spent += try_pose(
-                                scan, gx, gy, theta_var, pose, walls, starts, items, shape, raster_shape, bits, gates,
-                                rules, prior, found, count, best, progress, spreads, matches, sums, information,
-                                covariance,
-                            )  # fmt: skip
+                here = row * columns + column
+                for k in range(sector_starts[here], sector_starts[here + 1]):
+                    if (sector_items[k] - first_sector) & (SECTORS - 1) > more_sectors:
+                        continue
+                    wb = sector_items[k] >> SECTOR_BITS
+                    spent += 1
+                    wx = runs[wb, 0]
+                    wy = runs[wb, 1]
+                    across = wx * dy - wy * dx
+                    if wx * tdx + wy * tdy < cos_tolerance or abs(across) < MIN_CROSSING:
+                        continue
+                    slide = (runs[wb, 2] - wx * y + wy * x) / across
+                    # A wall is listed in several cells: it counts where the crossing is.
+                    if slide < at or slide >= until or slide > high:
+                        continue
+                    along = wx * (x + slide * dx) + wy * (y + slide * dy)
+                    if along - half_b < runs[wb, 3] or along + half_b > runs[wb, 4]:
+                        continue
+                    if base_pose(scan, a, b, runs, wa, wb, pose):
+                        gx = c * pin_x - s * pin_y
+                        gy = s * pin_x + c * pin_y
+                        spent += try_pose(
+                            scan, gx, gy, theta_var, pose, walls, starts, items, shape, raster_shape, bits, gates,
+                            rules, prior, found, count, best, progress, spreads, matches, sums, information,
+                            covariance,
+                        )  # fmt: skip
             at = until
             if next_x < next_y:
                 column += step_x

@@ -44,7 +44,7 @@ def accept(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> Accepte
     pose = best.pose
     found = accept_matches(
         best.matches, rows.order, scan.measured.segments.endpoints, pose.theta, pose.x, pose.y, index.walls.rows,
-        index.pieces, index.piece_starts, index.local.endpoints,
+        index.pieces, index.piece_starts, index.endpoints,
     )  # fmt: skip
     return Accepted(*found)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -29,6 +29,7 @@ SWEEP_CELL = 2.0  # m
 SWEEP_REACH = 0.02  # m; rounding
 RASTER_CELL = 0.5  # m
 MAX_CELLS = 4_000_000
+MAX_SWEEP_CELLS = 1_000_000
 
 
 class Walls(NamedTuple):
@@ -50,16 +51,16 @@ class Walls(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """A uniform grid over the walls, each cell with one list or one for every sector of directions.
+    """A uniform grid over the walls.
 
     Attributes
     ----------
     shape : (5,) x0, y0, cell size (metres), columns, rows
-    starts, items : place ``c = (row * columns + column) * sectors + sector`` lists ``items[starts[c]:starts[c + 1]]``
+    starts, items : cell ``c = row * columns + column`` lists ``items[starts[c]:starts[c + 1]]``
     """
 
     shape: Floats
-    starts: NDArray[np.int64]
+    starts: NDArray[np.int32]
     items: NDArray[np.int32]
 
 
@@ -91,8 +92,8 @@ class MapIndex:
         Standard deviation of the map's lines normal to themselves, metres.
     origin : (2,)
         Centre of the map, metres in the map frame; the index works relative to it, so that maps far out lose nothing.
-    local : Segments
-        The segments relative to `origin`.
+    endpoints : (n, 4)
+        Of the segments, relative to `origin`.
     directed : int
         Number of segments as sent; piece i stands for segment ``i % directed``.
     wall_of_piece : (n,) the wall that each segment is part of
@@ -103,14 +104,15 @@ class MapIndex:
     grid : Grid
         Walls within `REACH` of each cell, whatever their direction: what lies at a point?
     sectors : Grid
-        Runs on each cell by direction, `SECTORS` of them: which runs of that direction does a sweep meet?
+        Runs on each cell, ``run * SECTORS + sector`` with the sector of its direction: which runs of that direction
+        does a sweep meet? Told from the list alone, since a look at a run costs more than all else.
     raster : Raster
     """
 
     segments: Segments
     sigma: float
     origin: Floats
-    local: Segments
+    endpoints: Floats
     directed: int
     wall_of_piece: NDArray[np.int32]
     pieces: NDArray[np.int32]
@@ -122,7 +124,7 @@ class MapIndex:
     raster: Raster
 
     @classmethod
-    def build(cls, segments: Segments, sigma: float = 0.0) -> MapIndex:
+    def build(cls, segments: Segments, sigma: float = 0.0, *, oriented: bool = True) -> MapIndex:
         """Index a map; some 10 microseconds a segment.
 
         Parameters
@@ -131,6 +133,8 @@ class MapIndex:
             At least one, within an extent of 100 km.
         sigma : float
             Standard deviation of the map's lines normal to themselves, metres, 0 to 10.
+        oriented : bool
+            False lists every segment in both directions, for scans whose directions mean nothing.
 
         Raises
         ------
@@ -145,7 +149,8 @@ class MapIndex:
         low, high = corners.min(axis=0), corners.max(axis=0)
         if (high - low).max() > MAX_EXTENT:
             raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="map.segments")
-        return cls._of(segments, sigma, np.round(0.5 * (low + high)), len(segments))
+        origin = np.round(0.5 * (low + high))
+        return cls._of(segments if oriented else _both_ways(segments), sigma, origin, len(segments))
 
     @classmethod
     def _of(cls, segments: Segments, sigma: float, origin: Floats, directed: int) -> MapIndex:
@@ -156,13 +161,16 @@ class MapIndex:
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
         grids = _grids(walls, runs)
-        return cls(segments, sigma, origin, local, directed, wall_of_piece, order, starts, walls, runs, *grids)
+        return cls(
+            segments, sigma, origin, local.endpoints, directed, wall_of_piece, order, starts, walls, runs, *grids
+        )
 
     @cached_property
     def undirected(self) -> MapIndex:
-        """The same map with every segment in both directions, for scans whose directions mean nothing."""
-        both = np.concatenate([self.segments.endpoints, self.segments.endpoints[:, [2, 3, 0, 1]]])
-        return MapIndex._of(Segments.from_array(both), self.sigma, self.origin, self.directed)
+        """The same map with every segment in both directions; itself where it was built so."""
+        if len(self.segments) > self.directed:
+            return self
+        return MapIndex._of(_both_ways(self.segments), self.sigma, self.origin, self.directed)
 
     @cached_property
     def sorted_lengths(self) -> tuple[Floats, Floats]:
@@ -188,10 +196,14 @@ class MapIndex:
     def nbytes(self) -> int:
         """Memory held, bytes."""
         tables: list[tuple[NDArray[Any], ...]] = [self.walls, self.runs, self.grid, self.sectors, self.raster]
-        arrays: list[NDArray[Any]] = [self.wall_of_piece, self.pieces, self.piece_starts]
+        arrays: list[NDArray[Any]] = [self.endpoints, self.wall_of_piece, self.pieces, self.piece_starts]
         arrays += [array for table in tables for array in table]
-        geometry = 2 * 11 * 8 * len(self.segments)
-        return geometry + sum(a.nbytes for a in arrays)
+        lines = [getattr(self.segments, field.name) for field in fields(Segments)]
+        return sum(a.nbytes for a in arrays + lines)
+
+
+def _both_ways(segments: Segments) -> Segments:
+    return Segments.from_array(np.concatenate([segments.endpoints, segments.endpoints[:, [2, 3, 0, 1]]]))
 
 
 def _merge(local: Segments, gap: float) -> tuple[Walls, NDArray[np.int32]]:
@@ -258,8 +270,8 @@ def direction_bin(angles: Floats) -> NDArray[np.intp]:
 
 def _grids(walls: Walls, runs: Walls) -> tuple[Grid, Grid, Raster]:
     ends, sector, run_ends, run_sector = _ends(walls), _sectors(walls), _ends(runs), _sectors(runs)
-    near = _grid(ends, np.zeros(len(ends), dtype=np.int64), 1, (CELL, REACH))
-    swept = _grid(run_ends, run_sector, SECTORS, (SWEEP_CELL, SWEEP_REACH))
+    near, swept = _grid(ends, CELL, REACH, MAX_CELLS), _grid(run_ends, SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+    swept = swept._replace(items=swept.items * np.int32(SECTORS) + run_sector[swept.items])
     # The line of a run may pass its walls by as much as they were merged with.
     both, reach = np.vstack([ends, run_ends]), REACH + MERGE_LATERAL
     shape = _shape(both, RASTER_CELL, reach, MAX_CELLS)
@@ -275,20 +287,18 @@ def _ends(walls: Walls) -> Floats:
     return np.hstack([a, b])
 
 
-def _sectors(walls: Walls) -> NDArray[np.int64]:
+def _sectors(walls: Walls) -> NDArray[np.int32]:
     """Return the sector of each direction, of `SECTORS`."""
-    return np.floor((walls.rows[:, 5] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int64) % SECTORS
+    return np.floor((walls.rows[:, 5] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int32) % np.int32(SECTORS)
 
 
-def _grid(ends: Floats, sector: NDArray[np.int64], sectors: int, sizes: tuple[float, float]) -> Grid:
-    """Lay a grid of cells of ``sizes[0]`` metres over what is within ``sizes[1]`` of the walls."""
-    size, reach = sizes
-    shape = _shape(ends, size, reach, MAX_CELLS / sectors)
-    starts, items = grid_cells(ends, reach, shape, sector, sectors)
-    return Grid(shape, starts, items)
+def _grid(ends: Floats, size: float, reach: float, most: int) -> Grid:
+    """Lay a grid of at most about `most` cells of `size` metres over what is within `reach` metres of the walls."""
+    shape = _shape(ends, size, reach, most)
+    return Grid(shape, *grid_cells(ends, reach, shape))
 
 
-def _shape(ends: Floats, size: float, reach: float, most: float) -> Floats:
+def _shape(ends: Floats, size: float, reach: float, most: int) -> Floats:
     """Return x0, y0, cell size, columns and rows of cells of `size` metres, or larger ones where `most` asks for it."""
     corners = ends.reshape(-1, 2)
     low = corners.min(axis=0) - reach - size

@@ -17,7 +17,7 @@ from .schemas.parts import InlineMap, StoredMap
 from .schemas.requests import MapDocument
 
 MAX_EXTENT = 1e5  # m
-INDEXED_BYTES = 600  # that a segment takes once it is indexed, about
+INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 LARGE = 500_000  # bytes; larger documents would hold up everything else for too long
 
 
@@ -37,8 +37,10 @@ class MapLookup:
         self._store = store
         self._parser = parser
 
-    def indexed(self, asked: InlineMap | StoredMap) -> tuple[CachedMap, int | None]:
+    def indexed(self, asked: InlineMap | StoredMap, *, oriented: bool) -> tuple[CachedMap, int | None]:
         """Return a map ready to be searched, and its revision where it is a stored one.
+
+        Whether its directions count makes it another index, with a place of its own in the cache.
 
         Runs off the event loop.
 
@@ -52,28 +54,29 @@ class MapLookup:
         if isinstance(asked, InlineMap):
             # Robots send the same map with every scan: what is in it names it.
             digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
-            return self._cache.get((digest, asked.sigma, asked.frame_id), lambda: self._index(asked)), None
+            key = digest, asked.sigma, asked.frame_id, oriented
+            return self._cache.get(key, lambda: self._index(asked, oriented)), None
         while True:
             # Looked up before every use, so that a change by another worker is never missed.
             record = self._store.record(asked.map_id)
             try:
-                return self._cache.get(record, partial(self._load, record)), record.revision
+                return self._cache.get((record, oriented), partial(self._load, record, oriented)), record.revision
             except _ChangedError:
                 continue
 
-    def _load(self, record: MapRecord) -> CachedMap:
+    def _load(self, record: MapRecord, oriented: bool) -> CachedMap:
         stored = self._store.load(record.map_id)
         if stored.record != record:
             raise _ChangedError
         if len(stored.document) > LARGE:
-            return self._index(self._parser.call(read_stored, stored.document))
-        return self._index(read_stored(stored.document))
+            return self._index(self._parser.call(read_stored, stored.document), oriented)
+        return self._index(read_stored(stored.document), oriented)
 
-    def _index(self, asked: InlineMap | MapDocument) -> CachedMap:
-        # The old goes before the new comes: two of the largest at once would be a quarter of a gigabyte.
-        self._cache.make_room(INDEXED_BYTES * len(asked.segments))
+    def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
+        # The old goes before the new comes: two of the largest at once would take too much.
+        self._cache.make_room(INDEXED_BYTES * len(asked.segments) * (1 if oriented else 2))
         segments = Segments.from_array(asked.segments, argument="map.segments")
-        index = MapIndex.build(segments, asked.sigma)
+        index = MapIndex.build(segments, asked.sigma, oriented=oriented)
         return CachedMap(index, asked.frame_id, index.nbytes)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 
 _MMAP_THRESHOLD = -3  # of mallopt(3)
+_ARENA_MAX = -8
 _LARGE = 1 << 20  # bytes
 
 
@@ -12,8 +13,10 @@ def return_large_blocks() -> None:
     """Have every large block mapped by itself, so that the system has it back when it is freed; glibc only.
 
     By itself glibc stops doing so with the first large block that is freed, and keeps the heap that they then lie in:
-    three times the memory after some maps of 16 MB.
+    three times the memory after some maps of 16 MB. And each thread would get a heap of its own, with its own holes: of
+    two there is always one free, since what allocates much holds Python's lock.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(_MMAP_THRESHOLD, _LARGE)
+        mallopt(_ARENA_MAX, 2)

@@ -8,19 +8,21 @@ take is taken there, too.
 from __future__ import annotations
 
 import gc
-import multiprocessing
-import signal
+import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
+from contextlib import suppress
 from typing import Any, TypeVar
 
+from .channel import Channel
 from .memory import return_large_blocks
 from .problems import ProblemError
 
 T = TypeVar("T")
 END_SECONDS = 1.0
+COMMAND = "import sys; sys.path[:] = {path!r}; from service.parser_process import work; work({end})"
 
 
 class ParserProcess:
@@ -28,8 +30,8 @@ class ParserProcess:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._channel: Channel | None = None
 
     @property
     def pid(self) -> int | None:
@@ -50,17 +52,17 @@ class ParserProcess:
             When the process ends meanwhile; the next call has a new one.
         """
         with self._lock:
-            pipe = self._started()
+            channel = self._started()
             try:
-                pipe.send((function, arguments))
-                returned, answer = pipe.recv()
+                channel.send((function, *arguments))
+                kind, *answer = channel.receive()
             except (OSError, EOFError):
                 self._end()
                 raise ProblemError("overloaded", "the process that parses large bodies has ended") from None
-        if returned:
-            found: T = answer
-            return found
-        raise answer
+        if kind is Exception:
+            raise answer[0]
+        found: T = tuple(answer) if kind is tuple else answer[0]  # type: ignore[assignment]
+        return found
 
     def close(self) -> None:
         """End the process; what it works at is lost."""
@@ -70,43 +72,52 @@ class ParserProcess:
         with self._lock:
             self._end()
 
-    def _started(self) -> Connection:
-        if self._process is not None and not self._process.is_alive():
+    def _started(self) -> Channel:
+        if self._process is not None and self._process.poll() is not None:
             self._end()
-        if self._pipe is None:
-            # Spawned: a fork would copy the locks of threads that it does not have.
-            context = multiprocessing.get_context("spawn")
-            self._pipe, theirs = context.Pipe()
-            self._process = context.Process(target=_work, args=(theirs,), name="linefix-parser", daemon=True)
-            self._process.start()
-            theirs.close()
-        return self._pipe
+        if self._channel is None:
+            # Not by multiprocessing, which keeps one more process beside each that it starts. In a group of its own, so
+            # that Ctrl-C is for the service, which then ends this.
+            ours, theirs = socket.socketpair()
+            with theirs:
+                command = COMMAND.format(path=sys.path, end=theirs.fileno())
+                self._process = subprocess.Popen(
+                    [sys.executable, "-c", command],
+                    pass_fds=[theirs.fileno()],
+                    process_group=0,
+                    stdin=subprocess.DEVNULL,
+                )
+            self._channel = Channel(ours)
+        return self._channel
 
     def _end(self) -> None:
-        if self._pipe is not None:
-            self._pipe.close()
+        if self._channel is not None:
+            self._channel.close()
         if self._process is not None:
             self._process.kill()
-            self._process.join(END_SECONDS)
-        self._process = self._pipe = None
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_SECONDS)
+        self._process = self._channel = None
 
 
-def _work(pipe: Connection) -> None:
+def work(end: int) -> None:
     """Answer calls until the other end is gone, which it also is when the service was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service, which then ends this
+    channel = Channel(socket.socket(fileno=end))
     return_large_blocks()
     gc.disable()  # parsed JSON has no cycles, and looking for them takes longer than parsing
     while True:
         try:
-            function, arguments = pipe.recv()
+            function, *arguments = channel.receive()
         except (EOFError, OSError):
             return
+        answer: tuple[Any, ...]
         try:
-            answer = True, function(*arguments)
+            found = function(*arguments)
+            answer = (tuple, *found) if isinstance(found, tuple) else (object, found)
         except Exception as error:
-            answer = False, error
+            answer = Exception, error
         try:
-            pipe.send(answer)
+            channel.send(answer)
         except OSError:
             return
-        del function, arguments, answer
+        function = arguments = found = answer = None  # type: ignore[assignment]

@@ -21,7 +21,9 @@ def open_engine(url: URL) -> Engine:
     """Return an engine; nothing is opened yet."""
     if url.get_backend_name() == "sqlite":
         # No bound on connections: each is used by one thread, whose number is bounded elsewhere.
-        engine = create_engine(url, connect_args={"timeout": BUSY_SECONDS}, max_overflow=-1)
+        # A statement that is kept keeps what it was last given, a document of 15 MB for each and every connection.
+        waits = {"timeout": BUSY_SECONDS, "cached_statements": 0}
+        engine = create_engine(url, connect_args=waits, max_overflow=-1)
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         return engine

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
-from sqlalchemy import URL, Connection, Engine, Row, Select, Table, delete, insert, literal, select, update
+from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, literal, select, update
 from sqlalchemy.exc import IntegrityError
 
 from ..problems import ProblemError
@@ -78,12 +78,12 @@ class MapStore:
             record = MapRecord(map_id, last + 1, digest(document))
             if row is None:
                 # Not an upsert: of two first writers one has to fail here, and look again.
-                connection.execute(insert(maps).values(**columns_of(record, *summary)))
+                connection.execute(insert(maps), columns_of(record, *summary))
             else:
                 _update(connection, maps, columns_of(record, *summary))
             content = {"map_id": map_id, "revision": record.revision, "document": document}
             if not _update(connection, documents, content):
-                connection.execute(insert(documents).values(**content))
+                connection.execute(insert(documents), content)
             # Where the tables themselves are damaged rows may not come back as they were written: no commit then.
             back = _whole(connection, map_id)
             if _trusted(back) != record or not _matches(back, record):
@@ -230,9 +230,13 @@ def _last(connection: Connection, map_id: str, row: Row[Any] | None) -> tuple[in
 
 
 def _update(connection: Connection, table: Table, values: dict[str, Any]) -> bool:
-    """Write over the row of a map; tell whether there was one."""
-    same = table.c.map_id == values["map_id"]
-    return connection.execute(update(table).where(same).values(**values)).rowcount > 0
+    """Write over the row of a map; tell whether there was one.
+
+    The values are not part of the statement: SQLAlchemy keeps those, and would keep the first document for good.
+    """
+    rest = {name: value for name, value in values.items() if name != "map_id"}
+    same = table.c.map_id == bindparam("which")
+    return connection.execute(update(table).where(same), {"which": values["map_id"], **rest}).rowcount > 0
 
 
 def _summary(row: Row[Any]) -> MapSummary:

@@ -45,7 +45,7 @@ async def post_associate(request: Request) -> Response:
     deadline = watch.deadline(asked.options.deadline_ms, runtime.settings.max_deadline_ms)
 
     def answer() -> bytes:
-        cached, revision = runtime.lookup.indexed(asked.map)
+        cached, revision = runtime.lookup.indexed(asked.map, oriented=asked.options.oriented)
         watch.lap("decode")
         found = search(cached, (asked.scan, asked.prior, asked.options), deadline, runtime.metrics)
         watch.lap("search")
@@ -72,7 +72,8 @@ async def post_batch(request: Request) -> Response:
     deadline = watch.deadline(asked.options.deadline_ms, runtime.settings.max_deadline_ms)
 
     async def work() -> dict[str, Any]:
-        cached, revision = await runtime.take_turn(request, lambda: runtime.lookup.indexed(asked.map), deadline)
+        index = partial(runtime.lookup.indexed, asked.map, oriented=asked.options.oriented)
+        cached, revision = await runtime.take_turn(request, index, deadline)
         watch.lap("decode")
 
         def search_one(item: BatchItem | Exception) -> dict[str, Any]:

@@ -316,11 +316,11 @@ def test_accept_matches(seed):
     match.match_scan(prepared.rows, pose, np.diag([1e-4, 1e-4, 1e-6]), index.walls.rows, *grid, GATES, 0.0, matches)
     pairs, overlaps, rivals, starts = accepting.accept_matches(
         matches, prepared.order, endpoints, *pose, index.walls.rows, index.pieces, index.piece_starts,
-        index.local.endpoints,
+        index.endpoints,
     )  # fmt: skip
     local = RigidTransform(pose[1], pose[2], pose[0])
     expected = reference.accept_matches(
-        matches, prepared.order, endpoints, local, index.walls.rows, pieces_of_wall, index.local.endpoints
+        matches, prepared.order, endpoints, local, index.walls.rows, pieces_of_wall, index.endpoints
     )
     assert len(expected) > 0
     assert pairs.tolist() == [[i, piece] for i, piece, _, _ in expected]
