@@ -1,12 +1,13 @@
 """The map index keeps every wall findable, whatever the map is like."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 
 from association import InvalidMapError, MapIndex
-from association._match_kernels import REACH
+from association._match_kernels import REACH, SECTORS
 from registration import Segments
 
 from .scenes import ROOM, maze
@@ -75,6 +76,35 @@ def test_directions_are_sorted_longest_first():
 def test_far_from_the_origin_nothing_is_lost():
     near, far = index_of(ROOM), index_of(ROOM + 5e6)
     np.testing.assert_allclose(far.walls.rows, near.walls.rows, atol=1e-8)
+
+
+def test_built_without_directions_it_is_its_own_undirected():
+    segments = Segments.from_array(maze(1))
+    index = MapIndex.build(segments, oriented=False)
+    assert index.undirected is index
+    assert np.array_equal(index.walls.rows, MapIndex.build(segments).undirected.walls.rows)
+    assert (len(index.segments), index.directed) == (2 * len(segments), len(segments))
+
+
+def test_the_sweep_lists_the_sector_of_every_run():
+    index = index_of(maze(1))
+    runs, sectors = np.divmod(index.sectors.items, SECTORS)
+    angles = index.runs.rows[runs, 5]
+    off = (angles + math.pi - sectors * math.tau / SECTORS) % math.tau
+    assert set(runs) == set(range(len(index.runs.rows)))
+    assert np.minimum(off, math.tau - off).max() <= math.pi / SECTORS + 1e-9
+
+
+def test_its_memory_is_known():
+    """What a cache counts is what is held, within a tenth."""
+    ends = np.random.default_rng(0).uniform(0.0, 300.0, (20_000, 2))
+    segments = np.hstack([ends, ends + 0.5])
+    index_of(segments)
+    tracemalloc.start()
+    index = index_of(segments)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert index.nbytes == pytest.approx(held, rel=0.1)
 
 
 def test_memory_is_capped_whatever_the_extent():

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
+from sqlalchemy import URL
 
 from association import MapIndex
 from registration import Segments
 from service.finite import NotFiniteError, encode
-from service.maps import CachedMap, IndexCache
+from service.lookup import MapLookup
+from service.maps import CachedMap, IndexCache, MapStore
 from service.metrics import Metrics
+from service.parser_process import ParserProcess
+from service.schemas import examples
+from service.schemas.parts import InlineMap
 
 INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
 
@@ -73,6 +79,17 @@ def test_a_failed_build_is_not_remembered() -> None:
     with pytest.raises(ZeroDivisionError):
         cache.get("a", lambda: 1 // 0)  # type: ignore[arg-type, return-value]
     assert cache.get("a", lambda: a_map(1)).bytes == 1
+
+
+def test_a_map_without_directions_is_another_one_in_the_cache(tmp_path: Path) -> None:
+    cache = IndexCache(10_000_000, Metrics())
+    lookup = MapLookup(cache, MapStore(URL.create("sqlite", database=str(tmp_path / "maps"))), ParserProcess())
+    asked = InlineMap.model_validate({"segments": examples.WALLS}, context={"map_segments": 10})
+    one, other, again = (lookup.indexed(asked, oriented=oriented)[0] for oriented in (True, False, True))
+    assert len(other.index.segments) == 2 * len(one.index.segments)
+    assert again is one
+    assert cache.bytes == one.index.nbytes + other.index.nbytes
+    assert other.index.undirected is other.index
 
 
 @pytest.mark.parametrize("answer", [np.nan, {"a": [1.0, {"b": np.inf}]}, {"a": np.array([[1.0, -np.inf]])}, (np.nan,)])

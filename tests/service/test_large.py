@@ -143,6 +143,21 @@ def test_a_large_map_is_stored_and_found(client: httpx.Client) -> None:
     client.delete("/v1/maps/large")
 
 
+def test_nothing_is_kept_of_a_map_that_was_stored(start_service: Callable[..., Any]) -> None:
+    """Neither by a statement nor by its parameters: 15 MB each, and that for each connection."""
+    running = start_service()
+
+    def resident() -> float:
+        status = Path(f"/proc/{running.process.pid}/status").read_text()
+        return next(int(line.split()[1]) / 1e3 for line in status.splitlines() if line.startswith("RssAnon"))
+
+    body = large_map(150_000)
+    before = resident()
+    for _ in range(2):
+        running.client.put("/v1/maps/m", content=body).raise_for_status()
+    assert resident() - before < 0.75 * len(body) / 1e6
+
+
 def test_many_values_over_http_are_413(client: httpx.Client) -> None:
     limit = client.get("/v1/limits").json()["max_values"]
     answer = client.post("/v1/associate", content=b'{"a": [' + b"[]," * (limit // 2 + 1) + b"[]]}")
