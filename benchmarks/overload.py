@@ -125,22 +125,34 @@ def overload(service: Service, pairs: int, seconds: float) -> list[Row]:
         ratios.append(found["over"] / found["full"])
         print(f"pair {number + 1}: {found['full']:.0f} a second at capacity, ratio {ratios[-1]:.3f}")
     half = stats.t.ppf(0.975, len(ratios) - 1) * np.std(ratios, ddof=1) / math.sqrt(len(ratios))
-    service_ms = 1e3 * quantile((a.seconds for a in alone), 0.99)
-    bound = 1e3 * (QUEUE + service.cores) / float(np.mean(rates)) + service_ms
+    times = [1e3 * a.seconds for a in alone]
+    rate = float(np.mean(rates))
+    mean_queue = 1e3 * (QUEUE + service.cores) / rate + quantile(times, 0.99)
     return [
         at_least(
             f"goodput at {FACTOR} x over goodput at capacity, mean (+- {half:.3f})", float(np.mean(ratios)), GOODPUT
         ),
         at_most(
-            "accepted, p99, ms (goal: what the queue holds, and one more)",
+            "accepted, p99, ms (goal: of what a full queue takes)",
             1e3 * quantile(accepted, 0.99),
-            bound,
+            full_queue_ms(times, rate, service.cores),
             form=".1f",
         ),
+        Row("  a queue of mean requests, and one of 99 of 100, ms", f"{mean_queue:.1f}"),
         at_most("answered neither 200 nor 503", lost, 0, form=".0f"),
         at_most(f"/livez meanwhile, p99 of {len(probed)}, ms", 1e3 * quantile(probed, 0.99), PROBE_MS, form=".1f"),
         Row("/livez meanwhile, longest, ms", f"{1e3 * max(probed):.1f}"),
     ]
+
+
+def full_queue_ms(times: Sequence[float], rate: float, cores: int) -> float:
+    """Return within what time 99 of 100 requests are answered that find one place left in the queue.
+
+    Before it is answered, those ahead of it have been, what runs, and it itself: a sum of as many service times, drawn
+    from those that were measured by themselves and stretched to `rate` answers a second.
+    """
+    sums = np.random.default_rng(0).choice(times, (20_000, QUEUE // cores + 2)).sum(axis=1)
+    return quantile(sums * (1e3 * cores / rate / np.mean(times)), 0.99)
 
 
 def share(service: Service, seconds: float) -> list[Row]:

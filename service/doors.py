@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -19,7 +19,7 @@ SEARCHING = {
     path.encode("ascii"): path for path in ("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize")
 }
 REPORT_SECONDS = 1.0
-UNHEARD_SECONDS = 0.02
+NAP_SECONDS = 0.01
 
 
 class Doors:
@@ -33,7 +33,7 @@ class Doors:
         self._gate = gate
         self._keyring = keyring
         self._metrics = metrics
-        self._unheard: list[Callable[[], None]] = []
+        self._nap: asyncio.Handle | None = None
         self._refused: Counter[tuple[str, str, int]] = Counter()
 
     def refuse(self, method: bytes, url: bytes, headers: list[tuple[bytes, bytes]]) -> ProblemError | None:
@@ -51,21 +51,17 @@ class Doors:
             if not self._refused:
                 asyncio.get_running_loop().call_later(REPORT_SECONDS, self.report)
             self._refused[route, refusal.code, refusal.status] += 1
+            if self._nap is None:
+                self._nap = asyncio.get_running_loop().call_soon(self._rest)
         return refusal
 
-    def hear_later(self, listen: Callable[[], None]) -> None:
-        """Leave the connection of who was just sent away for a moment, and then hear all such in one go.
+    def _rest(self) -> None:
+        """Hear nobody for a moment, the event loop included, and then all who came meanwhile in one go.
 
-        To be woken for each by itself costs several times what it takes to refuse.
+        To be woken for each by itself, away from a search, costs several times what it takes to refuse.
         """
-        if not self._unheard:
-            asyncio.get_running_loop().call_later(UNHEARD_SECONDS, self._hear)
-        self._unheard.append(listen)
-
-    def _hear(self) -> None:
-        unheard, self._unheard = self._unheard, []
-        for listen in unheard:
-            listen()
+        self._nap = None
+        self._gate.rest(NAP_SECONDS)
 
     def announce(self, scope: Mapping[str, Any]) -> None:
         """Note that the body of a request is there, so that no more are let in than find room."""

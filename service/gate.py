@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from collections.abc import Callable, MutableMapping
 from concurrent.futures import ThreadPoolExecutor
@@ -39,6 +40,9 @@ class SearchGate:
         self.running = 0
         self.announced = 0
         self._over: asyncio.Future[None] | None = None
+        self._ended = threading.Event()
+        self._counting = threading.Lock()
+        self._busy = 0
 
     @property
     def waiting(self) -> int:
@@ -99,7 +103,7 @@ class SearchGate:
         await self._enter(deadline, holder, admitted)
         begun = time.monotonic()
         try:
-            work = asyncio.get_running_loop().run_in_executor(self._executor, function)
+            work = asyncio.get_running_loop().run_in_executor(self._executor, self._run, function)
         except BaseException:
             self._leave(holder, 0.0)
             raise
@@ -113,6 +117,14 @@ class SearchGate:
             return work.result()
         raise CancelledError
 
+    def rest(self, seconds: float) -> None:
+        """Hold the event loop for a time, or until a slot stands empty; not at all where one does."""
+        with self._counting:
+            self._ended.clear()
+            all_busy = self._busy == self.slots
+        if all_busy:
+            self._ended.wait(seconds)
+
     def cancel_all(self) -> None:
         """Tell everything that runs to give up, and soon wait no longer for what does not hear, as indexing a map."""
         for deadline in self._deadlines.values():
@@ -123,6 +135,16 @@ class SearchGate:
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
         self._executor.shutdown(wait=False, cancel_futures=True)
+
+    def _run(self, function: Callable[[], T]) -> T:
+        with self._counting:
+            self._busy += 1
+        try:
+            return function()
+        finally:
+            with self._counting:
+                self._busy -= 1
+                self._ended.set()
 
     def _end(self, over: asyncio.Future[None]) -> None:
         if not over.done():

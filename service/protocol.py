@@ -123,8 +123,6 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
             self._write(problem, taken_or_made(self.headers), close=close)
             if not close:
                 self.on_response_complete()
-                self.flow.pause_reading()
-                doors.hear_later(self._listen)
 
         def _write(self, problem: ProblemError, request_id: str, *, close: bool) -> None:
             self.transport.write(_response(problem, request_id, self.server_state.default_headers, close))
@@ -134,10 +132,6 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
                 if self.transport.can_write_eof():
                     self.transport.write_eof()
                 self.loop.call_later(LINGER, self._close)
-
-        def _listen(self) -> None:
-            if not self.transport.is_closing():
-                self.flow.resume_reading()
 
         def _expect_message(self) -> None:
             if self._timer is not None:

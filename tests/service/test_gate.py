@@ -148,6 +148,37 @@ def test_a_client_that_hangs_up_ends_its_search(tmp_path: Path) -> None:
     asyncio.run(scenario())
 
 
+def test_a_rest_lasts_until_a_slot_is_empty() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(2, 10)
+        release = [threading.Event(), threading.Event()]
+        began = [threading.Event(), threading.Event()]
+
+        def work(number: int) -> None:
+            began[number].set()
+            release[number].wait(10.0)
+
+        def rest() -> float:
+            start = time.monotonic()
+            gate.rest(0.3)
+            return time.monotonic() - start
+
+        one = asyncio.ensure_future(gate.run(lambda: work(0), soon()))
+        await until(began[0].is_set)
+        assert rest() < 0.1  # a slot is empty
+        other = asyncio.ensure_future(gate.run(lambda: work(1), soon()))
+        await until(began[1].is_set)
+        assert 0.29 < rest() < 3.0
+        threading.Timer(0.05, release[0].set).start()
+        assert 0.04 < rest() < 0.25
+        assert rest() < 0.1  # nothing has come into the empty slot
+        release[1].set()
+        await asyncio.gather(one, other)
+        gate.close()
+
+    asyncio.run(scenario())
+
+
 def test_a_failure_gives_the_slot_back() -> None:
     async def scenario() -> None:
         gate = SearchGate(1, 0)
