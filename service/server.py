@@ -10,6 +10,7 @@ import signal
 import socket
 import sys
 import threading
+from pathlib import Path
 from types import FrameType
 
 import uvicorn
@@ -28,6 +29,7 @@ logger = logging.getLogger("linefix")
 SWITCH_SECONDS = 0.001
 GARBAGE = (20_000, 10, 10)  # little of what a request makes is cyclic; by default Python looks after each 700 objects
 GRACE = 6  # s for requests that run when the doors close
+TICKS = 10  # a second, of uvicorn's main loop
 LAST_CALL = 9.5  # s after the signal the process ends whatever still runs
 
 
@@ -69,14 +71,27 @@ class DrainingServer(uvicorn.Server):
 class WorkerServer(DrainingServer):
     """One of several: Ctrl-C reaches them all, and is for the process above them to pass on."""
 
+    def __init__(self, config: uvicorn.Config, runtime: Runtime, sign_of_life: Path) -> None:
+        super().__init__(config, runtime)
+        self._sign_of_life = sign_of_life
+
+    async def on_tick(self, counter: int) -> bool:
+        """Show every second that the event loop turns."""
+        if counter % TICKS == 0:
+            self._sign_of_life.touch()
+        return await super().on_tick(counter)
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Begin to drain when the process above says so."""
         if sig != signal.SIGINT:
             super().handle_exit(sig, frame)
 
 
-def answer(settings: Settings, listener: socket.socket, part: Part) -> int:
-    """Answer requests in this process until a signal comes; does not return when it could not be ended cleanly."""
+def answer(settings: Settings, listener: socket.socket, part: Part, sign_of_life: Path | None = None) -> int:
+    """Answer requests in this process until a signal comes; does not return when it could not be ended cleanly.
+
+    One of several workers has a `sign_of_life`: a file that it touches every second while its event loop turns.
+    """
     return_large_blocks()
     sys.setswitchinterval(SWITCH_SECONDS)
     gc.set_threshold(*GARBAGE)
@@ -95,7 +110,7 @@ def answer(settings: Settings, listener: socket.socket, part: Part) -> int:
         timeout_graceful_shutdown=GRACE + 1,
         backlog=BACKLOG,
     )
-    server = (DrainingServer if part.of == 1 else WorkerServer)(config, runtime)
+    server = WorkerServer(config, runtime, sign_of_life) if sign_of_life else DrainingServer(config, runtime)
     server.run([listener])
     if runtime.gate.running:
         # A thread that indexes a map cannot be interrupted, and Python would wait for it.

@@ -72,6 +72,9 @@ class Settings(BaseSettings):
     cache_bytes: int = Field(128_000_000, ge=0, description="of indexed maps kept in memory")
     request_timeout: float = Field(9.0, gt=0.0, description="seconds that a request may take to arrive, head and body")
     drain_seconds: float = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
+    hang_seconds: float = Field(
+        30.0, ge=2.0, le=3600.0, description="without a sign of life after which one of several workers is replaced"
+    )
     log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
 
     @field_validator("keys", mode="before")

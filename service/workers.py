@@ -1,4 +1,4 @@
-"""Several worker processes on one port: started, replaced when they die, and ended together.
+"""Several worker processes on one port: started, replaced when they die or hang, and ended together.
 
 uvicorn has a supervisor of its own, which builds its own servers: ours drain, count into shared files, and are ready
 before they take the place of a dead one.
@@ -18,6 +18,7 @@ from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 
 from uvicorn.config import STARTUP_FAILURE
 
@@ -30,6 +31,8 @@ logger = logging.getLogger("linefix")
 ALL_ENDED = 9.8  # s after the signal whoever is left is killed
 SHORT_LIFE = 10.0  # s; who lives no longer again and again is started again ever later
 LONGEST_PAUSE = 30.0  # s
+LOOK_SECONDS = 1.0  # between looks at the signs of life
+LONGEST_START = 300  # looks without a first sign of life; kernels may have to be compiled
 
 
 class Workers:
@@ -50,6 +53,9 @@ class Workers:
         self._started: dict[int, float] = {}
         self._short_lives: dict[int, int] = {}
         self._due: dict[int, float] = {}
+        self._signs: dict[int, int] = {}
+        self._silent: dict[int, int] = {}
+        self._looked = 0.0
         self._signals = 0
         self._status = 0
 
@@ -68,8 +74,9 @@ class Workers:
                 self._start(directory, Part(index, self._settings.workers))
             while not self._signals:
                 soonest = min(self._due.values(), default=float("inf")) - time.monotonic()
-                timeout = None if soonest == float("inf") else max(0.0, soonest)
+                timeout = min(LOOK_SECONDS, max(0.0, soonest))
                 wait([heard, *(process.sentinel for process in self._processes.values())], timeout)
+                self._kill_hung(Path(directory))
                 self._replace_dead(directory)
             self._end_all(heard)
         return self._status
@@ -78,11 +85,33 @@ class Workers:
         self._signals += 1
 
     def _start(self, directory: str, part: Part) -> None:
+        self._signs[part.index] = self._silent[part.index] = 0
+        sign_of_life(Path(directory), part.index).unlink(missing_ok=True)
         arguments = (self._settings, self._listener, part, directory)
         process = self._context.Process(target=_work, args=arguments, name=f"linefix-worker-{part.index}")
         process.start()
         self._processes[part.index] = process
         self._started[part.index] = time.monotonic()
+
+    def _kill_hung(self, directory: Path) -> None:
+        """Kill whose event loop shows no sign of life.
+
+        Looks are counted, not seconds: when everything was stopped for a while it takes as many again.
+        """
+        if time.monotonic() - self._looked < LOOK_SECONDS:
+            return
+        self._looked = time.monotonic()
+        for index, process in self._processes.items():
+            try:
+                sign = sign_of_life(directory, index).stat().st_mtime_ns
+            except FileNotFoundError:
+                sign = 0
+            self._silent[index] = self._silent[index] + 1 if sign == self._signs[index] else 0
+            self._signs[index] = sign
+            if self._silent[index] * LOOK_SECONDS > (self._settings.hang_seconds if sign else LONGEST_START):
+                logger.error("a worker hangs", extra={"worker": index})
+                process.kill()
+                process.join()
 
     def _replace_dead(self, directory: str) -> None:
         now = time.monotonic()
@@ -141,4 +170,9 @@ def _work(settings: Settings, listener: socket.socket, part: Part, directory: st
     threading.Thread(target=follow, daemon=True).start()
     from .server import answer
 
-    raise SystemExit(answer(settings, listener, part))
+    raise SystemExit(answer(settings, listener, part, sign_of_life(Path(directory), part.index)))
+
+
+def sign_of_life(directory: Path, index: int) -> Path:
+    """Return the file that a worker touches every second, from its event loop."""
+    return directory / f"alive-{index}"

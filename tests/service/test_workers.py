@@ -95,6 +95,21 @@ def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: Ru
     assert "a worker has died" in pair.log()
 
 
+def test_a_worker_that_hangs_is_replaced(start_service: Callable[..., RunningService]) -> None:
+    running = start_service(workers=2, searches=2, hang_seconds=4)
+    until(lambda: running.log().count('"ready"') == 2)
+    before = workers_of(running)
+    time.sleep(6.0)
+    assert workers_of(running) == before  # nobody who is idle is taken for hung
+    os.kill(min(before), signal.SIGSTOP)
+    stopped = time.monotonic()
+    until(lambda: running.log().count('"ready"') == 3)
+    assert time.monotonic() - stopped < 20.0
+    assert "a worker hangs" in running.log()
+    assert len(workers_of(running)) == 2
+    assert workers_of(running) & before == {max(before)}
+
+
 def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
     body, enough = searched_for_a_while(), threading.Event()
     statuses: list[int] = []
