@@ -69,25 +69,32 @@ def trace(x, y, ux, uy, increment, closed, sigma, floor, default_gap, max_gap, m
     lines, spans = fit_all(x, y, ux, uy, bounds, totals, variance, floor, min_points, increment, longest)
     keep = 0
     for k in range(rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor)):
-        if acceptable(lines[k], increment > 0.0, min_points, min_length):
+        if large_enough(lines[k], min_points, min_length) and acceptable(lines[k], increment > 0.0):
             lines[keep] = lines[k]
             spans[keep] = spans[k]
             keep += 1
     lines = lines[:keep]
     spans = spans[:keep]
     cut_corners(x, y, ux, uy, lines, spans, increment, closed, variance, floor)
-    return lines, spans
+    # At a corner a line may have lost points, or an end.
+    still = np.empty(keep, dtype=np.bool_)
+    for k in range(keep):
+        still[k] = large_enough(lines[k], min_points, min_length)
+    return lines[still], spans[still]
 
 
 @njit(cache=True, nogil=True)
-def acceptable(line, rays, min_points, min_length):
-    """Tell whether a line is one: enough points, long enough, its angle known, its points on it."""
-    count = line[COUNT]
+def large_enough(line, min_points, min_length):
+    """Tell whether a line is one that was asked for."""
+    return line[COUNT] >= min_points and line[END] - line[BEGIN] >= min_length
+
+
+@njit(cache=True, nogil=True)
+def acceptable(line, rays):
+    """Tell whether a line is one: its angle known, its points on it."""
     return (
-        count >= min_points
-        and line[END] - line[BEGIN] >= min_length
-        and line[WEIGHT] * line[SPREAD] * WORST_ANGLE * WORST_ANGLE >= 1.0
-        and line[CHI2] <= WORST_FIT * max(1.0, count - 2.0)
+        line[WEIGHT] * line[SPREAD] * WORST_ANGLE * WORST_ANGLE >= 1.0
+        and line[CHI2] <= WORST_FIT * max(1.0, line[COUNT] - 2.0)
         and not (rays and line[P] <= 0.0)
     )
 

@@ -28,7 +28,7 @@ from vectorization._ray_kernels import (
     ray_noise,
     window_noise,
 )
-from vectorization._trace_kernels import WORST_ANGLE, WORST_FIT, acceptable
+from vectorization._trace_kernels import WORST_ANGLE, WORST_FIT, acceptable, large_enough
 
 from . import reference
 
@@ -226,10 +226,10 @@ def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(place, valu
     line = np.zeros(LINE)
     line[[NX, P, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END]] = 1.0, 2.0, 0.1, 1e5, 10.0, 8.0, -0.5, 0.5
     line[place] = value
-    assert acceptable(line, True, 10, 1.0) is accepted
+    assert (large_enough(line, 10, 1.0) and acceptable(line, True)) is accepted
 
 
 def test_points_without_rays_may_lie_on_a_line_through_their_middle():
     line = np.zeros(LINE)
     line[[NX, P, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END]] = 1.0, 0.0, 0.1, 1e5, 10.0, 8.0, -0.5, 0.5
-    assert acceptable(line, False, 10, 1.0)
+    assert acceptable(line, False)

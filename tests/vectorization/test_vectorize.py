@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from registration import RigidTransform, Segments
-from simulation import Scanner, l_room, oblique, scan, square_room
+from simulation import Scanner, l_room, oblique, offices, scan, square_room
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 POSE = RigidTransform(0.7, -0.4, 0.3)
@@ -261,6 +261,18 @@ def test_short_walls_and_few_points_are_left_out_as_asked():
         (VectorizationOptions(min_points=21), 1), (VectorizationOptions(min_points=22), 0),
     ]:  # fmt: skip
         assert len(vectorize(LaserScan(-0.1, 0.01, ranges), options).measured) == expected
+
+
+def test_none_is_smaller_than_asked_for_after_its_corners_were_cut():
+    rng = np.random.default_rng(0)
+    world = offices(rng)
+    least = []
+    for options in (VectorizationOptions(), VectorizationOptions(min_points=30, min_length=1.0)):
+        for pose in world.poses:
+            found = vectorize(laser(scan(world.segments, pose, Scanner(sigma=0.02), rng)), options)
+            least.append((found.measured.points.min() - options.min_points,
+                          found.measured.segments.lengths.min() - options.min_length))  # fmt: skip
+    assert np.min(least, axis=0).min() >= -1e-9
 
 
 def test_points_with_a_viewpoint_are_what_the_laser_saw():
