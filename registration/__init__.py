@@ -1,7 +1,7 @@
 """Known correspondences: the rigid transform that fits paired line segments, and how far to trust it."""
 
 from .correspondences import Correspondences
-from .errors import InvalidArgumentError, InvalidSegmentsError, RegistrationError
+from .errors import InputError, InvalidArgumentError, InvalidSegmentsError, RegistrationError
 from .joint import JointSums
 from .observability import Freedom, find_freedom
 from .one_step import OneStepSums
@@ -15,6 +15,7 @@ __all__ = [
     "Ambiguity",
     "Correspondences",
     "Freedom",
+    "InputError",
     "InvalidArgumentError",
     "InvalidSegmentsError",
     "JointSums",

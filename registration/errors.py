@@ -1,15 +1,16 @@
-"""What registration refuses.
+"""What registration refuses, and the root of what all packages refuse.
 
 ::
 
-    RegistrationError (ValueError)
-    ├── InvalidSegmentsError     a segment that no line can be put through
-    └── InvalidArgumentError     everything else that is wrong with an argument
+    InputError (ValueError)
+    └── RegistrationError
+        ├── InvalidSegmentsError     a segment that no line can be put through
+        └── InvalidArgumentError     everything else that is wrong with an argument
 """
 
 
-class RegistrationError(ValueError):
-    """Root of this package's errors: the input is wrong, and says where.
+class InputError(ValueError):
+    """The input is wrong, and this says where.
 
     Attributes
     ----------
@@ -17,6 +18,8 @@ class RegistrationError(ValueError):
         Which argument, a path in the caller's terms such as ``scan.segments``.
     index : int or None
         The row that is at fault, where there is one.
+    message : str
+        What was expected, or what is wrong with it.
     """
 
     def __init__(self, message: str, *, argument: str, index: int | None = None) -> None:
@@ -25,6 +28,10 @@ class RegistrationError(ValueError):
         self.message = message
         self.argument = argument
         self.index = index
+
+
+class RegistrationError(InputError):
+    """Root of this package's errors."""
 
 
 class InvalidSegmentsError(RegistrationError):

@@ -16,9 +16,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
-from association import AssociationError, CancelledError
-from registration import RegistrationError
-from vectorization import VectorizationError
+from association import CancelledError
+from registration import InputError
 
 from .context import RequestContext, note, request_id_of
 from .keys import KeyGuard
@@ -61,9 +60,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     for kind in (
         ProblemError,
         TooLargeError,
-        RegistrationError,
-        AssociationError,
-        VectorizationError,
+        InputError,
         CancelledError,
         RequestValidationError,
         HTTPException,

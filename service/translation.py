@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from association import AssociationError, CancelledError
-from registration import RegistrationError
-from vectorization import VectorizationError
+from association import CancelledError
+from registration import InputError
 
 from .problems import Fault, ProblemError, invalid
 from .schemas.strict import TooLargeError
 
 
-def _of_library(error: RegistrationError | AssociationError | VectorizationError) -> ProblemError:
+def _of_library(error: InputError) -> ProblemError:
     # The libraries name arguments as the contract does, with dots.
     pointer = "/" + error.argument.replace(".", "/")
     if error.index is not None:
@@ -29,9 +28,7 @@ def _of_size(error: TooLargeError) -> ProblemError:
 _TABLE: tuple[tuple[type[Exception], Callable[[Any], ProblemError]], ...] = (
     (ProblemError, lambda error: error),
     (TooLargeError, _of_size),
-    (RegistrationError, _of_library),
-    (AssociationError, _of_library),
-    (VectorizationError, _of_library),
+    (InputError, _of_library),
     (CancelledError, lambda _: ProblemError("not_ready", "the service is going down")),
 )
 
