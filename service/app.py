@@ -6,7 +6,7 @@ import asyncio
 import gc
 import logging
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from starlette.responses import Response
 from association import CancelledError
 from registration import InputError
 
+from .compiling import compile_kernels, is_compiled
 from .context import RequestContext, note, request_id_of
 from .keys import KeyGuard
 from .openapi import describe
@@ -103,6 +104,11 @@ async def _get_ready(runtime: Runtime) -> None:
     except ProblemError as problem:
         # readyz goes on trying; meanwhile it says what is wrong.
         logger.error("the store does not open: %s", problem.detail)
+    if not is_compiled():
+        logger.info("compiling, which takes half a minute; what comes of it is kept for the next start")
+        with suppress(ProblemError):  # if that process ends early this one compiles what is missing
+            await runtime.in_parser(partial(runtime.parser.call, compile_kernels))
+        runtime.parser.close()
     await asyncio.gather(runtime.in_parser(warm_up), runtime.in_parser(runtime.parser.start))
     # What is there now stays: no need to look through it for garbage ever again.
     gc.collect()

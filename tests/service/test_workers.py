@@ -39,7 +39,7 @@ def metric(running: RunningService, line: str) -> float:
 
 
 def until(condition: Callable[[], bool]) -> None:
-    give_up = time.monotonic() + 60
+    give_up = time.monotonic() + 120
     while not condition():
         assert time.monotonic() < give_up, "did not come about"
         time.sleep(0.02)
@@ -165,3 +165,18 @@ def test_what_is_watched_is_read_when_asked() -> None:
     assert b"linefix_test 1.0" in metrics.exposition()
     value = 2.0
     assert b"linefix_test 2.0" in metrics.exposition()
+
+
+def test_what_a_first_start_compiles_is_not_kept_in_memory(
+    start_service: Callable[..., RunningService], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    running = start_service(probe="/livez", workers=2, searches=2)
+    begun = time.monotonic()
+    until(lambda: running.log().count('"ready"') == 2)
+    assert time.monotonic() - begun > 5.0, "nothing was compiled"
+    assert running.log().count("compiling") == 2
+    for pid in workers_of(running):
+        status = Path(f"/proc/{pid}/status").read_text()
+        anonymous = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("RssAnon"))
+        assert anonymous < 200_000  # kB; with the compiler in it, 480,000
