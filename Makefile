@@ -36,8 +36,8 @@ layers: $(VENV)/.ready
 unit: $(VENV)/.ready
 	$(BIN)/python -m pytest -m "not long"
 
-serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000
-	$(BIN)/python -m service
+serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000, or as ARGS="--port 8001" says
+	$(BIN)/python -m service $(ARGS)
 
 faults: $(VENV)/.ready  ## kill, fill, flip, drain and load for hours: the long forms of tests/faults
 	$(BIN)/python -m pytest -s -m long tests/faults --soak-minutes $(or $(MINUTES),30)

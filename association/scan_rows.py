@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 # Roughness of a wall and bias of the ranges shift neighbouring points together: no number of points averages it out. It
 # decides the angle of short segments, which come with raw ranges.
 COMMON_ERROR = 0.008  # m
+LEAST_OVERLAP = 1e-3  # and as much less than all of a segment: its end may lie on a wall's
 
 GATE_SIGMAS = 3.0
 MIN_OFFSET_GATE = 0.08  # m
@@ -70,6 +71,6 @@ def gates(options: AssociationOptions) -> Floats:
             REACH if offset is None else offset,
             MIN_ANGLE_GATE if angle is None else angle,
             MAX_ANGLE_GATE if angle is None else angle,
-            max(options.min_overlap, 1e-3),
+            min(max(options.min_overlap, LEAST_OVERLAP), 1.0 - LEAST_OVERLAP),
         ]
     )

@@ -21,6 +21,7 @@ from .verdict import Evidence, Verdict, judge
 Floats = NDArray[np.float64]
 
 DEFAULT_OPTIONS = AssociationOptions()
+FACING = 0.05  # m; a wall seen along itself may pass the sensor on either side
 
 
 def associate(
@@ -93,7 +94,7 @@ def associate(
         ),
         alternatives=_alternatives([r for r in ranked if r is not best], index, options),
         search=candidates.report,
-        warnings=_warnings(verdict, candidates.report),
+        warnings=_warnings(scan, verdict, candidates.report, options),
     )
 
 
@@ -125,6 +126,15 @@ def _weak_direction(registered: RegistrationResult) -> tuple[float, float] | Non
     axis = np.linalg.eigh(registered.covariance[:2, :2])[1][:, 1]
     axis = axis if axis[0] > 0.0 or (axis[0] == 0.0 and axis[1] > 0.0) else -axis
     return float(axis[0]), float(axis[1])
+
+
+def _facing_away(scan: Scan) -> int:
+    """Count the segments whose left, where free space is, is not where the sensor stood."""
+    if scan.viewpoint is None:
+        return 0
+    segments = scan.measured.segments
+    fronts = np.einsum("ij,ij->i", segments.normals, np.asarray(scan.viewpoint) - segments.midpoints)
+    return int((fronts < -FACING).sum())
 
 
 def _alternatives(others: list[Ranked], index: MapIndex, options: AssociationOptions) -> tuple[Alternative, ...]:
@@ -161,12 +171,25 @@ def _no_match(
         diagnostics=None,
         alternatives=_alternatives(ranked, *place),
         search=report,
-        warnings=_warnings(verdict, report),
+        warnings=_warnings(scan, verdict, report, place[1]),
     )
 
 
-def _warnings(verdict: Verdict, report: SearchReport) -> tuple[AssociationWarning, ...]:
+def _warnings(
+    scan: Scan, verdict: Verdict, report: SearchReport, options: AssociationOptions
+) -> tuple[AssociationWarning, ...]:
     found = []
+    if len(scan.measured) == 0:
+        found.append(AssociationWarning("no_segments", "The scan has no segments, so that nothing could be searched."))
+    away = _facing_away(scan) if options.oriented else 0
+    if away:
+        found.append(
+            AssociationWarning(
+                "faces_away",
+                f"{away} of {len(scan.measured)} segments show their back to the viewpoint, from where nobody can see "
+                "them: are begin and end exchanged, or is this not the sensor's frame?",
+            )
+        )
     if verdict.contradicted:
         found.append(
             AssociationWarning("prior_contradicted", "A clearly better pose lies where the prior says it should not.")

@@ -114,7 +114,7 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
     explained = _logistic(float(x @ coefficients))
     if evidence.significance > CHANCE:
         explained = min(explained, _logistic(float(x @ cautious)))
-    if contradicted:
+    if better_elsewhere:
         probability = min(probability, 0.5)
     margin = best.value - others[0].value if others else None
     runner_up = max(0.0, others[0].value / best.value) if others and best.value > 0.0 else None
@@ -126,7 +126,7 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
         status = Status.AMBIGUOUS
     else:
         status = Status.OK
-    return Verdict(status, probability, margin, runner_up, contradicted)
+    return Verdict(status, min(probability, 0.5) if contradicted else probability, margin, runner_up, contradicted)
 
 
 def _bar(evidence: Evidence) -> float:

@@ -76,7 +76,7 @@ class RegistrationResult:
         translation in some direction a standard deviation over 0.5 m; or the segments have no directions and the half
         turn fits as well; or there is no pair.
     usable : bool
-        Not degenerate, and chi2 below its 99.9 % quantile.
+        Not degenerate, chi2 below its 99.9 % quantile, and no pair of opposite directions where they mean something.
     pose : RigidTransform or None
         map_from_scan; when degenerate, of those that fit the one that moves least along the free direction; None
         without pairs.

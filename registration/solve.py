@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .chi_square import chi_square_quantile
@@ -61,10 +62,12 @@ def register(
 
     residuals = Residuals.of(problem, fit)
     diagnostics = diagnose(problem, fit, residuals, options)
+    # Lines fit either way round, so chi2 does not see it.
+    reversed_pair = options.oriented and bool((np.abs(residuals.angles) > 0.5 * np.pi).any())
     has_covariance = not degenerate and options.estimator == "joint"
     return RegistrationResult(
         degenerate=degenerate,
-        usable=not degenerate and diagnostics.chi2 <= chi_square_quantile(diagnostics.dof, TAIL),
+        usable=not degenerate and diagnostics.chi2 <= chi_square_quantile(diagnostics.dof, TAIL) and not reversed_pair,
         pose=problem.map_from_local.compose(fit.local_from_scan),
         covariance=covariance_of(problem, fit) if has_covariance else None,
         unobservable=fit.freedom.direction,

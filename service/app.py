@@ -15,6 +15,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
+from starlette.routing import Match
 
 from association import CancelledError
 from registration import InputError
@@ -103,7 +104,8 @@ async def _get_ready(runtime: Runtime) -> None:
         await runtime.open_store()
     except ProblemError as problem:
         # readyz goes on trying; meanwhile it says what is wrong.
-        logger.error("the store does not open: %s", problem.detail)
+        where = runtime.settings.url.render_as_string(hide_password=True)
+        logger.error("the store does not open: %s", problem.detail, extra={"store": where})
     if not is_compiled():
         logger.info("compiling, which takes half a minute; what comes of it is kept for the next start")
         with suppress(ProblemError):  # if that process ends early this one compiles what is missing
@@ -119,7 +121,7 @@ async def _get_ready(runtime: Runtime) -> None:
 
 
 async def _refuse(request: Request, error: Exception) -> Response:
-    problem = _of_framework(error) or problem_of(error)
+    problem = _of_framework(request, error) or problem_of(error)
     if problem is None:
         logger.error("a defect", exc_info=error, extra={"request_id": request_id_of(request.scope)})
         problem = internal()
@@ -127,18 +129,28 @@ async def _refuse(request: Request, error: Exception) -> Response:
     return problem.response(request_id_of(request.scope))
 
 
-def _of_framework(error: Exception) -> ProblemError | None:
+def _of_framework(request: Request, error: Exception) -> ProblemError | None:
     """Return the problem of what FastAPI and Starlette refuse by themselves."""
     if isinstance(error, RequestValidationError):
         return invalid(faults_of(error.errors()))
     if isinstance(error, HTTPException):
         headers = dict(error.headers or {})
         if error.status_code == 405:
+            headers["Allow"] = ", ".join(_methods_of(request))
             return ProblemError("method_not_allowed", "this path takes other methods; see Allow", headers=headers)
         if error.status_code == 404:
             return ProblemError("not_found", "there is nothing under this path", headers=headers)
         return ProblemError("invalid_request", "the request is wrong", headers=headers)
     return None
+
+
+def _methods_of(request: Request) -> list[str]:
+    """Return what the path takes; the framework names the methods of one route only."""
+    every = [getattr(included, "original_router", None) or included for included in request.app.routes]
+    routes = [route for one in every for route in getattr(one, "routes", [one])]
+    matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)
+    methods = {method for route in matching for method in getattr(route, "methods", ())}
+    return sorted(methods | {"HEAD"} if "GET" in methods else methods)
 
 
 async def _nobody(request: Request, error: Exception) -> Response:

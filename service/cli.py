@@ -50,7 +50,17 @@ def serve(arguments: Sequence[str]) -> int:
     except SettingsError as error:
         print(f"linefix: {error}", file=sys.stderr)
         return 2
+    for name in unknown_settings():
+        print(f"linefix: {name} in the environment is no setting", file=sys.stderr)
     return run(settings)
+
+
+def unknown_settings() -> list[str]:
+    """Return what looks like a setting in the environment and is none."""
+    from .settings import Settings
+
+    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields}
+    return sorted(name for name in os.environ if name.upper().startswith("LINEFIX_") and name.upper() not in known)
 
 
 def run(settings: Settings) -> int:

@@ -51,6 +51,8 @@ class RequestContext:
         scope.setdefault("state", {})["request_id"] = request_id
         started = time.perf_counter()
         status = 0
+        # Whoever can be read can be asked for its headers: the server leaves the body away.
+        inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
 
         async def send_with_id(message: Message) -> None:
             nonlocal status
@@ -60,7 +62,7 @@ class RequestContext:
             await send(message)
 
         try:
-            await self._app(scope, receive, send_with_id)
+            await self._app(inner, receive, send_with_id)
         except Exception:
             logger.exception("a defect", extra={"request_id": request_id})
             if status:
@@ -69,7 +71,7 @@ class RequestContext:
         finally:
             end_announcement(scope)
             seconds = time.perf_counter() - started
-            route = getattr(scope.get("route"), "path", "unmatched")
+            route = getattr(inner.get("route"), "path", "unmatched")
             self._metrics.observe_request(route, scope["method"], status, seconds)
             logger.info(
                 "request",

@@ -12,12 +12,14 @@ from typing import Any
 from .gate import ANNOUNCED, SearchGate
 from .keys import Keyring
 from .metrics import Metrics
+from .parsing import too_large
 from .problems import ProblemError
 
 logger = logging.getLogger("linefix")
 SEARCHING = {
     path.encode("ascii"): path for path in ("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize")
 }
+OTHER = "unmatched"
 REPORT_SECONDS = 1.0
 NAP_SECONDS = 0.01
 
@@ -29,31 +31,42 @@ class Doors:
     once a second.
     """
 
-    def __init__(self, gate: SearchGate, keyring: Keyring, metrics: Metrics) -> None:
+    def __init__(self, gate: SearchGate, keyring: Keyring, metrics: Metrics, max_body_bytes: int) -> None:
         self._gate = gate
+        self._max_body_bytes = max_body_bytes
         self._keyring = keyring
         self._metrics = metrics
         self._nap: asyncio.Handle | None = None
-        self._refused: Counter[tuple[str, str, int]] = Counter()
+        self._refused: Counter[tuple[str, str, str, int]] = Counter()
 
     def refuse(self, method: bytes, url: bytes, headers: list[tuple[bytes, bytes]]) -> ProblemError | None:
         """Return why a request is not let in; None where the application is to answer."""
-        if not self._gate.full or method != b"POST":
+        if method not in (b"POST", b"PUT"):
             return None
-        route = SEARCHING.get(url.partition(b"?")[0])
-        if route is None:
-            return None
-        try:
-            refusal = self._gate.refusal(self._keyring.holder(headers))
-        except ProblemError:
-            return None  # the application says what is wrong with the key
+        route = SEARCHING.get(url.partition(b"?")[0]) if method == b"POST" else None
+        refusal = self._too_large(headers)
+        if refusal is None and route is not None and self._gate.full:
+            refusal = self._no_room(headers)
+            if refusal is not None and self._nap is None:
+                self._nap = asyncio.get_running_loop().call_soon(self._rest)
         if refusal is not None:
             if not self._refused:
                 asyncio.get_running_loop().call_later(REPORT_SECONDS, self.report)
-            self._refused[route, refusal.code, refusal.status] += 1
-            if self._nap is None:
-                self._nap = asyncio.get_running_loop().call_soon(self._rest)
+            self._refused[route or OTHER, method.decode(), refusal.code, refusal.status] += 1
         return refusal
+
+    def _too_large(self, headers: list[tuple[bytes, bytes]]) -> ProblemError | None:
+        """Refuse here what says so of itself: the connection then listens until the answer has been read."""
+        for name, value in headers:
+            if name == b"content-length" and int(value) > self._max_body_bytes:
+                return too_large(self._max_body_bytes)
+        return None
+
+    def _no_room(self, headers: list[tuple[bytes, bytes]]) -> ProblemError | None:
+        try:
+            return self._gate.refusal(self._keyring.holder(headers))
+        except ProblemError:
+            return None  # the application says what is wrong with the key
 
     def _rest(self) -> None:
         """Hear nobody for a moment, the event loop included, and then all who came meanwhile in one go.
@@ -71,7 +84,7 @@ class Doors:
 
     def report(self) -> None:
         """Count and log what was refused since the last time."""
-        for (route, code, status), count in self._refused.items():
-            self._metrics.count_refusals(route, status, count)
+        for (route, method, code, status), count in self._refused.items():
+            self._metrics.count_refusals(route, method, status, count)
             logger.warning("refused", extra={"route": route, "code": code, "count": count})
         self._refused.clear()

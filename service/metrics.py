@@ -77,9 +77,9 @@ class Metrics:
         self.requests.labels(route, name, str(status)).inc()
         self.request_seconds.labels(route).observe(seconds)
 
-    def count_refusals(self, route: str, status: int, count: int) -> None:
+    def count_refusals(self, route: str, method: str, status: int, count: int) -> None:
         """Count requests that were refused before the application saw them."""
-        self.requests.labels(route, "POST", str(status)).inc(count)
+        self.requests.labels(route, method, str(status)).inc(count)
 
     def observe_association(self, status: str, usable: bool, seconds: float, hypotheses: int) -> None:
         """Count one answered search."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -17,6 +18,7 @@ from .schemas.strict import TooLargeError
 M = TypeVar("M", bound=BaseModel)
 Limits = dict[str, int]
 _PIECE = 1 << 20
+_NO_NUMBER = re.compile(r"-?(NaN|Inf)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +114,10 @@ def parse(data: bytes | bytearray, limits: Limits) -> Any:
         return orjson.loads(data)
     except orjson.JSONDecodeError as error:
         # The message of the parser speaks of the kind of error and its place, not of the text.
-        raise ProblemError("invalid_json", f"{error.msg} at line {error.lineno} column {error.colno}") from None
+        what = f"{error.msg} at line {error.lineno} column {error.colno}"
+        if _NO_NUMBER.match(error.doc, error.pos):
+            what += ": NaN and Infinity are not JSON; a range without a return is null"
+        raise ProblemError("invalid_json", what) from None
 
 
 def validate(model: type[M], value: Any, limits: Limits) -> M:

@@ -54,7 +54,7 @@ TITLES: dict[str, str] = {
     "method_not_allowed": "The method is not allowed here",
     "request_timeout": "The body came too slowly",
     "map_corrupt": "The stored map is damaged",
-    "revision_conflict": "The map has another revision",
+    "revision_conflict": "The map is not as demanded",
     "too_large": "The request is over a limit",
     "unsupported_media_type": "The media type is not supported",
     "invalid_request": "The request is wrong",

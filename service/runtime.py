@@ -52,7 +52,7 @@ class Runtime:
         )
         self.gate = SearchGate(part.share(settings.searches), part.share(settings.queue))
         self.keyring = Keyring(settings.keys)
-        self.doors = Doors(self.gate, self.keyring, self.metrics)
+        self.doors = Doors(self.gate, self.keyring, self.metrics, settings.max_body_bytes)
         self.store = MapStore(settings.url)
         self.cache = IndexCache(part.share(settings.cache_bytes), self.metrics)
         self.parser = ParserProcess()

@@ -60,7 +60,7 @@ class LaserScan:
         turn = abs(angle_increment) * max(1, m - 1)
         if not (angle_increment != 0.0 and turn <= math.tau * (1.0 + 1e-3)):
             raise InvalidScanError(
-                f"expected a step other than 0 of which {m} beams make at most one turn, got {angle_increment!r}",
+                f"expected radians, not 0, that make at most one turn over {m} beams; got {angle_increment!r}",
                 argument="angle_increment",
             )
         if not 0.0 <= range_min < math.inf:

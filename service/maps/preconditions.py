@@ -38,4 +38,9 @@ class Preconditions:
             or (self.if_none_match is not None and present and revision in self.if_none_match)
         )
         if refused:
-            raise ProblemError("revision_conflict", "the map's present revision is not the one demanded")
+            now = f"the map's present revision is {revision}" if present else "there is no map under this id"
+            raise ProblemError(
+                "revision_conflict",
+                f"{now}, which is not what was demanded",
+                headers={"ETag": f'"{revision}"'} if present else {},
+            )

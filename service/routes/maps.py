@@ -27,7 +27,10 @@ ETAG: dict[str, Any] = {**REQUEST_ID, "ETag": {"description": "the revision in q
 
 
 def _conditional(*names: str) -> list[dict[str, Any]]:
-    about = {"If-Match": "revisions, one of which must be the present one; * for any", "If-None-Match": "the opposite"}
+    about = {
+        "If-Match": "revisions, one of which must be the present one; * for any",
+        "If-None-Match": "revisions, none of which may be the present one; * for none at all",
+    }
     return [
         {"name": name, "in": "header", "required": False, "description": about[name], "schema": {"type": "string"}}
         for name in names

@@ -62,6 +62,8 @@ async def limits(request: Request) -> Response:
     names = (
         "max_body_bytes",
         "max_values",
+        "max_bodies_bytes",
+        "request_timeout",
         "max_map_segments",
         "max_scan_segments",
         "max_beams",
@@ -82,6 +84,6 @@ async def limits(request: Request) -> Response:
     summary="Counts for Prometheus",
 )
 async def metrics(request: Request) -> Response:
-    """Give the counts of this process."""
+    """Give the counts, over all workers."""
     text = runtime_of(request).metrics.exposition()
     return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")

@@ -18,7 +18,7 @@ from .arrays import (
     SigmaOrSigmas,
     Spreads,
 )
-from .strict import Coordinate, FrameId, FreeJson, MapId, Point, Pose, Strict
+from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
 RaySigma = Annotated[float, Field(gt=0.0, le=10.0)]
@@ -29,6 +29,8 @@ EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segme
 INLINE, STORED = "<inline>", "<stored>"
 BY_SEGMENTS, BY_LASER, BY_POINTS = "<segments>", "<laser>", "<points>"
 SOFT, HARD = "<soft>", "<hard>"
+_BESIDE_A_MAP = frozenset(("sigma", "frame_id"))
+_BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint"))
 TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, SOFT, HARD))
 
 
@@ -50,6 +52,8 @@ def _map_kind(value: Any) -> str | None:
     if not isinstance(value, dict):
         return INLINE
     inline, stored = "segments" in value, "map_id" in value
+    if not inline and not stored and value.keys() - _BESIDE_A_MAP:
+        return INLINE  # which names the fields that it does not know, a misspelt one among them
     return None if inline == stored else STORED if stored else INLINE
 
 
@@ -95,11 +99,17 @@ class SegmentScan(_Scan, MeasuredFields):
 class Laser(Strict):
     """One turn of a scanner, as in a LaserScan message."""
 
-    angle_min: Coordinate = Field(description="radians, of the first beam")
+    angle_min: Angle = Field(description="radians, of the first beam")
     angle_increment: Annotated[float, Field(ge=-1.0, le=1.0)] = Field(description="radians from beam to beam")
     ranges: Ranges = Field(description="metres; null or outside [range_min, range_max]: no return")
     range_min: Annotated[float, Field(ge=0.0, le=1e9)] | None = Field(None, description="metres")
-    range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(None, description="metres")
+    range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
+        None, description="metres; a range of exactly this is a return"
+    )
+    angle_max: Any = Field(None, description="of a LaserScan message; taken and not used, as the next three")
+    time_increment: Any = None
+    scan_time: Any = None
+    intensities: Any = None
 
 
 class LaserScan(_Scan):
@@ -129,7 +139,11 @@ def _scan_kind(value: Any) -> str | None:
         return None if "segments" in value or "points" in value else BY_LASER
     if "segments" in value:
         return BY_SEGMENTS  # `points` beside it are counts
-    return BY_POINTS if "points" in value else None
+    if "points" in value:
+        return BY_POINTS
+    if "ranges" in value:
+        return BY_LASER  # without its `laser` around it
+    return BY_SEGMENTS if value.keys() - _BESIDE_A_SCAN else None
 
 
 AnyScan = Annotated[
@@ -181,10 +195,12 @@ class SearchOptions(Strict):
     confidence: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9999
     exhaustive: bool = False
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
-    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(None, description="milliseconds")
+    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+        None, description="milliseconds; at most `max_deadline_ms` of /v1/limits, which a longer one is cut to"
+    )
     oriented: bool = Field(True, description="false: directions of segments mean nothing")
-    offset_tolerance: Annotated[float, Field(gt=0.0, le=1e3)] | None = Field(None, description="metres")
-    angle_tolerance: Annotated[float, Field(gt=0.0, le=3.2)] | None = Field(None, description="radians")
+    offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(None, description="metres")
+    angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = Field(None, description="radians")
     min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     estimator: Literal["joint", "one_step"] = "joint"
     rotation: Literal["wahba", "mitsuta"] = "wahba"

@@ -245,6 +245,8 @@ class Limits(Answer):
 
     max_body_bytes: int = Field(description="of a request, unpacked")
     max_values: int = Field(description="numbers, strings, arrays and objects in a request")
+    max_bodies_bytes: int = Field(description="of all requests being read at once, by one of several workers")
+    request_timeout: float = Field(description="seconds that a request may take to arrive, head and body")
     max_map_segments: int
     max_scan_segments: int
     max_beams: int = Field(description="ranges or points of one scan")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import orjson
@@ -62,6 +63,8 @@ FreeJson = Annotated[Any, PlainValidator(_free_json), WithJsonSchema({})]
 """Anything, given back as it was sent."""
 
 Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
+# Two turns either way. Beyond that it is in degrees, and would choose a wrong place without a word.
+Angle = Annotated[float, Field(ge=-4.0 * math.pi, le=4.0 * math.pi)]
 Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
 FrameId = Annotated[str, Field(max_length=256)]
 MapId = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)]
@@ -73,4 +76,4 @@ class Pose(Strict):
 
     x: Coordinate = Field(description="metres")
     y: Coordinate = Field(description="metres")
-    theta: Coordinate = Field(description="radians, counter-clockwise")
+    theta: Angle = Field(description="radians, counter-clockwise")

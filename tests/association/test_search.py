@@ -176,6 +176,37 @@ def test_a_contradicted_prior_is_told_and_never_usable():
         assert "prior_contradicted" in [w.code for w in result.warnings], prior
 
 
+def test_a_prior_that_is_far_off_does_not_make_the_place_ambiguous():
+    endpoints, _ = seen(ROOM, INSIDE)
+    result = associate(ROOM_INDEX, scan_of(endpoints), SoftPrior(pose(5.0, 2.5, 0.7), np.diag([0.01, 0.01, 0.01])))
+    assert (result.status, result.usable, result.probability) == (Status.OK, False, 0.5)
+    assert [w.code for w in result.warnings] == ["prior_contradicted"]
+    assert same_pose(result.pose, INSIDE, 1e-9, 1e-9)
+
+
+def test_segments_may_have_to_lie_on_the_map_from_end_to_end():
+    endpoints, _ = seen(ROOM, INSIDE)
+    result = associate(ROOM_INDEX, scan_of(endpoints), options=AssociationOptions(min_overlap=1.0))
+    assert result.usable
+    assert len(result.correspondences) == len(endpoints)
+
+
+def test_segments_that_show_their_back_are_told():
+    endpoints, _ = seen(SQUARE, pose(0.5, 0.3, 0.7))
+    index = MapIndex.build(Segments.from_array(SQUARE))
+
+    def codes(ends, viewpoint=(0.0, 0.0), **options):
+        scan = scan_of(ends, viewpoint=viewpoint)
+        return [w.code for w in associate(index, scan, options=AssociationOptions(**options)).warnings]
+
+    assert codes(endpoints) == []
+    endpoints[1] = endpoints[1][[2, 3, 0, 1]]
+    assert codes(endpoints) == ["faces_away"]
+    assert codes(endpoints, oriented=False) == []
+    assert codes(endpoints, viewpoint=None) == []
+    assert codes(np.zeros((0, 4))) == ["no_segments"]
+
+
 def test_covariance_is_that_of_the_errors():
     """The mean squared Mahalanobis distance of 300 poses is 3, within four standard deviations of that mean."""
     rng = np.random.default_rng(9)

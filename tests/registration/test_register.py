@@ -217,6 +217,17 @@ def test_without_directions_segments_are_turned_round(theta, estimator):
     np.testing.assert_allclose(result.angles, 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_segment_the_wrong_way_round_is_not_usable_where_directions_count(estimator):
+    map_segments, scan = room()
+    assert register(map_segments, scan, diagonal(6), 0.0, RegistrationOptions(estimator)).usable
+    ends = scan.segments.endpoints.copy()
+    ends[0] = ends[0][[2, 3, 0, 1]]
+    mixed = MeasuredSegments.from_segments(Segments.from_array(ends))
+    assert not register(map_segments, mixed, diagonal(6), 0.0, RegistrationOptions(estimator)).usable
+    assert register(map_segments, mixed, diagonal(6), 0.0, RegistrationOptions(estimator, oriented=False)).usable
+
+
 def test_without_directions_a_corner_fits_both_ways():
     map_segments, scan = room()
     result = register(map_segments, scan, [[0, 0], [1, 1]], 0.0, RegistrationOptions(oriented=False))

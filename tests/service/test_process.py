@@ -19,7 +19,7 @@ import numpy as np
 import orjson
 import pytest
 
-from service.cli import choose_kernel_cache
+from service.cli import choose_kernel_cache, unknown_settings
 from service.schemas import examples
 from service.settings import SettingsError, read_settings
 
@@ -60,6 +60,12 @@ def test_a_wrong_setting_is_named_and_ends_the_start() -> None:
     assert ended.returncode == 2
     assert "LINEFIX_ALLOW_ANONYMOUS" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_a_misspelt_setting_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINEFIX_PROT", "81")
+    monkeypatch.setenv("LINEFIX_PORT", "81")
+    assert unknown_settings() == ["LINEFIX_PROT"]
 
 
 def test_kernels_are_kept_where_this_user_may_write(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import http.client
 from typing import Any
 
 import httpx
 import orjson
 import pytest
+
+from tests.conftest import RunningService
 
 ROOM = [[-4.0, -3.0, 4.0, -3.0], [4.0, -3.0, 4.0, 3.0], [4.0, 3.0, -4.0, 3.0], [-4.0, 3.0, -4.0, -3.0]]
 
@@ -202,8 +205,62 @@ def test_paths_and_methods(client: httpx.Client) -> None:
     response = client.get("/v1/associate")
     refused(response, 405, "method_not_allowed")
     assert response.headers["allow"] == "POST"
-    assert client.request("PATCH", "/livez").status_code == 405
+    assert client.request("PATCH", "/livez").headers["allow"] == "GET, HEAD"
+    assert client.post("/v1/maps/m").headers["allow"] == "DELETE, GET, HEAD, PUT"
     refused(client.request("BREW", "/livez"), 400, "invalid_http")
+
+
+def test_whoever_can_be_read_can_be_asked_for_its_headers(client: httpx.Client) -> None:
+    for path in ("/livez", "/v1/limits", "/v1/maps/none"):
+        read, asked = client.get(path), client.head(path)
+        assert (asked.status_code, asked.content) == (read.status_code, b"")
+        assert asked.headers["content-type"] == read.headers["content-type"]
+
+
+def test_a_body_that_is_too_large_is_told_so_to_who_sends_it_whole(service: RunningService) -> None:
+    """Without a lingering end the client would find its connection broken before it reads the answer."""
+    limit = service.client.get("/v1/limits").json()["max_body_bytes"]
+    for _ in range(3):
+        connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=20)
+        connection.request("POST", "/v1/associate", b" " * (limit + 1))
+        answer = connection.getresponse()
+        assert (answer.status, orjson.loads(answer.read())["code"]) == (413, "too_large")
+        connection.close()
+
+
+def test_angles_in_degrees_are_not_taken(client: httpx.Client) -> None:
+    prior = {"x": 0.0, "y": 0.0, "theta": 80.0}
+    laser = {"angle_min": -180.0, "angle_increment": 0.01, "ranges": [1.0] * 10}
+    for body, pointer in (
+        (associate_body(prior={**prior, "radius": 1.0, "angle": 1.0}), "/prior/theta"),
+        (associate_body(prior={**prior, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}), "/prior/theta"),
+        (associate_body(scan={"laser": laser}), "/scan/laser/angle_min"),
+    ):
+        problem = refused(client.post("/v1/associate", json=body), 422, "invalid_request")
+        assert [error["pointer"] for error in problem["errors"]] == [pointer]
+
+
+def test_a_misspelt_field_is_named(client: httpx.Client) -> None:
+    for body, wanted in (
+        (associate_body(scan={"segement": ROOM}), {"/scan/segments": "missing", "/scan/segement": "unknown field"}),
+        (associate_body(map={"id": "hq"}), {"/map/segments": "missing", "/map/id": "unknown field"}),
+        (associate_body(scan={"ranges": [1.0]}), {"/scan/laser": "missing", "/scan/ranges": "unknown field"}),
+    ):
+        problem = refused(client.post("/v1/associate", json=body), 422, "invalid_request")
+        assert {error["pointer"]: error["message"] for error in problem["errors"]} == wanted
+
+
+def test_nan_is_told_what_to_send_instead(client: httpx.Client) -> None:
+    for number in ("NaN", "Infinity", "-Infinity"):
+        answer = client.post("/v1/vectorize", content=f'{{"laser": {{"ranges": [1.0, {number}]}}}}'.encode())
+        assert "a range without a return is null" in refused(answer, 400, "invalid_json")["detail"]
+
+
+def test_a_laser_scan_message_is_taken_with_all_its_fields(client: httpx.Client) -> None:
+    laser = {"angle_min": -0.4, "angle_increment": 0.1, "ranges": [2.0] * 9, "range_max": 30.0}
+    more = {"angle_max": 0.4, "time_increment": 0.0, "scan_time": 0.1, "intensities": [1.0] * 9}
+    plain, full = (client.post("/v1/vectorize", json={"laser": one}).json() for one in (laser, laser | more))
+    assert plain["segments"] == full["segments"]
 
 
 def test_media_types(client: httpx.Client) -> None:
