@@ -44,6 +44,8 @@ USABLE_PROBABILITY = 0.94
 USABLE_CAUTIOUS = 0.92  # of the same, where other buildings are reckoned with
 USABLE_BY_CHANCE = 0.98  # likewise, where chance alone scores as high with that probability:
 LIKELY_BY_CHANCE = 0.3
+FEWEST = 3  # matched segments, or else
+MOSTLY = 0.7  # of the scan's length
 NO_MATCH_PROBABILITY = 0.03  # of the first explanation or a twin of it
 CHANCE = 1e-3  # where chance scores as high more often, other buildings are reckoned with in that too
 CONTRADICTION = 6.0  # nats by which a pose that the prior speaks against must be better to contradict it
@@ -122,7 +124,7 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
         status = Status.NO_MATCH
     elif is_degenerate(registered):
         status = Status.DEGENERATE
-    elif probability < USABLE_PROBABILITY or careful < _bar(evidence):
+    elif probability < USABLE_PROBABILITY or careful < _bar(evidence) or _is_thin(best):
         status = Status.AMBIGUOUS
     else:
         status = Status.OK
@@ -131,9 +133,14 @@ def judge(ranked: list[Ranked], registered: RegistrationResult | None, evidence:
 
 def _bar(evidence: Evidence) -> float:
     """Return what the cautious probability has to reach."""
-    if evidence.with_beams:
-        return USABLE_PROBABILITY
-    return USABLE_BY_CHANCE if evidence.significance > LIKELY_BY_CHANCE else USABLE_CAUTIOUS
+    if evidence.significance > LIKELY_BY_CHANCE:
+        return USABLE_BY_CHANCE
+    return USABLE_PROBABILITY if evidence.with_beams else USABLE_CAUTIOUS
+
+
+def _is_thin(best: Ranked) -> bool:
+    """Tell whether a corner is all that fits, and most of the scan does not: any building has one."""
+    return int((best.matches[:, 0] >= 0.0).sum()) < FEWEST and best.share < MOSTLY
 
 
 def features(best: Ranked, others: list[Ranked], evidence: Evidence) -> Floats:

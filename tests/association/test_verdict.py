@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, MapIndex, SoftPrior, Status, associate
+from association.ranking import Ranked
 from association.scan_rows import gates, scan_rows
 from association.significance import significance
-from registration import Segments
+from association.verdict import Evidence, judge
+from registration import MeasuredSegments, Segments, register
 
 from .scenes import CORRIDOR, ROOM, SQUARE, maze, pose, same_pose, scan_of, seen
 
@@ -79,6 +81,32 @@ def test_the_scan_of_another_building_is_never_usable(seed):
     result = associate(index_of(maze(1)), scan_of(endpoints))
     assert not result.usable
     assert result.probability < 0.5
+
+
+def judged(*, matched=2, share=0.4, lead=60.0, chance=1e-6):
+    """What a laser scan of 8 segments comes to of which some lie on the map."""
+    matches = np.full((8, 5), -1.0)
+    matches[:matched, 0] = range(matched)
+    best = Ranked(pose(), np.eye(3) * 1e-4, lead, lead, True, share, 8.0 * share, 1.0, 1.0, matches)
+    corner = Segments.from_array(ROOM[:2])
+    registered = register(corner, MeasuredSegments.from_segments(corner), [[0, 0], [1, 1]])
+    return judge([best], registered, Evidence(np.ones(8), 0.9, chance, with_beams=True))
+
+
+def test_a_corner_is_not_enough_where_most_of_a_laser_scan_does_not_fit():
+    assert judged(matched=3).status is Status.OK
+    assert judged(share=0.75).status is Status.OK
+    assert judged().status is Status.AMBIGUOUS
+
+
+def test_where_chance_scores_as_high_a_laser_scan_must_be_surer():
+    leads = np.linspace(0.0, 60.0, 200)
+    for bar, chance in ((0.94, 0.2), (0.98, 0.4)):
+        found = [judged(matched=4, lead=lead, chance=chance) for lead in leads]
+        sure = [v.probability for v in found if v.status is Status.OK]
+        unsure = [v.probability for v in found if v.status is Status.AMBIGUOUS]
+        assert max(unsure) < bar <= min(sure)
+        assert min(sure) - max(unsure) < 0.02
 
 
 def test_a_wall_that_should_hide_another_speaks_against_a_pose():
