@@ -5,6 +5,9 @@ import math
 import numpy as np
 from numba import njit
 
+# Where more pieces than that begin in one cell, as on no map of a building, some are not merged.
+MOST_LOOKS = 400
+
 
 @njit(cache=True, nogil=True)
 def _find(parent, i):
@@ -45,7 +48,9 @@ def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
         for a in range(-1, 2):
             for b in range(-1, 2):
                 j = heads[_cell_hash(column + a, row + b, buckets)]
-                while j >= 0:
+                looks = 0
+                while j >= 0 and looks < MOST_LOOKS:
+                    looks += 1
                     gx = endpoints[j, 0] - x
                     gy = endpoints[j, 1] - y
                     if (

@@ -197,8 +197,8 @@ BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 @njit(cache=True, nogil=True)
 def advance(
     scan, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items, sector_shape,
-    gates, rules, prior, found, count, best, progress, pairs, merits, uses, residual, bound, best_gains, missing,
-    inliers, miss, exhaustive, budget,
+    gates, rules, prior, found, count, best, progress, resume, pairs, merits, uses, residual, bound, best_gains,
+    missing, inliers, miss, exhaustive, budget,
 ):  # fmt: skip
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
@@ -218,9 +218,9 @@ def advance(
         b = pairs[progress[4], 1]
         spent += search_base(
             scan, a, b, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items,
-            sector_shape, gates, rules, prior, found, count, best, progress, budget - spent,
+            sector_shape, gates, rules, prior, found, count, best, progress, resume, budget - spent,
         )  # fmt: skip
-        if progress[1] > 0:
+        if progress[1] > 0 or resume[0] > -math.inf:
             return BUDGET
         progress[4] = -1
         needed = rules[3] * best[0]

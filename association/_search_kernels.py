@@ -207,14 +207,15 @@ def try_pose(
 @njit(cache=True, nogil=True)
 def search_base(
     scan, a, b, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items,
-    sector_shape, gates, rules, prior, found, count, best, progress, budget,
+    sector_shape, gates, rules, prior, found, count, best, progress, resume, budget,
 ):  # fmt: skip
     """Go through all pairs of runs that fit the base of scan segments `a`, which slides, and `b`.
 
     A run under `a` fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` then
     sweeps. The final angle splits the misfit of both, so that b turns about a by up to `swing` metres: the ends are
-    tested loosely until then. Goes on from the anchor where `progress` stands and stops when `budget` tests are used
-    up. Returns the tests that it took; ``progress[P_ANCHOR]`` is back at 0 when the base is done.
+    tested loosely until then. Goes on from the anchor where `progress` stands, at the slide ``resume[0]`` unless that
+    is -inf, and stops when `budget` tests are used up. Returns the tests that it took; ``progress[P_ANCHOR]`` is back
+    at 0, and ``resume[0]`` at -inf, when the base is done.
 
     The walk stands here whole, and reads arrays only by element: see `match_scan`.
     """
@@ -267,8 +268,10 @@ def search_base(
         spent += 5
         dx = runs[wa, 0]
         dy = runs[wa, 1]
-        at = runs[wa, 3] + half_a
+        at = max(runs[wa, 3] + half_a, resume[0])
         high = runs[wa, 4] - half_a
+        resume[0] = -math.inf
+        entered = at
         if windowed:
             away = dx * nearest_y - dy * nearest_x - runs[wa, 2]
             if abs(away) > window or abs(wrap(runs[wa, 5] - scan[a, 5] - prior[3])) > widest:
@@ -334,6 +337,11 @@ def search_base(
             else:
                 row += step_y
                 next_y += pace_y
+            # Rounding may have led back into the cell before, which leaves `at` where it is.
+            if spent > budget and entered < at <= high:
+                progress[1] -= 1
+                resume[0] = at
+                return spent
         if spent > budget and progress[1] < n_anchors:
             return spent
     progress[1] = 0
@@ -344,12 +352,14 @@ def search_base(
 @njit(cache=True, nogil=True)
 def search_slides(
     scan, a, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found, count, best,
-    progress, spacing,
+    progress, spacing, place, budget,
 ):  # fmt: skip
     """Lay scan segment `a` on every run that is long enough, at slides `spacing` metres apart, and keep the best.
 
-    For scans without a base: what is found is a family of poses, fixed across the walls and free along them.
+    For scans without a base: what is found is a family of poses, fixed across the walls and free along them. Goes on
+    from the anchor and the step at `place` (2,), and returns False when `budget` tests are used up before the end.
     """
+    spent = 0
     n = len(scan)
     pose = np.empty(3)
     matches = np.empty((n, 5))
@@ -360,8 +370,11 @@ def search_slides(
     angle_spreads(scan, scan[a, 10], gates, spreads)
     anchor_list = np.empty(len(runs), dtype=np.int32)
     n_anchors = anchors(scan[a, 4], runs, bin_starts, anchor_list)
-    for k in range(n_anchors):
-        w = anchor_list[k]
+    while place[0] < n_anchors:
+        w = anchor_list[place[0]]
+        place[0] += 1
+        first = place[1]
+        place[1] = 0
         half = 0.5 * scan[a, 4] - end_slack(scan[a, 4])
         low = runs[w, 3] + half
         high = runs[w, 4] - half
@@ -378,12 +391,17 @@ def search_slides(
                 continue
         steps = max(1, math.ceil((high - low) / spacing))
         var = scan[a, 10]
-        for j in range(steps):
+        for j in range(first, steps):
+            if spent > budget:
+                place[0] -= 1
+                place[1] = j
+                return False
             slide = low + (j + 0.5) / steps * (high - low)
             pose[0] = theta
             pose[1] = runs[w, 0] * slide - runs[w, 1] * runs[w, 2] - gx
             pose[2] = runs[w, 1] * slide + runs[w, 0] * runs[w, 2] - gy
-            try_pose(
+            spent += try_pose(
                 scan, gx, gy, var, pose, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found,
                 count, best, progress, spreads, matches, sums, information, covariance,
             )  # fmt: skip
+    return True

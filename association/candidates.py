@@ -40,6 +40,7 @@ SLIDE_SPACING_FOR_BEAMS = 0.5  # m; there beams tell where along them
 KEPT_SLIDES = 64
 PARALLEL_SINE = 0.1
 CHUNK = 300_000  # tests of a wall between two looks at the clock, a few milliseconds
+USUAL_CROWD = 8.0  # walls on the list that a place on a wall has
 SAMPLE_WORDS = 160  # of 64 samples, a resolution of 1e-4
 
 
@@ -148,7 +149,9 @@ def _search(
     rows = scan.rows
     n = min(len(rows), BASE_SEGMENTS)
     pairs, merits = plan_bases(rows, n, runs.bin_starts, runs.longest, runs.summed, index.area)
-    progress = np.array([0, 0, 0, 0, -1])
+    progress, resume = np.array([0, 0, 0, 0, -1]), np.array([-np.inf])
+    # A test of a pose takes longer the more walls lie where it is.
+    chunk = int(CHUNK / max(1.0, index.crowd / USUAL_CROWD))
     uses, residual, bound = np.zeros(n), rows[:, 12].copy(), np.array([rows[:, 12].sum()])
     inliers = _sampled_inliers(n)
     missing = np.full((n, SAMPLE_WORDS), ~np.uint64(0))
@@ -159,8 +162,8 @@ def _search(
         stopped = advance(
             rows, runs.rows, runs.bin_starts, walls.rows, grid.starts, grid.items, grid.shape, raster.shape,
             raster.bits, sectors.starts, sectors.items, sectors.shape, gate, rules, flat_prior, found, count, best,
-            progress, pairs, merits, uses, residual, bound, best_gains, missing, inliers, miss, options.exhaustive,
-            CHUNK,
+            progress, resume, pairs, merits, uses, residual, bound, best_gains, missing, inliers, miss,
+            options.exhaustive, chunk,
         )  # fmt: skip
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slides, slide_count = np.zeros((KEPT_SLIDES, FOUND_COLUMNS)), np.zeros(1, dtype=np.int64)
@@ -168,17 +171,22 @@ def _search(
     if isinstance(prior, HardPrior):
         spacing = min(spacing, prior.radius)
     rules[1] = 0.9 * spacing
+    slid = True
     for a in _sliding_segments(rows, (share if for_beams else RIVAL_SHARE) * best[0]):
-        search_slides(
-            rows, a, runs.rows, runs.bin_starts, walls.rows, grid.starts, grid.items, grid.shape, raster.shape,
-            raster.bits, gate, rules, flat_prior, slides, slide_count, best, progress, spacing,
-        )  # fmt: skip
+        place, slid = np.zeros(2, dtype=np.int64), False
+        while not slid and not deadline.passed:
+            slid = search_slides(
+                rows, a, runs.rows, runs.bin_starts, walls.rows, grid.starts, grid.items, grid.shape, raster.shape,
+                raster.bits, gate, rules, flat_prior, slides, slide_count, best, progress, spacing, place, chunk,
+            )  # fmt: skip
+        if not slid:
+            break
     found = np.concatenate([found[: count[0]], slides[: slide_count[0]]])
     if deadline.cancelled:
         raise CancelledError
     order = np.argsort(-found[:, 0], kind="stable")
     report = SearchReport(
-        complete=stopped != BUDGET,
+        complete=stopped != BUDGET and slid,
         exhaustive=stopped == EXHAUSTED and len(rows) <= BASE_SEGMENTS,
         confidence=1.0 if stopped in (EXHAUSTED, PROVEN) else 1.0 - float(miss[0]),
         bases=int(progress[0]),

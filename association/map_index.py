@@ -30,6 +30,7 @@ SWEEP_REACH = 0.02  # m; rounding
 RASTER_CELL = 0.5  # m
 MAX_CELLS = 4_000_000
 MAX_SWEEP_CELLS = 1_000_000
+MAX_ENTRIES = 10_000_000  # of all lists of a grid together, about
 
 
 class Walls(NamedTuple):
@@ -179,6 +180,12 @@ class MapIndex:
         return lengths, np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
 
     @cached_property
+    def crowd(self) -> float:
+        """How many walls are on the list of a cell, seen from the walls: the mean over all entries of all lists."""
+        counts = np.diff(self.grid.starts).astype(np.float64)
+        return float((counts * counts).sum() / max(1.0, counts.sum()))
+
+    @cached_property
     def agreeing_share(self) -> float:
         """The chance that two points of walls have the same direction, up to a neighbouring bin."""
         shares = np.add.reduceat(
@@ -299,10 +306,16 @@ def _grid(ends: Floats, size: float, reach: float, most: int) -> Grid:
 
 
 def _shape(ends: Floats, size: float, reach: float, most: int) -> Floats:
-    """Return x0, y0, cell size, columns and rows of cells of `size` metres, or larger ones where `most` asks for it."""
+    """Return x0, y0, cell size, columns and rows of cells of `size` metres.
+
+    Or larger ones, where there would be more than `most`, or many long walls would be listed too often.
+    """
     corners = ends.reshape(-1, 2)
     low = corners.min(axis=0) - reach - size
     extent = corners.max(axis=0) + reach + size - low
     cell = max(size, math.sqrt(extent[0] * extent[1] / most), extent.max() / most)
+    spans = np.abs(ends[:, 2:] - ends[:, :2]).sum(axis=1)
+    while float((spans / cell + 1.0).sum()) * (1.0 + 2.0 * reach / cell) > MAX_ENTRIES:
+        cell *= 1.25
     columns, rows = (math.ceil(e / cell) for e in extent)
     return np.array([low[0], low[1], cell, columns, rows])

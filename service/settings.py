@@ -69,7 +69,7 @@ class Settings(BaseSettings):
     max_correspondences: int = Field(200_000, ge=1, description="of one registration")
     max_batch: int = Field(256, ge=1, description="scans of one batch")
     max_deadline_ms: float = Field(30_000.0, gt=0.0, description="and the deadline where none is asked for")
-    cache_bytes: int = Field(128_000_000, ge=0, description="of indexed maps kept in memory")
+    cache_bytes: int = Field(112_000_000, ge=0, description="of indexed maps kept in memory")
     request_timeout: float = Field(9.0, gt=0.0, description="seconds that a request may take to arrive, head and body")
     drain_seconds: float = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
     hang_seconds: float = Field(

@@ -186,13 +186,19 @@ def test_a_base_is_swept_whole(seed):
 
     runs = INDEX.runs
     expected = reference.placements(rows, a, b, runs.rows, slack, tolerance)
-    progress = np.zeros(5, dtype=np.int64)
     rules = np.array([0.65, 0.3, 0.1, 0.9])
-    search.search_base(
-        rows, a, b, runs.rows, runs.bin_starts, INDEX.walls.rows, *GRID, *INDEX.raster, *SECTORS, GATES, rules,
-        np.zeros(10), np.zeros((64, 5)), np.zeros(1, dtype=np.int64), np.array([1e9, 0.0, 0.0]), progress, 10**9,
-    )  # fmt: skip
-    assert progress[2] == len(expected)
+    for budget in (10**9, 1):
+        progress, resume = np.zeros(5, dtype=np.int64), np.array([-np.inf])
+        calls = 0
+        while progress[0] == 0:
+            calls += 1
+            search.search_base(
+                rows, a, b, runs.rows, runs.bin_starts, INDEX.walls.rows, *GRID, *INDEX.raster, *SECTORS, GATES, rules,
+                np.zeros(10), np.zeros((64, 5)), np.zeros(1, dtype=np.int64), np.array([1e9, 0.0, 0.0]), progress,
+                resume, budget,
+            )  # fmt: skip
+        assert progress[2] == len(expected)
+        assert (calls == 1) == (budget > 1)
 
 
 @given(SEEDS)

@@ -1,6 +1,7 @@
 """The map index keeps every wall findable, whatever the map is like."""
 
 import math
+import time
 import tracemalloc
 
 import numpy as np
@@ -105,6 +106,23 @@ def test_its_memory_is_known():
     held, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert index.nbytes == pytest.approx(held, rel=0.1)
+
+
+def test_memory_is_capped_however_long_the_walls_are():
+    rng = np.random.default_rng(0)
+    walls = np.column_stack(
+        [np.zeros(5000), rng.uniform(0, 400, 5000), np.full(5000, 9990.0), rng.uniform(0, 400, 5000)]
+    )
+    index = index_of(walls)
+    assert index.nbytes < 100e6
+    assert len(index.grid.items) < 15e6
+
+
+def test_a_heap_of_equal_pieces_is_indexed_in_bounded_time():
+    """Where thousands begin in one place a look at all others would go with the square of their number."""
+    begun = time.monotonic()
+    index_of(np.tile(ROOM, (5000, 1)))
+    assert time.monotonic() - begun < 10.0  # by the square: more than a minute
 
 
 def test_memory_is_capped_whatever_the_extent():

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
@@ -286,6 +287,23 @@ def test_a_segment_across_a_doorway_is_reported_on_both_walls():
     across = next(c for c in result.correspondences if c.scan == 0)
     assert (across.map, across.alternatives) == (1, (0,))
     assert across.overlap == pytest.approx(6.0 / 7.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("seen_walls", [[[-3, 1, 3, 1], [3, -1, -3, -1]], [[-3, 1, 3, 1], [3, 1, 3, -2]]])
+def test_a_deadline_holds_where_walls_are_kilometres_long(seen_walls):
+    """Some hundred of them offer a million slides, and each crossing wall thousands of bases."""
+    along = np.linspace(0.0, 9000.0, 300)
+    far = np.full(300, 9999.0)
+    none = np.zeros(300)
+    walls = np.vstack([np.stack([none, along, far, along], 1), np.stack([along, none, along, far], 1)])
+    index = MapIndex.build(Segments.from_array(walls))
+    scan = scan_of(np.array(seen_walls, dtype=float))
+    associate(index, scan, deadline=Deadline(at=time.monotonic()))
+    begun = time.monotonic()
+    result = associate(index, scan, deadline=Deadline(at=begun + 0.1))
+    assert time.monotonic() - begun < 1.0
+    assert not result.search.complete
+    assert not result.usable
 
 
 def test_a_tiny_window_does_not_make_the_search_long():
