@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field
 from typing import Literal
@@ -9,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import MeasuredSegments, RigidTransform
+from registration import MeasuredSegments, RigidTransform, wrap_angle
 
 from ._match_kernels import MAX_ANGLE_GATE, REACH
 from .errors import InvalidSearchError
@@ -99,6 +100,11 @@ class HardPrior:
         for name, value, high in (("radius", self.radius, 1e6), ("angle", self.angle, 4.0)):
             if not 0.0 < value <= high:
                 raise InvalidSearchError(f"expected a number above 0 and up to {high:g}", argument=f"prior.{name}")
+
+    def contains(self, pose: RigidTransform) -> bool:
+        """Tell whether a pose lies within the window."""
+        away = math.hypot(pose.x - self.pose.x, pose.y - self.pose.y)
+        return away <= self.radius and abs(wrap_angle(pose.theta - self.pose.theta)) <= self.angle
 
 
 Prior = SoftPrior | HardPrior

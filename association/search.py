@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,7 @@ from registration import RegistrationResult, RigidTransform
 from .accept import accept, correspondences, place_on_family, register_accepted
 from .candidates import find_candidates
 from .map_index import MapIndex
-from .options import AssociationOptions, Deadline, Prior, Scan
+from .options import AssociationOptions, Deadline, HardPrior, Prior, Scan
 from .ranking import Ranked, rank_candidates
 from .result import Alternative, AssociationDiagnostics, AssociationResult, AssociationWarning, SearchReport, Status
 from .scan_rows import gates, scan_rows
@@ -70,9 +72,13 @@ def associate(
     if best is None or accepted is None or registered is None or verdict.status is Status.NO_MATCH:
         return _no_match(scan, ranked, verdict, candidates.report, (index, options))
     matched = set(accepted.pairs[:, 0].tolist())
+    on_map = set((accepted.pairs[:, 1] % index.directed).tolist())
     pose = registered.pose
     if verdict.status is Status.DEGENERATE:
         pose = place_on_family(index, rows, best, registered, _anchor(index, scan, best, prior))
+    if isinstance(prior, HardPrior) and pose is not None and not prior.contains(pose):
+        # It was inside before it was registered: the window is narrower than what the scan says.
+        verdict = replace(verdict, contradicted=True, probability=min(verdict.probability, 0.5))
     usable = verdict.status is Status.OK and candidates.report.complete and not verdict.contradicted
     return AssociationResult(
         status=verdict.status,
@@ -83,7 +89,7 @@ def associate(
         unobservable=_weak_direction(registered) if verdict.status is Status.DEGENERATE else None,
         correspondences=correspondences(index, accepted, registered),
         unmatched_scan=tuple(i for i in range(len(scan.measured)) if i not in matched),
-        missing_map=missing_walls(index, scan, rows, best),
+        missing_map=tuple(i for i in missing_walls(index, scan, rows, best) if i not in on_map),
         diagnostics=AssociationDiagnostics(
             registration=registered.diagnostics,
             inlier_fraction=best.share,

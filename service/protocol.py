@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from functools import lru_cache
 from http import HTTPStatus
 from typing import Any, cast
@@ -20,6 +21,7 @@ LEEWAY = 0.5  # s for the application to say that a body came too late
 LEAST_READ = 16_384  # bytes that a client takes of an answer within the time that a request may take to arrive
 
 
+_UPGRADE = re.compile(rb"(\r\n)(upgrade[ \t]*:)", re.IGNORECASE)
 SOME_ID = "0123456789abcdef" * 2  # stands where the id of a request goes
 
 
@@ -64,7 +66,7 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
             if self._deaf:
                 return
             self._complete = False
-            super().data_received(data)
+            super().data_received(data if self._in_message else _without_upgrade(data))
             if self._in_message or not self._complete:
                 if self._timer is None:
                     self._expect_message()
@@ -104,6 +106,12 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
                 return
             problem = ProblemError("invalid_http", "this is not HTTP/1.1 as RFC 9112 has it, or no method of HTTP")
             self._write(problem, taken_or_made([]), close=True)
+
+        def _unsupported_upgrade_warning(self) -> None:
+            # The parser has taken the body for another protocol: nothing after it can be a request.
+            self._deaf = True
+            if self.cycle is not None:
+                self.cycle.keep_alive = False
 
         def pause_writing(self) -> None:
             super().pause_writing()
@@ -150,6 +158,16 @@ def protocol_of(doors: Doors, seconds: float) -> type[HttpToolsProtocol]:
                 self.transport.close()
 
     return GuardedProtocol
+
+
+def _without_upgrade(data: bytes) -> bytes:
+    """Have a wish for another protocol ignored, as RFC 9110, 7.8, lets a server do.
+
+    Some clients, Java's for one, express it with every first request. The parser would take what follows the head for
+    that protocol: the body would be lost, or be the next request.
+    """
+    head, end, rest = data.partition(b"\r\n\r\n")
+    return _UPGRADE.sub(rb"\1x-\2", head) + end + rest if end and _UPGRADE.search(head) else data
 
 
 def _response(problem: ProblemError, request_id: str, default: list[tuple[bytes, bytes]], close: bool) -> bytes:

@@ -177,6 +177,20 @@ def test_a_contradicted_prior_is_told_and_never_usable():
         assert "prior_contradicted" in [w.code for w in result.warnings], prior
 
 
+def test_a_usable_answer_lies_within_its_window():
+    """What is registered may leave a window that is narrower than the noise: then it is told, and not usable."""
+    usable = 0
+    for seed in range(40):
+        endpoints, _ = seen(ROOM, INSIDE, noise=0.03, seed=seed)
+        prior = HardPrior(pose(3.01, 2.49, 0.7), 0.02, 0.004)
+        result = associate(ROOM_INDEX, scan_of(endpoints), prior)
+        if result.pose is not None and not prior.contains(result.pose):
+            assert not result.usable
+            assert "prior_contradicted" in [w.code for w in result.warnings]
+        usable += result.usable
+    assert 0 < usable < 40
+
+
 def test_a_prior_that_is_far_off_does_not_make_the_place_ambiguous():
     endpoints, _ = seen(ROOM, INSIDE)
     result = associate(ROOM_INDEX, scan_of(endpoints), SoftPrior(pose(5.0, 2.5, 0.7), np.diag([0.01, 0.01, 0.01])))

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import http.client
+import socket
+import time
+from contextlib import suppress
 from typing import Any
 
 import httpx
@@ -226,6 +229,28 @@ def test_a_body_that_is_too_large_is_told_so_to_who_sends_it_whole(service: Runn
         answer = connection.getresponse()
         assert (answer.status, orjson.loads(answer.read())["code"]) == (413, "too_large")
         connection.close()
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("split", [0, 60])
+def test_a_wish_for_another_protocol_is_ignored(service: RunningService, apart: bool, split: int) -> None:
+    """The body stays the body, wherever the pieces end; it is never taken for a request."""
+    body = b"GET /v1/limits HTTP/1.1\r\nHost: x\r\n\r\n" if apart else orjson.dumps(associate_body())
+    head = b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"
+    head += b"HTTP2-Settings: AAMAAABkAARAAAAAAAIAAAAA\r\nContent-Length: %d\r\n\r\n" % len(body)
+    pieces = [head[:split], head[split:], body] if apart else [head[:split], head[split:] + body]
+    with socket.create_connection(("127.0.0.1", service.port), timeout=3) as connection:
+        for piece in pieces:
+            connection.sendall(piece)
+            time.sleep(0.1)
+        answer = b""
+        with suppress(TimeoutError):
+            while piece := connection.recv(65_536):
+                answer += piece
+    assert answer.count(b"HTTP/1.1 ") == 1
+    assert b"max_body_bytes" not in answer
+    if split == 0:  # where the head comes in pieces it may also be refused
+        assert answer.startswith(b"HTTP/1.1 400 " if apart else b"HTTP/1.1 200 ")
 
 
 def test_angles_in_degrees_are_not_taken(client: httpx.Client) -> None:
