@@ -11,16 +11,24 @@ import pytest
 from service.problems import CODES
 
 TEXT = (Path(__file__).parents[2] / "docs" / "http.md").read_text()
+STORED = re.findall(
+    r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT
+)
 EXAMPLES = re.findall(r"curl -s localhost:8000(/v1/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT)
 
 
 def test_there_are_examples() -> None:
-    assert [path for path, _ in EXAMPLES] == ["/v1/register", "/v1/associate", "/v1/vectorize"]
+    assert [path for path, _ in STORED] == ["/v1/maps/hq-3"]
+    assert [path for path, _ in EXAMPLES] == ["/v1/register", "/v1/associate", "/v1/vectorize", "/v1/associate"]
 
 
 @pytest.mark.parametrize(("path", "body"), EXAMPLES)
 def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
+    for place, document in STORED:
+        client.put(place, content=document.encode()).raise_for_status()
     answer = client.post(path, content=body.encode())
+    for place, _ in STORED:
+        client.delete(place)
     assert answer.status_code == 200, answer.text
     if path == "/v1/vectorize":
         assert len(answer.json()["segments"]) == 1
