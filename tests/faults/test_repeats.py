@@ -14,6 +14,7 @@ import pytest
 
 from service.schemas import examples
 from service.warmup import room_ranges
+from tests.service.test_workers import until
 
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 LASER = {"angle_min": -np.pi, "angle_increment": np.pi / 180.0, "range_max": 30.0, "ranges": room_ranges(TURN).tolist()}
@@ -51,6 +52,7 @@ def test_the_same_answer_to_the_bit(
         folder = tmp_path / count
         folder.mkdir()
         services.append(start_service(folder, workers=2, searches=2, queue=64))
+        until(lambda: services[-1].log().count('"ready"') == 2)  # either of them may be asked
 
     def asked(client: httpx.Client) -> Iterator[tuple[str, bytes]]:
         for path, bodies in BODIES.items():
