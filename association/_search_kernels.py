@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ._keeping_kernels import HARD_PRIOR, floor_of, offer, prior_value
 from ._match_kernels import SECTOR_BITS, SECTORS, angle_spreads, match_scan, may_score, refine, turning, wrap
 
 BASE_SLACK = 0.2  # m; how far a scan segment of a base may stick out at an end of its wall
@@ -12,108 +13,15 @@ BASE_SLACK_SHARE = 0.1  # of its length
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base
 MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base
 
-# Places of `progress`: bases gone through, anchor within the base, hypotheses, verified ones.
-P_BASE, P_ANCHOR, P_HYPOTHESES, P_VERIFIED = range(4)
-PROGRESS_SIZE = 4
+# Places of `progress`: bases gone through, anchor within the base, hypotheses, verified ones, base under way or -1.
 
-# Columns of `found` (k, 5): value (score and prior together), theta, x, y, score.
-FOUND_COLUMNS = 5
-# Places of `best`: highest value found; least value on a full list.
-BEST_SIZE = 2
 WHOLE_OVERLAP = 0.5  # least overlap from which the raster of directions can be asked
 WINDOW_MARGIN = 0.5  # m, and
 WINDOW_TURN = 0.1  # rad; what lies farther outside a hard prior's window is not refined into it
-# Places of `rules`: share of the best value that a pose must reach to be kept; distance and angle of distinct poses.
-RULES_SIZE = 3
-# Places of `prior`: kind, x, y, theta, then xx, xy, xt, yy, yt, tt of the information matrix, or radius and angle.
-NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
-PRIOR_SIZE = 10
-SOFT_FLOOR = -20.0  # nats; the most that a soft prior speaks against a pose
-INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those outside
 
 COST_REJECTED = 10  # in tests of a wall
 COST_HYPOTHESIS = 50
 COST_REFINE = 800
-
-
-@njit(cache=True, nogil=True)
-def prior_value(prior, theta, x, y):
-    """Return what the prior says of a pose, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
-    if prior[0] == NO_PRIOR:
-        return 0.0
-    dx = x - prior[1]
-    dy = y - prior[2]
-    turn = wrap(theta - prior[3])
-    if prior[0] == HARD_PRIOR:
-        return INSIDE if dx * dx + dy * dy <= prior[4] * prior[4] and abs(turn) <= prior[5] else 0.0
-    square = (
-        prior[4] * dx * dx
-        + 2.0 * prior[5] * dx * dy
-        + 2.0 * prior[6] * dx * turn
-        + prior[7] * dy * dy
-        + 2.0 * prior[8] * dy * turn
-        + prior[9] * turn * turn
-    )
-    return max(SOFT_FLOOR, -0.5 * square)
-
-
-@njit(cache=True, nogil=True)
-def keep(found, count, best, pose, score, value, distance, angle):
-    """Put a pose among the best, at most one within `distance` metres and `angle` radians; ties keep the earlier."""
-    n = count[0]
-    near = -1
-    worst = 0
-    for k in range(n):
-        if (
-            abs(found[k, 2] - pose[1]) < distance
-            and abs(found[k, 3] - pose[2]) < distance
-            and abs(wrap(found[k, 1] - pose[0])) < angle
-            and (near < 0 or found[k, 0] > found[near, 0])
-        ):
-            near = k
-        if found[k, 0] < found[worst, 0]:
-            worst = k
-    if near >= 0:
-        place = near
-        if value <= found[near, 0]:
-            return
-    elif n < len(found):
-        place = n
-        count[0] = n + 1
-    else:
-        place = worst
-        if value <= found[worst, 0]:
-            return
-    found[place, 0] = value
-    found[place, 1] = pose[0]
-    found[place, 2] = pose[1]
-    found[place, 3] = pose[2]
-    found[place, 4] = score
-    if count[0] == len(found):
-        least = found[0, 0]
-        for k in range(1, len(found)):
-            least = min(least, found[k, 0])
-        best[1] = least
-
-
-@njit(inline="always")
-def floor_of(rules, best, bonus):
-    """Return the score that a pose must reach to be kept, given what the prior says of it."""
-    return max(rules[0] * best[0], best[1]) - bonus
-
-
-@njit(cache=True, nogil=True)
-def offer(found, count, best, rules, prior, pose, score):
-    """Keep a refined pose if it is worth it."""
-    bonus = prior_value(prior, pose[0], pose[1], pose[2])
-    if prior[0] == HARD_PRIOR:
-        if bonus < INSIDE:
-            return
-        bonus = 0.0
-    if score <= 0.0 or score < floor_of(rules, best, bonus):
-        return
-    keep(found, count, best, pose, score, score + bonus, rules[1], rules[2])
-    best[0] = max(best[0], score + bonus)
 
 
 @njit(inline="always")
@@ -214,7 +122,7 @@ def search_base(
     A run under `a` fixes the rotation and leaves one slide; the grid is walked along what the midpoint of `b` then
     sweeps. The final angle splits the misfit of both, so that b turns about a by up to `swing` metres: the ends are
     tested loosely until then. Goes on from the anchor where `progress` stands, at the slide ``resume[0]`` unless that
-    is -inf, and stops when `budget` tests are used up. Returns the tests that it took; ``progress[P_ANCHOR]`` is back
+    is -inf, and stops when `budget` tests are used up. Returns the tests that it took; ``progress[1]`` is back
     at 0, and ``resume[0]`` at -inf, when the base is done.
 
     The walk stands here whole, and reads arrays only by element: see `match_scan`.

@@ -8,16 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ._keeping_kernels import BEST_SIZE, FOUND_COLUMNS, HARD_PRIOR, NO_PRIOR, PRIOR_SIZE, SOFT_PRIOR
 from ._plan_kernels import BUDGET, EXHAUSTED, PROVEN, advance, plan_bases
-from ._search_kernels import (
-    BEST_SIZE,
-    FOUND_COLUMNS,
-    HARD_PRIOR,
-    NO_PRIOR,
-    PRIOR_SIZE,
-    SOFT_PRIOR,
-    search_slides,
-)
+from ._search_kernels import search_slides
 from .map_index import MapIndex
 from .options import AssociationOptions, CancelledError, Deadline, HardPrior, Prior, SoftPrior
 from .result import SearchReport

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from registration import RigidTransform
 
 from ._beam_kernels import rank_beams
-from ._search_kernels import INSIDE, prior_value
+from ._keeping_kernels import INSIDE, prior_value
 from ._sight_kernels import distinct, rank
 from .candidates import DISTINCT_ANGLE, DISTINCT_DISTANCE, Candidates, encode_prior
 from .map_index import MapIndex

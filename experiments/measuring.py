@@ -126,7 +126,7 @@ def _laser(seen: SimulatedScan) -> LaserScan:
 
 def _kept(measured: MeasuredSegments, setup: Setup) -> NDArray[np.bool_]:
     long_enough: NDArray[np.bool_] = measured.segments.lengths >= setup.min_length * UNIT
-    return long_enough & (measured.points >= setup.min_points)
+    return long_enough
 
 
 def _pairs(beams: Indices, hits: Indices, purity: float) -> Indices:

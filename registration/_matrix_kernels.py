@@ -1,4 +1,3 @@
-# mypy: allow-untyped-defs, allow-untyped-decorators, allow-untyped-calls, allow-incomplete-defs, no-check-untyped-defs
 """Compiled closed forms for small symmetric matrices, with no more rounding than an eigenvalue routine has."""
 
 import math

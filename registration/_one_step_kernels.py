@@ -1,4 +1,3 @@
-# mypy: disable-error-code="no-untyped-def"
 """Compiled sums of the paper's estimator over flat float64 arrays; nothing here validates.
 
 The sums are compensated, (2, `ONE_STEP_SIZE`), rows value and error, and taken about a reference transform ``T_ref``,

@@ -1,4 +1,3 @@
-# mypy: allow-untyped-defs, allow-untyped-decorators, allow-untyped-calls, allow-incomplete-defs, no-check-untyped-defs
 """Compiled work on pairs of segments: a row of numbers each.
 
 Columns of `rows` (n, 14), the map's in the map frame and the others in the scan frame: unit direction, midpoint (m) and

@@ -1,4 +1,3 @@
-# mypy: disable-error-code="no-untyped-def"
 """Compiled final fit of segments: maximum likelihood lines, their extension past gaps, and their ends.
 
 Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in

@@ -1,4 +1,3 @@
-# mypy: disable-error-code="no-untyped-def"
 """Compiled preparation of ranges: what is known of each beam, in which order, and what noise they show.
 
 Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in

@@ -1,4 +1,3 @@
-# mypy: disable-error-code="no-untyped-def"
 """The compiled way from ordered points to segments: pieces, lines, extension, corners.
 
 Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in

@@ -12,6 +12,7 @@ from association import AssociationOptions, MapIndex
 from association import _accept_kernels as accepting
 from association import _agreement_kernels as agreeing
 from association import _chance_kernels as chance
+from association import _keeping_kernels as keeping
 from association import _match_kernels as match
 from association import _plan_kernels as plan
 from association import _scan_kernels as scanning
@@ -263,13 +264,13 @@ def test_fewest_segments():
 
 def test_prior_value():
     soft = np.array([1.0, 2.0, 3.0, 3.1, 4.0, 0.0, 0.0, 1.0, 0.0, 100.0])
-    assert search.prior_value(soft, 3.1, 2.0, 3.0) == 0.0
-    assert search.prior_value(soft, -3.1, 2.5, 3.0) == pytest.approx(-0.5 * (1.0 + 100.0 * (math.tau - 6.2) ** 2))
-    assert search.prior_value(soft, 3.1, 200.0, 3.0) == search.SOFT_FLOOR
+    assert keeping.prior_value(soft, 3.1, 2.0, 3.0) == 0.0
+    assert keeping.prior_value(soft, -3.1, 2.5, 3.0) == pytest.approx(-0.5 * (1.0 + 100.0 * (math.tau - 6.2) ** 2))
+    assert keeping.prior_value(soft, 3.1, 200.0, 3.0) == keeping.SOFT_FLOOR
     hard = np.array([2.0, 2.0, 3.0, 3.1, 0.5, 0.2, 0, 0, 0, 0])
-    assert search.prior_value(hard, -3.1, 2.4, 3.2) == search.INSIDE
-    assert search.prior_value(hard, 3.1, 2.4, 3.4) == 0.0
-    assert search.prior_value(hard, 2.8, 2.0, 3.0) == 0.0
+    assert keeping.prior_value(hard, -3.1, 2.4, 3.2) == keeping.INSIDE
+    assert keeping.prior_value(hard, 3.1, 2.4, 3.4) == 0.0
+    assert keeping.prior_value(hard, 2.8, 2.0, 3.0) == 0.0
 
 
 @given(SEEDS)
