@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from registration import MeasuredSegments, RigidTransform, wrap_angle
 
-from ._match_kernels import MAX_ANGLE_GATE, REACH
+from .tuning import GREATEST_ANGLE_GATE, REACH
 from .errors import InvalidSearchError
 
 Estimator = Literal["joint", "one_step"]
@@ -158,7 +158,7 @@ class AssociationOptions:
             ("confidence", self.confidence, 0.5, 1.0),
             ("seed", self.seed, 0, 2**63 - 1),
             ("offset_tolerance", self.offset_tolerance, 1e-3, REACH),
-            ("angle_tolerance", self.angle_tolerance, 1e-3, MAX_ANGLE_GATE),
+            ("angle_tolerance", self.angle_tolerance, 1e-3, GREATEST_ANGLE_GATE),
             ("min_overlap", self.min_overlap, 0.0, 1.0),
         ]
         for name, value, low, high in ranges:

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-from ._accept_kernels import missing_pieces
-from ._agreement_kernels import NEUTRAL
-from ._agreement_kernels import agreement as agreement_at
-from .map_index import MapIndex
-from .options import Scan
+from .context import SearchContext
+from .kernels.acceptance import missing_pieces
+from .kernels.agreement import agreement as agreement_at
 from .ranking import Ranked
-from .scan_rows import ScanRows
+from .tuning import NEUTRAL
 
 
-def missing_walls(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> tuple[int, ...]:
+def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
     """List the map segments of walls that rays to the consensus set pass through; none without a viewpoint."""
-    if scan.viewpoint is None:
+    if context.scan.viewpoint is None:
         return ()
-    x, y = scan.viewpoint
-    pose = best.pose
+    index = context.index
     pieces = missing_pieces(
-        rows.rows, best.matches, float(x), float(y), pose.theta, pose.x, pose.y, index.walls.rows, index.grid.starts,
-        index.grid.items, index.grid.shape, index.pieces, index.piece_starts,
+        context.segments.rows, best.matches, context.view, best.estimate, index.tables.place, index.pieces,
+        context.workspace,
     )  # fmt: skip
     return tuple(sorted(set((pieces % index.directed).tolist())))
 
 
-def agreement(index: MapIndex, scan: Scan, rows: ScanRows, best: Ranked) -> float:
-    """Return the share of directions in which the scan shows what the map does, 0 to 1; see `_agreement_kernels`."""
-    if scan.viewpoint is None:
+def agreement(context: SearchContext, best: Ranked) -> float:
+    """Return the share of directions in which the scan shows what the map does, 0 to 1."""
+    if context.scan.viewpoint is None:
         return NEUTRAL
-    x, y = scan.viewpoint
-    pose = best.pose
-    return float(
-        agreement_at(
-            rows.rows, x, y, pose.theta, pose.x, pose.y, index.walls.rows, index.grid.starts, index.grid.items,
-            index.grid.shape,
-        )
-    )  # fmt: skip
+    pose, place = best.estimate, context.index.tables.place
+    return float(agreement_at(context.segments.rows, context.view, pose, place, context.workspace))

@@ -5,19 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ._chance_kernels import chance_matches, log_tail
-from .map_index import MapIndex
-from .scan_rows import ScanRows
-
-Floats = NDArray[np.float64]
+from .context import SearchContext
+from .kernels.chance import chance_matches, log_tail
+from .tuning import LEAST_SIGNIFICANCE
 
 EXPONENTS = np.geomspace(0.01, 2.0, 40)  # of Chernoff's bound
-LEAST = 1e-300
 
 
-def significance(index: MapIndex, scan: ScanRows, gates: Floats, score: float) -> float:
+def significance(context: SearchContext, score: float) -> float:
     """Bound the probability that some pose scores `score` on a map that has nothing to do with the scan.
 
     At a pose drawn at random, turned so that some directions agree, scan segment i lies on a wall with a probability
@@ -26,9 +22,7 @@ def significance(index: MapIndex, scan: ScanRows, gates: Floats, score: float) -
 
     Parameters
     ----------
-    index : MapIndex
-    scan : ScanRows
-    gates : (6,) see `scan_rows.gates`
+    context : SearchContext
     score : float
         Nats, without lines of sight.
 
@@ -37,10 +31,10 @@ def significance(index: MapIndex, scan: ScanRows, gates: Floats, score: float) -
     float
         0 to 1; small is good.
     """
+    index, scan, gates = context.index, context.segments.rows, context.gates
     lengths, beyond = index.sorted_lengths
-    offset_gate, angle_gate = float(gates[1]), float(gates[3])
-    chances = chance_matches(scan.rows, lengths, beyond, index.agreeing_share, index.area, gates)
-    exponent = float(log_tail(scan.rows, chances, score, EXPONENTS))
-    places = index.area / (2.0 * offset_gate) ** 2
-    turns = math.tau / (2.0 * angle_gate)
-    return min(1.0, max(LEAST, math.exp(min(0.0, exponent + math.log(max(1.0, places * turns))))))
+    chances = chance_matches(scan, lengths, beyond, index.agreeing_share, index.area, gates)
+    exponent = float(log_tail(scan, chances, score, EXPONENTS))
+    places = index.area / (2.0 * float(gates["least_offset"][0])) ** 2
+    turns = math.tau / (2.0 * float(gates["least_angle"][0]))
+    return min(1.0, max(LEAST_SIGNIFICANCE, math.exp(min(0.0, exponent + math.log(max(1.0, places * turns))))))

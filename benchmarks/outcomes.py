@@ -15,7 +15,7 @@ import numpy as np
 
 from association import AssociationOptions, AssociationResult, Deadline, associate
 from association.candidates import find_candidates
-from association.scan_rows import scan_rows
+from association.context import SearchContext
 from registration import RigidTransform, wrap_angle
 
 from .collection import Collection, MapKey, Query, building
@@ -81,9 +81,9 @@ def run_one(collection: Collection, query: Query, key: MapKey | None = None, *, 
     wall, cpu = time.perf_counter() - began[0], time.thread_time() - began[1]
     search = math.nan
     if steps:
-        rows = scan_rows(scan, index.sigma, OPTIONS)
+        context = SearchContext.of(index, scan, None, OPTIONS, Deadline())
         start = time.thread_time()
-        find_candidates(index, rows, None, OPTIONS, Deadline())
+        find_candidates(context)
         search = 1e3 * (time.thread_time() - start)
     own = key is None or key == query.map  # in the map of another building nothing is right
     right = own and is_right(result.pose, query.pose, collection)

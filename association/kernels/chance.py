@@ -1,24 +1,26 @@
-"""Compiled bound on what chance scores; see `significance`, and `_match_kernels` for the arrays."""
+"""Compiled bound on what chance scores; see `association.significance`."""
 
 import math
 
 import numpy as np
-from numba import njit
 
-LEAST_CHANCE, MOST_CHANCE = 1e-6, 0.9
+from registration.compiling import kernel
+
+from ..tuning import LEAST_CHANCE, MOST_CHANCE
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def chance_matches(scan, lengths, beyond, agreeing, area, gates):
     """Return (n,) the probability that each scan segment lies on a wall at a random pose with agreeing directions.
 
     `lengths` (m,): of the walls, ascending; ``beyond[k]`` is the sum of those from k on, (m + 1,). `agreeing` is the
-    chance that two points of walls have the same direction.
+    chance that two points of walls have the same direction. `gates` (1,).
     """
+    gate = gates[0]
     chances = np.empty(len(scan))
     for i in range(len(scan)):
         # The walls that are long enough: the first of them by bisection.
-        least = gates[5] * scan[i, 4]
+        least = gate.least_overlap * scan[i].length
         low = 0
         high = len(lengths)
         while low < high:
@@ -27,11 +29,11 @@ def chance_matches(scan, lengths, beyond, agreeing, area, gates):
                 low = middle + 1
             else:
                 high = middle
-        chances[i] = min(MOST_CHANCE, max(LEAST_CHANCE, 2.0 * gates[1] * agreeing * beyond[low] / area))
+        chances[i] = min(MOST_CHANCE, max(LEAST_CHANCE, 2.0 * gate.least_offset * agreeing * beyond[low] / area))
     return chances
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def log_tail(scan, chances, score, exponents):
     """Return Chernoff's bound on the log of the probability that gains drawn with `chances` come to `score`.
 
@@ -44,8 +46,8 @@ def log_tail(scan, chances, score, exponents):
         middle = (low + high) // 2
         slope = -score
         for i in range(len(scan)):
-            grown = chances[i] * math.exp(exponents[middle] * scan[i, 12])
-            slope += scan[i, 12] * grown / (1.0 - chances[i] + grown)
+            grown = chances[i] * math.exp(exponents[middle] * scan[i].gain)
+            slope += scan[i].gain * grown / (1.0 - chances[i] + grown)
         if slope < 0.0:
             low = middle + 1
         else:
@@ -54,6 +56,6 @@ def log_tail(scan, chances, score, exponents):
     for k in range(max(0, low - 1), min(low + 1, len(exponents))):
         total = -exponents[k] * score
         for i in range(len(scan)):
-            total += math.log1p(chances[i] * math.expm1(exponents[k] * scan[i, 12]))
+            total += math.log1p(chances[i] * math.expm1(exponents[k] * scan[i].gain))
         least = min(least, total)
     return least

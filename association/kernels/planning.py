@@ -3,40 +3,42 @@
 import math
 
 import numpy as np
-from numba import njit
 
-from ._search_kernels import MIN_CROSSING_BASE, least_length, search_base
+from registration.compiling import kernel
 
-TELLING = 0.25  # m; how far a base may lay the other segments off, root mean square
-UNTELLING = 0.1  # what a base is worth less that lays them farther off
-REUSE = 0.3  # what a base is worth less for each earlier use of one of its segments
+from ..layout import BASE
+from ..tuning import (
+    COST_ANCHOR,
+    COST_BASE,
+    COST_HYPOTHESIS,
+    COST_SLIDE,
+    GAIN_POWER,
+    HYPOTHESIS_SCALE,
+    MIN_CROSSING_BASE,
+    REUSE,
+    SHORT_LENGTH,
+    SHORT_POWER,
+    SINE_POWER,
+    TELLING,
+    UNTELLING,
+)
+from .proposing import least_length, search_base
 
-# Measured costs, nanoseconds: of a base, a wall that it may slide on, a metre of slide, a hypothesis.
-COST_BASE = 2000.0
-COST_ANCHOR = 60.0
-COST_SLIDE = 3.0
-COST_HYPOTHESIS = 480.0
-# Observed over expected number of hypotheses: short walls stand beside long ones, at corners and doors, so that a base
-# with a short segment fits more often than lengths alone say, and one across at a small angle less often.
-HYPOTHESIS_SCALE = 2.0
-SHORT_POWER = -0.7  # of the length of the shorter segment, metres
-SHORT_LENGTH = 0.1
-SINE_POWER = 0.3
-GAIN_POWER = 3.0  # of the lesser gain: long segments are clutter less often
 
+@kernel
+def slack_tables(scan, count, runs):
+    """Sum over the runs of each direction bin how far scan segment i could slide on them.
 
-@njit(cache=True, nogil=True)
-def slack_tables(scan, count, bin_starts, longest, summed):
-    """Sum over the walls of each direction bin how far scan segment i could slide on them.
-
-    `longest` (m,): lengths of the walls; `summed` (m + 1,): their running sum. Returns
-    slides (count, bins) in metres and the number of walls long enough for each segment.
+    Returns slides (count, bins) in metres and the number of runs long enough for each segment (count,).
     """
+    bin_starts = runs.bin_starts
+    longest = runs.longest
+    summed = runs.summed
     bins = len(bin_starts) - 1
     slides = np.zeros((count, bins))
     fitting = np.zeros(count)
     for i in range(count):
-        need = least_length(scan[i, 4])
+        need = least_length(scan[i].length)
         for b in range(bins):
             low = bin_starts[b]
             high = bin_starts[b + 1]
@@ -52,31 +54,33 @@ def slack_tables(scan, count, bin_starts, longest, summed):
     return slides, fitting
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def is_telling(scan, a, b):
     """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
 
     Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
     """
-    variance = scan[a, 10] * scan[b, 10] / (scan[a, 10] + scan[b, 10])
-    x = 0.5 * (scan[a, 2] + scan[b, 2])
-    y = 0.5 * (scan[a, 3] + scan[b, 3])
+    va = scan[a].angle_variance
+    vb = scan[b].angle_variance
+    variance = va * vb / (va + vb)
+    x = 0.5 * (scan[a].x + scan[b].x)
+    y = 0.5 * (scan[a].y + scan[b].y)
     total = 0.0
     gain = 0.0
     for i in range(len(scan)):
-        total += scan[i, 12] * ((scan[i, 2] - x) ** 2 + (scan[i, 3] - y) ** 2)
-        gain += scan[i, 12]
+        total += scan[i].gain * ((scan[i].x - x) ** 2 + (scan[i].y - y) ** 2)
+        gain += scan[i].gain
     return variance * total <= TELLING**2 * gain
 
 
-@njit(cache=True, nogil=True)
-def plan_bases(scan, count, bin_starts, longest, summed, area):
-    """List the non-parallel pairs of the first `count` scan segments with their logarithmic merit.
+@kernel
+def plan_bases(scan, count, runs, area):
+    """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`.
 
-    The merit is what the base can tell (the lesser gain) over what it will cost. Returns pairs (k, 2), the one that
-    slides first, and merits (k,).
+    The merit is what the base can tell (the lesser gain) over what it will cost. `area` is that of the map, m^2.
     """
-    slides, fitting = slack_tables(scan, count, bin_starts, longest, summed)
+    slides, fitting = slack_tables(scan, count, runs)
+    bin_starts = runs.bin_starts
     bins = len(bin_starts) - 1
     total = np.zeros(count)
     smooth = np.empty((count, bins))
@@ -88,16 +92,15 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
             n_taken += 1
     short = np.empty(count)
     for i in range(count):
-        short[i] = (scan[i, 4] + SHORT_LENGTH) ** SHORT_POWER
+        short[i] = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
         for b in range(bins):
             total[i] += slides[i, b]
             smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, (b + 1) % bins]
-    pairs = np.empty((count * (count - 1) // 2, 2), dtype=np.int64)
-    merits = np.empty(len(pairs))
+    bases = np.empty(count * (count - 1) // 2, dtype=BASE)
     k = 0
     for i in range(count):
         for j in range(i + 1, count):
-            turn = scan[j, 5] - scan[i, 5]
+            turn = scan[j].angle - scan[i].angle
             sine = abs(math.sin(turn))
             if sine < MIN_CROSSING_BASE:
                 continue
@@ -110,17 +113,18 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
                 expected += slides[i, b] * smooth[j, (b + shift) % bins]
             expected *= HYPOTHESIS_SCALE / area * sine**SINE_POWER * max(short[i], short[j])
             cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
-            pairs[k, 0] = i if sweep_i <= sweep_j else j
-            pairs[k, 1] = j if sweep_i <= sweep_j else i
-            merits[k] = GAIN_POWER * math.log(min(scan[i, 12], scan[j, 12])) - math.log(cost)
+            bases[k].sliding = i if sweep_i <= sweep_j else j
+            bases[k].crossing = j if sweep_i <= sweep_j else i
+            merit = GAIN_POWER * math.log(min(scan[i].gain, scan[j].gain)) - math.log(cost)
             if not is_telling(scan, i, j):
-                merits[k] += math.log(UNTELLING)
+                merit += math.log(UNTELLING)
+            bases[k].merit = merit
             k += 1
-    return pairs[:k], merits[:k]
+    return bases[:k]
 
 
-@njit(cache=True, nogil=True)
-def next_base(pairs, merits, uses):
+@kernel
+def next_base(bases, uses):
     """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
 
     Ties go to the pair that comes first, that of the longest segments.
@@ -128,23 +132,23 @@ def next_base(pairs, merits, uses):
     best = -1
     best_merit = -math.inf
     fade = math.log(REUSE)
-    for k in range(len(pairs)):
-        if merits[k] == -math.inf:
+    for k in range(len(bases)):
+        if bases[k].merit == -math.inf:
             continue
-        merit = merits[k] + fade * (uses[pairs[k, 0]] + uses[pairs[k, 1]])
+        merit = bases[k].merit + fade * (uses[bases[k].sliding] + uses[bases[k].crossing])
         if merit > best_merit:
             best_merit = merit
             best = k
     if best >= 0:
-        merits[best] = -math.inf
-        uses[pairs[best, 0]] += 1
-        uses[pairs[best, 1]] += 1
+        bases[best].merit = -math.inf
+        uses[bases[best].sliding] += 1
+        uses[bases[best].crossing] += 1
     return best
 
 
-@njit(cache=True, nogil=True)
-def cover(residual, bound, a, b):
-    """Lower the bound on what a pose can score whose consensus set contains none of the bases so far.
+@kernel
+def cover(residual, a, b):
+    """Return by how much a base lowers the bound on what a pose can score that contains none of the bases so far.
 
     Such a pose lacks one segment of each base. The greedy packing of the gains over the bases is a feasible solution of
     the dual of that covering problem, so the bound holds. `residual` (n,) is what is left of each gain.
@@ -152,10 +156,10 @@ def cover(residual, bound, a, b):
     less = min(residual[a], residual[b])
     residual[a] -= less
     residual[b] -= less
-    bound[0] -= less
+    return less
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def strike(missing, inliers, a, b, fewest):
     """Take a base off the sampled consensus sets that have missed all bases so far.
 
@@ -176,7 +180,7 @@ def strike(missing, inliers, a, b, fewest):
     return ones / (64.0 * missing.shape[1])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fewest_segments(best_gains, beyond, needed):
     """Return how many of the first segments a consensus set has at least that scores `needed`.
 
@@ -194,43 +198,42 @@ def fewest_segments(best_gains, beyond, needed):
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
 
-@njit(cache=True, nogil=True)
-def advance(
-    scan, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items, sector_shape,
-    gates, rules, prior, found, count, best, progress, resume, pairs, merits, uses, residual, bound, best_gains,
-    missing, inliers, miss, exhaustive, budget,
-):  # fmt: skip
+@kernel
+def advance(question, tables, plan, found, progress, work, allowed, budget):
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
-    ``progress[4]`` is the base under way or -1. ``miss[0]`` is the chance of having missed a better consensus set, kept
-    up to date, ``miss[1]`` the greatest one allowed. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+    `allowed` is the greatest chance of having missed a better consensus set, -1 to go through all bases; `progress`
+    (1,) keeps that chance up to date. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
     """
+    scan = question.scan
+    rules = question.terms[0].rules
+    state = progress[0]
+    bases = plan.bases
     beyond = 0.0
-    for i in range(len(best_gains), len(scan)):
-        beyond += scan[i, 12]
+    for i in range(len(plan.best_gains), len(scan)):
+        beyond += scan[i].gain
     spent = 0
     while True:
-        if progress[4] < 0:
-            progress[4] = next_base(pairs, merits, uses)
-            if progress[4] < 0:
+        if state.base < 0:
+            state.base = next_base(bases, plan.uses)
+            if state.base < 0:
                 return EXHAUSTED
-        a = pairs[progress[4], 0]
-        b = pairs[progress[4], 1]
-        spent += search_base(
-            scan, a, b, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items,
-            sector_shape, gates, rules, prior, found, count, best, progress, resume, budget - spent,
-        )  # fmt: skip
-        if progress[1] > 0 or resume[0] > -math.inf:
+        base = bases[state.base]
+        spent += search_base(question, tables, base, found, state, work, budget - spent)
+        if state.anchor > 0 or state.slide > -math.inf:
             return BUDGET
-        progress[4] = -1
-        needed = rules[3] * best[0]
+        state.base = -1
+        needed = rules.rival_share * state.best_value
+        a = base.sliding
+        b = base.crossing
         if is_telling(scan, a, b):
-            cover(residual, bound, a, b)
-            miss[0] = strike(missing, inliers, a, b, fewest_segments(best_gains, beyond, needed))
-        if not exhaustive:
-            if bound[0] < needed:
+            state.bound -= cover(plan.residual, a, b)
+            fewest = fewest_segments(plan.best_gains, beyond, needed)
+            state.missed = strike(plan.missing, plan.inliers, a, b, fewest)
+        if allowed >= 0.0:
+            if state.bound < needed:
                 return PROVEN
-            if miss[0] <= miss[1]:
+            if state.missed <= allowed:
                 return CONFIDENT
         if spent > budget:
             return BUDGET

@@ -3,13 +3,13 @@
 import math
 
 import numpy as np
-from numba import njit
 
-# Where more pieces than that begin in one cell, as on no map of a building, some are not merged.
-MOST_LOOKS = 400
+from registration.compiling import kernel
+
+from ..tuning import MOST_LOOKS
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find(parent, i):
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -17,13 +17,13 @@ def _find(parent, i):
     return i
 
 
-@njit(cache=True, nogil=True)
-def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
+@kernel
+def collinear_groups(ends, directions, max_gap, max_lateral, min_cos):
     """Label pieces that continue one another: the end of one within `max_gap` of the begin of the other.
 
-    `endpoints` (n, 4) metres, `directions` (n, 2). Returns (n,) labels, the lowest index of each group.
+    Where more than `MOST_LOOKS` begin in one cell, as on no map of a building, some are not merged. `ends` (n,) of `ENDS`, `directions` (n,) of `POINT`. Returns (n,) labels, the lowest index of each group.
     """
-    n = len(endpoints)
+    n = len(ends)
     parent = np.arange(n)
     if n == 0:
         return parent
@@ -35,14 +35,14 @@ def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
     heads = np.full(buckets, -1)
     following = np.full(n, -1)
     for i in range(n):
-        key = _cell_hash(math.floor(endpoints[i, 0] / cell), math.floor(endpoints[i, 1] / cell), buckets)
+        key = _cell_hash(math.floor(ends[i].x1 / cell), math.floor(ends[i].y1 / cell), buckets)
         following[i] = heads[key]
         heads[key] = i
     for i in range(n):
-        x = endpoints[i, 2]
-        y = endpoints[i, 3]
-        dx = directions[i, 0]
-        dy = directions[i, 1]
+        x = ends[i].x2
+        y = ends[i].y2
+        dx = directions[i].x
+        dy = directions[i].y
         column = math.floor(x / cell)
         row = math.floor(y / cell)
         for a in range(-1, 2):
@@ -51,13 +51,13 @@ def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
                 looks = 0
                 while j >= 0 and looks < MOST_LOOKS:
                     looks += 1
-                    gx = endpoints[j, 0] - x
-                    gy = endpoints[j, 1] - y
+                    gx = ends[j].x1 - x
+                    gy = ends[j].y1 - y
                     if (
                         j != i
                         and abs(gx * dx + gy * dy) <= max_gap
                         and abs(gy * dx - gx * dy) <= max_lateral
-                        and directions[j, 0] * dx + directions[j, 1] * dy >= min_cos
+                        and directions[j].x * dx + directions[j].y * dy >= min_cos
                     ):
                         one = _find(parent, i)
                         other = _find(parent, j)
@@ -71,12 +71,12 @@ def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
     return parent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cell_hash(column, row, buckets):
     return (int(column) * 73856093 ^ int(row) * 19349663) & (buckets - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _column_span(x1, y1, x2, y2, radius, low, high):
     """Return the span of y that a segment dilated by `radius` may have between two values of x."""
     left = max(low - radius, min(x1, x2))
@@ -94,15 +94,15 @@ def _column_span(x1, y1, x2, y2, radius, low, high):
     return min(ya, yb) - radius, max(ya, yb) + radius
 
 
-@njit(cache=True, nogil=True)
-def grid_cells(endpoints, radius, shape):
+@kernel
+def grid_cells(ends, radius, shape):
     """List for every cell of a uniform grid the walls that come within `radius` of the cell.
 
-    `shape` (5,): x0, y0, cell size, columns, rows. Returns ``(starts, items)``: cell ``c = row * columns + column``
+    `shape` (1,) of `GRID_SHAPE`. Returns ``(starts, items)``: cell ``c = row * columns + column``
     holds ``items[starts[c]:starts[c + 1]]``, in ascending order.
     """
-    x0, y0, cell = shape[0], shape[1], shape[2]
-    columns, rows = int(shape[3]), int(shape[4])
+    x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
+    columns, rows = shape[0].columns, shape[0].rows
     places = columns * rows
     starts = np.zeros(places + 1, dtype=np.int32)
     items = np.zeros(0, dtype=np.int32)
@@ -114,11 +114,11 @@ def grid_cells(endpoints, radius, shape):
                 starts[c] = total
                 total += here
             items = np.zeros(total, dtype=np.int32)
-        for i in range(len(endpoints)):
-            x1 = endpoints[i, 0]
-            y1 = endpoints[i, 1]
-            x2 = endpoints[i, 2]
-            y2 = endpoints[i, 3]
+        for i in range(len(ends)):
+            x1 = ends[i].x1
+            y1 = ends[i].y1
+            x2 = ends[i].x2
+            y2 = ends[i].y2
             first = max(0, int((min(x1, x2) - radius - x0) / cell))
             last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))
             for column in range(first, last + 1):
@@ -138,17 +138,17 @@ def grid_cells(endpoints, radius, shape):
     return starts, items
 
 
-@njit(cache=True, nogil=True)
-def direction_raster(endpoints, radius, shape, sectors):
+@kernel
+def direction_raster(ends, radius, shape, sectors):
     """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of. Returns (rows * columns,) of bits."""
-    x0, y0, cell = shape[0], shape[1], shape[2]
-    columns, rows = int(shape[3]), int(shape[4])
+    x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
+    columns, rows = shape[0].columns, shape[0].rows
     bits = np.zeros(columns * rows, dtype=np.uint16)
-    for i in range(len(endpoints)):
-        x1 = endpoints[i, 0]
-        y1 = endpoints[i, 1]
-        x2 = endpoints[i, 2]
-        y2 = endpoints[i, 3]
+    for i in range(len(ends)):
+        x1 = ends[i].x1
+        y1 = ends[i].y1
+        x2 = ends[i].x2
+        y2 = ends[i].y2
         bit = np.uint16(1 << sectors[i])
         first = max(0, int((min(x1, x2) - radius - x0) / cell))
         last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))

@@ -1,0 +1,85 @@
+"""From the matches on walls to correspondences with the map's own segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import RegistrationOptions, RegistrationResult, register
+
+from .context import SearchContext
+from .kernels.acceptance import accept_matches
+from .layout import ENDS, as_records
+from .map_index import MapIndex
+from .options import Estimator, Rotation
+from .ranking import Ranked
+from .result import Correspondence
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """A consensus set in the map's own segments.
+
+    Attributes
+    ----------
+    pairs : (n, 2) scan index and index of the map piece, by scan index
+    overlaps : (n,) share of each scan segment's length that lies on pieces of its wall, or run where it is long
+    rivals, rival_starts : pair k lies also on the pieces ``rivals[rival_starts[k]:rival_starts[k + 1]]``
+    """
+
+    pairs: Indices
+    overlaps: Floats
+    rivals: Indices
+    rival_starts: Indices
+
+    @property
+    def scan_indices(self) -> list[int]:
+        """Scan index of each pair."""
+        indices: list[int] = self.pairs[:, 0].tolist()
+        return indices
+
+    def map_indices(self, index: MapIndex) -> list[int]:
+        """Return the map index of each pair, as sent."""
+        indices: list[int] = (self.pairs[:, 1] % index.directed).tolist()
+        return indices
+
+
+def accept(context: SearchContext, best: Ranked) -> Accepted:
+    """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
+    index, ends = context.index, as_records(ENDS, context.scan.measured.segments.endpoints)
+    found = accept_matches(
+        best.matches, context.segments.order, ends, best.estimate, index.walls.rows, index.pieces
+    )
+    return Accepted(*found)
+
+
+def register_accepted(context: SearchContext, accepted: Accepted) -> RegistrationResult | None:
+    """Fit the pose to a consensus set, as `/v1/register` would; None without pairs."""
+    if not len(accepted.pairs):
+        return None
+    index, options = context.index, context.options
+    how = _how(options.estimator, options.rotation)
+    return register(index.segments, context.scan.measured, accepted.pairs, index.sigma, how)
+
+
+@lru_cache
+def _how(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
+    return RegistrationOptions(estimator=estimator, rotation=rotation)
+
+
+def correspondences(index: MapIndex, accepted: Accepted, registered: RegistrationResult) -> tuple[Correspondence, ...]:
+    """Report the consensus set by scan index."""
+    rivals, starts = (accepted.rivals % index.directed).tolist(), accepted.rival_starts.tolist()
+    columns = (accepted.overlaps, registered.offsets, registered.angles, registered.weights)
+    alternatives = (tuple(rivals[begin:end]) for begin, end in pairwise(starts))
+    values = (column.tolist() for column in columns)
+    return tuple(
+        map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, alternatives)
+    )

@@ -1,0 +1,122 @@
+"""What one search goes by, derived once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from registration import RigidTransform
+
+from .layout import (
+    HARD_PRIOR,
+    NO_PRIOR,
+    PRIOR,
+    RULES,
+    SOFT_PRIOR,
+    TERMS,
+    VIEW,
+    Question,
+    Records,
+    Workspace,
+    record,
+)
+from .map_index import MapIndex
+from .options import AssociationOptions, Deadline, HardPrior, Prior, Scan, SoftPrior
+from .scan_segments import ScanSegments, gates
+
+
+NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
+ANY = record(RULES)  # for kernels that keep no poses
+
+
+@lru_cache
+def _view(x: float, y: float, sighted: bool) -> Records:
+    return record(VIEW, x=x, y=y, sighted=sighted)
+
+
+@dataclass(frozen=True)
+class SearchContext:
+    """A search's map, scan, prior and options, and what the kernels are handed of them.
+
+    Attributes
+    ----------
+    index : MapIndex
+        Of the directed or of the undirected map, as the options want it.
+    scan : Scan
+    prior : Prior or None
+        In the map frame.
+    options : AssociationOptions
+    deadline : Deadline
+    segments : ScanSegments
+    gates : (1,) of `GATES`
+    """
+
+    index: MapIndex
+    scan: Scan
+    prior: Prior | None
+    options: AssociationOptions
+    deadline: Deadline
+    segments: ScanSegments
+    gates: Records
+
+    @classmethod
+    def of(
+        cls, index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline
+    ) -> SearchContext:
+        """Prepare a search."""
+        place = index if options.oriented else index.undirected
+        segments = ScanSegments.of(scan, place.sigma, options)
+        return cls(place, scan, prior, options, deadline, segments, gates(options))
+
+    @property
+    def with_beams(self) -> bool:
+        """Whether single beams are evidence."""
+        return self.scan.beams is not None
+
+    @property
+    def window(self) -> HardPrior | None:
+        """The hard prior, if there is one."""
+        return self.prior if isinstance(self.prior, HardPrior) else None
+
+    @cached_property
+    def view(self) -> Records:
+        """Where the sensor stood, (1,) of `VIEW`; segments have no lines of sight where single beams tell more."""
+        sighted = self.scan.viewpoint is not None and not self.with_beams
+        return _view(*(self.scan.viewpoint or (0.0, 0.0)), sighted)
+
+    @cached_property
+    def workspace(self) -> Workspace:
+        """What the kernels write to while they look at poses."""
+        return Workspace.of(len(self.segments.rows))
+
+    def question(self, rules: Records) -> Question:
+        """Return what the kernels search for; `rules` (1,) say which poses are kept."""
+        terms = np.zeros(1, TERMS)
+        terms["gates"], terms["rules"], terms["prior"] = self.gates, rules, self.prior_record
+        return Question(self.segments.rows, terms)
+
+    def anywhere(self) -> SearchContext:
+        """Return the same search without its prior."""
+        return replace(self, prior=None)
+
+    def in_map(self, pose: RigidTransform) -> RigidTransform:
+        """Return a pose of the index frame in the map frame."""
+        x, y = self.index.origin
+        return RigidTransform(pose.x + float(x), pose.y + float(y), pose.theta)
+
+    @cached_property
+    def prior_record(self) -> Records:
+        """The prior in the index frame, (1,) of `PRIOR`."""
+        prior = self.prior
+        if prior is None:
+            return NOTHING_KNOWN
+        x, y = self.index.origin
+        at = {"x": prior.pose.x - x, "y": prior.pose.y - y, "theta": prior.pose.theta}
+        if isinstance(prior, HardPrior):
+            return record(PRIOR, kind=HARD_PRIOR, **at, radius=prior.radius, angle=prior.angle)
+        assert isinstance(prior, SoftPrior)
+        information = np.linalg.inv(prior.covariance)[np.triu_indices(3)]
+        named = dict(zip(("xx", "xy", "xt", "yy", "yt", "tt"), information, strict=True))
+        return record(PRIOR, kind=SOFT_PRIOR, **at, **named)

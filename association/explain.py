@@ -1,0 +1,90 @@
+"""From a prepared search to its explanations, and the best of them worked out: all that the verdict weighs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from registration import RegistrationResult
+
+from .acceptance import Accepted, accept, register_accepted
+from .candidates import find_candidates
+from .context import SearchContext
+from .ranking import Ranked, rank_candidates
+from .result import SearchReport
+from .sight import agreement
+from .significance import significance
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The best explanation, worked out.
+
+    Attributes
+    ----------
+    best : Ranked
+    accepted : Accepted
+        Its consensus set in the map's own segments.
+    registered : RegistrationResult
+        The pose of that set.
+    agreement : float
+        Share of directions in which the scan shows what the map does, 0 to 1.
+    significance : float
+        Probability that chance scores as high.
+    """
+
+    best: Ranked
+    accepted: Accepted
+    registered: RegistrationResult
+    agreement: float
+    significance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Explanations:
+    """What a search found.
+
+    Attributes
+    ----------
+    ranked : tuple of Ranked
+        Distinct; those within a hard prior's window first, the best first.
+    answer : Answer or None
+        The first within the window; None where there is none.
+    search : SearchReport
+    """
+
+    ranked: tuple[Ranked, ...]
+    answer: Answer | None
+    search: SearchReport
+
+    @property
+    def rivals(self) -> tuple[Ranked, ...]:
+        """The other explanations within the window, best first."""
+        return tuple(one for one in self.ranked if one.inside)[1:]
+
+    @property
+    def others(self) -> tuple[Ranked, ...]:
+        """All explanations but that of the answer."""
+        return self.ranked if self.answer is None else tuple(r for r in self.ranked if r is not self.answer.best)
+
+
+def explain(context: SearchContext) -> Explanations:
+    """Search, rank what was found, and work out the best of it.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    candidates = find_candidates(context)
+    ranked = rank_candidates(context, candidates)
+    best = next((one for one in ranked if one.inside), None)
+    return Explanations(tuple(ranked), None if best is None else _answer(context, best), candidates.report)
+
+
+def _answer(context: SearchContext, best: Ranked) -> Answer | None:
+    accepted = accept(context, best)
+    registered = register_accepted(context, accepted)
+    if registered is None:
+        return None
+    chance = significance(context, float(best.matches["worth"].sum()))
+    return Answer(best, accepted, registered, agreement(context, best), chance)

@@ -1,0 +1,136 @@
+"""Compiled evidence of single beams: what a laser should read at a pose, and what it did."""
+
+import math
+
+from registration.compiling import kernel
+from registration.kernels import joint_add, joint_solve
+
+from ..tuning import (
+    BEAM_GATES,
+    BEHIND,
+    CERTAIN,
+    LEAST_INCIDENCE,
+    LEAST_POINTS,
+    NEAR,
+    PASSED_SLACK,
+    SURE_LENGTH,
+)
+from .consensus import clear, hold
+from .sight import first_hit
+
+
+@kernel
+def beam_evidence(rays, view, pose, place, ray, evidence):
+    """Write the shares of the beams that read the wall they should, and that passed through one, to `evidence`.
+
+    A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
+    proves little, black or mirror walls give none.
+    """
+    angles = rays.angles
+    ranges = rays.ranges
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    ray.x = c * view.x - s * view.y + pose.x
+    ray.y = s * view.x + c * view.y + pose.y
+    read = 0.0
+    passed = 0.0
+    for i in range(len(angles)):
+        dx = math.cos(pose.theta + angles[i])
+        dy = math.sin(pose.theta + angles[i])
+        if math.isinf(ranges[i]):
+            continue
+        ray.dx = dx
+        ray.dy = dy
+        ray.limit = min(rays.reach, ranges[i] + BEHIND)
+        expected, w = first_hit(ray, walls, starts, items, shape)
+        if w < 0:
+            continue
+        incidence = max(LEAST_INCIDENCE, abs(walls[w].dx * dy - walls[w].dy * dx))
+        across = (ranges[i] - expected) * incidence
+        read += math.exp(-0.5 * across * across / (NEAR * NEAR))
+        if across > CERTAIN:
+            passed += min(1.0, (walls[w].end - walls[w].begin) / SURE_LENGTH)
+    n = max(1, len(angles))
+    evidence.read = read / n
+    evidence.passed = passed / n
+
+
+@kernel
+def refine_by_beams(rays, view, pose, place, gate, work):
+    """Move `pose` to where the ends of the beams lie on the walls nearest to them, up to `gate` metres off.
+
+    One round of point-to-line least squares by the same sums; a point is a pair without spread. A direction that no
+    wall fixes is held where it is.
+    """
+    angles = rays.angles
+    ranges = rays.ranges
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    sums = work.scratch[0].sums
+    point = work.scratch[0].point
+    clear(sums)
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    for i in range(len(angles)):
+        if math.isinf(ranges[i]):
+            continue
+        px = view.x + ranges[i] * math.cos(angles[i])
+        py = view.y + ranges[i] * math.sin(angles[i])
+        x = c * px - s * py + pose.x
+        y = s * px + c * py + pose.y
+        fx = (x - shape.x0) / shape.cell
+        fy = (y - shape.y0) / shape.cell
+        if not (fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows):
+            continue
+        here = int(fy) * shape.columns + int(fx)
+        nearest = -1
+        least = gate
+        for k in range(starts[here], starts[here + 1]):
+            w = items[k]
+            along = walls[w].dx * x + walls[w].dy * y
+            off = abs(walls[w].dx * y - walls[w].dy * x - walls[w].offset)
+            if off < least and along >= walls[w].begin - NEAR and along <= walls[w].end + NEAR:
+                least = off
+                nearest = w
+        if nearest >= 0:
+            point.centroid_x = px
+            point.centroid_y = py
+            joint_add(sums, walls[nearest], point, 1.0, 1.0)
+    if sums.count < LEAST_POINTS:
+        return
+    hold(sums, pose.x, pose.y, 1.0)
+    theta, tx, ty, _, _ = joint_solve(sums, pose.theta, False)
+    pose.theta = theta
+    pose.x = tx
+    pose.y = ty
+
+
+@kernel
+def weigh_beams(rays, view, poses, place, refined, work, out):
+    """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`. `view` (1,).
+
+    The first `refined` poses are moved to where the beams fit best, if they fit better there.
+    """
+    moved = work.scratch[0].estimate
+    evidence = work.scratch[0].evidence
+    for k in range(len(poses)):
+        beam_evidence(rays, view[0], poses[k], place, work.scratch[0].ray, out[k])
+        if k < refined:
+            moved.theta = poses[k].theta
+            moved.x = poses[k].x
+            moved.y = poses[k].y
+            for gate in BEAM_GATES:
+                refine_by_beams(rays, view[0], moved, place, gate, work)
+            beam_evidence(rays, view[0], moved, place, work.scratch[0].ray, evidence)
+            if evidence.read > out[k].read and evidence.passed <= out[k].passed + PASSED_SLACK:
+                out[k].read = evidence.read
+                out[k].passed = evidence.passed
+                poses[k].theta = moved.theta
+                poses[k].x = moved.x
+                poses[k].y = moved.y

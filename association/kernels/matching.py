@@ -1,0 +1,156 @@
+"""Compiled matching of a scan to the walls at a pose."""
+
+import math
+
+from registration.compiling import inlined, kernel
+
+from ..tuning import BRIDGING, SECTORS
+
+PER_RADIAN = SECTORS / (2.0 * math.pi)
+
+
+@inlined
+def wrap(angle):
+    """Return the angle in [-pi, pi]."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@kernel
+def match_scan(scan, estimate, place, gates, threshold, matches):
+    """Find for every scan segment the wall that it lies on best, the most telling segments first.
+
+    Gated by the innovation: ``offset^2`` against ``sigma^2 + g' C g`` with the pose's covariance C. Best is least in
+    offset over gate plus what the overlap lacks. Writes wall or -1, offset, sine and overlap to `matches` and returns
+    the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach.
+
+    One loop without calls: handing arrays on costs more than the work, Numba counts references to each.
+    """
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    c = math.cos(estimate.theta)
+    s = math.sin(estimate.theta)
+    per_cell = 1.0 / shape.cell
+    total = 0.0
+    for i in range(len(scan)):
+        gx = c * scan[i].x - s * scan[i].y
+        gy = s * scan[i].x + c * scan[i].y
+        dx = c * scan[i].dx - s * scan[i].dy
+        dy = s * scan[i].dx + c * scan[i].dy
+        # g = (n, n . J R m) with the normal n across the segment.
+        lever = dx * gx + dy * gy
+        var = (
+            dy * dy * estimate.xx
+            - 2.0 * dx * dy * estimate.xy
+            + dx * dx * estimate.yy
+            + 2.0 * lever * (dx * estimate.yt - dy * estimate.xt)
+            + lever * lever * estimate.tt
+        )
+        deviation = math.sqrt(scan[i].offset_variance + max(var, 0.0))
+        offset_gate = min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
+        deviation = math.sqrt(scan[i].angle_variance + estimate.tt)
+        angle_gate = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
+        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
+        x = gx + estimate.x
+        y = gy + estimate.y
+        fx = (x - shape.x0) * per_cell
+        fy = (y - shape.y0) * per_cell
+        length = scan[i].length
+        half = 0.5 * length
+        best_cost = 1e300
+        matches[i].wall = -1
+        matches[i].overlap = 0.0
+        if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
+            here = int(fy) * shape.columns + int(fx)
+            for k in range(starts[here], starts[here + 1]):
+                w = items[k]
+                wx = walls[w].dx
+                wy = walls[w].dy
+                offset = wx * y - wy * x - walls[w].offset
+                if abs(offset) > offset_gate or wx * dx + wy * dy < cos_gate:
+                    continue
+                along = wx * x + wy * y
+                low = max(walls[w].begin - along, -half)
+                high = min(walls[w].end - along, half)
+                covered = high - low
+                # What bridges a doorway lies on the walls on both sides of it; the gap between speaks against that.
+                bridging = length > BRIDGING and covered > 0.0
+                v = walls[w].before if low > -half and bridging else -1
+                while v >= 0:
+                    along = walls[v].dx * x + walls[v].dy * y
+                    edge = walls[v].end - along
+                    if edge <= -half:
+                        break
+                    covered -= low - edge
+                    low = max(walls[v].begin - along, -half)
+                    covered += edge - low
+                    v = walls[v].before if low > -half else -1
+                v = walls[w].after if high < half and bridging else -1
+                while v >= 0:
+                    along = walls[v].dx * x + walls[v].dy * y
+                    edge = walls[v].begin - along
+                    if edge >= half:
+                        break
+                    covered -= edge - high
+                    high = min(walls[v].end - along, half)
+                    covered += high - edge
+                    v = walls[v].after if high < half else -1
+                overlap = min(1.0, covered / length)
+                cost = abs(offset) / offset_gate + 1.0 - overlap
+                if overlap >= gates.least_overlap and cost < best_cost:
+                    best_cost = cost
+                    matches[i].wall = w
+                    matches[i].offset = offset
+                    matches[i].sine = dx * wy - dy * wx
+                    matches[i].overlap = overlap
+        total += scan[i].gain * matches[i].overlap
+        if total + scan[i].later_gain < threshold:
+            return -1.0
+    return total
+
+
+@kernel
+def angle_spreads(scan, theta_var, gates, spreads):
+    """Write the angle gate of every scan segment at a pose with that variance, in sectors.
+
+    A hundredth wider than `match_scan` has it, which tests a cosine to the second order.
+    """
+    for i in range(len(scan)):
+        deviation = math.sqrt(scan[i].angle_variance + theta_var)
+        gate = 1.01 * min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
+        spreads[i] = gate * PER_RADIAN
+
+
+@kernel
+def may_score(scan, pose, spreads, raster, threshold):
+    """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
+
+    Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or
+    is between two; and a tenth of the price of `match_scan`. `spreads` as of `angle_spreads`.
+    """
+    shape = raster.shape[0]
+    bits = raster.bits
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    per_cell = 1.0 / shape.cell
+    left = (pose.x - shape.x0) * per_cell
+    bottom = (pose.y - shape.y0) * per_cell
+    turned = (pose.theta + math.pi) * PER_RADIAN + 0.5
+    c *= per_cell
+    s *= per_cell
+    total = 0.0
+    for i in range(len(scan)):
+        fx = c * scan[i].x - s * scan[i].y + left
+        fy = s * scan[i].x + c * scan[i].y + bottom
+        if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
+            here = bits[int(fy) * shape.columns + int(fx)]
+            if here != 0:
+                middle = turned + scan[i].angle * PER_RADIAN
+                for raw in range(math.floor(middle - spreads[i]), math.floor(middle + spreads[i]) + 1):
+                    if (here >> (raw & (SECTORS - 1))) & 1:
+                        total += scan[i].gain
+                        break
+        if total + scan[i].later_gain < threshold:
+            return False
+    return True

@@ -1,0 +1,97 @@
+"""Compiled ranking: candidate poses refined, scored with the lines of sight, and told apart."""
+
+import math
+
+import numpy as np
+
+from registration.compiling import kernel
+from registration.kernels import invert3
+from registration.layout import SYMMETRIC3
+
+from ..layout import BLOCKER, Blockers
+from ..tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
+from .consensus import refine
+from .matching import wrap
+from .sight import count_blockers, sight_penalty
+
+
+@kernel
+def rank(question, place, view, estimates, merits, matches, work):
+    """Refine the candidate poses of `estimates` (k,) in place and score them with the lines of sight.
+
+    The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). `view` (1,).
+    """
+    scan = question.scan
+    gates = question.terms[0].gates
+    sums = work.scratch[0].sums
+    sighted = view[0].sighted
+    blockers = Blockers(np.zeros(len(place.walls), dtype=BLOCKER), np.empty(len(place.walls), dtype=np.int64))
+    best = 0.0
+    length = 0.0
+    for i in range(len(scan)):
+        length += scan[i].length
+    for k in range(len(estimates)):
+        one = estimates[k]
+        merit = merits[k]
+        one.xx = START_VARIANCE
+        one.xy = 0.0
+        one.xt = 0.0
+        one.yy = START_VARIANCE
+        one.yt = 0.0
+        one.tt = START_ANGLE_VARIANCE
+        merit.score = refine(scan, one, place, gates, matches[k], work, ROUNDS)
+        det = sums.xx * sums.yy - sums.xy * sums.xy
+        weight = sums.xx + sums.yy
+        merit.reliability = min(1.0, 2.0 * math.sqrt(max(det, 0.0)) / weight) if weight > 0.0 else 0.0
+        merit.length = 0.0
+        merit.misfit = 0.0
+        count = 0
+        for i in range(len(scan)):
+            if matches[k, i].wall >= 0:
+                merit.length += scan[i].length
+                merit.misfit += matches[k, i].offset ** 2 / scan[i].plain_variance
+                count += 1
+        merit.share = merit.length / length
+        merit.misfit /= max(1, count)
+        # The candidates come best first: what is far behind is no rival, its score may stay too good.
+        if sighted and merit.score > best - FAR_BEHIND:
+            count = count_blockers(scan, matches[k], view[0], one, place, blockers, work.scratch[0].ray)
+            merit.score -= sight_penalty(blockers, count, place.walls)
+            best = max(best, merit.score)
+
+
+@kernel
+def distinct(poses, order, most, distance, angle, same_family):
+    """Pick from `order`, the best first, at most `most` poses without those that a better one stands for.
+
+    A pose stands for those that are near, within `distance` metres and `angle` radians, and for those that its own
+    covariance does not tell from it, at less than `same_family` squared deviations: a family along a corridor is one
+    explanation. `poses` (k,) of `ESTIMATE`. Returns the places in them.
+    """
+    kept = np.empty(min(most, len(order)), dtype=np.int64)
+    informations = np.empty(len(kept), dtype=SYMMETRIC3)
+    known = np.empty(len(kept), dtype=np.bool_)
+    count = 0
+    for i in order:
+        if count == len(kept):
+            break
+        stands = False
+        for k in range(count):
+            better = poses[kept[k]]
+            x = poses[i].x - better.x
+            y = poses[i].y - better.y
+            turn = wrap(poses[i].theta - better.theta)
+            if math.sqrt(x * x + y * y) < distance and abs(turn) < angle:
+                stands = True
+                break
+            f = informations[k]
+            square = f.xx * x * x + f.yy * y * y + f.tt * turn * turn
+            square += 2.0 * (f.xy * x * y + f.xt * x * turn + f.yt * y * turn)
+            if known[k] and square < same_family:
+                stands = True
+                break
+        if not stands:
+            kept[count] = i
+            known[count] = invert3(poses[i], informations[count])
+            count += 1
+    return kept[:count]

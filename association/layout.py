@@ -1,0 +1,320 @@
+"""The records that the kernels speak in, and the tables that they are handed.
+
+Lengths in metres, angles in radians, scores and gains in nats. Poses are in the index frame, from the scan frame. What
+a kernel changes besides arrays is a record of an array of length 1. A `NamedTuple` groups the arrays that are handed
+on together; a kernel binds those that it needs to names once, outside of its loops, because Numba counts references to
+each array that it takes out of a tuple.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration.layout import JOINT_SUMS, POSE, SEEN, SYMMETRIC3
+
+Records = NDArray[np.void]
+
+_F, _I = np.float64, np.int64
+
+
+def _fields(*groups: tuple[type, str]) -> np.dtype[Any]:
+    return np.dtype([(name, kind) for kind, names in groups for name in names.split()])
+
+
+# A point or a direction, and both ends of a segment.
+POINT = _fields((_F, "x y"))
+ENDS = _fields((_F, "x1 y1 x2 y2"))
+
+# A line of the map, or several joined: unit direction; offset along the left normal; abscissae of begin and end along
+# the direction; angle of the direction; the walls before and after it on its run, or -1. One cache line.
+WALL = _fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
+
+# A segment of the scan, the most telling first: unit direction; midpoint; length; angle of the direction; mean of the
+# points and their second moment along the segment (m^2); variances of offset (m^2) and angle (rad^2) with the model's
+# slack; weight in the sums (1/m^2); what it is worth on a wall; the sum of that over all later segments; variance of
+# the offset by the sigmas alone (m^2).
+SCAN_SEGMENT = _fields(
+    (
+        _F,
+        "dx dy x y length angle centroid_x centroid_y spread offset_variance angle_variance weight gain later_gain "
+        "plain_variance",
+    ),
+)
+
+# Where a scan segment lies: the wall or -1; offset from it; sine of the angle to it; share of the length on walls;
+# worth of the match.
+MATCH = _fields((_I, "wall"), (_F, "offset sine overlap worth"))
+
+# A pose with its covariance, of additive x, y, theta.
+ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
+
+# What an estimate is worth: its score; the length of the matched segments; its share of the scan's; the paper's
+# reliability, Eq. (28); the mean squared offset over what the sigmas alone expect.
+MERIT = _fields((_F, "score length share reliability misfit"))
+
+# A pose among the best: score and prior together; the score alone.
+FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
+
+# Geometry of a grid: its corner; the size of a cell; how many there are.
+GRID_SHAPE = _fields((_F, "x0 y0 cell"), (_I, "columns rows"))
+
+# What a match has to pass: gates in standard deviations, and the least and greatest offset and angle that they may
+# come to; the least share of the length on walls.
+GATES = _fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
+
+# Which poses are kept: share of the best value that is needed; distance and angle of distinct poses; share of the best
+# value that makes a rival, up to which the search goes on.
+RULES = _fields((_F, "kept_share distinct_distance distinct_angle rival_share"))
+
+# What is known before: kind; the pose; radius and angle of a window; information of a Gaussian.
+PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYMMETRIC3.descr])
+NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
+
+# All of these together.
+TERMS = np.dtype([("gates", GATES), ("rules", RULES), ("prior", PRIOR)])
+
+# Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs.
+BASE = _fields((_I, "sliding crossing"), (_F, "merit"))
+
+# How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
+# through, poses proposed, poses scored to the end; where to go on: the base or -1, the anchor, the step along it, and
+# the slide or -inf; bound on the score of a pose that contains no base so far; chance of having missed a better
+# consensus set.
+PROGRESS = _fields(
+    (_F, "best_value least_kept"),
+    (_I, "count bases hypotheses verified base anchor step"),
+    (_F, "slide bound missed"),
+)
+
+# What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
+# together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
+VARIANCES = _fields((_F, "map common least_offset least_angle"))
+
+# Where the sensor stood in the scan frame, and whether lines of sight from there are evidence.
+VIEW = _fields((_F, "x y"), (_I, "sighted"))
+
+# A ray from a place in the index frame: unit direction; how far it is followed.
+RAY = _fields((_F, "x y dx dy limit"))
+
+# How many rays pass through a wall on their way to a segment of the consensus set, and to another one.
+BLOCKER = _fields((_I, "to_matched to_clutter"))
+
+# What single beams say of a pose: the shares that read the wall they should, and that passed through one.
+BEAM_EVIDENCE = _fields((_F, "read passed"))
+
+
+class Walls(NamedTuple):
+    """Walls or runs, by direction bin and the longest of a bin first.
+
+    Attributes
+    ----------
+    rows : (m,) of `WALL`
+    bin_starts : (bins + 1,) where each bin begins
+    longest : (m,) their lengths, metres
+    summed : (m + 1,) running sum of `longest`
+    """
+
+    rows: Records
+    bin_starts: NDArray[np.int64]
+    longest: NDArray[np.float64]
+    summed: NDArray[np.float64]
+
+
+# What kernels write to while they look at one pose: the pose; the information of its consensus set and the sums of that;
+# the end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would outlive the
+# array, whose last use ends it: hence these come from outside.
+SCRATCH = np.dtype(
+    [
+        ("estimate", ESTIMATE),
+        ("information", SYMMETRIC3),
+        ("sums", JOINT_SUMS),
+        ("point", SEEN),
+        ("ray", RAY),
+        ("evidence", BEAM_EVIDENCE),
+    ]
+)
+
+
+class Grid(NamedTuple):
+    """A uniform grid with a list for each cell.
+
+    Attributes
+    ----------
+    shape : (1,) of `GRID_SHAPE`
+    starts, items : cell ``c = row * columns + column`` lists ``items[starts[c]:starts[c + 1]]``
+    """
+
+    shape: Records
+    starts: NDArray[np.int32]
+    items: NDArray[np.int32]
+
+
+class Raster(NamedTuple):
+    """Which directions the walls near a place have.
+
+    Attributes
+    ----------
+    shape : (1,) of `GRID_SHAPE`
+    bits : (columns * rows,) bit s of a cell is set where a wall or a run of direction sector s is near
+    """
+
+    shape: Records
+    bits: NDArray[np.uint16]
+
+
+class Place(NamedTuple):
+    """The walls, and where they are: what lies at a point, and what does a ray meet?"""
+
+    walls: Records
+    grid: Grid
+
+
+class Sweep(NamedTuple):
+    """The runs, and where they are: what may lie under a base?
+
+    Attributes
+    ----------
+    runs : (m,) of `WALL`
+    bin_starts : (bins + 1,) where each direction bin of the runs begins
+    sectors : Grid
+        Runs on each cell, ``run * SECTORS + sector``.
+    """
+
+    runs: Records
+    bin_starts: NDArray[np.int64]
+    sectors: Grid
+
+
+class Pieces(NamedTuple):
+    """The map's own segments.
+
+    Attributes
+    ----------
+    items, starts : wall w consists of segments ``items[starts[w]:starts[w + 1]]``
+    ends : (n,) of `ENDS`
+    """
+
+    items: NDArray[np.int32]
+    starts: NDArray[np.int64]
+    ends: Records
+
+
+class MapTables(NamedTuple):
+    """All that the search reads of a map."""
+
+    place: Place
+    sweep: Sweep
+    raster: Raster
+
+
+class Measured(NamedTuple):
+    """Scan segments as they were measured: see `registration.MeasuredSegments`; the first two of `POINT`."""
+
+    directions: Records
+    midpoints: Records
+    lengths: NDArray[np.float64]
+    centroids: Records
+    spreads: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    points: NDArray[np.float64]
+
+
+class Rays(NamedTuple):
+    """Single beams of which something is known.
+
+    Attributes
+    ----------
+    angles : (m,) radians in the scan frame
+    ranges : (m,) metres, inf where nothing was met
+    reach : float
+        Metres; how far a beam without return is known to be free.
+    """
+
+    angles: NDArray[np.float64]
+    ranges: NDArray[np.float64]
+    reach: float
+
+
+class Question(NamedTuple):
+    """What is searched for.
+
+    Attributes
+    ----------
+    scan : (n,) of `SCAN_SEGMENT`
+    terms : (1,) of `TERMS`
+    """
+
+    scan: Records
+    terms: Records
+
+
+class Blockers(NamedTuple):
+    """The walls that rays pass through.
+
+    Attributes
+    ----------
+    counts : (m,) of `BLOCKER`, by wall
+    touched : (m,) the walls that any ray passes through, as many as there are
+    """
+
+    counts: Records
+    touched: NDArray[np.int64]
+
+
+class Plan(NamedTuple):
+    """The bases of a scan, and what tells when enough of them have been gone through.
+
+    Attributes
+    ----------
+    bases : (k,) of `BASE`
+    uses : (n,) how often each of the first n scan segments was part of a base so far
+    residual : (all scan segments,) what is left of each gain in the bound, nats
+    best_gains : (n,) the gains of the first n, the largest first, nats
+    inliers : (n, n, words) ``[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1
+    missing : (n, words) which of these samples have missed all bases so far
+    """
+
+    bases: Records
+    uses: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    best_gains: NDArray[np.float64]
+    inliers: NDArray[np.uint64]
+    missing: NDArray[np.uint64]
+
+
+class Workspace(NamedTuple):
+    """What the kernels write to while they look at one pose after the other.
+
+    Attributes
+    ----------
+    matches : (n,) of `MATCH`
+    spreads : (n,) angle gates in sectors
+    held : (n,) which wall of each scan segment is in the sums, or -1
+    scratch : (1,) of `SCRATCH`
+    """
+
+    matches: Records
+    spreads: NDArray[np.float64]
+    held: NDArray[np.int64]
+    scratch: Records
+
+    @classmethod
+    def of(cls, count: int) -> Workspace:
+        """Return one for a scan of `count` segments."""
+        return cls(np.zeros(count, MATCH), np.zeros(count), np.zeros(count, np.int64), np.zeros(1, SCRATCH))
+
+
+def record(dtype: np.dtype[Any], /, **values: float) -> Records:
+    """Return an array of one record; what is not named is 0."""
+    out = np.zeros(1, dtype)
+    for name, value in values.items():
+        out[name] = value
+    return out
+
+
+def as_records(dtype: np.dtype[Any], rows: NDArray[np.float64]) -> Records:
+    """Return the rows of a float array (n, fields) as records (n,), without a copy where it is contiguous."""
+    return np.ascontiguousarray(rows, dtype=np.float64).view(dtype).reshape(-1)

@@ -1,0 +1,202 @@
+"""Every threshold of the search and the verdict, by stage, with its unit and where it comes from.
+
+Origins: *geometry* follows from what the number means; *tables* was chosen by the tables of `docs/search.md` on floor
+plans and logs, and little changes near it; *measured* is a fit or a timing of what it stands for; *rounding* keeps
+arithmetic sound. Coefficients of the verdict are not here: a command fits them, see `verdict.py`.
+"""
+
+import math
+
+# --- Walls: from a map's segments to lines, and where they are listed -------------------------------------------------
+
+MAX_EXTENT = 1e5  # m; the contract
+MAX_MAP_SIGMA = 10.0  # m; the contract
+MERGE_GAP = 0.3  # m, geometry: a doorway is wider, the joint between two pieces of one wall is not
+RUN_GAP = 1.5  # m, geometry: a scan segment may bridge a doorway
+MERGE_LATERAL = 0.03  # m, tables
+MERGE_ANGLE = math.radians(2.0)  # tables
+MOST_LOOKS = 400  # pieces that begin in one cell and are compared; geometry: no building has more
+DIRECTION_BINS = 90  # tables
+SECTOR_BITS = 4
+SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degrees is the middle of one; tables
+REACH = 0.4  # m, tables; a wall is listed in the cells this near to it, so gates end here
+CELL = 1.0  # m, tables
+SWEEP_CELL = 2.0  # m, tables
+SWEEP_REACH = 0.02  # m, rounding
+RASTER_CELL = 0.5  # m, tables
+MAX_CELLS = 4_000_000  # memory: some 50 MB
+MAX_SWEEP_CELLS = 1_000_000  # memory
+MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about
+CELL_GROWTH = 1.25  # by which cells grow until their lists fit
+
+# --- Scan: what a segment is worth and how far it is to be trusted ----------------------------------------------------
+
+# What no sigma that is sent accounts for: maps drawn or built with some slack, walls that are not quite straight.
+MODEL_OFFSET = 0.02  # m, tables
+MODEL_ANGLE = math.radians(0.6)  # tables
+# Roughness of a wall and bias of the ranges shift neighbouring points together: no number of points averages it out. It
+# decides the angle of short segments, which come with raw ranges.
+COMMON_ERROR = 0.008  # m, tables
+# What finding a segment on a wall is worth against its being clutter: a share of its own, and one by length.
+GAIN = 6.0  # nats, tables
+GAIN_PER_METRE = 2.0  # nats, tables
+GAIN_LENGTH = 4.0  # m, tables; beyond it a segment tells no more
+LEAST_SPREAD = 1e-6  # m^2, rounding
+LEAST_VARIANCE = 1e-8  # m^2, rounding
+
+# --- Matching: when a scan segment lies on a wall ---------------------------------------------------------------------
+
+GATE_SIGMAS = 3.0  # geometry: 99.7 % of a Gaussian
+LEAST_OFFSET_GATE = 0.08  # m, tables
+LEAST_ANGLE_GATE = math.radians(4.0)  # tables
+GREATEST_ANGLE_GATE = 0.35  # rad, tables
+LEAST_OVERLAP = 1e-3  # rounding, and as much less than all of a segment: its end may lie on a wall's
+BRIDGING = 3.0  # m, tables; only a longer segment may bridge a gap between walls: a short one may well be clutter there
+WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
+
+# --- Consensus: growing and shrinking a set of matches at a pose ------------------------------------------------------
+
+ROUNDS = 3  # tables; of matching and solving
+MAX_STEP = 1.0  # m, tables; a consensus set that moves its pose farther than that, or
+MAX_TURN = 0.2  # rad, tables; is not the one that the pose was proposed for
+SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
+START_VARIANCE = 1e-4  # m^2, tables; of a pose that comes without a covariance
+START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
+
+# --- Proposing: bases, sweeps and slides ------------------------------------------------------------------------------
+
+BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the most telling segments
+BASE_SLACK = 0.2  # m, tables; how far a scan segment of a base may stick out at an end of its wall
+BASE_SLACK_SHARE = 0.1  # of its length, tables
+MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base, tables
+MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base, tables
+WINDOW_MARGIN = 0.5  # m, tables, and
+WINDOW_TURN = 0.1  # rad, tables; what lies farther outside a hard prior's window is not refined into it
+SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
+SLIDE_SPACING = 2.0  # m, tables; what is found stands for the family along the walls
+SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; there beams tell where along them
+SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are told apart
+PARALLEL_SINE = 0.1  # tables
+KEPT_SLIDES = 64  # tables
+
+# --- Planning: the order of bases, and when enough have been gone through ---------------------------------------------
+
+TELLING = 0.25  # m, tables; how far a base may lay the other segments off, root mean square
+UNTELLING = 0.1  # tables; what a base is worth less that lays them farther off
+REUSE = 0.3  # tables; what a base is worth less for each earlier use of one of its segments
+# What a base, a wall that it may slide on, a metre of slide, a hypothesis cost; nanoseconds, measured.
+COST_BASE = 2000.0
+COST_ANCHOR = 60.0
+COST_SLIDE = 3.0
+COST_HYPOTHESIS = 480.0
+# Observed over expected number of hypotheses: short walls stand beside long ones, at corners and doors, so that a base
+# with a short segment fits more often than lengths alone say, and one across at a small angle less often. Measured.
+HYPOTHESIS_SCALE = 2.0
+SHORT_POWER = -0.7  # of the length of the shorter segment, metres
+SHORT_LENGTH = 0.1  # m
+SINE_POWER = 0.3
+GAIN_POWER = 3.0  # of the lesser gain, tables: long segments are clutter less often
+SAMPLE_WORDS = 160  # of 64 samples, a resolution of 1e-4
+SAMPLE_SEED = 20190901
+# Work between two looks at the clock, in tests of a wall: a few milliseconds. Measured.
+CHUNK = 300_000
+USUAL_CROWD = 8.0  # walls on the list that a place on a wall has
+TESTS_ANCHOR = 5
+TESTS_REJECTED = 10
+TESTS_HYPOTHESIS = 50
+TESTS_REFINED = 800
+
+# --- Keeping: which poses are remembered ------------------------------------------------------------------------------
+
+KEPT = 64  # poses, tables
+KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no rivals
+# Where raw beams are to decide, the segments propose more. Tables.
+KEPT_FOR_BEAMS = 192
+KEPT_SHARE_FOR_BEAMS = 0.5
+RIVAL_SHARE = 0.95  # of the best value, tables; a pose above it must not have been missed
+DISTINCT_DISTANCE = 0.3  # m, tables
+DISTINCT_ANGLE = 0.1  # rad, tables
+SOFT_FLOOR = -20.0  # nats, tables; the most that a soft prior speaks against a pose
+INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those outside
+
+# --- Ranking ----------------------------------------------------------------------------------------------------------
+
+LEAST_DISTINCT = 24  # tables; explanations told apart at least: the verdict weighs the best against the others
+SAME_FAMILY = 12.8  # squared deviations, geometry: 99.5 % of chi-square of three; two nearer poses are one
+
+# --- Lines of sight ---------------------------------------------------------------------------------------------------
+
+RAY_SPACING = 0.25  # m, tables; between the points of a segment that rays are sent to
+MAX_RAYS = 12  # to one segment, tables
+END_MARGIN = 0.06  # m, tables; rays keep this far from the ends of a segment, where neighbours meet
+SIGHT_TOLERANCE = 0.2  # m, tables; a wall this near before the end of a ray does not block it
+BLOCKED = 2.0  # nats a metre of wall, tables; against a pose, where rays to the consensus set pass through the wall
+BLOCKED_CLUTTER = 2.0  # nats a metre, tables; likewise for rays to clutter
+BLOCKING_LENGTH = 3.0  # m, tables; beyond it a wall speaks no more
+BLOCKING_RAYS = 4.0  # that count fully, tables
+FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of sight
+
+# --- Beams ------------------------------------------------------------------------------------------------------------
+
+FEW_BEAMS = 60  # tables; for a first look: neighbouring beams say the same
+MOST_BEAMS = 180  # tables
+BEAM_FINALISTS = 32  # tables
+BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
+BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
+NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
+CERTAIN = 0.15  # m, tables; a reading farther across than this is not of that wall
+BEHIND = 2.0  # m, tables; how far behind a reading a wall is looked for
+LEAST_INCIDENCE = 0.15  # cosine, tables; nearer to grazing the pose decides too much
+LEAST_POINTS = 10  # tables; for the beams to move a pose
+BEAM_GATES = (0.35, 0.25, 0.15, 0.15)  # m, tables; of the rounds in which they do
+PASSED_SLACK = 0.01  # tables; share of beams that may pass more where a pose was moved
+SURE_LENGTH = 3.0  # m, tables; shorter walls on a map made by a robot may have been people or carts
+
+# --- Agreement: what is seen beside what the map shows ----------------------------------------------------------------
+
+RAYS = 120  # tables
+AGREEING = 0.2  # m, tables; a scan segment and a wall nearer to each other than that, and
+AGREEING_SHARE = 0.02  # of the distance more, agree
+FAR = 25.0  # m, tables; farther walls are looked for only as far as one and a half times the scan reaches
+FARTHER = 1.5
+MISSING_RANGE = 15.0  # m, tables; a wall nearer than that, within the reach of the scan,
+MISSING_LENGTH = 0.8  # m, tables; as long,
+MISSING_SINE = 0.3  # tables; and not seen at a grazing angle, should have left a segment
+BLIND_SHARE = 0.25  # of the circle, tables; a wider gap without any segment is out of the sensor's view
+NEUTRAL = 0.8  # tables; where there is nothing to compare
+
+# --- Chance -----------------------------------------------------------------------------------------------------------
+
+LEAST_CHANCE, MOST_CHANCE = 1e-6, 0.9  # of one match, rounding
+LEAST_SIGNIFICANCE = 1e-300  # rounding
+
+# --- Reporting --------------------------------------------------------------------------------------------------------
+
+FACING = 0.05  # m, geometry; a wall seen along itself may pass the sensor on either side
+MAX_RIVALS = 8  # map segments named beside the one that a scan segment lies on most
+MIN_EXTENT = 1e-9  # m, rounding; what a segment along a wall counts as at least
+
+# --- Verdict ----------------------------------------------------------------------------------------------------------
+
+MANY = 8  # matched segments, tables; from which on the misfit says as much as it can
+NEARLY_ALL = 0.85  # of the scan's length, tables
+LONGEST_UNMATCHED = 4.0  # m, tables; a longer segment
+MOST_UNMATCHED = 16.0  # m, tables; and more clutter say no more
+MAX_LEAD = 40.0  # nats, tables
+MOST_DEVIATION = 1.0  # m, tables
+CROWD_TEMPERATURE = 4.0  # nats, tables
+LEAST_CROWD = -12.0
+LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
+TWIN_TEMPERATURE = 1.5  # nats, fitted; how far apart two explanations score that are as likely as one to e
+USABLE_PROBABILITY = 0.94  # cross-validated
+USABLE_CAUTIOUS = 0.92  # cross-validated; of the same, where other buildings are reckoned with
+USABLE_BY_CHANCE = 0.98  # cross-validated; likewise, where chance alone scores as high with that probability:
+LIKELY_BY_CHANCE = 0.3  # tables
+FEWEST = 3  # matched segments, tables; or else
+MOSTLY = 0.7  # of the scan's length, tables
+NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a twin of it
+CHANCE = 1e-3  # tables; where chance scores as high more often, other buildings are reckoned with in that too
+CONTRADICTION = 6.0  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
+CONTRADICTED = 0.5  # the most that an answer can then be probable
+FAR_FROM_PRIOR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
+MAX_DEVIATION = 0.5  # m; beyond it the weakest direction counts as not fixed; the contract
