@@ -6,7 +6,8 @@ Wall w consists of ``pieces[piece_starts[w]:piece_starts[w + 1]]``, whose `endpo
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import inlined, kernel
 
 from ._match_kernels import BRIDGING
 from ._sight_kernels import BLOCKING_RAYS, SIGHT_TOLERANCE, count_blockers
@@ -15,7 +16,7 @@ MAX_RIVALS = 8  # of one pair
 MIN_EXTENT = 1e-9  # m; what a segment along a wall counts as at least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def union_length(lows, highs, count):
     """Return the length of the union of the first `count` intervals."""
     if count == 1:
@@ -30,7 +31,7 @@ def union_length(lows, highs, count):
     return total
 
 
-@njit(inline="always")
+@inlined
 def first_wall(walls, w, bridging):
     """Return the first wall of the run that wall `w` is on, or itself where nothing may bridge a doorway."""
     while bridging and walls[w, 6] >= 0:
@@ -38,7 +39,7 @@ def first_wall(walls, w, bridging):
     return w
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def accept_matches(matches, order, scan_endpoints, theta, x, y, walls, pieces, piece_starts, endpoints):
     """Pick for every matched scan segment the piece of its wall that it lies on most, of equal ones the first.
 
@@ -122,7 +123,7 @@ def accept_matches(matches, order, scan_endpoints, theta, x, y, walls, pieces, p
     return pairs, overlaps, rivals[: rival_starts[found]], rival_starts
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def missing_pieces(
     scan, matches, viewpoint_x, viewpoint_y, theta, x, y, walls, starts, items, shape, pieces, piece_starts
 ):

@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 from ._sight_kernels import first_hit
 
@@ -18,7 +19,7 @@ BLIND_SHARE = 0.25  # of the circle; a wider gap without any segment is out of t
 NEUTRAL = 0.8  # where there is nothing to compare
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def scan_distances(scan, x, y, distances):
     """Write the distance from ``(x, y)`` in the scan frame to the first segment along each ray, inf where none is."""
     rays = len(distances)
@@ -43,7 +44,7 @@ def scan_distances(scan, x, y, distances):
     return farthest
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def in_view(distances, view):
     """Tell of each ray whether the sensor looked there: all but the widest gap without segments, if that is wide."""
     rays = len(distances)
@@ -70,7 +71,7 @@ def in_view(distances, view):
             view[(after + step) % rays] = False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def agreement(scan, x, y, theta, tx, ty, walls, starts, items, shape):
     """Return of the directions that tell something the share in which the scan shows what the map does, 0 to 1.
 

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from registration._kernels import joint_add, joint_solve
+from registration.compiling import kernel
 
 from ._match_kernels import hold
 from ._sight_kernels import first_hit
@@ -17,7 +17,7 @@ LEAST_POINTS = 10  # for the beams to move a pose
 SURE_LENGTH = 3.0  # m; shorter walls on a map made by a robot may have been people or carts
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def beam_evidence(angles, ranges, reach, viewpoint, pose, walls, starts, items, shape):
     """Return the shares of the beams that read the wall they should and that passed through one.
 
@@ -48,7 +48,7 @@ def beam_evidence(angles, ranges, reach, viewpoint, pose, walls, starts, items, 
     return read / n, passed / n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def refine_by_beams(angles, ranges, viewpoint, pose, walls, starts, items, shape, gate, sums):
     """Move `pose` to where the ends of the beams lie on the walls nearest to them, up to `gate` metres off.
 
@@ -90,7 +90,7 @@ def refine_by_beams(angles, ranges, viewpoint, pose, walls, starts, items, shape
     pose[2] = ty
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rank_beams(angles, ranges, reach, viewpoint, poses, walls, starts, items, shape, refined, out):
     """Write the evidence of the beams, shares read and passed, for each of the poses (k, 3) to `out` (k, 2).
 

@@ -3,12 +3,13 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 LEAST_CHANCE, MOST_CHANCE = 1e-6, 0.9
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def chance_matches(scan, lengths, beyond, agreeing, area, gates):
     """Return (n,) the probability that each scan segment lies on a wall at a random pose with agreeing directions.
 
@@ -31,7 +32,7 @@ def chance_matches(scan, lengths, beyond, agreeing, area, gates):
     return chances
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def log_tail(scan, chances, score, exponents):
     """Return Chernoff's bound on the log of the probability that gains drawn with `chances` come to `score`.
 

@@ -1,6 +1,6 @@
 """Compiled list of the best poses so far, and what a prior says of a pose."""
 
-from numba import njit
+from registration.compiling import inlined, kernel
 
 from ._match_kernels import wrap
 
@@ -17,7 +17,7 @@ SOFT_FLOOR = -20.0  # nats; the most that a soft prior speaks against a pose
 INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those outside
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def prior_value(prior, theta, x, y):
     """Return what the prior says of a pose, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
     if prior[0] == NO_PRIOR:
@@ -38,7 +38,7 @@ def prior_value(prior, theta, x, y):
     return max(SOFT_FLOOR, -0.5 * square)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def keep(found, count, best, pose, score, value, distance, angle):
     """Put a pose among the best, at most one within `distance` metres and `angle` radians; ties keep the earlier."""
     n = count[0]
@@ -77,13 +77,13 @@ def keep(found, count, best, pose, score, value, distance, angle):
         best[1] = least
 
 
-@njit(inline="always")
+@inlined
 def floor_of(rules, best, bonus):
     """Return the score that a pose must reach to be kept, given what the prior says of it."""
     return max(rules[0] * best[0], best[1]) - bonus
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def offer(found, count, best, rules, prior, pose, score):
     """Keep a refined pose if it is worth it."""
     bonus = prior_value(prior, pose[0], pose[1], pose[2])

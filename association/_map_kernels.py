@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 # Where more pieces than that begin in one cell, as on no map of a building, some are not merged.
 MOST_LOOKS = 400
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _find(parent, i):
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -17,7 +18,7 @@ def _find(parent, i):
     return i
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
     """Label pieces that continue one another: the end of one within `max_gap` of the begin of the other.
 
@@ -71,12 +72,12 @@ def collinear_groups(endpoints, directions, max_gap, max_lateral, min_cos):
     return parent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _cell_hash(column, row, buckets):
     return (int(column) * 73856093 ^ int(row) * 19349663) & (buckets - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _column_span(x1, y1, x2, y2, radius, low, high):
     """Return the span of y that a segment dilated by `radius` may have between two values of x."""
     left = max(low - radius, min(x1, x2))
@@ -94,7 +95,7 @@ def _column_span(x1, y1, x2, y2, radius, low, high):
     return min(ya, yb) - radius, max(ya, yb) + radius
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def grid_cells(endpoints, radius, shape):
     """List for every cell of a uniform grid the walls that come within `radius` of the cell.
 
@@ -138,7 +139,7 @@ def grid_cells(endpoints, radius, shape):
     return starts, items
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def direction_raster(endpoints, radius, shape, sectors):
     """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of. Returns (rows * columns,) of bits."""
     x0, y0, cell = shape[0], shape[1], shape[2]

@@ -8,9 +8,9 @@ scan frame.
 import math
 
 import numpy as np
-from numba import njit
 
 from registration._kernels import joint_add, joint_information, joint_solve
+from registration.compiling import inlined, kernel
 
 # Columns of `walls` (m, 8), one cache line a wall: 0, 1 unit direction; 2 offset along the left normal; 3, 4 abscissae
 # of begin and end along the direction; 5 angle; 6, 7 the walls before and after it on its run (collinear, across a
@@ -34,13 +34,13 @@ MAX_TURN = 0.2  # rad, is not the one that the pose was proposed for
 SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
 
 
-@njit(inline="always")
+@inlined
 def wrap(angle):
     """Return the angle in [-pi, pi]."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def match_scan(scan, pose, covariance, walls, starts, items, shape, gates, threshold, matches):
     """Find for every scan segment the wall that it lies on best, the most telling segments first.
 
@@ -132,7 +132,7 @@ def match_scan(scan, pose, covariance, walls, starts, items, shape, gates, thres
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def angle_spreads(scan, theta_var, gates, spreads):
     """Write the angle gate of every scan segment at a pose with that variance, in sectors.
 
@@ -143,7 +143,7 @@ def angle_spreads(scan, theta_var, gates, spreads):
         spreads[i] = gate * (SECTORS / (2.0 * math.pi))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def may_score(scan, pose, spreads, raster_shape, bits, threshold):
     """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
 
@@ -176,7 +176,7 @@ def may_score(scan, pose, spreads, raster_shape, bits, threshold):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def turning(theta_var, gx, gy, covariance):
     """Write the covariance of a pose held at a point, and turning about it with `theta_var`.
 
@@ -193,7 +193,7 @@ def turning(theta_var, gx, gy, covariance):
     covariance[2, 2] = theta_var
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def invert3(f, out):
     """Write the inverse of a symmetric positive 3 x 3 matrix to `out`; return False where it is singular."""
     a = f[1, 1] * f[2, 2] - f[1, 2] * f[1, 2]
@@ -214,7 +214,7 @@ def invert3(f, out):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def pair(scan, i, walls, w, sign, sums):
     """Add scan segment `i` on wall `w` to the sums (`sign` 1) or remove it (-1)."""
     joint_add(
@@ -223,7 +223,7 @@ def pair(scan, i, walls, w, sign, sums):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def value_matches(scan, matches):
     """Give each match its worth, the gain less half its chi-square, at least 0 (clutter); return their sum, nats."""
     total = 0.0
@@ -242,7 +242,7 @@ def value_matches(scan, matches):
     return total
 
 
-@njit(inline="always")
+@inlined
 def hold(sums, x, y, sign):
     """Add or remove the weak spring that holds a translation where it is."""
     sums[9] += sign * SPRING
@@ -252,7 +252,7 @@ def hold(sums, x, y, sign):
     sums[14] += sign * SPRING * (x * x + y * y)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def refine(scan, pose, covariance, walls, starts, items, shape, gates, matches, sums, information, rounds):
     """Grow and shrink the consensus set at `pose`, solving anew each time; pose and covariance move in place.
 

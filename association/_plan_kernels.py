@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 from ._search_kernels import MIN_CROSSING_BASE, least_length, search_base
 
@@ -25,7 +26,7 @@ SINE_POWER = 0.3
 GAIN_POWER = 3.0  # of the lesser gain: long segments are clutter less often
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def slack_tables(scan, count, bin_starts, longest, summed):
     """Sum over the walls of each direction bin how far scan segment i could slide on them.
 
@@ -52,7 +53,7 @@ def slack_tables(scan, count, bin_starts, longest, summed):
     return slides, fitting
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def is_telling(scan, a, b):
     """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
 
@@ -69,7 +70,7 @@ def is_telling(scan, a, b):
     return variance * total <= TELLING**2 * gain
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def plan_bases(scan, count, bin_starts, longest, summed, area):
     """List the non-parallel pairs of the first `count` scan segments with their logarithmic merit.
 
@@ -119,7 +120,7 @@ def plan_bases(scan, count, bin_starts, longest, summed, area):
     return pairs[:k], merits[:k]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def next_base(pairs, merits, uses):
     """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
 
@@ -142,7 +143,7 @@ def next_base(pairs, merits, uses):
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cover(residual, bound, a, b):
     """Lower the bound on what a pose can score whose consensus set contains none of the bases so far.
 
@@ -155,7 +156,7 @@ def cover(residual, bound, a, b):
     bound[0] -= less
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def strike(missing, inliers, a, b, fewest):
     """Take a base off the sampled consensus sets that have missed all bases so far.
 
@@ -176,7 +177,7 @@ def strike(missing, inliers, a, b, fewest):
     return ones / (64.0 * missing.shape[1])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fewest_segments(best_gains, beyond, needed):
     """Return how many of the first segments a consensus set has at least that scores `needed`.
 
@@ -194,7 +195,7 @@ def fewest_segments(best_gains, beyond, needed):
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def advance(
     scan, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items, sector_shape,
     gates, rules, prior, found, count, best, progress, resume, pairs, merits, uses, residual, bound, best_gains,

@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 from ._match_kernels import SCAN_COLUMNS
 
@@ -20,7 +21,7 @@ LEAST_SPREAD = 1e-6  # m^2
 LEAST_VARIANCE = 1e-8  # m^2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fill_rows(
     directions, midpoints, lengths, centroids, spreads, sigma, points, order, map_var, common_var, offset_var, angle_var
 ):

@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import inlined, kernel
 
 from ._keeping_kernels import HARD_PRIOR, floor_of, offer, prior_value
 from ._match_kernels import SECTOR_BITS, SECTORS, angle_spreads, match_scan, may_score, refine, turning, wrap
@@ -24,19 +25,19 @@ COST_HYPOTHESIS = 50
 COST_REFINE = 800
 
 
-@njit(inline="always")
+@inlined
 def end_slack(length):
     """How far a scan segment, as part of a base, may stick out at each end of its wall."""
     return BASE_SLACK + BASE_SLACK_SHARE * length
 
 
-@njit(inline="always")
+@inlined
 def least_length(length):
     """How long a wall is at least under a scan segment of a base."""
     return length - 2.0 * end_slack(length)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def anchors(length, runs, bin_starts, out):
     """List the runs long enough for a scan segment of `length` metres."""
     n = 0
@@ -50,7 +51,7 @@ def anchors(length, runs, bin_starts, out):
     return n
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def base_pose(scan, a, b, runs, wa, wb, pose):
     """Write the pose that puts both midpoints on their lines and splits the misfit of the angles by their variances.
 
@@ -82,7 +83,7 @@ def base_pose(scan, a, b, runs, wa, wb, pose):
     return along - half >= runs[wb, 3] and along + half <= runs[wb, 4]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def try_pose(
     scan, gx, gy, theta_var, pose, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found, count,
     best, progress, spreads, matches, sums, information, covariance,
@@ -112,7 +113,7 @@ def try_pose(
     return COST_REFINE
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def search_base(
     scan, a, b, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, sector_starts, sector_items,
     sector_shape, gates, rules, prior, found, count, best, progress, resume, budget,
@@ -257,7 +258,7 @@ def search_base(
     return spent
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def search_slides(
     scan, a, runs, bin_starts, walls, starts, items, shape, raster_shape, bits, gates, rules, prior, found, count, best,
     progress, spacing, place, budget,

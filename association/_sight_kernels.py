@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 from ._match_kernels import invert3, refine, wrap
 
@@ -18,7 +19,7 @@ MAX_RAYS = 12  # to one segment
 END_MARGIN = 0.06  # m; rays keep this far from the ends of a segment, where neighbours meet
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def first_hit(x, y, dx, dy, limit, walls, starts, items, shape):
     """Return the distance to the first wall along a ray and that wall, ``(limit, -1)`` when there is none before."""
     cell = shape[2]
@@ -72,7 +73,7 @@ def first_hit(x, y, dx, dy, limit, walls, starts, items, shape):
     return best, wall
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_blockers(
     scan, matches, viewpoint, pose, walls, starts, items, shape, tolerance, to_matched, to_clutter, touched
 ):  # fmt: skip
@@ -111,7 +112,7 @@ def count_blockers(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sight_penalty(to_matched, to_clutter, touched, count, walls):
     """Return what the walls that should have blocked the view speak against a pose, nats, at least 0; clear the counts.
 
@@ -130,7 +131,7 @@ def sight_penalty(to_matched, to_clutter, touched, count, walls):
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rank(
     scan, poses, walls, starts, items, shape, gates, viewpoint, sighted, scores, covariances, shares, reliabilities,
     matches,
@@ -176,7 +177,7 @@ def rank(
             best = max(best, scores[k])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def distinct(poses, covariances, order, most, rules):
     """Pick from `order`, the best first, at most `most` poses (k, 3) without those that a better one stands for.
 

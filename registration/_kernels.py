@@ -12,9 +12,9 @@ whatever its size.
 import math
 
 import numpy as np
-from numba import njit
 
 from ._pair_kernels import CENTROID_X, CENTROID_Y, DX, DY, MAP_DX, MAP_DY, MAP_X, MAP_Y, SPREAD
+from .compiling import kernel
 
 JOINT_SIZE = 18
 
@@ -28,7 +28,7 @@ MAX_STEPS = 16
 MAX_STEP = 0.3  # rad
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_add(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign):
     """Add (`sign` 1) or remove (-1) one pair: map line ``(nx, ny, p)``, scan centroid, direction, second moment."""
     f0 = nx * mx + ny * my
@@ -59,7 +59,7 @@ def joint_add(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign):
     sums[17] += sign
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_solve(sums, theta0, use_wahba):
     """Minimise ``x' Q x`` over the rigid transforms.
 
@@ -137,7 +137,7 @@ def joint_solve(sums, theta0, use_wahba):
     return theta, tx, ty, max(cost, 0.0), observable
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_cost(sums, theta, tx, ty):
     """Return ``x' Q x`` at any transform."""
     x = (math.cos(theta), math.sin(theta), tx, ty, 1.0)
@@ -152,7 +152,7 @@ def joint_cost(sums, theta, tx, ty):
     return max(total, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_information(sums, theta, out):
     """Write the 3 x 3 information matrix of additive (t_x, t_y, theta) in the map frame to `out`."""
     c = math.cos(theta)
@@ -168,7 +168,7 @@ def joint_information(sums, theta, out):
     out[2, 2] = s * s * sums[0] - 2.0 * s * c * sums[1] + c * c * sums[5]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def accumulate(sums, k, high, low):
     """Add ``high + low`` to entry k of compensated sums, rows value and error, in double-double arithmetic.
 
@@ -183,14 +183,14 @@ def accumulate(sums, k, high, low):
     sums[0, k] = value
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def compensated_add(sums, other, sign):
     """Add (`sign` 1) or remove (-1) whole compensated sums, both (2, k)."""
     for k in range(sums.shape[1]):
         accumulate(sums, k, sign * other[0, k], sign * other[1, k])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_add_compensated(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign):
     """Do as `joint_add` on (2, `JOINT_SIZE`) compensated sums."""
     terms = np.zeros(JOINT_SIZE)
@@ -199,7 +199,7 @@ def joint_add_compensated(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign)
         accumulate(sums, k, sign * terms[k], 0.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_sums_compensated(rows, weights):
     """Return the compensated joint sums of pairs, (2, `JOINT_SIZE`); see `_pair_kernels` for `rows`."""
     sums = np.zeros((2, JOINT_SIZE))

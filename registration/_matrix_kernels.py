@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from .compiling import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def eigen2(a, b, d):
     """Return both eigenvalues of ``[[a, b], [b, d]]``, none below 0, the smaller first, and the smaller's axis."""
     big = 0.5 * (a + d) + math.sqrt(0.25 * (a - d) * (a - d) + b * b)
@@ -15,7 +16,7 @@ def eigen2(a, b, d):
     return small, big, math.cos(angle), math.sin(angle)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def is_regular3(m, least):
     """Tell whether a symmetric 3 x 3 matrix, scaled to a unit diagonal, has only eigenvalues over `least`.
 
@@ -34,7 +35,7 @@ def is_regular3(m, least):
     return first - b * b / first - rest * rest / second > 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def invert3(m):
     """Return the inverse of a positive definite 3 x 3 matrix of unlike units: scaled to a unit diagonal, by pivots."""
     scale = np.empty(3)
@@ -64,7 +65,7 @@ def invert3(m):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def carried(covariance, x, y):
     """Return the covariance of (x, y, theta) of a frame whose origin is ``-(x, y)``, both turned, in the moved one.
 

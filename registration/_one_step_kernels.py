@@ -9,17 +9,17 @@ The sums are compensated, (2, `ONE_STEP_SIZE`), rows value and error, and taken 
 import math
 
 import numpy as np
-from numba import njit
 
 from ._kernels import PARALLEL_RATIO, accumulate
 from ._pair_kernels import DX, DY, MAP_DX, MAP_DY, MAP_X, MAP_Y, X, Y
+from .compiling import kernel
 
 ONE_STEP_SIZE = 12
 
 SW, SX2, SY2, SXY, SPX, SPY, SC, SA, SA2, SVERSINE, SSINE, SCOUNT = range(ONE_STEP_SIZE)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def one_step_add(sums, vx, vy, gap, dx, dy, alpha_ref, weight, sign):
     """Add (`sign` 1) or remove (-1) one pair: map direction v, ``gap`` r, scan direction d."""
     # The scan direction turned by alpha_ref, and the angle from there to the map's.
@@ -44,7 +44,7 @@ def one_step_add(sums, vx, vy, gap, dx, dy, alpha_ref, weight, sign):
     accumulate(sums, SCOUNT, sign, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def one_step_sums(rows, x, y, alpha_ref, weights):
     """Return the compensated sums of pairs about a reference; see `_pair_kernels` for `rows`."""
     sums = np.zeros((2, ONE_STEP_SIZE))
@@ -59,7 +59,7 @@ def one_step_sums(rows, x, y, alpha_ref, weights):
     return sums
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def one_step_solve(values, use_wahba):
     """Return ``(a, t_x, t_y, observable)`` relative to the reference transform, from the row of values.
 
@@ -89,7 +89,7 @@ def one_step_solve(values, use_wahba):
     return angle, 0.0, 0.0, False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def one_step_moved(sums, dx, dy, turn):
     """Return the sums about a reference that is moved by ``(dx, dy)`` and turned by `turn`."""
     v = sums[0]
@@ -113,7 +113,7 @@ def one_step_moved(sums, dx, dy, turn):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def one_step_costs(sums, dx, dy, turn):
     """Return the costs at the reference moved by ``(dx, dy)`` and turned by `turn`, each at least 0.
 

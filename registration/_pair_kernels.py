@@ -8,7 +8,8 @@ it (m^2), and the variance of its offset (m^2). Pairs of weight 0 do not count.
 import math
 
 import numpy as np
-from numba import njit
+
+from .compiling import kernel
 
 PAIR_COLUMNS = 14
 MAP_DX, MAP_DY, MAP_X, MAP_Y, MAP_LENGTH, DX, DY, X, Y, LENGTH, CENTROID_X, CENTROID_Y, SPREAD, VARIANCE = range(
@@ -18,7 +19,7 @@ MAP_DX, MAP_DY, MAP_X, MAP_Y, MAP_LENGTH, DX, DY, X, Y, LENGTH, CENTROID_X, CENT
 MIN_SIGMA = 1e-12  # m; a smaller one that is not 0 counts as this, so that its square is not lost
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def first_outside(pairs, column, count):
     """Return the first row whose index in `column` is not from 0 to ``count - 1``, or -1."""
     for i in range(len(pairs)):
@@ -27,7 +28,7 @@ def first_outside(pairs, column, count):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gather(
     pairs, map_directions, map_midpoints, map_lengths, directions, midpoints, lengths, centroids, spreads, sigmas,
     points,
@@ -55,7 +56,7 @@ def gather(
     return rows
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def inverse_variances(rows, map_variance):
     """Return 1 / variance of each pair's offset (n,), and whether all pairs have a variance."""
     inverses = np.empty(len(rows))
@@ -67,7 +68,7 @@ def inverse_variances(rows, map_variance):
     return inverses, True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def middles(rows, weights):
     """Return the means of the map midpoints and of the points' means, ``(map_x, map_y, scan_x, scan_y)``, and n."""
     map_x = 0.0
@@ -85,7 +86,7 @@ def middles(rows, weights):
     return map_x / count, map_y / count, scan_x / count, scan_y / count, count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def moved_origins(rows, map_x, map_y, scan_x, scan_y):
     """Return the rows in frames that have been moved to new origins."""
     moved = rows.copy()
@@ -99,7 +100,7 @@ def moved_origins(rows, map_x, map_y, scan_x, scan_y):
     return moved
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def relative_angles(rows, theta):
     """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
     c = math.cos(theta)
@@ -114,7 +115,7 @@ def relative_angles(rows, theta):
     return angles
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def offset_at(rows, i, px, py, c, s, tx, ty):
     """Return the signed distance of a moved scan point from the map line of pair i."""
     gx = c * px - s * py + tx - rows[i, MAP_X]
@@ -122,7 +123,7 @@ def offset_at(rows, i, px, py, c, s, tx, ty):
     return rows[i, MAP_DX] * gy - rows[i, MAP_DY] * gx
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def residuals(rows, used, information, theta, tx, ty):
     """Return offsets at the midpoints and angles, (n,) each, then chi2 and the root mean squares of both.
 
