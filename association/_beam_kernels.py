@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from registration._kernels import joint_add, joint_solve
 from registration.compiling import kernel
 
+from ._joint_kernels import joint_add, joint_solve
 from ._match_kernels import hold
 from ._sight_kernels import first_hit
 

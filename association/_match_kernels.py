@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
-from registration._kernels import joint_add, joint_information, joint_solve
 from registration.compiling import inlined, kernel
+
+from ._joint_kernels import joint_add, joint_information, joint_solve
 
 # Columns of `walls` (m, 8), one cache line a wall: 0, 1 unit direction; 2 offset along the left normal; 3, 4 abscissae
 # of begin and end along the direction; 5 angle; 6, 7 the walls before and after it on its run (collinear, across a
