@@ -27,11 +27,8 @@ RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir 
 ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.warmup import warm_up; warm_up()"
-# From here on nobody writes to them; see the file.
-COPY deploy/kernel_cache.py /tmp/
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && cp /tmp/kernel_cache.py . \
-    && $COMPILE registration vectorization association simulation service kernel_cache.py \
+    && $COMPILE registration vectorization association simulation service \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}
@@ -43,7 +40,6 @@ COPY --from=build /opt/linefix /opt/linefix
 ENV PATH=/opt/linefix/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     NUMBA_CACHE_DIR=/opt/linefix/kernels \
-    NUMBA_CACHE_LOCATOR_CLASSES=kernel_cache.ReadOnlyLocator \
     NUMBA_CPU_NAME=generic \
     NUMBA_CPU_FEATURES="" \
     LINEFIX_HOST=0.0.0.0 \

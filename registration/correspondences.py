@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _pair_kernels as kernels
 from .errors import InvalidArgumentError
+from .kernels import pairs as kernels
+from .layout import Floats, Records, X, Y
 from .segments import MeasuredSegments, Segments
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Point = Floats | tuple[float, float]
 
@@ -24,11 +24,11 @@ class Correspondences:
 
     Attributes
     ----------
-    rows : (n, 14)
-        What the properties show, the columns named in `_pair_kernels`.
+    rows : (n,) PAIR
+        What the properties show.
     """
 
-    rows: Floats
+    rows: Records
 
     @classmethod
     def of(cls, map_segments: Segments, scan: MeasuredSegments, pairs: ArrayLike) -> Correspondences:
@@ -48,13 +48,11 @@ class Correspondences:
             of the first row at fault.
         """
         chosen = _checked_pairs(pairs, len(scan), len(map_segments))
-        m, s = map_segments, scan.segments
-        return cls(
-            kernels.gather(
-                chosen, m.directions, m.midpoints, m.lengths, s.directions, s.midpoints, s.lengths, scan.centroids,
-                scan.spreads, scan.sigma, scan.points,
-            )
-        )  # fmt: skip
+        of_map, of_scan = (
+            kernels.SegmentArrays(s.directions, s.midpoints, s.lengths) for s in (map_segments, scan.segments)
+        )
+        points = kernels.PointArrays(scan.centroids, scan.spreads, scan.sigma, scan.points)
+        return cls(kernels.gather(chosen[:, 0], chosen[:, 1], of_map, of_scan, points))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -62,7 +60,7 @@ class Correspondences:
     @property
     def map_directions(self) -> Floats:
         """Unit directions of the map segments, (n, 2)."""
-        return self.rows[:, kernels.MAP_DX : kernels.MAP_DY + 1]
+        return _vectors(self.rows["map"], "dx", "dy")
 
     @property
     def map_normals(self) -> Floats:
@@ -72,27 +70,27 @@ class Correspondences:
     @property
     def map_midpoints(self) -> Floats:
         """Midpoints of the map segments, (n, 2) metres."""
-        return self.rows[:, kernels.MAP_X : kernels.MAP_Y + 1]
+        return _vectors(self.rows["map"], "x", "y")
 
     @property
     def map_offsets(self) -> Floats:
         """Signed distances of the map lines from the map frame's origin, (n,) metres."""
-        return _dots(self.map_normals, self.map_midpoints)
+        return self.rows["map"]["offset"]
 
     @property
     def map_lengths(self) -> Floats:
         """Lengths of the map segments, (n,) metres."""
-        return self.rows[:, kernels.MAP_LENGTH]
+        return self.rows["map"]["length"]
 
     @property
     def directions(self) -> Floats:
         """Unit directions of the scan segments, (n, 2)."""
-        return self.rows[:, kernels.DX : kernels.DY + 1]
+        return _vectors(self.rows["scan"], "dx", "dy")
 
     @property
     def midpoints(self) -> Floats:
         """Midpoints of the scan segments, (n, 2) metres."""
-        return self.rows[:, kernels.X : kernels.Y + 1]
+        return _vectors(self.rows["scan"], "x", "y")
 
     @property
     def offsets(self) -> Floats:
@@ -102,27 +100,26 @@ class Correspondences:
     @property
     def lengths(self) -> Floats:
         """Lengths of the scan segments, (n,) metres."""
-        return self.rows[:, kernels.LENGTH]
+        return self.rows["scan"]["length"]
 
     @property
     def centroids(self) -> Floats:
         """Means of the points behind the scan segments, (n, 2) metres."""
-        return self.rows[:, kernels.CENTROID_X : kernels.CENTROID_Y + 1]
+        return _vectors(self.rows["scan"], "centroid_x", "centroid_y")
 
     @property
     def spreads(self) -> Floats:
         """Second moments of those points along the scan segments, (n,) m^2."""
-        return self.rows[:, kernels.SPREAD]
+        return self.rows["scan"]["spread"]
 
     @property
     def variances(self) -> Floats:
         """Variances of the scan segments' offsets, ``sigma^2 / points``, (n,) m^2."""
-        return self.rows[:, kernels.VARIANCE]
+        return self.rows["scan"]["variance"]
 
     def angles(self, theta: float) -> Floats:
         """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
-        angles: Floats = kernels.relative_angles(self.rows, theta)
-        return angles
+        return kernels.relative_angles(self.rows, theta)
 
     def runs_against(self, theta: float) -> NDArray[np.bool_]:
         """Tell which scan segments, turned by `theta`, run against their map segments."""
@@ -134,9 +131,10 @@ class Correspondences:
 
     def turned(self, rows: NDArray[np.bool_]) -> Correspondences:
         """Return the pairs with the scan segments of `rows` running the other way."""
-        turned = Correspondences(self.rows.copy())
-        turned.directions[rows] *= -1.0
-        return turned
+        turned = self.rows.copy()
+        for component in ("dx", "dy"):
+            turned["scan"][component][rows] *= -1.0
+        return Correspondences(turned)
 
     def about(self, map_origin: Point, scan_origin: Point) -> Correspondences:
         """Return the pairs in frames that have been moved to two new origins, each (2,) metres in its old frame."""
@@ -146,8 +144,12 @@ class Correspondences:
         )
 
 
+def _vectors(records: Records, x: str, y: str) -> Floats:
+    return np.stack([records[x], records[y]], axis=1)
+
+
 def _left(directions: Floats) -> Floats:
-    return np.stack([-directions[:, 1], directions[:, 0]], axis=1)
+    return np.stack([-directions[:, Y], directions[:, X]], axis=1)
 
 
 def _dots(a: Floats, b: Floats) -> Floats:
@@ -170,7 +172,7 @@ def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices
         raise InvalidArgumentError(f"expected integers, got {rows.dtype}", argument="correspondences", index=index)
     chosen = np.ascontiguousarray(rows, dtype=np.intp)
     for column, count, what in ((0, scan_count, "scan"), (1, map_count, "map")):
-        index = kernels.first_outside(chosen, column, count)
+        index = kernels.first_outside(chosen[:, column], count)
         if index >= 0:
             raise InvalidArgumentError(
                 f"expected a {what} index from 0 to {count - 1}, got {rows[index, column]}"

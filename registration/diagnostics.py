@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ._matrix_kernels import carried, invert3
-from ._pair_kernels import residuals
 from .estimate import Fit, Problem
 from .joint import JointSums
+from .kernels import carried, invert3_scaled
+from .kernels.pairs import residuals
+from .layout import COVARIANCE, full_matrix
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .transform import RigidTransform
@@ -69,14 +70,17 @@ def covariance_of(problem: Problem, fit: Fit) -> Floats:
     information ``i``, ``F(w)^-1 F(w^2 / i) F(w)^-1``.
     """
     weights, theta = problem.weights, fit.local_from_scan.theta
-    covariance = invert3(fit.sums.information(theta))
+    covariance = np.empty(1, COVARIANCE)
+    invert3_scaled(fit.sums.information_record(theta)[0], covariance[0])
     if weights.information is not weights.used:
         scatter = JointSums.of_set(problem.centred, weights.used**2 / weights.information).information(theta)
-        covariance = covariance @ scatter @ covariance
+        inverse = full_matrix(covariance)
+        covariance[0] = tuple((inverse @ scatter @ inverse)[np.triu_indices(3)])
     # From the middle of the scan segments to the origin of the scan frame.
     lever = RigidTransform(0.0, 0.0, theta).compose(problem.scan_from_centred)
-    moved: Floats = carried(covariance, lever.x, lever.y)
-    return moved
+    moved = np.empty(1, COVARIANCE)
+    carried(covariance[0], lever.x, lever.y, moved[0])
+    return full_matrix(moved)
 
 
 def diagnose(problem: Problem, fit: Fit, residuals: Residuals, options: RegistrationOptions) -> RegistrationDiagnostics:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ._pair_kernels import middles
 from .correspondences import Correspondences
 from .joint import JointSums
+from .kernels.pairs import middles
 from .observability import Freedom, find_freedom
 from .one_step import OneStepSums
 from .options import RegistrationOptions, Rotation

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from . import _kernels as kernels
-from ._matrix_kernels import eigen2
 from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
-
-Floats = NDArray[np.float64]
+from .kernels import eigen2, joint_cost, joint_information, joint_solve
+from .kernels.compensated import compensated_add
+from .kernels.joint import joint_sums_compensated
+from .layout import INFORMATION, Floats, Record, Records, full_matrix
 
 THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
@@ -34,11 +34,11 @@ class JointSums:
 
     Attributes
     ----------
-    compensated : (2, 18)
+    compensated : (2,) JOINT_SUMS
         Values and their errors, read-only.
     """
 
-    compensated: Floats
+    compensated: Records
 
     def __post_init__(self) -> None:
         self.compensated.setflags(write=False)
@@ -46,7 +46,7 @@ class JointSums:
     @classmethod
     def of_set(cls, pairs: Correspondences, weights: ArrayLike) -> JointSums:
         """Sum over all pairs, `weights` (n,) in 1/m^2; those of weight 0 do not count."""
-        return cls(kernels.joint_sums_compensated(pairs.rows, np.ascontiguousarray(weights, dtype=np.float64)))
+        return cls(joint_sums_compensated(pairs.rows, np.ascontiguousarray(weights, dtype=np.float64)))
 
     @classmethod
     def of_pair(cls, pairs: Correspondences, index: int, weight: float) -> JointSums:
@@ -69,19 +69,23 @@ class JointSums:
 
     def _combined(self, other: JointSums, sign: float) -> JointSums:
         total = self.compensated.copy()
-        kernels.compensated_add(total, other.compensated, sign)
+        compensated_add(total, other.compensated, sign)
         return JointSums(total)
 
     @property
     def values(self) -> Floats:
-        """The sums in plain doubles, (18,), as the kernels take them."""
-        values: Floats = self.compensated[0]
-        return values
+        """The sums in plain doubles, (18,) in the order of JOINT_SUMS."""
+        return self.compensated[:1].view(np.float64)
+
+    @property
+    def record(self) -> Record:
+        """The sums in plain doubles by name, as the kernels take them."""
+        return self.compensated[0]
 
     @property
     def count(self) -> int:
         """Number of pairs."""
-        return round(float(self.values[kernels.COUNT]))
+        return round(float(self.record["count"]))
 
     @property
     def normal_moments(self) -> tuple[float, float, float]:
@@ -89,8 +93,8 @@ class JointSums:
 
         The information of a translation when the rotation is known.
         """
-        v = self.values
-        return float(v[kernels.XX]), float(v[kernels.XY]), float(v[kernels.YY])
+        sums = self.record
+        return float(sums["xx"]), float(sums["xy"]), float(sums["yy"])
 
     @property
     def parallel(self) -> bool:
@@ -105,7 +109,7 @@ class JointSums:
             return True
         xx, xy, yy = self.normal_moments
         small, *_ = eigen2(xx, xy, yy)
-        resultant = math.hypot(self.values[kernels.WAHBA_COS], self.values[kernels.WAHBA_SIN])
+        resultant = math.hypot(self.record["wahba_cos"], self.record["wahba_sin"])
         return bool(small * resultant / (xx + yy) <= chi_square_quantile(self.count - 1, THREE_SIGMA_TAIL))
 
     def solve(self, start: float) -> tuple[float, Floats, bool]:
@@ -125,18 +129,22 @@ class JointSums:
         observable : bool
             False where all lines are parallel to rounding.
         """
-        theta, x, y, _, observable = kernels.joint_solve(self.values, float(start), False)
-        return float(theta), np.array([x, y]), bool(observable)
+        theta, x, y, _, observable = joint_solve(self.record, float(start), False)
+        return theta, np.array([x, y]), observable
 
     def cost(self, theta: float, translation: ArrayLike) -> float:
         """Return ``x' Q x`` at any transform: chi-square when the weights are 1 / variance."""
         x, y = np.asarray(translation, dtype=np.float64)
-        return float(kernels.joint_cost(self.values, float(theta), x, y))
+        return joint_cost(self.record, float(theta), x, y)
 
     def information(self, theta: float) -> Floats:
         """Return the information of additive (x, y, theta) in the map frame at rotation `theta`, (3, 3)."""
-        out = np.empty((3, 3))
-        kernels.joint_information(self.values, float(theta), out)
+        return full_matrix(self.information_record(theta))
+
+    def information_record(self, theta: float) -> Records:
+        """Return `information` as the kernels take it, an array of one INFORMATION."""
+        out = np.empty(1, INFORMATION)
+        joint_information(self.record, float(theta), out[0])
         return out
 
     def marginal(self, theta: float) -> tuple[float, float, float]:
@@ -144,5 +152,5 @@ class JointSums:
 
         The Schur complement of the rotation in `information`, which must not be 0 there.
         """
-        (xx, xy, xt), (_, yy, yt), (_, _, tt) = self.information(theta).tolist()
+        xx, xy, xt, yy, yt, tt = self.information_record(theta)[0].item()
         return xx - xt * xt / tt, xy - xt * yt / tt, yy - yt * yt / tt

@@ -6,15 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from . import _one_step_kernels as kernels
-from ._kernels import compensated_add
 from .correspondences import Correspondences
+from .kernels import one_step as kernels
+from .kernels.compensated import compensated_add
+from .layout import Floats, Record, Records
 from .options import Rotation
 from .transform import RigidTransform, wrap_angle
-
-Floats = NDArray[np.float64]
 
 IDENTITY = RigidTransform(0.0, 0.0, 0.0)
 
@@ -33,12 +32,12 @@ class OneStepSums:
 
     Attributes
     ----------
-    compensated : (2, 12)
-        Values and their errors, read-only; see `_one_step_kernels` for what they are.
+    compensated : (2,) ONE_STEP_SUMS
+        Values and their errors, read-only.
     reference : RigidTransform
     """
 
-    compensated: Floats
+    compensated: Records
     reference: RigidTransform = IDENTITY
 
     def __post_init__(self) -> None:
@@ -88,25 +87,29 @@ class OneStepSums:
 
     @property
     def values(self) -> Floats:
-        """The sums in plain doubles, (12,)."""
-        values: Floats = self.compensated[0]
-        return values
+        """The sums in plain doubles, (12,) in the order of ONE_STEP_SUMS."""
+        return self.compensated[:1].view(np.float64)
+
+    @property
+    def record(self) -> Record:
+        """The sums in plain doubles by name, as the kernels take them."""
+        return self.compensated[0]
 
     @property
     def count(self) -> int:
         """Number of pairs."""
-        return round(float(self.values[kernels.SCOUNT]))
+        return round(float(self.record["count"]))
 
     @property
     def determinant(self) -> float:
         """Eq. (8)'s D, 0 for parallel lines (the paper calls it discriminant, and the lines collinear)."""
-        v = self.values
-        return max(0.0, float(v[kernels.SX2] * v[kernels.SY2] - v[kernels.SXY] ** 2))
+        sums = self.record
+        return max(0.0, float(sums["x2"] * sums["y2"] - sums["xy"] ** 2))
 
     @property
     def reliability(self) -> float:
         """Eq. (28) from 0 to 1; ``2 sqrt(D) / S_w``. Knows the directions of the map lines and nothing of noise."""
-        total = float(self.values[kernels.SW])
+        total = float(self.record["w"])
         return min(1.0, 2.0 * math.sqrt(self.determinant) / total) if total > 0.0 else 0.0
 
     def solve(self, rotation: Rotation) -> tuple[RigidTransform, bool]:
@@ -116,9 +119,9 @@ class OneStepSums:
         holds. The translation is Eqs. (7) and (8), with plus signs in D1 and D2 where minus is printed. For parallel
         lines it is the nearest to the reference.
         """
-        angle, x, y, observable = kernels.one_step_solve(self.values, rotation == "wahba")
+        angle, x, y, observable = kernels.one_step_solve(self.record, rotation == "wahba")
         at = self.reference
-        return RigidTransform(at.x + float(x), at.y + float(y), at.theta + float(angle)), bool(observable)
+        return RigidTransform(at.x + x, at.y + y, at.theta + angle), observable
 
     def translation_cost(self, at: RigidTransform) -> float:
         """Return ``A_t / k_t`` at any transform.

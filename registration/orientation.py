@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ._kernels import CC, SS
 from .correspondences import Correspondences
 from .joint import JointSums
 from .transform import wrap_angle
@@ -49,7 +48,7 @@ def choose_rotation(pairs: Correspondences, weights: Floats, *, is_noise: bool) 
         theta, translation, _ = sums.solve(angle)
         thetas.append(theta)
         costs.append(sums.cost(theta, translation))
-    rounding = ROUNDING * float(sums.values[CC] + sums.values[SS])
+    rounding = ROUNDING * float(sums.record["cc"] + sums.record["ss"])
     theta = thetas[0] if costs[0] <= costs[1] + rounding else thetas[1]
     only_one = abs(wrap_angle(thetas[1] - thetas[0])) < SAME_ANGLE
     unique = only_one or abs(costs[1] - costs[0]) > rounding + (MARGIN if is_noise else 0.0)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._pair_kernels import MIN_SIGMA, inverse_variances
 from .correspondences import Correspondences
 from .errors import InvalidArgumentError
+from .kernels.pairs import MIN_SIGMA, inverse_variances
 from .options import RegistrationOptions
 
 Floats = NDArray[np.float64]

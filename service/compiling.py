@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import fcntl
-import os
-from importlib.util import find_spec
-from pathlib import Path
+
+from registration import compiling
 
 PACKAGES = ("registration", "vectorization", "association")
 
 
 def is_compiled() -> bool:
-    """Tell whether something of every module of kernels is kept, though perhaps not of its present source."""
-    for package in PACKAGES:
-        home = _home(package)
-        named = os.environ.get("NUMBA_CACHE_DIR")
-        places = [home / "__pycache__"] if named is None else list(Path(named).glob(f"{package}_*"))
-        for module in home.glob("_*kernels.py"):
-            if not any(any(place.glob(f"{module.stem}.*.nbi")) for place in places):
-                return False
-    return True
+    """Tell whether the kernels are kept for their present source."""
+    return all(compiling.is_compiled(package) for package in PACKAGES)
 
 
 def compile_kernels() -> None:
@@ -27,7 +19,7 @@ def compile_kernels() -> None:
 
     The compiler keeps 330 MB, so whoever is to go on afterwards loads what another process has compiled.
     """
-    place = Path(os.environ.get("NUMBA_CACHE_DIR", _home("association") / "__pycache__"))
+    place = compiling.cache_directory("association").parent
     place.mkdir(parents=True, exist_ok=True)
     with open(place / "linefix.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -35,10 +27,3 @@ def compile_kernels() -> None:
             from .warmup import warm_up
 
             warm_up()
-
-
-def _home(package: str) -> Path:
-    spec = find_spec(package)
-    assert spec is not None
-    assert spec.submodule_search_locations is not None
-    return Path(spec.submodule_search_locations[0])

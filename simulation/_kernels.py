@@ -7,7 +7,8 @@ Nothing here validates: callers hand over finite arrays of the shapes that are n
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 # rad; a ray this close to an end still meets the segment, so that none slips through the joint of two walls.
 END_TOLERANCE = 1e-12
@@ -16,7 +17,7 @@ END_TOLERANCE = 1e-12
 BACK_FACE_HANDICAP = 1.0 + 1e-9
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cast(endpoints, x, y, start, increment, cosines, sines, one_sided):
     """Intersect the beams from ``(x, y)`` with n segments, each over the beams that it subtends.
 

@@ -7,6 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from registration.layout import PAIR
+
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -15,15 +17,16 @@ def rotation(theta):
 
 
 def pair_rows(map_segments, scan, pairs):
-    """What is known of each pair, in the order of `registration._pair_kernels`."""
-    rows = []
-    for i, j in pairs:
+    """What is known of each pair, as `registration.layout.PAIR` has it."""
+    rows = np.zeros(len(pairs), PAIR)
+    for row, (i, j) in zip(rows, pairs, strict=True):
         m, s = map_segments, scan.segments
         sigma = max(scan.sigma[i], 1e-12) if scan.sigma[i] > 0.0 else 0.0
-        of_map = [*m.directions[j], *m.midpoints[j], m.lengths[j]]
-        of_scan = [*s.directions[i], *s.midpoints[i], s.lengths[i], *scan.centroids[i], scan.spreads[i]]
-        rows.append([*of_map, *of_scan, sigma**2 / scan.points[i]])
-    return np.array(rows)
+        offset = np.sum(TURN @ m.directions[j] * m.midpoints[j])
+        row["map"] = (*m.directions[j], offset, *m.midpoints[j], m.lengths[j])
+        measured = (*s.directions[i], *scan.centroids[i], scan.spreads[i])
+        row["scan"] = (*measured, *s.midpoints[i], s.lengths[i], sigma**2 / scan.points[i])
+    return rows
 
 
 # Joint estimator -----------------------------------------------------------------------------------------------------

@@ -11,7 +11,8 @@ points' total weight, their number, their chi-square, and the abscissae of the t
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 from ._kernels import BREAK_PENALTY, SUMS, sums_cost
 
@@ -43,7 +44,7 @@ FLATNESS = 5e-3
 NEAR_PARALLEL = 0.2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance, floor):
     """Join pieces of one line with a few points in front of it between them.
 
@@ -80,7 +81,7 @@ def bridge(pieces, sums, x, y, ux, uy, increment, longest, min_points, variance,
     return bounds[:count].copy(), totals[:count].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def adjoin(x, y, ux, uy, z, a, increment, longest):
     """Tell whether one wall may reach from point z to point a."""
     turn = math.atan2(abs(ux[z] * uy[a] - uy[z] * ux[a]), ux[z] * ux[a] + uy[z] * uy[a])
@@ -88,7 +89,7 @@ def adjoin(x, y, ux, uy, z, a, increment, longest):
     return near and a - z - 1 <= SKIPPED and turn <= SKIPPED_STEPS * increment + 1e-9
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor):
     """Make one of neighbouring lines, in place, that their points do not tell apart by their full likelihood.
 
@@ -129,7 +130,7 @@ def rejoin(x, y, ux, uy, lines, spans, increment, longest, variance, floor):
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def seen_through(nx, ny, p, a, b, x, y, ux, uy, variance, floor):
     """Tell whether a point from a to b - 1 lies behind the line, as seen from the sensor."""
     for i in range(a, b):
@@ -140,7 +141,7 @@ def seen_through(nx, ny, p, a, b, x, y, ux, uy, variance, floor):
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def line_of(total):
     """Return unit normal and distance (not negative) of the total least squares line of sums."""
     n = total[0]
@@ -158,7 +159,7 @@ def line_of(total):
     return nx, ny, p
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fit_line(x, y, ux, uy, a, b, variance, floor, line, own):
     """Move `line` to the maximum likelihood one of the points a to b - 1 that lie within the gate.
 
@@ -196,7 +197,7 @@ def fit_line(x, y, ux, uy, a, b, variance, floor, line, own):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def weigh(x, y, ux, uy, a, b, variance, floor, line, own, gate):
     """Sum up the points a to b - 1 whose squared distance from the line is within `gate` variances; set its ends.
 
@@ -241,7 +242,7 @@ def weigh(x, y, ux, uy, a, b, variance, floor, line, own, gate):
     return count, w_sum, t_mean, e_mean, tt - t_sum * t_mean, te - t_sum * e_mean, ee
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def describe(lines, x, y):
     """Return what is told of each line, moved to the place (x, y) of the sensor: endpoints, sigma, centroid and rms.
 

@@ -12,7 +12,8 @@ rays' sums are those of the unit matrix, and the projection below is 1 for every
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 SUMS = 9
 
@@ -31,7 +32,7 @@ GRAZING = math.radians(10.0)
 MISSING_STEPS = 4.5
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def running_sums(x, y, ux, uy):
     """Return the ``(n + 1, SUMS)`` running totals of the points."""
     n = len(x)
@@ -50,7 +51,7 @@ def running_sums(x, y, ux, uy):
     return sums
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sums_cost(total, variance, floor):
     """Return the chi-square of the total least squares line of sums.
 
@@ -61,7 +62,7 @@ def sums_cost(total, variance, floor):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def stretch_cost(sums, a, b, variance, floor):
     """Return the `sums_cost` of points a to b - 1, in constant time."""
     return chi_square(
@@ -79,7 +80,7 @@ def stretch_cost(sums, a, b, variance, floor):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def chi_square(n, sx, sy, sxx, sxy, syy, uxx, uxy, uyy, variance, floor):
     """Return the `sums_cost` of single numbers."""
     if n < 3.0:
@@ -95,7 +96,7 @@ def chi_square(n, sx, sy, sxx, sxy, syy, uxx, uxy, uyy, variance, floor):
     return n * squares / (0.5 * variance * max(projected, 0.0) + n * floor)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def find_gaps(x, y, ux, uy, increment, sigma, default_gap, max_gap):
     """Return the first point of every stretch without a gap.
 
@@ -131,7 +132,7 @@ def find_gaps(x, y, ux, uy, increment, sigma, default_gap, max_gap):
     return starts[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def farthest_point(x, y, ux, uy, a, b, variance, floor):
     """Return the point between a and b - 1 farthest from their chord in standard deviations, and their square."""
     dx = x[b - 1] - x[a]
@@ -158,7 +159,7 @@ def farthest_point(x, y, ux, uy, a, b, variance, floor):
     return best, worst / least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def best_break(sums, a, b, low, high, stride, variance, floor):
     """Return the break k in low..high that fits lines through a..k-1 and k..b-1 best, and their chi-square."""
     best = -1
@@ -171,7 +172,7 @@ def best_break(sums, a, b, low, high, stride, variance, floor):
     return best, least
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def split(x, y, ux, uy, sums, starts, variance, floor):
     """Split every stretch until each piece is straight; return the ``(m, 2)`` first and one-past-last points."""
     n = len(x)
@@ -210,7 +211,7 @@ def split(x, y, ux, uy, sums, starts, variance, floor):
     return pieces[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def merge(pieces, sums, gaps, variance, floor):
     """Join adjoining pieces, the cheapest joint first, as long as it costs less than `BREAK_PENALTY`.
 
@@ -249,7 +250,7 @@ def merge(pieces, sums, gaps, variance, floor):
     return left[:count].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def joint_cost(pieces, k, sums, variance, floor):
     """Return what the chi-square grows by when pieces k and k + 1 share one line."""
     a = pieces[k, 0]
@@ -259,7 +260,7 @@ def joint_cost(pieces, k, sums, variance, floor):
     return stretch_cost(sums, a, c, variance, floor) - apart
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def settle_breaks(pieces, sums, gaps, variance, floor):
     """Move every break between adjoining pieces, in place, to where they fit best; return whether any moved."""
     moved = False

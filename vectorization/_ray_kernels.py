@@ -7,7 +7,8 @@ Nothing here validates: callers hand over finite arrays of the shapes that are n
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 # Share of the triples of points that are trusted to lie on straight walls, and the mean square of that lower share of a
 # Gaussian's |z|. A mean, for quantised ranges make a quantile jump.
@@ -25,7 +26,7 @@ QUANTUM_UNIT = 1e-4
 LEAST_QUANTUM = 10
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def clean(ranges, range_min, range_max):
     """Return the ranges with beams without return at inf and beams of which nothing is known at nan."""
     cleaned = ranges.copy()
@@ -37,7 +38,7 @@ def clean(ranges, range_min, range_max):
     return cleaned
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def gather(cleaned, cosines, sines, backward, closed):
     """Return indices, ranges, the rays' two components and the points' of the beams that have a range.
 
@@ -72,7 +73,7 @@ def gather(cleaned, cosines, sines, backward, closed):
     return order, r, rays, points
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def quantum(ranges):
     """Return the step that all ranges are multiples of, metres, 0 for none or one below a millimetre."""
     step = 0
@@ -88,7 +89,7 @@ def quantum(ranges):
     return step * QUANTUM_UNIT
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def ray_noise(ranges, ux, uy, increment):
     """Return the standard deviation of the ranges, or 0 where there are too few neighbours to tell.
 
@@ -122,7 +123,7 @@ def ray_noise(ranges, ux, uy, increment):
     return math.sqrt(squares / (k * TRUSTED_MEAN_SQUARE))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def window_noise(x, y):
     """Return the standard deviation of points normal to the walls, from small windows, or 0 where there are too few."""
     n = len(x)

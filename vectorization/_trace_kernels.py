@@ -7,7 +7,8 @@ Nothing here validates: callers hand over finite arrays of the shapes that are n
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 from ._fit_kernels import (
     BEGIN,
@@ -46,7 +47,7 @@ CORNER_REACH = 1.6
 CORNER_BEAMS = 3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def trace(x, y, ux, uy, increment, closed, sigma, floor, default_gap, max_gap, min_points, min_length):
     """Return the ``(m, LINE)`` lines and the ``(m, 2)`` first and last points of the segments, in order.
 
@@ -82,13 +83,13 @@ def trace(x, y, ux, uy, increment, closed, sigma, floor, default_gap, max_gap, m
     return lines[still], spans[still]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def large_enough(line, min_points, min_length):
     """Tell whether a line is one that was asked for."""
     return line[COUNT] >= min_points and line[END] - line[BEGIN] >= min_length
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def acceptable(line, rays):
     """Tell whether a line is one: its angle known, its points on it."""
     return (
@@ -98,7 +99,7 @@ def acceptable(line, rays):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fit_all(x, y, ux, uy, bounds, totals, variance, floor, min_points, increment, longest):
     """Fit every piece of at least `min_points` and extend it over the points around that no such piece has."""
     n = len(x)
@@ -139,7 +140,7 @@ def fit_all(x, y, ux, uy, bounds, totals, variance, floor, min_points, increment
     return lines[:count].copy(), spans[:count].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def strays(x, y, ux, uy, i, line, variance, floor):
     """Tell whether point i, the last of its line, is better taken for one of what lies beside the wall."""
     e = line[NX] * x[i] + line[NY] * y[i] - line[P]
@@ -149,7 +150,7 @@ def strays(x, y, ux, uy, i, line, variance, floor):
     return e * e > END_GATE * END_GATE * (variance * cosine * cosine + floor)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def extend(x, y, ux, uy, start, direction, taken, line, increment, longest, variance, floor):
     """Return the last point, from `start` on in `direction`, that still lies on the line; one misfit may intervene."""
     last = start
@@ -178,7 +179,7 @@ def extend(x, y, ux, uy, start, direction, taken, line, increment, longest, vari
     return last
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cut_corners(x, y, ux, uy, lines, spans, increment, closed, variance, floor):
     """Move the ends of neighbouring lines to their intersection where it lies between their nearest points' rays.
 
@@ -203,7 +204,7 @@ def cut_corners(x, y, ux, uy, lines, spans, increment, closed, variance, floor):
             nearer_end(other, other[NX] * cy - other[NY] * cx)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def corner(x, y, ux, uy, lines, spans, k, following, increment, variance):
     """Return whether lines k and `following` meet between their nearest points, and where."""
     one = lines[k]
@@ -225,7 +226,7 @@ def corner(x, y, ux, uy, lines, spans, k, following, increment, variance):
     return near, cx, cy
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def share(x, y, ux, uy, lines, spans, k, cx, cy, variance, floor):
     """Give the points about a corner of lines k and k + 1 to their own side's line; return whether any changed."""
     a = spans[k, 0]
@@ -252,7 +253,7 @@ def share(x, y, ux, uy, lines, spans, k, cx, cy, variance, floor):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def leave_seam(x, y, ux, uy, lines, spans, cx, cy, variance, floor):
     """Take from the first and the last line of a closed scan the points beyond their corner, and fit what is left."""
     own = np.empty(len(x), dtype=np.bool_)
@@ -273,7 +274,7 @@ def leave_seam(x, y, ux, uy, lines, spans, cx, cy, variance, floor):
         fit_line(x, y, ux, uy, spans[last, 0], b + 1, variance, floor, lines[last], own)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def before(x, y, ux, uy, lines, k, cx, cy, i):
     """Tell whether point i is on line k's side of its corner with the next: by its ray, or by the nearer line."""
     if ux[i] != 0.0 or uy[i] != 0.0:
@@ -282,14 +283,14 @@ def before(x, y, ux, uy, lines, k, cx, cy, i):
     return here <= abs(lines[k + 1, NX] * x[i] + lines[k + 1, NY] * y[i] - lines[k + 1, P])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def last_abscissa(line, i, x, y):
     """Return the end of the line that point i is nearest to."""
     t = line[NX] * y[i] - line[NY] * x[i]
     return line[BEGIN] if abs(t - line[BEGIN]) < abs(t - line[END]) else line[END]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def nearer_end(line, t):
     """Move the nearer of the line's ends to the abscissa t."""
     if abs(t - line[BEGIN]) < abs(t - line[END]):
@@ -298,7 +299,7 @@ def nearer_end(line, t):
         line[END] = t
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def corner_reach(line, i, x, y, ux, uy, increment):
     """Return how far the end at point i may be moved: about as far as to the next ray, or a point's spacing."""
     if increment <= 0.0:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from registration.compiling import kernel
 
 LEAST_SINE = math.sin(math.radians(20.0))  # of lines that make a corner
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cross_lines(ends, reach):
     """Return the corners of directed segments that come within `reach` of where their lines cross.
 
@@ -48,7 +49,7 @@ def cross_lines(ends, reach):
     return found[:filled].copy()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fit_corners(seen, known, order, gates):
     """Return pairs of corners, of the scan and of the map, with like turns whose segments contain each other.
 
@@ -76,7 +77,7 @@ def fit_corners(seen, known, order, gates):
     return pairs[:filled]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def explained(scan, known, pose, gates):
     """Return how many metres of the scan lie on the map at a pose; `gates` are metres and radians."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -102,7 +103,7 @@ def explained(scan, known, pose, gates):
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def affinities(seen, known, pairs, widths):
     """Return how well pairs of corners agree with each other: distances and headings; ``(k, k)``, 0 for not at all."""
     count = len(pairs)

@@ -9,7 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from registration import Correspondences, RigidTransform, _kernels, _matrix_kernels, _one_step_kernels, _pair_kernels
+from registration import Correspondences, RigidTransform
+from registration.kernels import compensated, joint, matrices, one_step
+from registration.kernels import pairs as pairing
+from registration.layout import JOINT_SUMS, ONE_STEP_SUMS, PAIR, SYMMETRIC3, full_matrix
 from tests import reference
 
 from .scenes import correspondences, noisy_pairs
@@ -22,72 +25,85 @@ def drawn(seed, n=7):
     rng = np.random.default_rng(seed)
     pairs = correspondences(*noisy_pairs(rng, n, noise=0.05))
     weights = rng.uniform(0.1, 2.0, n)
-    joint = (pairs.map_normals, pairs.map_offsets, pairs.centroids, pairs.directions, pairs.spreads, weights)
-    return rng, pairs, weights, joint
+    measured = (pairs.map_normals, pairs.map_offsets, pairs.centroids, pairs.directions, pairs.spreads, weights)
+    return rng, pairs, weights, measured
 
 
 def rows_of(normals, offsets, centroids, directions, spreads):
     """Return rows of which only the joint sums are right: map lines by normal and offset."""
-    rows = np.zeros((len(offsets), _pair_kernels.PAIR_COLUMNS))
-    pairs = Correspondences(rows)
-    pairs.map_directions[:] = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
-    pairs.map_midpoints[:] = offsets[:, None] * normals
-    pairs.centroids[:], pairs.directions[:], pairs.spreads[:] = centroids, directions, spreads
+    rows = np.zeros(len(offsets), PAIR)
+    rows["map"]["dx"], rows["map"]["dy"], rows["map"]["offset"] = normals[:, 1], -normals[:, 0], offsets
+    rows["scan"]["dx"], rows["scan"]["dy"] = directions.T
+    rows["scan"]["centroid_x"], rows["scan"]["centroid_y"], rows["scan"]["spread"] = *centroids.T, spreads
     return rows
+
+
+def plain(sums):
+    """Return compensated sums as rows of doubles, values and errors."""
+    return sums.view(np.float64).reshape(2, -1)
+
+
+def symmetric(matrix):
+    """Return the upper triangle of a matrix as a kernel takes it."""
+    return np.array([tuple(matrix[np.triu_indices(3)])], SYMMETRIC3)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
 def test_joint_sums(seed):
-    rng, pairs, weights, joint = drawn(seed)
-    sums = _kernels.joint_sums_compensated(pairs.rows, weights)
-    np.testing.assert_allclose(sums.sum(axis=0), reference.joint_sums(*joint), **CLOSE)
-    plain = np.zeros(_kernels.JOINT_SIZE)
-    for n, p, m, d, spread, w in zip(*joint, strict=True):
-        _kernels.joint_add(plain, *n, p, *m, *d, spread, w, 1.0)
-    np.testing.assert_allclose(plain, reference.joint_sums(*joint), **CLOSE)
+    rng, pairs, weights, measured = drawn(seed)
+    expected = reference.joint_sums(*measured)
+    sums = joint.joint_sums_compensated(pairs.rows, weights)
+    np.testing.assert_allclose(plain(sums).sum(axis=0), expected, **CLOSE)
+    sums = np.zeros(1, JOINT_SUMS)
+    for row, w in zip(pairs.rows, weights, strict=True):
+        joint.joint_add(sums[0], row["map"], row["scan"], w, 1.0)
+    np.testing.assert_allclose(sums.view(np.float64), expected, **CLOSE)
+    for row, w in zip(pairs.rows, weights, strict=True):
+        joint.joint_add(sums[0], row["map"], row["scan"], w, -1.0)
+    np.testing.assert_allclose(sums.view(np.float64), 0.0, atol=1e-12 * np.abs(expected).max())
     counts = rng.random(7) < 0.5
-    some = reference.joint_sums(*(values[counts] for values in joint))
-    sums = _kernels.joint_sums_compensated(pairs.rows, np.where(counts, weights, 0.0))
-    np.testing.assert_allclose(sums.sum(axis=0), some, **CLOSE)
+    some = reference.joint_sums(*(values[counts] for values in measured))
+    sums = joint.joint_sums_compensated(pairs.rows, np.where(counts, weights, 0.0))
+    np.testing.assert_allclose(plain(sums).sum(axis=0), some, **CLOSE)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
 def test_joint_cost_and_information(seed):
-    rng, pairs, weights, joint = drawn(seed)
+    rng, pairs, weights, measured = drawn(seed)
     theta, x, y = rng.uniform(-3.0, 3.0, 3)
-    sums = _kernels.joint_sums_compensated(pairs.rows, weights)[0]
-    assert _kernels.joint_cost(sums, theta, x, y) == pytest.approx(
-        reference.joint_cost(theta, np.array([x, y]), *joint), rel=1e-9
+    sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
+    assert joint.joint_cost(sums, theta, x, y) == pytest.approx(
+        reference.joint_cost(theta, np.array([x, y]), *measured), rel=1e-9
     )
-    information = np.empty((3, 3))
-    _kernels.joint_information(sums, theta, information)
-    np.testing.assert_allclose(information, reference.joint_information(theta, *joint), **CLOSE)
+    information = np.empty(1, SYMMETRIC3)
+    joint.joint_information(sums, theta, information[0])
+    np.testing.assert_allclose(full_matrix(information), reference.joint_information(theta, *measured), **CLOSE)
 
 
 @given(SEEDS)
 @settings(max_examples=5, deadline=None)
 def test_joint_solve(seed):
-    _, pairs, weights, joint = drawn(seed)
-    sums = _kernels.joint_sums_compensated(pairs.rows, weights)[0]
-    theta, x, y, cost, observable = _kernels.joint_solve(sums, 0.0, True)
-    start = math.atan2(sums[_kernels.WAHBA_SIN], sums[_kernels.WAHBA_COS])
-    expected_theta, expected_t = reference.joint_solve(start, *joint)
+    _, pairs, weights, measured = drawn(seed)
+    sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
+    theta, x, y, cost, observable = joint.joint_solve(sums, 0.0, True)
+    start = math.atan2(sums["wahba_sin"], sums["wahba_cos"])
+    expected_theta, expected_t = reference.joint_solve(start, *measured)
     assert observable
     np.testing.assert_allclose([theta, x, y], [expected_theta, *expected_t], **CLOSE)
-    assert cost == pytest.approx(reference.joint_cost(theta, np.array([x, y]), *joint), rel=1e-9)
+    assert cost == pytest.approx(reference.joint_cost(theta, np.array([x, y]), *measured), rel=1e-9)
 
 
 @pytest.mark.parametrize("start", np.linspace(-3.0, 3.0, 13))
 def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start):
     _, pairs, weights, _ = drawn(3)
-    sums = _kernels.joint_sums_compensated(pairs.rows, weights)[0]
-    theta, x, y, cost, _ = _kernels.joint_solve(sums, start, False)
+    sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
+    theta, x, y, cost, _ = joint.joint_solve(sums, start, False)
     for step in (-1e-3, 1e-3):
-        assert cost < _kernels.joint_cost(sums, theta + step, x, y)
-        assert cost < _kernels.joint_cost(sums, theta, x + step, y)
-        assert cost < _kernels.joint_cost(sums, theta, x, y + step)
+        assert cost < joint.joint_cost(sums, theta + step, x, y)
+        assert cost < joint.joint_cost(sums, theta, x + step, y)
+        assert cost < joint.joint_cost(sums, theta, x, y + step)
 
 
 def test_joint_solve_of_parallel_lines_gives_the_shortest_translation():
@@ -100,8 +116,8 @@ def test_joint_solve_of_parallel_lines_gives_the_shortest_translation():
         np.array([along, -along]),
         np.ones(2),
     )
-    sums = _kernels.joint_sums_compensated(rows, np.ones(2))[0]
-    theta, x, y, cost, observable = _kernels.joint_solve(sums, 0.0, True)
+    sums = joint.joint_sums_compensated(rows, np.ones(2))[0]
+    theta, x, y, cost, observable = joint.joint_solve(sums, 0.0, True)
     assert not observable
     np.testing.assert_allclose([theta, x, y, cost], [0.0, *(2.0 * across), 0.0], atol=1e-12)
 
@@ -112,12 +128,12 @@ def test_one_step_sums(seed):
     rng, pairs, weights, _ = drawn(seed)
     at = (*rng.uniform(-5.0, 5.0, 2), 0.4 + rng.uniform(-1.0, 1.0))
     for counts in (np.full(7, True), rng.random(7) < 0.5):
-        sums = _one_step_kernels.one_step_sums(pairs.rows, *at, np.where(counts, weights, 0.0))
+        sums = one_step.one_step_sums(pairs.rows, *at, np.where(counts, weights, 0.0))
         some = pairs.take(counts)
         expected = reference.one_step_sums(
             some.map_directions, some.map_midpoints, some.directions, some.midpoints, weights[counts], at
         )
-        np.testing.assert_allclose(sums.sum(axis=0), expected, **CLOSE)
+        np.testing.assert_allclose(plain(sums).sum(axis=0), expected, **CLOSE)
 
 
 @given(SEEDS)
@@ -131,11 +147,11 @@ def test_one_step_moved(seed):
             pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, weights, (x, y, alpha)
         )
 
-    before = np.stack([about(1.0, 2.0, 0.3), np.zeros(12)])
-    after = _one_step_kernels.one_step_moved(before, dx, dy, turn)
+    before = np.concatenate([about(1.0, 2.0, 0.3), np.zeros(12)]).view(ONE_STEP_SUMS)
+    after = one_step.one_step_moved(before, dx, dy, turn)
     expected = about(1.0 + dx, 2.0 + dy, 0.3 + turn)
-    np.testing.assert_allclose(after.sum(axis=0), expected, **CLOSE)
-    costs = _one_step_kernels.one_step_costs(before, dx, dy, turn)
+    np.testing.assert_allclose(plain(after).sum(axis=0), expected, **CLOSE)
+    costs = one_step.one_step_costs(before, dx, dy, turn)
     np.testing.assert_allclose(costs, [expected[6], expected[8], 2.0 * expected[9]], **CLOSE)
 
 
@@ -145,18 +161,18 @@ def test_one_step_solve(seed):
     _, pairs, weights, _ = drawn(seed)
     values = reference.one_step_sums(
         pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, weights, (0.0, 0.0, 0.0)
-    )
+    ).view(ONE_STEP_SUMS)[0]
     rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
     lines = [reference.transformation_line(*row) for row in rows]
     expected = reference.one_step_translation(lines, weights)
 
-    angle, x, y, observable = _one_step_kernels.one_step_solve(values, True)
+    angle, x, y, observable = one_step.one_step_solve(values, True)
     assert observable
     np.testing.assert_allclose([x, y], expected, **CLOSE)
     assert angle == pytest.approx(reference.wahba(pairs.map_directions, pairs.directions, weights), abs=1e-9)
 
     total, _ = reference.mitsuta([alpha for *_, alpha in lines], weights)
-    mean, *_ = _one_step_kernels.one_step_solve(values, False)
+    mean, *_ = one_step.one_step_solve(values, False)
     assert mean == pytest.approx(total / weights.sum(), abs=1e-9)
 
 
@@ -168,100 +184,61 @@ def test_compensated_sums_are_exact(seed):
     sums = np.zeros((2, 4))
     for row in terms:
         for k in range(4):
-            _kernels.accumulate(sums, k, row[k], 0.0)
+            sums[:, k] = compensated.accumulated(*sums[:, k], row[k], 0.0)
     np.testing.assert_array_equal(sums[0], reference.exact_sums(terms))
-    _kernels.compensated_add(sums, sums.copy(), -1.0)
-    np.testing.assert_array_equal(sums, 0.0)
+    flat = sums.ravel()
+    compensated.compensated_add(flat, flat.copy(), -1.0)
+    np.testing.assert_array_equal(flat, 0.0)
 
 
 @njit
-def change(sums, normals, offsets, centroids, directions, spreads, weights, row, shift, sign):
-    _kernels.joint_add_compensated(
-        sums,
-        normals[row, 0],
-        normals[row, 1],
-        offsets[row] + shift,
-        centroids[row, 0],
-        centroids[row, 1],
-        directions[row, 0],
-        directions[row, 1],
-        spreads[row],
-        weights[row],
-        sign,
-    )
+def joint_change(sums, row, weight, alpha, shift, sign):
+    """Add or remove a pair whose map line is shifted meanwhile."""
+    offset = row.map.offset
+    row.map.offset = offset + shift
+    joint.joint_add_compensated(sums, row.map, row.scan, weight, sign)
+    row.map.offset = offset
 
 
 @njit
-def churn(sums, normals, offsets, centroids, directions, spreads, weights, rows):
-    """Add and remove a pair per row, at once and all together: four changes each."""
-    for row in rows:
+def one_step_change(sums, row, weight, alpha, shift, sign):
+    gap = row.map.offset - pairing.offset_of(row.scan) + shift
+    one_step.one_step_add(sums, row.map, row.scan, gap, alpha, weight, sign)
+
+
+def churner(change):
+    """Return a function that adds and removes a pair for each of `order`, at once and all together: four changes."""
+
+    @njit
+    def churn(sums, rows, weights, alpha, order):
+        for i in order:
+            for sign in (1.0, -1.0):
+                change(sums, rows[i], weights[i], alpha, 0.125, sign)
         for sign in (1.0, -1.0):
-            change(sums, normals, offsets, centroids, directions, spreads, weights, row, 0.125, sign)
-    for sign in (1.0, -1.0):
-        for row in rows:
-            change(sums, normals, offsets, centroids, directions, spreads, weights, row, 0.25, sign)
+            for i in order:
+                change(sums, rows[i], weights[i], alpha, 0.25, sign)
 
-
-@njit
-def one_step_total(map_directions, gaps, directions, alpha, weights):
-    sums = np.zeros((2, _one_step_kernels.ONE_STEP_SIZE))
-    for row in range(len(weights)):
-        one_step_change(sums, map_directions, gaps, directions, alpha, weights, row, 0.0, 1.0)
-    return sums
-
-
-@njit
-def one_step_churn(sums, map_directions, gaps, directions, alpha, weights, rows):
-    """Add and remove a pair per row, at once and all together: four changes each."""
-    for row in rows:
-        for sign in (1.0, -1.0):
-            one_step_change(sums, map_directions, gaps, directions, alpha, weights, row, 0.125, sign)
-    for sign in (1.0, -1.0):
-        for row in rows:
-            one_step_change(sums, map_directions, gaps, directions, alpha, weights, row, 0.25, sign)
-
-
-@njit
-def one_step_change(sums, map_directions, gaps, directions, alpha, weights, row, shift, sign):
-    _one_step_kernels.one_step_add(
-        sums,
-        map_directions[row, 0],
-        map_directions[row, 1],
-        gaps[row] + shift,
-        directions[row, 0],
-        directions[row, 1],
-        alpha,
-        weights[row],
-        sign,
-    )
+    return churn
 
 
 @pytest.mark.parametrize("offset", [0.0, 5e6], ids=["near", "utm"])
-def test_a_million_changes_leave_the_one_step_sums_of_what_remains(offset):
+@pytest.mark.parametrize(("change", "kind"), [(joint_change, JOINT_SUMS), (one_step_change, ONE_STEP_SUMS)])
+def test_a_million_changes_leave_the_sums_of_what_remains(change, kind, offset):
     rng, pairs, weights, _ = drawn(11, 40)
-    gaps = np.einsum("ij,ij->i", pairs.map_normals, pairs.map_midpoints) - pairs.offsets + offset
-    kept = (pairs.map_directions, gaps, pairs.directions, 0.3, weights)
-    sums = one_step_total(*kept)
+    rows = pairs.rows.copy()
+    rows["map"]["offset"] += offset
 
-    one_step_change(sums, *kept, 0, 1e8, 1.0)
-    one_step_churn(sums, *kept, rng.integers(0, 40, 250_000))
-    one_step_change(sums, *kept, 0, 1e8, -1.0)
-    np.testing.assert_allclose(sums[0], one_step_total(*kept)[0], rtol=1e-12, atol=0.0)
+    def fresh():
+        sums = np.zeros(2, kind)
+        for row, weight in zip(rows, weights, strict=True):
+            change(sums, row, weight, 0.3, 0.0, 1.0)
+        return sums
 
-
-@pytest.mark.parametrize("offset", [0.0, 5e6], ids=["near", "utm"])
-def test_a_million_changes_leave_the_sums_of_what_remains(offset):
-    rng, pairs, weights, _ = drawn(11, 40)
-    map_offsets = pairs.map_offsets + offset
-    kept = (pairs.map_normals, map_offsets, pairs.centroids, pairs.directions, pairs.spreads, weights)
-    rows_kept = rows_of(*kept[:-1])
-    sums = _kernels.joint_sums_compensated(rows_kept, weights)
-
-    change(sums, *kept, 0, 1e8, 1.0)
-    rows = rng.integers(0, 40, 250_000)
-    churn(sums, *kept, rows)
-    change(sums, *kept, 0, 1e8, -1.0)
-    np.testing.assert_allclose(sums[0], _kernels.joint_sums_compensated(rows_kept, weights)[0], rtol=1e-12, atol=0.0)
+    sums = fresh()
+    change(sums, rows[0], weights[0], 0.3, 1e8, 1.0)
+    churner(change)(sums, rows, weights, 0.3, rng.integers(0, 40, 250_000))
+    change(sums, rows[0], weights[0], 0.3, 1e8, -1.0)
+    np.testing.assert_allclose(plain(sums)[0], plain(fresh())[0], rtol=1e-12, atol=0.0)
 
 
 @given(SEEDS)
@@ -271,23 +248,22 @@ def test_gather(seed):
     map_segments, scan = noisy_pairs(rng, 9)
     scan = replace(scan, sigma=rng.choice([0.0, 1e-200, 1e-12, 0.3], 9))
     pairs = np.stack([rng.integers(0, 9, 12), rng.integers(0, 9, 12)], axis=1)
-    s, m = scan.segments, map_segments
-    rows = _pair_kernels.gather(
-        pairs, m.directions, m.midpoints, m.lengths, s.directions, s.midpoints, s.lengths, scan.centroids, scan.spreads,
-        scan.sigma, scan.points,
-    )  # fmt: skip
+    of_map, of_scan = (
+        pairing.SegmentArrays(s.directions, s.midpoints, s.lengths) for s in (map_segments, scan.segments)
+    )
+    points = pairing.PointArrays(scan.centroids, scan.spreads, scan.sigma, scan.points)
+    rows = pairing.gather(pairs[:, 0], pairs[:, 1], of_map, of_scan, points)
     np.testing.assert_array_equal(rows, reference.pair_rows(map_segments, scan, pairs))
     for least in (0.0, 0.25):
-        inverses, known = _pair_kernels.inverse_variances(rows, least)
+        inverses, known = pairing.inverse_variances(rows, least)
         assert known == bool((scan.sigma[pairs[:, 0]] > 0.0).all() or least > 0.0)
         if known:
-            np.testing.assert_allclose(inverses, 1.0 / (rows[:, 13] + least), rtol=1e-15)
+            np.testing.assert_allclose(inverses, 1.0 / (rows["scan"]["variance"] + least), rtol=1e-15)
 
 
 def test_first_outside():
-    pairs = np.array([[0, 3], [4, 0], [1, -1], [5, 2]])
-    assert [_pair_kernels.first_outside(pairs, 0, count) for count in (6, 5, 4, 0)] == [-1, 3, 1, 0]
-    assert [_pair_kernels.first_outside(pairs, 1, count) for count in (4, 3)] == [2, 0]
+    assert [pairing.first_outside(np.array([0, 4, 1, 5]), count) for count in (6, 5, 4, 0)] == [-1, 3, 1, 0]
+    assert [pairing.first_outside(np.array([3, 0, -1, 2]), count) for count in (4, 3)] == [2, 0]
 
 
 @given(SEEDS)
@@ -296,23 +272,30 @@ def test_middles_and_moved_origins(seed):
     rng, pairs, weights, _ = drawn(seed)
     counts = np.append(rng.random(6) < 0.5, True)
     some = pairs.take(counts)
-    *middles, count = _pair_kernels.middles(pairs.rows, np.where(counts, weights, 0.0))
+    *middles, count = pairing.middles(pairs.rows, np.where(counts, weights, 0.0))
     np.testing.assert_allclose(middles, [*some.map_midpoints.mean(axis=0), *some.centroids.mean(axis=0)], **CLOSE)
     assert count == counts.sum()
+    map_x, map_y, scan_x, scan_y = middles
     expected = pairs.rows.copy()
-    expected[:, 2:4] -= middles[:2]
-    expected[:, 7:9] -= middles[2:]
-    expected[:, 10:12] -= middles[2:]
-    np.testing.assert_array_equal(_pair_kernels.moved_origins(pairs.rows, *middles), expected)
+    expected["map"]["x"] -= map_x
+    expected["map"]["y"] -= map_y
+    expected["scan"]["x"] -= scan_x
+    expected["scan"]["y"] -= scan_y
+    expected["scan"]["centroid_x"] -= scan_x
+    expected["scan"]["centroid_y"] -= scan_y
+    moved = Correspondences(pairing.moved_origins(pairs.rows, *middles))
+    np.testing.assert_allclose(moved.map_offsets, np.sum(moved.map_normals * moved.map_midpoints, axis=1), **CLOSE)
+    expected["map"]["offset"] = moved.map_offsets
+    np.testing.assert_array_equal(moved.rows, expected)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
 def test_residuals(seed):
-    rng, pairs, weights, joint = drawn(seed)
+    rng, pairs, weights, measured = drawn(seed)
     at = RigidTransform(*rng.uniform(-3.0, 3.0, 3))
     counts = np.append(rng.random(6) < 0.5, True)
-    offsets, angles, chi2, rms_offset, rms_angle = _pair_kernels.residuals(
+    offsets, angles, chi2, rms_offset, rms_angle = pairing.residuals(
         pairs.rows, np.where(counts, 1.0, 0.0), np.where(counts, weights, 0.0), at.theta, at.x, at.y
     )
     expected = np.sum(pairs.map_normals * at.apply(pairs.midpoints), axis=1) - pairs.map_offsets
@@ -321,8 +304,8 @@ def test_residuals(seed):
     alphas = [reference.transformation_line(*row)[2] for row in rows]
     turns = [math.remainder(alpha - at.theta, math.tau) for alpha in alphas]
     np.testing.assert_allclose(angles, turns, **CLOSE)
-    np.testing.assert_array_equal(_pair_kernels.relative_angles(pairs.rows, at.theta), angles)
-    cost = reference.joint_cost(at.theta, np.array([at.x, at.y]), *(values[counts] for values in joint))
+    np.testing.assert_array_equal(pairing.relative_angles(pairs.rows, at.theta), angles)
+    cost = reference.joint_cost(at.theta, np.array([at.x, at.y]), *(values[counts] for values in measured))
     assert chi2 == pytest.approx(cost, rel=1e-9)
     assert rms_offset == pytest.approx(math.sqrt(np.mean(offsets[counts] ** 2)))
     assert rms_angle == pytest.approx(math.sqrt(np.mean(angles[counts] ** 2)))
@@ -340,7 +323,7 @@ def definite(rng, size, spread=3.0):
 def test_eigen2(seed):
     rng = np.random.default_rng(seed)
     matrix = definite(rng, 2)
-    small, big, x, y = _matrix_kernels.eigen2(matrix[0, 0], matrix[0, 1], matrix[1, 1])
+    small, big, x, y = matrices.eigen2(matrix[0, 0], matrix[0, 1], matrix[1, 1])
     values, axes = np.linalg.eigh(matrix)
     np.testing.assert_allclose([small, big], values, rtol=1e-12, atol=1e-14 * values[1])
     assert math.hypot(x, y) == pytest.approx(1.0, rel=1e-15)
@@ -349,9 +332,9 @@ def test_eigen2(seed):
 
 def test_eigen2_of_what_has_no_one_axis():
     for a in (0.0, 2.0):
-        small, big, x, y = _matrix_kernels.eigen2(a, 0.0, a)
+        small, big, x, y = matrices.eigen2(a, 0.0, a)
         np.testing.assert_allclose((small, big, x, y), (a, a, 1.0, 0.0), atol=1e-15)
-    assert _matrix_kernels.eigen2(1.0, 1.0, 1.0)[0] == 0.0
+    assert matrices.eigen2(1.0, 1.0, 1.0)[0] == 0.0
 
 
 @given(SEEDS, st.sampled_from([1e-12, 1e-6, 1e-2]))
@@ -364,31 +347,45 @@ def test_is_regular3(seed, least):
     smallest = np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0]
     units = 10.0 ** rng.uniform(-3.0, 3.0, 3)
     if abs(smallest - least) > 1e-9 * least:
-        assert _matrix_kernels.is_regular3(matrix * np.outer(units, units), least) == (smallest > least)
+        assert matrices.is_regular3(symmetric(matrix * np.outer(units, units))[0], least) == (smallest > least)
 
 
 def test_is_regular3_of_what_is_not():
-    assert not _matrix_kernels.is_regular3(np.diag([1.0, 0.0, 1.0]), 1e-12)
-    for row in ([1.0, 1.0, 1.0], [1.0, -2.0, 0.0], [0.5, 0.0, 1e3]):
-        assert not _matrix_kernels.is_regular3(np.outer(row, row), 1e-12)
-    assert not _matrix_kernels.is_regular3(np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), 1e-12)
+    singular = [np.diag([1.0, 0.0, 1.0]), np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])]
+    singular += [np.outer(row, row) for row in ([1.0, 1.0, 1.0], [1.0, -2.0, 0.0], [0.5, 0.0, 1e3])]
+    for matrix in singular:
+        assert not matrices.is_regular3(symmetric(matrix)[0], 1e-12)
+        assert not matrices.invert3(symmetric(matrix)[0], np.empty(1, SYMMETRIC3)[0])
     # Two eigenvalues are small, the least of them on one side of 1e-12 or the other.
     for gap, regular in ((1e-11, True), (1e-13, False)):
-        assert _matrix_kernels.is_regular3(np.ones((3, 3)) + 2.0 * gap * np.eye(3), 1e-12) is regular
+        matrix = np.ones((3, 3)) + 2.0 * gap * np.eye(3)
+        assert matrices.is_regular3(symmetric(matrix)[0], 1e-12) is regular
 
 
 @given(SEEDS)
 @settings(max_examples=100, deadline=None)
-def test_matrix_invert3_and_carried(seed):
+def test_inverses_and_carried(seed):
     rng = np.random.default_rng(seed)
     matrix = definite(rng, 3)
     scale = np.sqrt(np.diag(matrix))
-    inverse = _matrix_kernels.invert3(matrix)
-    np.testing.assert_array_equal(inverse, inverse.T)
-    product = (inverse * np.outer(scale, scale)) @ (matrix / np.outer(scale, scale))
     condition = np.linalg.cond(matrix / np.outer(scale, scale))
-    np.testing.assert_allclose(product, np.eye(3), atol=1e-14 * condition)
+    out = np.empty(1, SYMMETRIC3)
+
+    def error():
+        product = (full_matrix(out) * np.outer(scale, scale)) @ (matrix / np.outer(scale, scale))
+        return np.abs(product - np.eye(3)).max()
+
+    matrices.invert3_scaled(symmetric(matrix)[0], out[0])
+    assert error() <= 1e-14 * condition
+    if condition < 1e4:
+        assert matrices.invert3(symmetric(matrix)[0], out[0])
+        assert error() <= 1e-14 * condition**2
+    in_place = symmetric(matrix)
+    matrices.invert3(in_place[0], in_place[0])
+    np.testing.assert_array_equal(in_place, out if condition < 1e4 else in_place)
+
     x, y = rng.uniform(-5.0, 5.0, 2)
     lever = np.array([[1.0, 0.0, y], [0.0, 1.0, -x], [0.0, 0.0, 1.0]])
     expected = lever @ matrix @ lever.T
-    np.testing.assert_allclose(_matrix_kernels.carried(matrix, x, y), expected, rtol=1e-12, atol=1e-12 * expected.max())
+    matrices.carried(symmetric(matrix)[0], x, y, out[0])
+    np.testing.assert_allclose(full_matrix(out), expected, rtol=1e-12, atol=1e-12 * expected.max())

@@ -1,0 +1,20 @@
+"""Compiled sums and solvers over records; see ``layout.py`` for what these hold.
+
+Nothing here validates: callers hand over finite numbers and indices in range. Every kernel has a slow twin in
+``tests/reference.py``. Below are those that the kernels of other packages may call.
+"""
+
+from .joint import joint_add, joint_cost, joint_information, joint_solve
+from .matrices import carried, eigen2, invert3, invert3_scaled, is_regular3
+
+__all__ = [
+    "carried",
+    "eigen2",
+    "invert3",
+    "invert3_scaled",
+    "is_regular3",
+    "joint_add",
+    "joint_cost",
+    "joint_information",
+    "joint_solve",
+]

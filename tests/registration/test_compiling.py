@@ -1,0 +1,297 @@
+"""Compiled kernels that are kept: never those of another source, and kept wherever one may write."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from registration import compiling
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("registration", "vectorization", "association", "simulation", "benchmarks.peers")
+ALLOWED = {"numpy", "numba"}
+
+INNER = """
+from registration.compiling import kernel
+from ..layout import FACTOR
+@kernel
+def inner(x: float) -> float:
+    return FACTOR * x + 1.0
+"""
+OUTER = """
+from registration.compiling import kernel
+from .inner import inner
+@kernel
+def outer(x: float) -> float:
+    return 2.0 * inner(x)
+"""
+RUN = """
+from small.kernels.outer import outer
+from registration import compiling
+before = compiling.is_compiled("small")
+print(outer(1.0), sum(outer.stats.cache_hits.values()), before, compiling.is_compiled("small"), outer.stats.cache_path)
+"""
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a process printed that ran the kernel of the small package."""
+
+    answer: float
+    loaded: bool
+    compiled_before: bool
+    compiled_after: bool
+    directory: Path
+    log: str
+
+
+@dataclass(frozen=True)
+class SmallPackage:
+    """A package on disk: kernel `outer` calls `inner`, which stands in another file and reads a third."""
+
+    home: Path
+
+    @classmethod
+    def write(cls, parent: Path) -> SmallPackage:
+        package = cls(parent / "small")
+        (package.home / "kernels").mkdir(parents=True)
+        for name, text in {"__init__": "", "layout": "FACTOR = 10.0\n"}.items():
+            (package.home / f"{name}.py").write_text(text)
+        for name, text in {"__init__": "", "inner": INNER, "outer": OUTER}.items():
+            (package.home / "kernels" / f"{name}.py").write_text(text)
+        return package
+
+    def edit(self, file: str, old: str, new: str) -> None:
+        path = self.home / file
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new))
+
+    def run(self, **environment: object) -> Ran:
+        """Run the kernel in a process of its own, which obeys the permissions of files whoever started the tests."""
+        left = ("LINEFIX_KERNELS", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+        clean = {name: value for name, value in os.environ.items() if name not in left}
+        clean |= {"PYTHONPATH": str(self.home.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+        clean |= {name: str(value) for name, value in environment.items()}
+        ended = subprocess.run(
+            [sys.executable, "-c", RUN], env=clean, cwd=self.home.parent, capture_output=True, text=True, timeout=120,
+            preexec_fn=_obey_permissions, check=False,
+        )  # fmt: skip
+        assert ended.returncode == 0, ended.stderr
+        answer, hits, before, after, directory = ended.stdout.split()
+        return Ran(float(answer), hits == "1", before == "True", after == "True", Path(directory), ended.stderr)
+
+
+def _obey_permissions() -> None:
+    """Take from root what lets it write and read everything."""
+    if os.geteuid() == 0:
+        for capability in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+            assert ctypes.CDLL(None).prctl(24, capability, 0, 0, 0) == 0  # PR_CAPBSET_DROP
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> SmallPackage:
+    return SmallPackage.write(tmp_path)
+
+
+def test_unchanged_source_is_loaded_and_not_compiled(small: SmallPackage) -> None:
+    first, second = small.run(), small.run()
+    assert (first.answer, first.loaded, first.compiled_before, first.compiled_after) == (22.0, False, False, True)
+    assert (second.answer, second.loaded, second.compiled_before, second.compiled_after) == (22.0, True, True, True)
+    assert first.directory.parent == small.home / "kernels" / "__pycache__"
+    assert not first.log
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "answer"),
+    [("kernels/inner.py", "+ 1.0", "+ 3.0", 26.0), ("layout.py", "10.0", "20.0", 42.0)],
+)
+def test_an_edited_callee_changes_the_answer(small: SmallPackage, file: str, old: str, new: str, answer: float) -> None:
+    before = small.run()
+    small.edit(file, old, new)
+    edited = small.run()
+    assert (edited.answer, edited.loaded, edited.compiled_before) == (answer, False, False)
+    small.edit(file, new, old)
+    again = small.run()
+    assert (again.answer, again.loaded, again.directory) == (22.0, True, before.directory)
+
+
+def test_what_cannot_be_written_is_loaded_from(small: SmallPackage, tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    directory = small.run(LINEFIX_KERNELS=kept).directory
+    files = sorted(directory.iterdir())
+    for path in (directory, kept):
+        path.chmod(0o500)
+    ran = small.run(LINEFIX_KERNELS=kept)
+    assert (ran.answer, ran.loaded, ran.directory, ran.log) == (22.0, True, directory, "")
+    small.edit("kernels/inner.py", "+ 1.0", "+ 3.0")
+    edited = small.run(LINEFIX_KERNELS=kept)
+    assert (edited.answer, edited.loaded, edited.compiled_after) == (26.0, False, False)
+    assert edited.log.count("cannot be kept") == 1
+    kept.chmod(0o700)
+    assert list(kept.iterdir()) == [directory]
+    assert sorted(directory.iterdir()) == files
+
+
+def test_kept_beside_by_another_user(small: SmallPackage, tmp_path: Path) -> None:
+    directory = small.run().directory
+    for path in (directory, directory.parent):
+        path.chmod(0o500)
+    ran = small.run(XDG_CACHE_HOME=tmp_path / "cache")
+    assert (ran.loaded, ran.directory) == (True, directory)
+    small.edit("kernels/inner.py", "+ 1.0", "+ 3.0")
+    edited = small.run(XDG_CACHE_HOME=tmp_path / "cache")
+    assert (edited.answer, edited.directory.parent) == (26.0, tmp_path / "cache" / "linefix" / "kernels")
+    assert edited.directory.parent.stat().st_mode & 0o777 == 0o700
+    assert edited.compiled_after
+
+
+def test_the_first_directory_that_is_named(small: SmallPackage, tmp_path: Path) -> None:
+    a, b = tmp_path / "a", tmp_path / "b"
+    assert small.run(LINEFIX_KERNELS=a, NUMBA_CACHE_DIR=b).directory.parent == a
+    assert small.run(LINEFIX_KERNELS="", NUMBA_CACHE_DIR=b).directory.parent == b
+
+
+def test_without_a_place_of_its_own(small: SmallPackage, tmp_path: Path) -> None:
+    """A temporary one that nobody else can write to, and that is gone afterwards."""
+    (small.home / "kernels").chmod(0o500)
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    ran = small.run(XDG_CACHE_HOME=blocked, TMPDIR=tmp_path)
+    assert (ran.answer, ran.compiled_after, ran.directory.parent.parent) == (22.0, True, tmp_path)
+    assert ran.directory.parent.name.startswith("linefix-kernels-")
+    assert not ran.directory.parent.exists()
+    homeless = small.run(HOME="~", TMPDIR=tmp_path)
+    assert homeless.directory.parent.parent == tmp_path
+
+
+def test_a_broken_file_is_compiled_anew(small: SmallPackage) -> None:
+    directory = small.run().directory
+    for path, content in zip(sorted(directory.iterdir()), (b"", b"\x80\x05}"), strict=True):
+        path.write_bytes(content)
+    broken = small.run()
+    assert (broken.answer, broken.loaded) == (22.0, False)
+    assert broken.log.count("compiling anew") == 2
+    mended = small.run()
+    assert (mended.answer, mended.loaded, mended.log) == (22.0, True, "")
+
+
+def test_old_source_is_forgotten_in_the_end(small: SmallPackage) -> None:
+    place = small.home / "kernels" / "__pycache__"
+    stamps = [place / f"small-{k:020x}" for k in range(compiling.KEPT_STAMPS + 3)]
+    others = [place / "small-notes", place / f"smaller-{0:020x}"]
+    for age, path in enumerate([*others, *reversed(stamps)]):
+        path.mkdir(parents=True)
+        os.utime(path, (age, age))
+    newest = small.run().directory
+    assert set(place.iterdir()) == {newest, *others, *stamps[: compiling.KEPT_STAMPS - 1]}
+
+
+def test_a_kernel_elsewhere_is_refused() -> None:
+    with pytest.raises(TypeError, match="test_compiling"):
+
+        @compiling.kernel
+        def outside(x: float) -> float:
+            return x
+
+    factor = 2.0
+    with pytest.raises(TypeError, match="enclosing"):
+
+        @compiling.kernel
+        def closure(x: float) -> float:
+            return factor * x
+
+
+def test_other_numbas_are_refused() -> None:
+    """As if a later Numba had no such class any more."""
+    script = "import numba.core.caching as caching; del caching._Cache; import registration.compiling"
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert "install one of the versions" in ended.stderr
+
+
+def test_the_directory_changes_with_the_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    stamps = {compiling.stamp("registration")}
+    for target, name, value in (
+        (np, "__version__", "0"),
+        (compiling, "VERSIONS", ()),
+        (compiling, "PROCESSOR", ("another",)),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(target, name, value)
+            stamps.add(compiling.stamp.__wrapped__("registration"))
+    assert len(stamps) == 4
+
+
+def _imports_of(path: Path, module: str) -> set[str]:
+    """Return the modules that a file imports, or imports names of, without Python's own and `ALLOWED`."""
+    found = set()
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            parts = package.split(".")
+            above = parts[: len(parts) + 1 - node.level] if node.level else []
+            source = ".".join([*above, *filter(None, [node.module])])
+            inner = {f"{source}.{alias.name}" for alias in node.names}
+            found |= {name if _file_of(name) else source for name in inner}
+    return {name for name in found if name.split(".")[0] not in ALLOWED | sys.stdlib_module_names}
+
+
+def _file_of(module: str) -> Path | None:
+    try:
+        spec = find_spec(module)
+    except ModuleNotFoundError:
+        return None
+    return Path(spec.origin) if spec is not None and spec.origin is not None else None
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_kernels_reach_only_what_the_stamp_covers(package: str) -> None:
+    covered = {*compiling.sources(package), *compiling.sources("registration"), Path(compiling.__file__)}
+    home = _file_of(package).parent
+    ways = [
+        ".".join((package, *path.relative_to(home).with_suffix("").parts)).removesuffix(".__init__")
+        for path in compiling.sources(package)
+        if path.stem.endswith("kernels") or "kernels" in path.parts
+    ]
+    assert ways, "the package has no kernels"
+    reached: dict[Path, str] = {}
+    while ways:
+        module = ways.pop()
+        path = _file_of(module)
+        if path not in reached:
+            reached[path] = module
+            if path != Path(compiling.__file__):
+                ways += _imports_of(path, module)
+    assert not reached.keys() - covered
+
+
+def test_every_compiled_function_is_covered() -> None:
+    """Nothing outside the kernels' files is compiled."""
+    for folder in ("registration", "vectorization", "association", "simulation", "service", "benchmarks"):
+        for path in (ROOT / folder).rglob("*.py"):
+            if path.name != "compiling.py":
+                assert "njit" not in path.read_text(), path
+
+
+def test_clean_leaves_no_kernels(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    kept = tmp_path / "registration" / "kernels" / "__pycache__" / "registration-0123"
+    gone = [kept, tmp_path / ".venv", tmp_path / ".venv-peers", tmp_path / "out"]
+    for path in gone:
+        path.mkdir(parents=True)
+        (path / "file").touch()
+    subprocess.run(["make", "clean"], cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    assert not any(path.exists() for path in gone)
+    assert not list(tmp_path.rglob("__pycache__"))
+    assert (tmp_path / "registration" / "kernels").exists()
