@@ -54,9 +54,7 @@ class Accepted:
 def accept(context: SearchContext, best: Ranked) -> Accepted:
     """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
     index, ends = context.index, as_records(ENDS, context.scan.measured.segments.endpoints)
-    found = accept_matches(
-        best.matches, context.segments.order, ends, best.estimate, index.walls.rows, index.pieces
-    )
+    found = accept_matches(best.matches, context.segments.order, ends, best.estimate, index.walls.rows, index.pieces)
     return Accepted(*found)
 
 
@@ -80,6 +78,4 @@ def correspondences(index: MapIndex, accepted: Accepted, registered: Registratio
     columns = (accepted.overlaps, registered.offsets, registered.angles, registered.weights)
     alternatives = (tuple(rivals[begin:end]) for begin, end in pairwise(starts))
     values = (column.tolist() for column in columns)
-    return tuple(
-        map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, alternatives)
-    )
+    return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, alternatives))

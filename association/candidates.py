@@ -8,10 +8,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from registration.layout import Records
+
 from .context import SearchContext
 from .kernels.planning import BUDGET, EXHAUSTED, PROVEN, advance, plan_bases
 from .kernels.proposing import search_slides
-from .layout import FOUND, PROGRESS, RULES, Plan, Records, record
+from .layout import FOUND, PROGRESS, RULES, Plan, record
 from .options import CancelledError
 from .result import SearchReport
 from .tuning import (

@@ -8,24 +8,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from registration import RigidTransform
+from registration.layout import Records
 
-from .layout import (
-    HARD_PRIOR,
-    NO_PRIOR,
-    PRIOR,
-    RULES,
-    SOFT_PRIOR,
-    TERMS,
-    VIEW,
-    Question,
-    Records,
-    Workspace,
-    record,
-)
+from .layout import HARD_PRIOR, NO_PRIOR, PRIOR, RULES, SOFT_PRIOR, TERMS, VIEW, Question, Workspace, record
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, Scan, SoftPrior
 from .scan_segments import ScanSegments, gates
-
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 ANY = record(RULES)  # for kernels that keep no poses

@@ -19,7 +19,7 @@ def is_degenerate(registered: RegistrationResult) -> bool:
     if registered.degenerate or registered.covariance is None:
         return registered.degenerate
     (xx, xy), (_, yy) = registered.covariance[:2, :2].tolist()
-    return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2
+    return bool(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2)
 
 
 def free_direction(registered: RegistrationResult) -> tuple[float, float] | None:

@@ -7,8 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from registration.layout import Records
+
 from .kernels.walls import direction_raster, grid_cells
-from .layout import ENDS, GRID_SHAPE, Grid, Raster, Records, Walls, as_records, record
+from .layout import ENDS, GRID_SHAPE, Grid, Raster, Walls, as_records, record
 from .tuning import (
     CELL,
     CELL_GROWTH,

@@ -8,14 +8,17 @@ each array that it takes out of a tuple.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import JOINT_SUMS, POSE, SEEN, SYMMETRIC3
+from registration.layout import JOINT_SUMS, POSE, SEEN, SYMMETRIC3, Floats, Records
 
-Records = NDArray[np.void]
+Integers: TypeAlias = NDArray[np.integer[Any]]
+Indices: TypeAlias = NDArray[np.intp]
+Words: TypeAlias = NDArray[np.uint64]
+Flags: TypeAlias = NDArray[np.bool_]
 
 _F, _I = np.float64, np.int64
 
@@ -118,13 +121,13 @@ class Walls(NamedTuple):
     """
 
     rows: Records
-    bin_starts: NDArray[np.int64]
-    longest: NDArray[np.float64]
-    summed: NDArray[np.float64]
+    bin_starts: Integers
+    longest: Floats
+    summed: Floats
 
 
-# What kernels write to while they look at one pose: the pose; the information of its consensus set and the sums of that;
-# the end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would outlive the
+# What kernels write to while they look at one pose: the pose; the information of its consensus set, and its sums; the
+# end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would outlive the
 # array, whose last use ends it: hence these come from outside.
 SCRATCH = np.dtype(
     [
@@ -148,8 +151,8 @@ class Grid(NamedTuple):
     """
 
     shape: Records
-    starts: NDArray[np.int32]
-    items: NDArray[np.int32]
+    starts: Integers
+    items: Integers
 
 
 class Raster(NamedTuple):
@@ -162,18 +165,18 @@ class Raster(NamedTuple):
     """
 
     shape: Records
-    bits: NDArray[np.uint16]
+    bits: Integers
 
 
 class Place(NamedTuple):
-    """The walls, and where they are: what lies at a point, and what does a ray meet?"""
+    """The walls, and where they are: what lies at a point, and what a ray meets."""
 
     walls: Records
     grid: Grid
 
 
 class Sweep(NamedTuple):
-    """The runs, and where they are: what may lie under a base?
+    """The runs, and where they are: where a base may lie.
 
     Attributes
     ----------
@@ -184,7 +187,7 @@ class Sweep(NamedTuple):
     """
 
     runs: Records
-    bin_starts: NDArray[np.int64]
+    bin_starts: Integers
     sectors: Grid
 
 
@@ -197,8 +200,8 @@ class Pieces(NamedTuple):
     ends : (n,) of `ENDS`
     """
 
-    items: NDArray[np.int32]
-    starts: NDArray[np.int64]
+    items: Integers
+    starts: Integers
     ends: Records
 
 
@@ -215,11 +218,11 @@ class Measured(NamedTuple):
 
     directions: Records
     midpoints: Records
-    lengths: NDArray[np.float64]
+    lengths: Floats
     centroids: Records
-    spreads: NDArray[np.float64]
-    sigma: NDArray[np.float64]
-    points: NDArray[np.float64]
+    spreads: Floats
+    sigma: Floats
+    points: Floats
 
 
 class Rays(NamedTuple):
@@ -233,8 +236,8 @@ class Rays(NamedTuple):
         Metres; how far a beam without return is known to be free.
     """
 
-    angles: NDArray[np.float64]
-    ranges: NDArray[np.float64]
+    angles: Floats
+    ranges: Floats
     reach: float
 
 
@@ -261,7 +264,7 @@ class Blockers(NamedTuple):
     """
 
     counts: Records
-    touched: NDArray[np.int64]
+    touched: Integers
 
 
 class Plan(NamedTuple):
@@ -278,11 +281,11 @@ class Plan(NamedTuple):
     """
 
     bases: Records
-    uses: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    best_gains: NDArray[np.float64]
-    inliers: NDArray[np.uint64]
-    missing: NDArray[np.uint64]
+    uses: Floats
+    residual: Floats
+    best_gains: Floats
+    inliers: Words
+    missing: Words
 
 
 class Workspace(NamedTuple):
@@ -297,8 +300,8 @@ class Workspace(NamedTuple):
     """
 
     matches: Records
-    spreads: NDArray[np.float64]
-    held: NDArray[np.int64]
+    spreads: Floats
+    held: Integers
     scratch: Records
 
     @classmethod
@@ -315,6 +318,6 @@ def record(dtype: np.dtype[Any], /, **values: float) -> Records:
     return out
 
 
-def as_records(dtype: np.dtype[Any], rows: NDArray[np.float64]) -> Records:
+def as_records(dtype: np.dtype[Any], rows: Floats) -> Records:
     """Return the rows of a float array (n, fields) as records (n,), without a copy where it is contiguous."""
     return np.ascontiguousarray(rows, dtype=np.float64).view(dtype).reshape(-1)

@@ -13,7 +13,7 @@ from registration import Segments
 
 from .errors import InvalidMapError
 from .grids import directions_near, near_walls, swept_runs
-from .layout import ENDS, Grid, MapTables, Pieces, Place, Raster, Sweep, Walls, as_records
+from .layout import ENDS, Grid, Integers, MapTables, Pieces, Place, Raster, Sweep, Walls, as_records
 from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
 
@@ -55,7 +55,7 @@ class MapIndex:
     sigma: float
     origin: Floats
     directed: int
-    wall_of_piece: NDArray[np.int32]
+    wall_of_piece: Integers
     pieces: Pieces
     walls: Walls
     runs: Walls

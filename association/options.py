@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from registration import MeasuredSegments, RigidTransform, wrap_angle
 
-from .tuning import GREATEST_ANGLE_GATE, REACH
 from .errors import InvalidSearchError
+from .tuning import GREATEST_ANGLE_GATE, REACH
 
 Estimator = Literal["joint", "one_step"]
 Rotation = Literal["wahba", "mitsuta"]

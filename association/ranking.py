@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform
-from registration.layout import POSE
+from registration.layout import Records
 
 from .candidates import Candidates
 from .context import ANY, SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
-from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Rays, Records
+from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Rays
 from .tuning import (
     BEAM_FINALISTS,
     BEAMS_PASSED,
@@ -120,10 +120,11 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
 
 
 def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, windowed: bool) -> Ranked:
-    score, *measures = merit
+    score, length, share, reliability, misfit = merit
     within = value >= INSIDE / 2
     estimate, matches = scored.estimates[place : place + 1], scored.matches[place]
-    return Ranked(estimate, score, score if within else value, within or not windowed, *measures, matches)
+    value, inside = score if within else value, within or not windowed
+    return Ranked(estimate, score, value, inside, length, share, reliability, misfit, matches)
 
 
 def _distinct(estimates: Records, values: Floats, most: int) -> list[int]:
@@ -138,7 +139,7 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
     """Refine the poses on their consensus sets and score those, with lines of sight unless there are beams."""
     k, place = len(poses), context.index.tables.place
     scored = _Scored(np.zeros(k, ESTIMATE), np.zeros(k, MERIT), np.zeros((k, len(context.segments.rows)), MATCH))
-    for name in POSE.names:
+    for name in ("theta", "x", "y"):
         scored.estimates[name] = poses[name]
     rank(context.question(ANY), place, context.view, scored.estimates, scored.merits, scored.matches, context.workspace)
     return scored
@@ -171,7 +172,9 @@ def _beam_scores(context: SearchContext, poses: Records, most: int, refined: int
     Moves the first `refined` of the poses.
     """
     evidence = np.zeros(len(poses), BEAM_EVIDENCE)
-    weigh_beams(_rays(context, most), context.view, poses, context.index.tables.place, refined, context.workspace, evidence)
+    weigh_beams(
+        _rays(context, most), context.view, poses, context.index.tables.place, refined, context.workspace, evidence
+    )
     return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])
 
 

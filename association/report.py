@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration import RegistrationResult
+from registration.layout import Floats
 
 from .acceptance import correspondences
 from .context import SearchContext
@@ -23,8 +23,6 @@ from .result import (
 from .sight import missing_segments
 from .tuning import FACING
 from .verdict import Verdict
-
-Floats = NDArray[np.float64]
 
 
 def report(context: SearchContext, explanations: Explanations, verdict: Verdict) -> AssociationResult:

@@ -8,8 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from registration.layout import Records
+
 from .kernels.scans import describe_segments
-from .layout import GATES, POINT, VARIANCES, Measured, Records, as_records, record
+from .layout import GATES, POINT, VARIANCES, Measured, as_records, record
 from .options import AssociationOptions, Scan
 from .tuning import (
     COMMON_ERROR,

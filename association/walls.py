@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from registration import Segments
 
 from .kernels.walls import collinear_groups
-from .layout import ENDS, POINT, WALL, Walls, as_records
+from .layout import ENDS, POINT, WALL, Integers, Walls, as_records
 from .tuning import DIRECTION_BINS, MERGE_ANGLE, MERGE_LATERAL
 
 Floats = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 def both_ways(segments: Segments) -> Segments:
@@ -22,7 +21,7 @@ def both_ways(segments: Segments) -> Segments:
     return Segments.from_array(np.concatenate([segments.endpoints, segments.endpoints[:, [2, 3, 0, 1]]]))
 
 
-def merge(local: Segments, gap: float) -> tuple[Walls, Indices]:
+def merge(local: Segments, gap: float) -> tuple[Walls, Integers]:
     """Put one line through each group of collinear pieces up to `gap` apart; a group that is not straight stays apart.
 
     Returns
@@ -61,13 +60,13 @@ class _Lines:
         return len(self.offsets)
 
 
-def _lines(local: Segments, labels: NDArray[np.intp]) -> tuple[NDArray[np.intp], _Lines]:
+def _lines(local: Segments, labels: Integers) -> tuple[NDArray[np.intp], _Lines]:
     """Return the group of each piece, counted from 0, and the groups' lines."""
     _, wall = np.unique(labels, return_inverse=True)
     return wall, _Lines(local, wall, int(wall.max()) + 1)
 
 
-def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Walls, Indices]:
+def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Walls, Integers]:
     """Order the lines by direction bin, the longest of a bin first, as far as their pieces reach."""
     m, d = len(lines), lines.directions
     begins, ends = np.full(m, np.inf), np.full(m, -np.inf)
@@ -88,7 +87,7 @@ def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Wal
     return Walls(rows, starts, longest, np.concatenate([[0.0], np.cumsum(longest)])), place[wall]
 
 
-def link(walls: Walls, run: Indices) -> None:
+def link(walls: Walls, run: Integers) -> None:
     """Name in each wall its neighbours on its run, (m,)."""
     order = np.lexsort((walls.rows["begin"], run))
     before, after = order[:-1], order[1:]

@@ -29,7 +29,7 @@ from association import (
     SoftPrior,
     associate,
 )
-from registration import MeasuredSegments, RigidTransform, Segments
+from registration import RigidTransform
 from vectorization import vectorize
 
 from .collection import Collection, MapKey, Query

@@ -16,13 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from association.accept import accept, register_accepted
+from association.scan_rows import scan_rows
 from scipy.optimize import minimize
 
 from association import Deadline, MapIndex
-from association.accept import accept, register_accepted
 from association.candidates import find_candidates
 from association.ranking import rank_candidates
-from association.scan_rows import scan_rows
 from association.sight import agreement
 from association.verdict import (
     CAUTIOUS,

@@ -5,14 +5,15 @@ import math
 import numpy as np
 
 from registration.compiling import inlined, kernel
+from registration.layout import Floats, Records
 
-from ..layout import BLOCKER, Blockers
+from ..layout import BLOCKER, Blockers, Indices, Integers, Pieces, Place, Workspace
 from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT
 from .sight import count_blockers
 
 
 @kernel
-def union_length(lows, highs, count):
+def union_length(lows: Floats, highs: Floats, count: int) -> float:
     """Return the length of the union of the first `count` intervals."""
     if count == 1:
         return highs[0] - lows[0]
@@ -27,7 +28,7 @@ def union_length(lows, highs, count):
 
 
 @inlined
-def first_wall(walls, w, bridging):
+def first_wall(walls: Records, w: int, bridging: bool) -> int:
     """Return the first wall of the run that wall `w` is on, or itself where nothing may bridge a doorway."""
     while bridging and walls[w].before >= 0:
         w = walls[w].before
@@ -35,7 +36,9 @@ def first_wall(walls, w, bridging):
 
 
 @kernel
-def accept_matches(matches, order, scan_ends, pose, walls, pieces):
+def accept_matches(
+    matches: Records, order: Integers, scan_ends: Records, pose: Records, walls: Records, pieces: Pieces
+) -> tuple[Indices, Floats, Indices, Indices]:
     """Pick for every matched scan segment the piece of its wall that it lies on most, of equal ones the first.
 
     `order` (n,) is the scan index of each match; `pose` (1,). Returns, by scan index, pairs (k, 2) of scan index and
@@ -55,9 +58,7 @@ def accept_matches(matches, order, scan_ends, pose, walls, pieces):
         w = matches[row].wall
         if w >= 0:
             i = order[row]
-            length = math.hypot(
-                scan_ends[i].x2 - scan_ends[i].x1, scan_ends[i].y2 - scan_ends[i].y1
-            )
+            length = math.hypot(scan_ends[i].x2 - scan_ends[i].x1, scan_ends[i].y2 - scan_ends[i].y1)
             bridging[i] = length > BRIDGING
             w = first_wall(walls, w, bridging[i])
             wall_of[i] = w
@@ -122,7 +123,9 @@ def accept_matches(matches, order, scan_ends, pose, walls, pieces):
 
 
 @kernel
-def missing_pieces(scan, matches, view, pose, place, pieces, work):
+def missing_pieces(
+    scan: Records, matches: Records, view: Records, pose: Records, place: Place, pieces: Pieces, work: Workspace
+) -> Indices:
     """List the pieces of walls that rays to the consensus set pass through, of which nothing was seen.
 
     `view` and `pose` (1,).

@@ -5,7 +5,9 @@ import math
 import numpy as np
 
 from registration.compiling import kernel
+from registration.layout import Floats, Records
 
+from ..layout import Flags, Place, Workspace
 from ..tuning import (
     AGREEING,
     AGREEING_SHARE,
@@ -22,7 +24,7 @@ from .sight import first_hit
 
 
 @kernel
-def scan_distances(scan, x, y, distances):
+def scan_distances(scan: Records, x: float, y: float, distances: Floats) -> float:
     """Write the distance from ``(x, y)`` in the scan frame to the first segment along each ray, inf where none is.
 
     Returns how far the scan reaches.
@@ -50,7 +52,7 @@ def scan_distances(scan, x, y, distances):
 
 
 @kernel
-def in_view(distances, view):
+def in_view(distances: Floats, view: Flags) -> None:
     """Tell of each ray whether the sensor looked there: all but the widest gap without segments, if that is wide."""
     rays = len(distances)
     view[:] = True
@@ -77,7 +79,7 @@ def in_view(distances, view):
 
 
 @kernel
-def agreement(scan, view, pose, place, work):
+def agreement(scan: Records, view: Records, pose: Records, place: Place, work: Workspace) -> float:
     """Return of the directions that tell something the share in which the scan shows what the map does, 0 to 1.
 
     Rays from the sensor. For: the first segment and the first wall are as far away. Against: the wall is before the

@@ -4,7 +4,9 @@ import math
 
 from registration.compiling import kernel
 from registration.kernels import joint_add, joint_solve
+from registration.layout import Record, Records
 
+from ..layout import Place, Rays, Workspace
 from ..tuning import (
     BEAM_GATES,
     BEHIND,
@@ -20,7 +22,7 @@ from .sight import first_hit
 
 
 @kernel
-def beam_evidence(rays, view, pose, place, ray, evidence):
+def beam_evidence(rays: Rays, view: Record, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
     """Write the shares of the beams that read the wall they should, and that passed through one, to `evidence`.
 
     A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
@@ -60,7 +62,7 @@ def beam_evidence(rays, view, pose, place, ray, evidence):
 
 
 @kernel
-def refine_by_beams(rays, view, pose, place, gate, work):
+def refine_by_beams(rays: Rays, view: Record, pose: Record, place: Place, gate: float, work: Workspace) -> None:
     """Move `pose` to where the ends of the beams lie on the walls nearest to them, up to `gate` metres off.
 
     One round of point-to-line least squares by the same sums; a point is a pair without spread. A direction that no
@@ -112,7 +114,9 @@ def refine_by_beams(rays, view, pose, place, gate, work):
 
 
 @kernel
-def weigh_beams(rays, view, poses, place, refined, work, out):
+def weigh_beams(
+    rays: Rays, view: Records, poses: Records, place: Place, refined: int, work: Workspace, out: Records
+) -> None:
     """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`. `view` (1,).
 
     The first `refined` poses are moved to where the beams fit best, if they fit better there.

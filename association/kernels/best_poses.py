@@ -3,6 +3,7 @@
 import numpy as np
 
 from registration.compiling import inlined, kernel
+from registration.layout import Floats, Record, Records
 
 from ..layout import HARD_PRIOR, NO_PRIOR
 from ..tuning import INSIDE, SOFT_FLOOR
@@ -10,7 +11,7 @@ from .matching import wrap
 
 
 @kernel
-def prior_value(prior, pose):
+def prior_value(prior: Record, pose: Record) -> float:
     """Return what the prior says of a pose, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
     if prior.kind == NO_PRIOR:
         return 0.0
@@ -31,7 +32,7 @@ def prior_value(prior, pose):
 
 
 @kernel
-def prior_values(prior, poses):
+def prior_values(prior: Records, poses: Records) -> Floats:
     """Return what the prior (1,) says of each of the poses (k,), nats."""
     values = np.empty(len(poses))
     for k in range(len(poses)):
@@ -40,7 +41,7 @@ def prior_values(prior, poses):
 
 
 @kernel
-def keep(found, progress, rules, pose, score, value):
+def keep(found: Records, progress: Record, rules: Record, pose: Record, score: float, value: float) -> None:
     """Put a pose among the best, at most one within the distance and angle of `rules`; ties keep the earlier."""
     n = progress.count
     near = -1
@@ -79,13 +80,13 @@ def keep(found, progress, rules, pose, score, value):
 
 
 @inlined
-def floor_of(rules, progress, bonus):
+def floor_of(rules: Record, progress: Record, bonus: float) -> float:
     """Return the score that a pose must reach to be kept, given what the prior says of it."""
     return max(rules.kept_share * progress.best_value, progress.least_kept) - bonus
 
 
 @kernel
-def offer(found, progress, rules, prior, pose, score):
+def offer(found: Records, progress: Record, rules: Record, prior: Record, pose: Record, score: float) -> None:
     """Keep a refined pose if it is worth it."""
     bonus = prior_value(prior, pose)
     if prior.kind == HARD_PRIOR:

@@ -5,12 +5,15 @@ import math
 import numpy as np
 
 from registration.compiling import kernel
+from registration.layout import Floats, Records
 
 from ..tuning import LEAST_CHANCE, MOST_CHANCE
 
 
 @kernel
-def chance_matches(scan, lengths, beyond, agreeing, area, gates):
+def chance_matches(
+    scan: Records, lengths: Floats, beyond: Floats, agreeing: float, area: float, gates: Records
+) -> Floats:
     """Return (n,) the probability that each scan segment lies on a wall at a random pose with agreeing directions.
 
     `lengths` (m,): of the walls, ascending; ``beyond[k]`` is the sum of those from k on, (m + 1,). `agreeing` is the
@@ -34,7 +37,7 @@ def chance_matches(scan, lengths, beyond, agreeing, area, gates):
 
 
 @kernel
-def log_tail(scan, chances, score, exponents):
+def log_tail(scan: Records, chances: Floats, score: float, exponents: Floats) -> float:
     """Return Chernoff's bound on the log of the probability that gains drawn with `chances` come to `score`.
 
     The least of it over the ascending `exponents`. It is convex in the exponent, so bisection by its slope finds the

@@ -4,13 +4,15 @@ import math
 
 from registration.compiling import inlined, kernel
 from registration.kernels import invert3, joint_add, joint_information, joint_solve
+from registration.layout import Record, Records
 
+from ..layout import Place, Workspace
 from ..tuning import MAX_STEP, MAX_TURN, SPRING
 from .matching import match_scan, wrap
 
 
 @kernel
-def turning(theta_var, gx, gy, covariance):
+def turning(theta_var: float, gx: float, gy: float, covariance: Record) -> None:
     """Write the covariance of a pose held at a point, and turning about it with `theta_var`.
 
     ``(gx, gy)`` is that point in the scan frame, rotated: the lever from the sensor to it.
@@ -24,7 +26,7 @@ def turning(theta_var, gx, gy, covariance):
 
 
 @kernel
-def value_matches(scan, matches):
+def value_matches(scan: Records, matches: Records) -> float:
     """Give each match its worth, the gain less half its chi-square, at least 0 (clutter); return their sum, nats."""
     total = 0.0
     for i in range(len(scan)):
@@ -43,7 +45,7 @@ def value_matches(scan, matches):
 
 
 @inlined
-def hold(sums, x, y, sign):
+def hold(sums: Record, x: float, y: float, sign: float) -> None:
     """Add or remove the weak spring that holds a translation where it is."""
     sums.xx += sign * SPRING
     sums.yy += sign * SPRING
@@ -53,7 +55,7 @@ def hold(sums, x, y, sign):
 
 
 @kernel
-def clear(sums):
+def clear(sums: Record) -> None:
     """Set the sums to those of no pair."""
     sums.cc = 0.0
     sums.cs = 0.0
@@ -76,7 +78,9 @@ def clear(sums):
 
 
 @kernel
-def refine(scan, estimate, place, gates, matches, work, rounds):
+def refine(
+    scan: Records, estimate: Record, place: Place, gates: Record, matches: Records, work: Workspace, rounds: int
+) -> float:
     """Grow and shrink the consensus set at a pose, solving anew each time; pose and covariance move in place.
 
     Pairs that come or go change the sums of `work` in constant time. Returns the score in nats; the consensus set stays

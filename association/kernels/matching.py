@@ -3,20 +3,24 @@
 import math
 
 from registration.compiling import inlined, kernel
+from registration.layout import Floats, Record, Records
 
+from ..layout import Place, Raster
 from ..tuning import BRIDGING, SECTORS
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)
 
 
 @inlined
-def wrap(angle):
+def wrap(angle: float) -> float:
     """Return the angle in [-pi, pi]."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 @kernel
-def match_scan(scan, estimate, place, gates, threshold, matches):
+def match_scan(
+    scan: Records, estimate: Record, place: Place, gates: Record, threshold: float, matches: Records
+) -> float:
     """Find for every scan segment the wall that it lies on best, the most telling segments first.
 
     Gated by the innovation: ``offset^2`` against ``sigma^2 + g' C g`` with the pose's covariance C. Best is least in
@@ -111,7 +115,7 @@ def match_scan(scan, estimate, place, gates, threshold, matches):
 
 
 @kernel
-def angle_spreads(scan, theta_var, gates, spreads):
+def angle_spreads(scan: Records, theta_var: float, gates: Record, spreads: Floats) -> None:
     """Write the angle gate of every scan segment at a pose with that variance, in sectors.
 
     A hundredth wider than `match_scan` has it, which tests a cosine to the second order.
@@ -123,7 +127,7 @@ def angle_spreads(scan, theta_var, gates, spreads):
 
 
 @kernel
-def may_score(scan, pose, spreads, raster, threshold):
+def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, threshold: float) -> bool:
     """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
 
     Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or

@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from registration.compiling import kernel
+from registration.layout import Floats, Records
 
-from ..layout import BASE
+from ..layout import BASE, MapTables, Plan, Question, Walls, Words, Workspace
 from ..tuning import (
     COST_ANCHOR,
     COST_BASE,
@@ -26,7 +27,7 @@ from .proposing import least_length, search_base
 
 
 @kernel
-def slack_tables(scan, count, runs):
+def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats]:
     """Sum over the runs of each direction bin how far scan segment i could slide on them.
 
     Returns slides (count, bins) in metres and the number of runs long enough for each segment (count,).
@@ -55,7 +56,7 @@ def slack_tables(scan, count, runs):
 
 
 @kernel
-def is_telling(scan, a, b):
+def is_telling(scan: Records, a: int, b: int) -> bool:
     """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
 
     Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
@@ -74,7 +75,7 @@ def is_telling(scan, a, b):
 
 
 @kernel
-def plan_bases(scan, count, runs, area):
+def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
     """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`.
 
     The merit is what the base can tell (the lesser gain) over what it will cost. `area` is that of the map, m^2.
@@ -124,7 +125,7 @@ def plan_bases(scan, count, runs, area):
 
 
 @kernel
-def next_base(bases, uses):
+def next_base(bases: Records, uses: Floats) -> int:
     """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
 
     Ties go to the pair that comes first, that of the longest segments.
@@ -147,7 +148,7 @@ def next_base(bases, uses):
 
 
 @kernel
-def cover(residual, a, b):
+def cover(residual: Floats, a: int, b: int) -> float:
     """Return by how much a base lowers the bound on what a pose can score that contains none of the bases so far.
 
     Such a pose lacks one segment of each base. The greedy packing of the gains over the bases is a feasible solution of
@@ -160,7 +161,7 @@ def cover(residual, a, b):
 
 
 @kernel
-def strike(missing, inliers, a, b, fewest):
+def strike(missing: Words, inliers: Words, a: int, b: int, fewest: int) -> float:
     """Take a base off the sampled consensus sets that have missed all bases so far.
 
     ``inliers[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1 segments, ``missing[m]`` which
@@ -181,7 +182,7 @@ def strike(missing, inliers, a, b, fewest):
 
 
 @kernel
-def fewest_segments(best_gains, beyond, needed):
+def fewest_segments(best_gains: Floats, beyond: float, needed: float) -> int:
     """Return how many of the first segments a consensus set has at least that scores `needed`.
 
     `best_gains` (n,): their gains, the largest first; `beyond`: what all other segments of the scan could add.
@@ -199,7 +200,16 @@ BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
 
 @kernel
-def advance(question, tables, plan, found, progress, work, allowed, budget):
+def advance(
+    question: Question,
+    tables: MapTables,
+    plan: Plan,
+    found: Records,
+    progress: Records,
+    work: Workspace,
+    allowed: float,
+    budget: int,
+) -> int:
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
     `allowed` is the greatest chance of having missed a better consensus set, -1 to go through all bases; `progress`

@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from registration.compiling import inlined, kernel
+from registration.layout import Record, Records
 
-from ..layout import HARD_PRIOR
+from ..layout import HARD_PRIOR, Integers, MapTables, Place, Question, Raster, Workspace
 from ..tuning import (
     BASE_SLACK,
     BASE_SLACK_SHARE,
@@ -28,19 +29,19 @@ from .matching import PER_RADIAN, angle_spreads, match_scan, may_score, wrap
 
 
 @inlined
-def end_slack(length):
+def end_slack(length: float) -> float:
     """Return how far a scan segment, as part of a base, may stick out at each end of its wall."""
     return BASE_SLACK + BASE_SLACK_SHARE * length
 
 
 @inlined
-def least_length(length):
+def least_length(length: float) -> float:
     """Return how long a wall is at least under a scan segment of a base."""
     return length - 2.0 * end_slack(length)
 
 
 @kernel
-def anchors(length, runs, bin_starts, out):
+def anchors(length: float, runs: Records, bin_starts: Integers, out: Integers) -> int:
     """List the runs long enough for a scan segment of `length` metres."""
     n = 0
     need = least_length(length)
@@ -54,7 +55,7 @@ def anchors(length, runs, bin_starts, out):
 
 
 @kernel
-def base_pose(a, b, wa, wb, pose):
+def base_pose(a: Record, b: Record, wa: Record, wb: Record, pose: Record) -> bool:
     """Write the pose that puts the midpoints of `a` and `b` on the lines `wa` and `wb`.
 
     Splits the misfit of the angles by their variances. Returns whether both segments then lie within the ends of their
@@ -87,7 +88,9 @@ def base_pose(a, b, wa, wb, pose):
 
 
 @kernel
-def try_pose(question, place, raster, found, progress, work):
+def try_pose(
+    question: Question, place: Place, raster: Raster, found: Records, progress: Record, work: Workspace
+) -> int:
     """Score the pose of the workspace, given with its covariance; keep it if it is among the best.
 
     Returns what it cost, in tests of a wall.
@@ -118,7 +121,9 @@ def try_pose(question, place, raster, found, progress, work):
 
 
 @kernel
-def search_base(question, tables, base, found, progress, work, budget):
+def search_base(
+    question: Question, tables: MapTables, base: Record, found: Records, progress: Record, work: Workspace, budget: int
+) -> int:
     """Go through all pairs of runs that fit a base of two scan segments a, which slides, and b.
 
     A run under a fixes the rotation and leaves one slide; the grid is walked along what the midpoint of b then sweeps.
@@ -259,7 +264,16 @@ def search_base(question, tables, base, found, progress, work, budget):
 
 
 @kernel
-def search_slides(question, tables, sliding, found, progress, work, spacing, budget):
+def search_slides(
+    question: Question,
+    tables: MapTables,
+    sliding: int,
+    found: Records,
+    progress: Records,
+    work: Workspace,
+    spacing: float,
+    budget: int,
+) -> bool:
     """Lay scan segment `sliding` on every run that is long enough, at slides `spacing` metres apart; keep the best.
 
     For scans without a base: what is found is a family of poses, fixed across the walls and free along them. Goes on

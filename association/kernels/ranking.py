@@ -6,9 +6,9 @@ import numpy as np
 
 from registration.compiling import kernel
 from registration.kernels import invert3
-from registration.layout import SYMMETRIC3
+from registration.layout import SYMMETRIC3, Records
 
-from ..layout import BLOCKER, Blockers
+from ..layout import BLOCKER, Blockers, Integers, Place, Question, Workspace
 from ..tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
 from .consensus import refine
 from .matching import wrap
@@ -16,7 +16,15 @@ from .sight import count_blockers, sight_penalty
 
 
 @kernel
-def rank(question, place, view, estimates, merits, matches, work):
+def rank(
+    question: Question,
+    place: Place,
+    view: Records,
+    estimates: Records,
+    merits: Records,
+    matches: Records,
+    work: Workspace,
+) -> None:
     """Refine the candidate poses of `estimates` (k,) in place and score them with the lines of sight.
 
     The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). `view` (1,).
@@ -61,7 +69,7 @@ def rank(question, place, view, estimates, merits, matches, work):
 
 
 @kernel
-def distinct(poses, order, most, distance, angle, same_family):
+def distinct(poses: Records, order: Integers, most: int, distance: float, angle: float, same_family: float) -> Integers:
     """Pick from `order`, the best first, at most `most` poses without those that a better one stands for.
 
     A pose stands for those that are near, within `distance` metres and `angle` radians, and for those that its own

@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from registration.compiling import kernel
+from registration.layout import Records
 
-from ..layout import SCAN_SEGMENT
+from ..layout import SCAN_SEGMENT, Integers, Measured
 from ..tuning import (
     GAIN,
     GAIN_LENGTH,
@@ -19,7 +20,7 @@ from ..tuning import (
 
 
 @kernel
-def describe_segments(measured, order, variances):
+def describe_segments(measured: Measured, order: Integers, variances: Records) -> Records:
     """Return the segments of `measured` in `order`, (n,) of `SCAN_SEGMENT`; `variances` (1,) of `VARIANCES`."""
     directions = measured.directions
     midpoints = measured.midpoints

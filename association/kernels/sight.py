@@ -3,7 +3,9 @@
 import math
 
 from registration.compiling import kernel
+from registration.layout import Record, Records
 
+from ..layout import Blockers, Integers, Place
 from ..tuning import (
     BLOCKED,
     BLOCKED_CLUTTER,
@@ -17,7 +19,7 @@ from ..tuning import (
 
 
 @kernel
-def first_hit(ray, walls, starts, items, shape):
+def first_hit(ray: Record, walls: Records, starts: Integers, items: Integers, shape: Record) -> tuple[float, int]:
     """Return the distance to the first wall along a ray and that wall, ``(limit, -1)`` when there is none before.
 
     Takes the arrays of a `Place` one by one: it is called for each ray, and takes no time to count references.
@@ -79,7 +81,9 @@ def first_hit(ray, walls, starts, items, shape):
 
 
 @kernel
-def count_blockers(scan, matches, view, pose, place, blockers, ray):
+def count_blockers(
+    scan: Records, matches: Records, view: Record, pose: Record, place: Place, blockers: Blockers, ray: Record
+) -> int:
     """Count for every wall the rays to segments that pass through it well before their end.
 
     `blockers` counts nothing before. Returns how many walls that are, listed in ``blockers.touched``.
@@ -126,7 +130,7 @@ def count_blockers(scan, matches, view, pose, place, blockers, ray):
 
 
 @kernel
-def sight_penalty(blockers, count, walls):
+def sight_penalty(blockers: Blockers, count: int, walls: Records) -> float:
     """Return what the walls that should have blocked the view speak against a pose, nats, at least 0; clear the counts.
 
     A wall counts once, however many rays pass, and by its length: short ones on a map made by a robot are often people

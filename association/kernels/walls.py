@@ -5,12 +5,14 @@ import math
 import numpy as np
 
 from registration.compiling import kernel
+from registration.layout import Records
 
+from ..layout import Integers
 from ..tuning import MOST_LOOKS
 
 
 @kernel
-def _find(parent, i):
+def _find(parent: Integers, i: int) -> int:
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -18,10 +20,13 @@ def _find(parent, i):
 
 
 @kernel
-def collinear_groups(ends, directions, max_gap, max_lateral, min_cos):
+def collinear_groups(
+    ends: Records, directions: Records, max_gap: float, max_lateral: float, min_cos: float
+) -> Integers:
     """Label pieces that continue one another: the end of one within `max_gap` of the begin of the other.
 
-    Where more than `MOST_LOOKS` begin in one cell, as on no map of a building, some are not merged. `ends` (n,) of `ENDS`, `directions` (n,) of `POINT`. Returns (n,) labels, the lowest index of each group.
+    Where more than `MOST_LOOKS` begin in one cell, as on no map of a building, some are not merged. `ends` (n,) of
+    `ENDS`, `directions` (n,) of `POINT`. Returns (n,) labels, the lowest index of each group.
     """
     n = len(ends)
     parent = np.arange(n)
@@ -72,12 +77,14 @@ def collinear_groups(ends, directions, max_gap, max_lateral, min_cos):
 
 
 @kernel
-def _cell_hash(column, row, buckets):
+def _cell_hash(column: int, row: int, buckets: int) -> int:
     return (int(column) * 73856093 ^ int(row) * 19349663) & (buckets - 1)
 
 
 @kernel
-def _column_span(x1, y1, x2, y2, radius, low, high):
+def _column_span(
+    x1: float, y1: float, x2: float, y2: float, radius: float, low: float, high: float
+) -> tuple[float, float]:
     """Return the span of y that a segment dilated by `radius` may have between two values of x."""
     left = max(low - radius, min(x1, x2))
     right = min(high + radius, max(x1, x2))
@@ -95,7 +102,7 @@ def _column_span(x1, y1, x2, y2, radius, low, high):
 
 
 @kernel
-def grid_cells(ends, radius, shape):
+def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, Integers]:
     """List for every cell of a uniform grid the walls that come within `radius` of the cell.
 
     `shape` (1,) of `GRID_SHAPE`. Returns ``(starts, items)``: cell ``c = row * columns + column``
@@ -139,7 +146,7 @@ def grid_cells(ends, radius, shape):
 
 
 @kernel
-def direction_raster(ends, radius, shape, sectors):
+def direction_raster(ends: Records, radius: float, shape: Records, sectors: Integers) -> Integers:
     """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of. Returns (rows * columns,) of bits."""
     x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
     columns, rows = shape[0].columns, shape[0].rows
