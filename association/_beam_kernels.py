@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 
+from registration import kernels
 from registration.compiling import kernel
+from registration.layout import JOINT_SUMS, SEEN
 
-from ._joint_kernels import joint_add, joint_solve
+from ._joint_kernels import WALL, joint_solve
 from ._match_kernels import hold
 from ._sight_kernels import first_hit
 
@@ -56,6 +58,10 @@ def refine_by_beams(angles, ranges, viewpoint, pose, walls, starts, items, shape
     wall fixes is held where it is.
     """
     sums[:] = 0.0
+    lines = walls.view(WALL)
+    points = np.zeros(1, SEEN)
+    point = points[0]
+    point.dx = 1.0
     c = math.cos(pose[0])
     s = math.sin(pose[0])
     for i in range(len(angles)):
@@ -80,7 +86,10 @@ def refine_by_beams(angles, ranges, viewpoint, pose, walls, starts, items, shape
                 least = off
                 nearest = w
         if nearest >= 0:
-            joint_add(sums, -walls[nearest, 1], walls[nearest, 0], walls[nearest, 2], px, py, 1.0, 0.0, 0.0, 1.0, 1.0)
+            point.centroid_x = px
+            point.centroid_y = py
+            kernels.joint_add(sums.view(JOINT_SUMS)[0], lines[nearest, 0], point, 1.0, 1.0)
+    kernels.keep_alive(points)
     if sums[17] < LEAST_POINTS:
         return
     hold(sums, pose[1], pose[2], 1.0)

@@ -4,23 +4,16 @@ import numpy as np
 
 from registration import kernels
 from registration.compiling import kernel
-from registration.layout import JOINT_SUMS, LINE, SEEN, SYMMETRIC3
+from registration.layout import JOINT_SUMS, LINE, SYMMETRIC3
 
-
-@kernel
-def joint_add(sums, nx, ny, p, mx, my, dx, dy, spread, weight, sign):
-    """Add (`sign` 1) or remove (-1) one pair: map line ``(nx, ny, p)``, scan centroid, direction, second moment."""
-    line = np.empty(1, LINE)
-    line[0].dx = ny
-    line[0].dy = -nx
-    line[0].offset = p
-    seen = np.empty(1, SEEN)
-    seen[0].centroid_x = mx
-    seen[0].centroid_y = my
-    seen[0].dx = dx
-    seen[0].dy = dy
-    seen[0].spread = spread
-    kernels.joint_add(sums.view(JOINT_SUMS)[0], line[0], seen[0], weight, sign)
+# The rows of `walls` and `scan`, see `_match_kernels`, as far as the sums read them.
+WALL = np.dtype([*LINE.descr, ("others", "f8", 5)])
+SCAN_SEGMENT = np.dtype(
+    [
+        ("dx", "f8"), ("dy", "f8"), ("before", "f8", 4),
+        ("centroid_x", "f8"), ("centroid_y", "f8"), ("spread", "f8"), ("after", "f8", 7),
+    ]
+)  # fmt: skip
 
 
 @kernel
@@ -44,3 +37,4 @@ def joint_information(sums, theta, out):
     out[1, 2] = f.yt
     out[2, 1] = f.yt
     out[2, 2] = f.tt
+    kernels.keep_alive(record)

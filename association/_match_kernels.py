@@ -9,9 +9,11 @@ import math
 
 import numpy as np
 
+from registration import kernels
 from registration.compiling import inlined, kernel
+from registration.layout import JOINT_SUMS
 
-from ._joint_kernels import joint_add, joint_information, joint_solve
+from ._joint_kernels import SCAN_SEGMENT, WALL, joint_information, joint_solve
 
 # Columns of `walls` (m, 8), one cache line a wall: 0, 1 unit direction; 2 offset along the left normal; 3, 4 abscissae
 # of begin and end along the direction; 5 angle; 6, 7 the walls before and after it on its run (collinear, across a
@@ -218,10 +220,9 @@ def invert3(f, out):
 @kernel
 def pair(scan, i, walls, w, sign, sums):
     """Add scan segment `i` on wall `w` to the sums (`sign` 1) or remove it (-1)."""
-    joint_add(
-        sums, -walls[w, 1], walls[w, 0], walls[w, 2], scan[i, 6], scan[i, 7], scan[i, 0], scan[i, 1],
-        scan[i, 8], scan[i, 11], sign,
-    )  # fmt: skip
+    line = walls.view(WALL)[w, 0]
+    seen = scan.view(SCAN_SEGMENT)[i, 0]
+    kernels.joint_add(sums.view(JOINT_SUMS)[0], line, seen, scan[i, 11], sign)
 
 
 @kernel
