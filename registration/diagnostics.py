@@ -6,17 +6,15 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .estimate import Fit, Problem
 from .joint import JointSums
-from .kernels.of_arrays import carried_matrix
+from .kernels.of_arrays import carried_matrix, inverse
 from .kernels.pairs import residuals
+from .layout import Floats
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .transform import RigidTransform
-
-Floats = NDArray[np.float64]
 
 
 def no_answer(options: RegistrationOptions) -> RegistrationResult:
@@ -69,7 +67,7 @@ def covariance_of(problem: Problem, fit: Fit) -> Floats:
     information ``i``, ``F(w)^-1 F(w^2 / i) F(w)^-1``.
     """
     weights, theta = problem.weights, fit.local_from_scan.theta
-    covariance = fit.sums.inverse_information(theta)
+    covariance = inverse(fit.sums.information(theta))
     if weights.information is not weights.used:
         scatter = JointSums.of_set(problem.centred, weights.used**2 / weights.information).information(theta)
         covariance = covariance @ scatter @ covariance

@@ -133,10 +133,6 @@ class JointSums:
         """Return the information of additive (x, y, theta) in the map frame at rotation `theta`, (3, 3)."""
         return of_arrays.information(self.compensated, float(theta))
 
-    def inverse_information(self, theta: float) -> Floats:
-        """Return the inverse of `information`, (3, 3), which has to be regular."""
-        return of_arrays.inverse_information(self.compensated, float(theta))
-
     def is_regular(self, theta: float, least: float) -> bool:
         """Tell whether `information`, scaled to a unit diagonal, has only eigenvalues over `least`."""
         return of_arrays.is_regular(self.compensated, float(theta), least)

@@ -19,6 +19,9 @@ Record: TypeAlias = Any  # an element of one; type checkers cannot see its field
 
 X, Y = 0, 1  # columns of an (n, 2) array of points or directions
 
+# The ends of a segment.
+SEGMENT = np.dtype([("begin_x", "f8"), ("begin_y", "f8"), ("end_x", "f8"), ("end_y", "f8")])  # m
+
 # A map line, in the map frame.
 LINE = np.dtype(
     [

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .correspondences import Correspondences
 from .joint import JointSums
+from .layout import Floats
 from .transform import wrap_angle
-
-Floats = NDArray[np.float64]
 
 MARGIN = 9.0  # of chi-square: three standard deviations
 SAME_ANGLE = 1e-6  # rad; both starts have come down to one minimum

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import kernel
-from ..layout import COVARIANCE, INFORMATION, Floats, Records
+from ..layout import INFORMATION, SYMMETRIC3, Floats, Records
 from .joint import joint_cost, joint_information, joint_solve
 from .matrices import carried, invert3_scaled, is_regular3
 from .one_step import one_step_solve
@@ -71,27 +71,33 @@ def marginal(sums: Records, theta: float) -> tuple[float, float, float]:
 
 
 @kernel
-def inverse_information(sums: Records, theta: float) -> Floats:
-    """Return the inverse of `information`, which has to be regular."""
-    out = np.empty(1, INFORMATION)
-    joint_information(sums[0], theta, out[0])
-    invert3_scaled(out[0], out[0])
-    return full_matrix(out)
+def upper_triangle(matrix: Floats) -> Records:
+    """Return the upper triangle of a (3, 3) matrix, an array of one SYMMETRIC3."""
+    out = np.empty(1, SYMMETRIC3)
+    m = out[0]
+    m.xx = matrix[0, 0]
+    m.xy = matrix[0, 1]
+    m.xt = matrix[0, 2]
+    m.yy = matrix[1, 1]
+    m.yt = matrix[1, 2]
+    m.tt = matrix[2, 2]
+    return out
+
+
+@kernel
+def inverse(matrix: Floats) -> Floats:
+    """Do as `invert3_scaled` with a (3, 3) matrix."""
+    m = upper_triangle(matrix)
+    invert3_scaled(m[0], m[0])
+    return full_matrix(m)
 
 
 @kernel
 def carried_matrix(covariance: Floats, x: float, y: float) -> Floats:
-    """Do as `carried` with the upper triangle of a (3, 3) matrix."""
-    out = np.empty(1, COVARIANCE)
-    m = out[0]
-    m.xx = covariance[0, 0]
-    m.xy = covariance[0, 1]
-    m.xt = covariance[0, 2]
-    m.yy = covariance[1, 1]
-    m.yt = covariance[1, 2]
-    m.tt = covariance[2, 2]
-    carried(m, x, y, m)
-    return full_matrix(out)
+    """Do as `carried` with a (3, 3) matrix."""
+    m = upper_triangle(covariance)
+    carried(m[0], x, y, m[0])
+    return full_matrix(m)
 
 
 @kernel
