@@ -48,11 +48,12 @@ class Correspondences:
             of the first row at fault.
         """
         chosen = _checked_pairs(pairs, len(scan), len(map_segments))
-        of_map, of_scan = (
-            kernels.SegmentArrays(s.directions, s.midpoints, s.lengths) for s in (map_segments, scan.segments)
-        )
-        points = kernels.PointArrays(scan.centroids, scan.spreads, scan.sigma, scan.points)
-        return cls(kernels.gather(chosen[:, 0], chosen[:, 1], of_map, of_scan, points))
+        m, s = map_segments, scan.segments
+        rows = kernels.empty_pairs(len(chosen))
+        kernels.fill_in_map(rows, chosen, m.directions, m.midpoints, m.lengths)
+        kernels.fill_in_scan(rows, chosen, s.directions, s.midpoints, s.lengths)
+        kernels.fill_in_points(rows, chosen, scan.centroids, scan.spreads, scan.sigma, scan.points)
+        return cls(rows)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -131,17 +132,18 @@ class Correspondences:
 
     def turned(self, rows: NDArray[np.bool_]) -> Correspondences:
         """Return the pairs with the scan segments of `rows` running the other way."""
-        turned = self.rows.copy()
-        for component in ("dx", "dy"):
-            turned["scan"][component][rows] *= -1.0
+        which = np.zeros(len(self), dtype=np.bool_)
+        which[rows] = True
+        turned = kernels.empty_pairs(len(self))
+        kernels.turn_round(self.rows, which, turned)
         return Correspondences(turned)
 
     def about(self, map_origin: Point, scan_origin: Point) -> Correspondences:
         """Return the pairs in frames that have been moved to two new origins, each (2,) metres in its old frame."""
         (map_x, map_y), (scan_x, scan_y) = map_origin, scan_origin
-        return Correspondences(
-            kernels.moved_origins(self.rows, float(map_x), float(map_y), float(scan_x), float(scan_y))
-        )
+        moved = kernels.empty_pairs(len(self))
+        kernels.move_origins(self.rows, float(map_x), float(map_y), float(scan_x), float(scan_y), moved)
+        return Correspondences(moved)
 
 
 def _vectors(records: Records, x: str, y: str) -> Floats:
@@ -171,8 +173,8 @@ def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices
         index = int(np.argmax(broken)) if np.any(broken) else None
         raise InvalidArgumentError(f"expected integers, got {rows.dtype}", argument="correspondences", index=index)
     chosen = np.ascontiguousarray(rows, dtype=np.intp)
-    for column, count, what in ((0, scan_count, "scan"), (1, map_count, "map")):
-        index = kernels.first_outside(chosen[:, column], count)
+    for column, count, what in ((kernels.SCAN, scan_count, "scan"), (kernels.MAP, map_count, "map")):
+        index = kernels.first_outside(chosen, column, count)
         if index >= 0:
             raise InvalidArgumentError(
                 f"expected a {what} index from 0 to {count - 1}, got {rows[index, column]}"

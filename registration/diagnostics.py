@@ -6,18 +6,15 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .estimate import Fit, Problem
 from .joint import JointSums
-from .kernels import carried, invert3_scaled
+from .kernels.of_arrays import carried_matrix, inverse
 from .kernels.pairs import residuals
-from .layout import COVARIANCE, full_matrix
+from .layout import Floats
 from .options import RegistrationOptions
 from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .transform import RigidTransform
-
-Floats = NDArray[np.float64]
 
 
 def no_answer(options: RegistrationOptions) -> RegistrationResult:
@@ -70,17 +67,13 @@ def covariance_of(problem: Problem, fit: Fit) -> Floats:
     information ``i``, ``F(w)^-1 F(w^2 / i) F(w)^-1``.
     """
     weights, theta = problem.weights, fit.local_from_scan.theta
-    covariance = np.empty(1, COVARIANCE)
-    invert3_scaled(fit.sums.information_record(theta)[0], covariance[0])
+    covariance = inverse(fit.sums.information(theta))
     if weights.information is not weights.used:
         scatter = JointSums.of_set(problem.centred, weights.used**2 / weights.information).information(theta)
-        inverse = full_matrix(covariance)
-        covariance[0] = tuple((inverse @ scatter @ inverse)[np.triu_indices(3)])
+        covariance = covariance @ scatter @ covariance
     # From the middle of the scan segments to the origin of the scan frame.
     lever = RigidTransform(0.0, 0.0, theta).compose(problem.scan_from_centred)
-    moved = np.empty(1, COVARIANCE)
-    carried(covariance[0], lever.x, lever.y, moved[0])
-    return full_matrix(moved)
+    return carried_matrix(covariance, lever.x, lever.y)
 
 
 def diagnose(problem: Problem, fit: Fit, residuals: Residuals, options: RegistrationOptions) -> RegistrationDiagnostics:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .correspondences import Correspondences
 from .joint import JointSums
 from .kernels.pairs import middles
@@ -16,8 +13,6 @@ from .options import RegistrationOptions, Rotation
 from .orientation import choose_rotation
 from .transform import RigidTransform
 from .weights import PairWeights
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
-from .kernels import eigen2, joint_cost, joint_information, joint_solve
-from .kernels.compensated import compensated_add
+from .kernels import eigen2, of_arrays
+from .kernels.compensated import compensated_sum
 from .kernels.joint import joint_sums_compensated
-from .layout import INFORMATION, Floats, Record, Records, full_matrix
+from .layout import Floats, Records
 
 THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
@@ -51,7 +51,7 @@ class JointSums:
     @classmethod
     def of_pair(cls, pairs: Correspondences, index: int, weight: float) -> JointSums:
         """Sum over pair `index` alone, in constant time."""
-        return cls.of_set(pairs.take(slice(index, index + 1)), [weight])
+        return cls(joint_sums_compensated(pairs.rows[index : index + 1], np.array([weight], dtype=np.float64)))
 
     def add(self, pairs: Correspondences, index: int, weight: float) -> JointSums:
         """Return the sums with one pair more."""
@@ -68,9 +68,7 @@ class JointSums:
         return self._combined(other, -1.0)
 
     def _combined(self, other: JointSums, sign: float) -> JointSums:
-        total = self.compensated.copy()
-        compensated_add(total, other.compensated, sign)
-        return JointSums(total)
+        return JointSums(compensated_sum(self.compensated, other.compensated, sign))
 
     @property
     def values(self) -> Floats:
@@ -78,14 +76,9 @@ class JointSums:
         return self.compensated[:1].view(np.float64)
 
     @property
-    def record(self) -> Record:
-        """The sums in plain doubles by name, as the kernels take them."""
-        return self.compensated[0]
-
-    @property
     def count(self) -> int:
         """Number of pairs."""
-        return round(float(self.record["count"]))
+        return round(float(self.compensated["count"][0]))
 
     @property
     def normal_moments(self) -> tuple[float, float, float]:
@@ -93,8 +86,7 @@ class JointSums:
 
         The information of a translation when the rotation is known.
         """
-        sums = self.record
-        return float(sums["xx"]), float(sums["xy"]), float(sums["yy"])
+        return of_arrays.normal_moments(self.compensated)
 
     @property
     def parallel(self) -> bool:
@@ -109,7 +101,7 @@ class JointSums:
             return True
         xx, xy, yy = self.normal_moments
         small, *_ = eigen2(xx, xy, yy)
-        resultant = math.hypot(self.record["wahba_cos"], self.record["wahba_sin"])
+        resultant = math.hypot(*of_arrays.wahba_resultant(self.compensated))
         return bool(small * resultant / (xx + yy) <= chi_square_quantile(self.count - 1, THREE_SIGMA_TAIL))
 
     def solve(self, start: float) -> tuple[float, Floats, bool]:
@@ -129,28 +121,25 @@ class JointSums:
         observable : bool
             False where all lines are parallel to rounding.
         """
-        theta, x, y, _, observable = joint_solve(self.record, float(start), False)
+        theta, x, y, _, observable = of_arrays.solve(self.compensated, float(start))
         return theta, np.array([x, y]), observable
 
     def cost(self, theta: float, translation: ArrayLike) -> float:
         """Return ``x' Q x`` at any transform: chi-square when the weights are 1 / variance."""
         x, y = np.asarray(translation, dtype=np.float64)
-        return joint_cost(self.record, float(theta), x, y)
+        return of_arrays.cost(self.compensated, float(theta), x, y)
 
     def information(self, theta: float) -> Floats:
         """Return the information of additive (x, y, theta) in the map frame at rotation `theta`, (3, 3)."""
-        return full_matrix(self.information_record(theta))
+        return of_arrays.information(self.compensated, float(theta))
 
-    def information_record(self, theta: float) -> Records:
-        """Return `information` as the kernels take it, an array of one INFORMATION."""
-        out = np.empty(1, INFORMATION)
-        joint_information(self.record, float(theta), out[0])
-        return out
+    def is_regular(self, theta: float, least: float) -> bool:
+        """Tell whether `information`, scaled to a unit diagonal, has only eigenvalues over `least`."""
+        return of_arrays.is_regular(self.compensated, float(theta), least)
 
     def marginal(self, theta: float) -> tuple[float, float, float]:
         """Return what is known of the translation when the rotation is not, its elements xx, xy and yy.
 
         The Schur complement of the rotation in `information`, which must not be 0 there.
         """
-        xx, xy, xt, yy, yt, tt = self.information_record(theta)[0].item()
-        return xx - xt * xt / tt, xy - xt * yt / tt, yy - yt * yt / tt
+        return of_arrays.marginal(self.compensated, float(theta))

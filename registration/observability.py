@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from .joint import JointSums
-from .kernels import eigen2, is_regular3
+from .kernels import eigen2
 from .kernels.matrices import PARALLEL_RATIO
 
 MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
@@ -58,7 +58,7 @@ def find_freedom(used: JointSums, noise: JointSums | None, theta: float) -> Free
     if noise is not None and noise.parallel:
         _, _, *axis = eigen2(*noise.normal_moments)
         return Freedom(True, True, _signed(*axis), _slack(noise, *axis))
-    if not is_regular3(used.information_record(theta)[0], PARALLEL_RATIO):
+    if not used.is_regular(theta, PARALLEL_RATIO):
         return Freedom(True)
     if noise is not None:
         # What is known of the translation when the rotation is not.

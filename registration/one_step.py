@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .correspondences import Correspondences
+from .kernels import of_arrays
 from .kernels import one_step as kernels
-from .kernels.compensated import compensated_add
-from .layout import Floats, Record, Records
+from .kernels.compensated import compensated_sum
+from .layout import Floats, Records
 from .options import Rotation
 from .transform import RigidTransform, wrap_angle
 
@@ -54,7 +55,8 @@ class OneStepSums:
         cls, pairs: Correspondences, index: int, weight: float, reference: RigidTransform = IDENTITY
     ) -> OneStepSums:
         """Sum over pair `index` alone, in constant time."""
-        return cls.of_set(pairs.take(slice(index, index + 1)), [weight], reference)
+        row, at = pairs.rows[index : index + 1], reference
+        return cls(kernels.one_step_sums(row, at.x, at.y, at.theta, np.array([weight], dtype=np.float64)), reference)
 
     def add(self, pairs: Correspondences, index: int, weight: float) -> OneStepSums:
         """Return the sums with one pair more."""
@@ -71,8 +73,7 @@ class OneStepSums:
         return self._combined(other, -1.0)
 
     def _combined(self, other: OneStepSums, sign: float) -> OneStepSums:
-        total = self.compensated.copy()
-        compensated_add(total, other.about(self.reference).compensated, sign)
+        total = compensated_sum(self.compensated, other.about(self.reference).compensated, sign)
         return OneStepSums(total, self.reference)
 
     def about(self, reference: RigidTransform) -> OneStepSums:
@@ -91,25 +92,20 @@ class OneStepSums:
         return self.compensated[:1].view(np.float64)
 
     @property
-    def record(self) -> Record:
-        """The sums in plain doubles by name, as the kernels take them."""
-        return self.compensated[0]
-
-    @property
     def count(self) -> int:
         """Number of pairs."""
-        return round(float(self.record["count"]))
+        return round(float(self.compensated["count"][0]))
 
     @property
     def determinant(self) -> float:
         """Eq. (8)'s D, 0 for parallel lines (the paper calls it discriminant, and the lines collinear)."""
-        sums = self.record
-        return max(0.0, float(sums["x2"] * sums["y2"] - sums["xy"] ** 2))
+        _, x2, y2, xy = of_arrays.direction_moments(self.compensated)
+        return max(0.0, x2 * y2 - xy**2)
 
     @property
     def reliability(self) -> float:
         """Eq. (28) from 0 to 1; ``2 sqrt(D) / S_w``. Knows the directions of the map lines and nothing of noise."""
-        total = float(self.record["w"])
+        total = of_arrays.direction_moments(self.compensated)[0]
         return min(1.0, 2.0 * math.sqrt(self.determinant) / total) if total > 0.0 else 0.0
 
     def solve(self, rotation: Rotation) -> tuple[RigidTransform, bool]:
@@ -119,7 +115,7 @@ class OneStepSums:
         holds. The translation is Eqs. (7) and (8), with plus signs in D1 and D2 where minus is printed. For parallel
         lines it is the nearest to the reference.
         """
-        angle, x, y, observable = kernels.one_step_solve(self.record, rotation == "wahba")
+        angle, x, y, observable = of_arrays.solve_one_step(self.compensated, rotation == "wahba")
         at = self.reference
         return RigidTransform(at.x + x, at.y + y, at.theta + angle), observable
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .correspondences import Correspondences
 from .joint import JointSums
+from .layout import Floats
 from .transform import wrap_angle
-
-Floats = NDArray[np.float64]
 
 MARGIN = 9.0  # of chi-square: three standard deviations
 SAME_ANGLE = 1e-6  # rad; both starts have come down to one minimum
@@ -48,7 +46,7 @@ def choose_rotation(pairs: Correspondences, weights: Floats, *, is_noise: bool) 
         theta, translation, _ = sums.solve(angle)
         thetas.append(theta)
         costs.append(sums.cost(theta, translation))
-    rounding = ROUNDING * float(sums.record["cc"] + sums.record["ss"])
+    rounding = ROUNDING * float(sums.compensated["cc"][0] + sums.compensated["ss"][0])
     theta = thetas[0] if costs[0] <= costs[1] + rounding else thetas[1]
     only_one = abs(wrap_angle(thetas[1] - thetas[0])) < SAME_ANGLE
     unique = only_one or abs(costs[1] - costs[0]) > rounding + (MARGIN if is_noise else 0.0)

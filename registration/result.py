@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from .layout import Floats
 from .transform import RigidTransform
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError, InvalidSegmentsError
+from .layout import Floats
+from .limits import MAX_COORDINATE, MAX_LENGTH, MAX_POINTS, MAX_SIGMA, MIN_LENGTH
 
-Floats = NDArray[np.float64]
-
-MIN_LENGTH = 1e-6  # m; shorter ones have no direction worth the name
-MAX_LENGTH = 1e4  # m
-MAX_COORDINATE = 1e9  # m; beyond it float64 resolves less than a micrometre
 DEFAULT_POINT_SPACING = 0.05  # m, what a segment without a count of points is taken to have
 
 
@@ -171,8 +168,8 @@ class MeasuredSegments:
         centroids, spreads = moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
         ranges: list[tuple[str, Any, tuple[int, ...], float, float]] = [
             ("sigma", np.broadcast_to(np.asarray(sigma, dtype=np.float64), (n,)) if np.ndim(sigma) == 0 else sigma,
-             (n,), 0.0, 1e3),
-            ("points", default_points if points is None else points, (n,), 1.0, 1e9),
+             (n,), 0.0, MAX_SIGMA),
+            ("points", default_points if points is None else points, (n,), 1.0, MAX_POINTS),
             ("centroids", centroids, (n, 2), -MAX_COORDINATE, MAX_COORDINATE),
             ("spreads", spreads, (n,), 0.0, MAX_LENGTH**2),
         ]  # fmt: skip

@@ -6,17 +6,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .correspondences import Correspondences
 from .errors import InvalidArgumentError
 from .kernels.pairs import MIN_SIGMA, inverse_variances
+from .layout import Floats
+from .limits import MAX_SIGMA
 from .options import RegistrationOptions
 
-Floats = NDArray[np.float64]
-
 MIN_WEIGHT, MAX_WEIGHT = 1e-100, 1e100  # squares and products with 1e9 m squared stay finite
-MAX_SIGMA = 1e3  # m
 
 
 @dataclass(frozen=True, slots=True, eq=False)

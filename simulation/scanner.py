@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
+from registration.layout import Floats
+from registration.limits import MAX_ANGLE, MAX_BEAMS
 
-from ._kernels import cast
 from .errors import SimulationError
+from .kernels.casting import cast
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-MAX_BEAMS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ class Scanner:
     def __post_init__(self) -> None:
         checks = [
             ("beams", 1 <= self.beams <= MAX_BEAMS, f"from 1 to {MAX_BEAMS}"),
-            ("angle_min", abs(self.angle_min) <= 1e3, "of at most 1000 rad"),
+            ("angle_min", abs(self.angle_min) <= MAX_ANGLE, f"of at most {MAX_ANGLE:g} rad"),
             ("angle_increment", 0.0 < abs(self.angle_increment) * (self.beams - 1) <= math.tau * (1 + 1e-9)
              or (self.beams == 1 and 0.0 < abs(self.angle_increment) <= math.tau), "that makes at most one turn"),
             ("range_min", 0.0 <= self.range_min < math.inf, "from 0 up"),

@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ._ray_kernels import clean
+from registration.layout import Floats
+from registration.limits import MAX_ANGLE, MAX_BEAMS, MAX_LENGTH
+
 from .errors import InvalidScanError
-
-Floats = NDArray[np.float64]
-
-MAX_BEAMS = 100_000
-MAX_RANGE = 1e4  # m, as long as a segment can be
+from .kernels.rays import clean
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -55,8 +53,8 @@ class LaserScan:
     ) -> None:
         values = _numbers(ranges)
         m = len(values)
-        if not abs(angle_min) <= 1e3:
-            raise InvalidScanError(f"expected at most 1000 rad, got {angle_min!r}", argument="angle_min")
+        if not abs(angle_min) <= MAX_ANGLE:
+            raise InvalidScanError(f"expected at most {MAX_ANGLE:g} rad, got {angle_min!r}", argument="angle_min")
         turn = abs(angle_increment) * max(1, m - 1)
         if not (angle_increment != 0.0 and turn <= math.tau * (1.0 + 1e-3)):
             raise InvalidScanError(
@@ -81,8 +79,7 @@ class LaserScan:
     @property
     def cleaned(self) -> Floats:
         """The ranges with every beam without return at inf and every beam of which nothing is known at nan."""
-        cleaned: Floats = clean(self.ranges, self.range_min, min(self.range_max, MAX_RANGE))
-        return cleaned
+        return clean(self.ranges, self.range_min, min(self.range_max, MAX_LENGTH))
 
     def points(self) -> Floats:
         """Return the measured points in the scan frame, ``(k, 2)`` metres, beams without a range left out."""

@@ -9,30 +9,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import MeasuredSegments, Segments
+from registration.layout import Floats, Records
+from registration.limits import MAX_BEAMS, MAX_COORDINATE, MAX_LENGTH
 
-from ._fit_kernels import BEGIN, COUNT, END, LINE, NX, NY, SPREAD, describe
-from ._ray_kernels import gather, quantum, ray_noise, window_noise
-from ._trace_kernels import trace
 from .errors import InvalidScanError
-from .laser import MAX_RANGE, LaserScan
+from .kernels.rays import gather, place, quantum, ray_noise, window_noise
+from .kernels.tracing import describe, trace
+from .laser import LaserScan
+from .layout import FITTED, SCANNER
 from .options import VectorizationOptions
+from .tuning import (
+    GAP_NOISE,
+    LEAST_INCREMENT,
+    LEAST_SIGMA,
+    LONGEST_STEP,
+    RELATIVE_ROUGHNESS,
+    ROUGHNESS,
+    SPACINGS,
+    UNKNOWN_SIGMA,
+)
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-# Standard deviations in metres: taken where the scan is too short to tell, the least that an estimate is believed,
-# and how far a wall itself is from straight (also as a share of sigma: beams have a width).
-UNKNOWN_SIGMA = 0.02
-LEAST_SIGMA = 1e-3
-ROUGHNESS = 3e-3
-RELATIVE_ROUGHNESS = 0.1
-
-# Points without rays are neighbours up to this many median spacings.
-SPACINGS = 6.0
-
-LEAST_INCREMENT = 1e-6  # rad
-
-MAX_POINTS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,49 +114,55 @@ def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization
     increment = abs(scan.angle_increment)
     closed = increment * len(angles) > math.tau - 0.5 * increment
     ranges = scan.cleaned
-    order, r, rays, points = gather(ranges, np.cos(angles), np.sin(angles), scan.angle_increment < 0.0, closed)
-    sigma = options.sigma or _estimated(ray_noise(r, rays[0], rays[1], increment), r)
-    lines, spans = _trace(points, rays, increment, closed, sigma, options)
+    order, points = gather(ranges, np.cos(angles), np.sin(angles), scan.angle_increment < 0.0, closed)
+    sigma = options.sigma or _estimated(ray_noise(points, increment), points)
+    lines = _trace(points, increment, closed, sigma, options)
     measured, rms = _measured(lines, (0.0, 0.0))
-    return Vectorization(measured, rms, sigma, order[spans], angles, ranges, scan.range_max)
+    return Vectorization(measured, rms, sigma, order[_spans(lines)], angles, ranges, scan.range_max)
 
 
-def _from_viewed_points(points: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:
-    seen = points - viewpoint
+def _from_viewed_points(places: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:
+    seen = places - viewpoint
     r = np.hypot(seen[:, 0], seen[:, 1])
     order = np.flatnonzero(r > 0.0)
     directions = seen[order] / r[order, None]
     turns = directions[:-1, 0] * directions[1:, 1] - directions[:-1, 1] * directions[1:, 0]
     if np.sum(np.sign(turns)) < 0.0:
         order = order[::-1]
-    r = r[order]
-    xy = np.ascontiguousarray(seen[order].T)
-    rays = xy / r
+    points = place(seen[order], r[order])
     increment = max(LEAST_INCREMENT, float(np.median(np.abs(turns)))) if len(turns) else LEAST_INCREMENT
-    sigma = options.sigma or _estimated(ray_noise(r, rays[0], rays[1], increment), r)
-    lines, spans = _trace(xy, rays, increment, False, sigma, options)
+    sigma = options.sigma or _estimated(ray_noise(points, increment), points)
+    lines = _trace(points, increment, False, sigma, options)
     # The viewpoint is on the left whatever way the points run.
-    backward = _runs_backward(lines, spans, xy)
+    spans = _spans(lines)
+    backward = _runs_backward(lines, points)
     spans[backward] = spans[backward, ::-1]
     measured, rms = _measured(lines, (viewpoint[0], viewpoint[1]))
     return Vectorization(measured, rms, sigma, order[spans], np.zeros(0), np.zeros(0), math.inf)
 
 
-def _from_bare_points(points: Floats, options: VectorizationOptions) -> Vectorization:
-    origin = points.mean(axis=0) if len(points) else np.zeros(2)
-    xy = np.ascontiguousarray((points - origin).T)
-    sigma = options.sigma or _estimated(window_noise(xy[0], xy[1]), np.zeros(0))
-    lines, spans = _trace(xy, np.zeros_like(xy), 0.0, False, sigma, options)
-    backward = _runs_backward(lines, spans, xy)
-    lines[backward, BEGIN], lines[backward, END] = lines[backward, END], lines[backward, BEGIN]
+def _from_bare_points(places: Floats, options: VectorizationOptions) -> Vectorization:
+    origin = places.mean(axis=0) if len(places) else np.zeros(2)
+    points = place(places - origin, np.zeros(len(places)))
+    sigma = options.sigma or _estimated(window_noise(points), points[:0])
+    lines = _trace(points, 0.0, False, sigma, options)
+    backward = _runs_backward(lines, points)
+    begin = lines["begin"].copy()
+    lines["begin"][backward] = lines["end"][backward]
+    lines["end"][backward] = begin[backward]
     measured, rms = _measured(lines, (origin[0], origin[1]))
-    return Vectorization(measured, rms, sigma, spans, np.zeros(0), np.zeros(0), math.inf)
+    return Vectorization(measured, rms, sigma, _spans(lines), np.zeros(0), np.zeros(0), math.inf)
 
 
-def _runs_backward(lines: Floats, spans: Indices, xy: Floats) -> NDArray[np.bool_]:
-    """Whether the points of each line run against its direction ``(-n_y, n_x)``."""
-    run = xy[:, spans[:, 1]] - xy[:, spans[:, 0]]
-    backward: NDArray[np.bool_] = lines[:, NX] * run[1] < lines[:, NY] * run[0]
+def _spans(lines: Records) -> Indices:
+    """Return the first and the last point of each line, (k, 2)."""
+    return np.stack([lines["first"], lines["last"]], axis=1)
+
+
+def _runs_backward(lines: Records, points: Records) -> NDArray[np.bool_]:
+    """Tell whether the points of each line run against its direction ``(-n_y, n_x)``."""
+    first, last = points[lines["first"]], points[lines["last"]]
+    backward: NDArray[np.bool_] = lines["nx"] * (last["y"] - first["y"]) < lines["ny"] * (last["x"] - first["x"])
     return backward
 
 
@@ -174,15 +177,17 @@ def _checked_points(points: ArrayLike) -> Floats:
         raise InvalidScanError(
             f"expected numbers of shape (m, 2), got {raw.dtype} of shape {raw.shape}", argument="points"
         )
-    if len(raw) > MAX_POINTS:
-        raise InvalidScanError(f"expected at most {MAX_POINTS} points, got {len(raw)}", argument="points")
+    if len(raw) > MAX_BEAMS:
+        raise InvalidScanError(f"expected at most {MAX_BEAMS} points, got {len(raw)}", argument="points")
     values = np.array(raw, dtype=np.float64)
     bad = ~np.isfinite(values).all(axis=1)
     if len(values) and not bad.any():
-        bad = (np.abs(values - values[0]) > MAX_RANGE).any(axis=1) | (np.abs(values) > 1e9).any(axis=1)
+        bad = (np.abs(values - values[0]) > MAX_LENGTH).any(axis=1) | (np.abs(values) > MAX_COORDINATE).any(axis=1)
     if bad.any():
         raise InvalidScanError(
-            f"expected finite numbers within {MAX_RANGE:g} m of the first", argument="points", index=int(np.argmax(bad))
+            f"expected finite numbers within {MAX_LENGTH:g} m of the first",
+            argument="points",
+            index=int(np.argmax(bad)),
         )
     return values
 
@@ -191,36 +196,32 @@ def _checked_viewpoint(viewpoint: tuple[float, float], points: Floats) -> Floats
     place = np.asarray(viewpoint, dtype=np.float64)
     if place.shape != (2,) or not np.isfinite(place).all():
         raise InvalidScanError(f"expected two finite numbers, got {viewpoint!r}", argument="viewpoint")
-    if (np.abs(points - place) > MAX_RANGE).any():
-        raise InvalidScanError(f"expected within {MAX_RANGE:g} m of all points", argument="viewpoint")
+    if (np.abs(points - place) > MAX_LENGTH).any():
+        raise InvalidScanError(f"expected within {MAX_LENGTH:g} m of all points", argument="viewpoint")
     return place
 
 
-def _estimated(noise: float, ranges: Floats) -> float:
+def _estimated(noise: float, points: Records) -> float:
     """Return the noise, but no less than what the quantisation of the ranges lets it be."""
     noise = noise or UNKNOWN_SIGMA
-    return max(noise, LEAST_SIGMA, float(quantum(ranges)) / math.sqrt(12.0))
+    return max(noise, LEAST_SIGMA, quantum(points) / math.sqrt(12.0))
 
 
-def _trace(
-    points: Floats, rays: Floats, increment: float, closed: bool, sigma: float, options: VectorizationOptions
-) -> tuple[Floats, Indices]:
-    if points.shape[1] < options.min_points:
-        return np.zeros((0, LINE)), np.zeros((0, 2), dtype=np.int64)
+def _trace(points: Records, increment: float, closed: bool, sigma: float, options: VectorizationOptions) -> Records:
+    if len(points) < options.min_points:
+        return np.zeros(0, FITTED)
     floor = max(ROUGHNESS, RELATIVE_ROUGHNESS * sigma) ** 2
-    spacing = 0.0
-    if increment == 0.0:
-        spacing = SPACINGS * float(np.median(np.hypot(*np.diff(points, axis=1)))) + 4.0 * sigma
     max_gap = math.inf if options.max_gap is None else options.max_gap
-    lines, spans = trace(
-        points[0], points[1], rays[0], rays[1], increment, closed, sigma, floor, spacing, max_gap,
-        options.min_points, options.min_length,
-    )  # fmt: skip
-    return lines, spans
+    default_gap, longest = 0.0, LONGEST_STEP
+    if increment == 0.0:
+        spacing = float(np.median(np.hypot(np.diff(points["x"]), np.diff(points["y"]))))
+        default_gap = longest = SPACINGS * spacing + GAP_NOISE * sigma
+    scanner = (increment, sigma, sigma * sigma, floor, default_gap, max_gap, min(longest, max_gap))
+    return trace(points, np.array([scanner], SCANNER), closed, options.min_points, options.min_length)
 
 
-def _measured(lines: Floats, origin: tuple[float, float]) -> tuple[MeasuredSegments, Floats]:
+def _measured(lines: Records, origin: tuple[float, float]) -> tuple[MeasuredSegments, Floats]:
     endpoints, sigmas, centroids, rms = describe(lines, origin[0], origin[1])
-    moments = centroids, lines[:, SPREAD]
-    measured = MeasuredSegments.from_segments(Segments.from_array(endpoints), sigmas, lines[:, COUNT], moments)
+    moments = centroids, lines["spread"]
+    measured = MeasuredSegments.from_segments(Segments.from_array(endpoints), sigmas, lines["count"], moments)
     return measured, rms

@@ -23,10 +23,12 @@ def accumulated(value: float, error: float, high: float, low: float) -> tuple[fl
 
 
 @kernel
-def compensated_add(sums: Records, other: Records, sign: float) -> None:
-    """Add (`sign` 1) or remove (-1) whole compensated sums of the same type."""
-    into = sums.view(np.float64)
+def compensated_sum(sums: Records, other: Records, sign: float) -> Records:
+    """Return whole compensated sums with others of the same type added (`sign` 1) or removed (-1)."""
+    total = sums.copy()
+    into = total.view(np.float64)
     what = other.view(np.float64)
     size = len(into) // 2
     for k in range(size):
         into[k], into[size + k] = accumulated(into[k], into[size + k], sign * what[k], sign * what[size + k])
+    return total

@@ -72,6 +72,7 @@ def invert3_scaled(m: Record, out: Record) -> None:
 
     Scaled to a unit diagonal, as its units are unlike, and by pivots. It has to be regular, see `is_regular3`.
     """
+    # All are read before one is written: `out` may be `m`.
     scale_x = 1.0 / math.sqrt(m.xx)
     scale_y = 1.0 / math.sqrt(m.yy)
     scale_t = 1.0 / math.sqrt(m.tt)
@@ -99,10 +100,10 @@ def carried(covariance: Record, x: float, y: float, out: Record) -> None:
 
     ``L C L'`` with ``L = [[1, 0, y], [0, 1, -x], [0, 0, 1]]``.
     """
-    c = covariance
+    c = covariance  # `out` may be the same: each is read before it is written
     out.xx = c.xx + 2.0 * y * c.xt + y * y * c.tt
     out.xy = c.xy + y * c.yt - x * c.xt - x * y * c.tt
-    out.xt = c.xt + y * c.tt
     out.yy = c.yy - 2.0 * x * c.yt + x * x * c.tt
+    out.xt = c.xt + y * c.tt
     out.yt = c.yt - x * c.tt
     out.tt = c.tt

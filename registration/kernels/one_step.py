@@ -13,6 +13,7 @@ from ..compiling import kernel
 from ..layout import ONE_STEP_SUMS, Floats, Record, Records
 from .compensated import accumulated
 from .matrices import PARALLEL_RATIO
+from .records import keep_alive
 
 
 @kernel
@@ -133,4 +134,7 @@ def one_step_costs(sums: Records, dx: float, dy: float, turn: float) -> tuple[fl
     Of the translation, ``sum w r^2``; of the rotation by Mitsuta, ``sum w a^2``, and by Wahba, ``2 sum w (1 - cos a)``.
     """
     moved = one_step_moved(sums, dx, dy, turn)
-    return max(0.0, moved[0].gap2), max(0.0, moved[0].angle2), max(0.0, 2.0 * moved[0].versine)
+    value = moved[0]
+    costs = (max(0.0, value.gap2), max(0.0, value.angle2), max(0.0, 2.0 * value.versine))
+    keep_alive(moved)
+    return costs

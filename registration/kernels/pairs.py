@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,75 +13,72 @@ from ..layout import PAIR, Floats, Record, Records, X, Y
 MIN_SIGMA = 1e-12  # m; a smaller one that is not 0 counts as this, so that its square is not lost
 
 
-class SegmentArrays(NamedTuple):
-    """Segments, an array for each property."""
-
-    directions: Floats  # (n, 2)
-    midpoints: Floats  # (n, 2) m
-    lengths: Floats  # (n,) m
-
-
-class PointArrays(NamedTuple):
-    """What is known of the points behind each segment."""
-
-    centroids: Floats  # (n, 2) m
-    spreads: Floats  # (n,) m^2
-    sigmas: Floats  # (n,) m
-    counts: Floats  # (n,)
+SCAN, MAP = 0, 1  # columns of the (n, 2) indices that name pairs
 
 
 @kernel
-def first_outside(indices: NDArray[np.intp], count: int) -> int:
-    """Return the first place of `indices` (n,) that does not hold one from 0 to ``count - 1``, or -1."""
+def first_outside(indices: NDArray[np.intp], column: int, count: int) -> int:
+    """Return the first row of `indices` that does not have a number from 0 to ``count - 1`` in `column`, or -1."""
     for i in range(len(indices)):
-        if indices[i] < 0 or indices[i] >= count:
+        if indices[i, column] < 0 or indices[i, column] >= count:
             return i
     return -1
 
 
 @kernel
-def gather(
-    scan_indices: NDArray[np.intp],
-    map_indices: NDArray[np.intp],
-    map_segments: SegmentArrays,
-    scan_segments: SegmentArrays,
-    points: PointArrays,
-) -> Records:
-    """Return the pairs of indices (n,) each, all in range."""
-    # Taken out once: an array that is taken out of a tuple is counted as referenced.
-    map_directions = map_segments.directions
-    map_midpoints = map_segments.midpoints
-    map_lengths = map_segments.lengths
-    directions = scan_segments.directions
-    midpoints = scan_segments.midpoints
-    lengths = scan_segments.lengths
-    centroids = points.centroids
-    spreads = points.spreads
-    sigmas = points.sigmas
-    counts = points.counts
-    pairs = np.empty(len(scan_indices), PAIR)
-    for k in range(len(pairs)):
-        i = scan_indices[k]
-        j = map_indices[k]
-        line = pairs[k].map
-        line.dx = map_directions[j, X]
-        line.dy = map_directions[j, Y]
-        line.x = map_midpoints[j, X]
-        line.y = map_midpoints[j, Y]
+def empty_pairs(count: int) -> Records:
+    """Return pairs to be filled in.
+
+    Python gets all its arrays of pairs from here. Others that kernels return have an equal type, but not the same, and
+    handing them over takes two microseconds more.
+    """
+    return np.empty(count, PAIR)
+
+
+@kernel
+def fill_in_map(
+    pairs: Records, indices: NDArray[np.intp], directions: Floats, midpoints: Floats, lengths: Floats
+) -> None:
+    """Write the segments (k,) of the map that `indices` name to the pairs."""
+    for i in range(len(pairs)):
+        j = indices[i, MAP]
+        line = pairs[i].map
+        line.dx = directions[j, X]
+        line.dy = directions[j, Y]
+        line.x = midpoints[j, X]
+        line.y = midpoints[j, Y]
         line.offset = offset_of(line)
-        line.length = map_lengths[j]
-        seen = pairs[k].scan
-        seen.dx = directions[i, X]
-        seen.dy = directions[i, Y]
-        seen.x = midpoints[i, X]
-        seen.y = midpoints[i, Y]
-        seen.length = lengths[i]
-        seen.centroid_x = centroids[i, X]
-        seen.centroid_y = centroids[i, Y]
-        seen.spread = spreads[i]
-        sigma = max(sigmas[i], MIN_SIGMA) if sigmas[i] > 0.0 else 0.0
-        seen.variance = sigma * sigma / counts[i]
-    return pairs
+        line.length = lengths[j]
+
+
+@kernel
+def fill_in_scan(
+    pairs: Records, indices: NDArray[np.intp], directions: Floats, midpoints: Floats, lengths: Floats
+) -> None:
+    """Write the segments (k,) of the scan that `indices` name to the pairs."""
+    for i in range(len(pairs)):
+        j = indices[i, SCAN]
+        seen = pairs[i].scan
+        seen.dx = directions[j, X]
+        seen.dy = directions[j, Y]
+        seen.x = midpoints[j, X]
+        seen.y = midpoints[j, Y]
+        seen.length = lengths[j]
+
+
+@kernel
+def fill_in_points(
+    pairs: Records, indices: NDArray[np.intp], centroids: Floats, spreads: Floats, sigmas: Floats, counts: Floats
+) -> None:
+    """Write what is known of the points behind the segments (k,) of the scan that `indices` name to the pairs."""
+    for i in range(len(pairs)):
+        j = indices[i, SCAN]
+        seen = pairs[i].scan
+        seen.centroid_x = centroids[j, X]
+        seen.centroid_y = centroids[j, Y]
+        seen.spread = spreads[j]
+        sigma = max(sigmas[j], MIN_SIGMA) if sigmas[j] > 0.0 else 0.0
+        seen.variance = sigma * sigma / counts[j]
 
 
 @kernel
@@ -122,10 +118,10 @@ def middles(pairs: Records, weights: Floats) -> tuple[float, float, float, float
 
 
 @kernel
-def moved_origins(pairs: Records, map_x: float, map_y: float, scan_x: float, scan_y: float) -> Records:
-    """Return the pairs in frames that have been moved to new origins."""
-    moved = pairs.copy()
-    for i in range(len(moved)):
+def move_origins(pairs: Records, map_x: float, map_y: float, scan_x: float, scan_y: float, moved: Records) -> None:
+    """Write the pairs in frames that have been moved to new origins to `moved`."""
+    for i in range(len(pairs)):
+        moved[i] = pairs[i]
         line = moved[i].map
         line.x -= map_x
         line.y -= map_y
@@ -135,7 +131,16 @@ def moved_origins(pairs: Records, map_x: float, map_y: float, scan_x: float, sca
         seen.y -= scan_y
         seen.centroid_x -= scan_x
         seen.centroid_y -= scan_y
-    return moved
+
+
+@kernel
+def turn_round(pairs: Records, which: NDArray[np.bool_], turned: Records) -> None:
+    """Write the pairs to `turned`, with the scan segments of `which` (n,) running the other way."""
+    for i in range(len(pairs)):
+        turned[i] = pairs[i]
+        if which[i]:
+            turned[i].scan.dx *= -1.0
+            turned[i].scan.dy *= -1.0
 
 
 @kernel

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numba import njit
 
 from registration import Correspondences, RigidTransform
-from registration.kernels import compensated, joint, matrices, one_step
+from registration.kernels import compensated, joint, matrices, of_arrays, one_step
 from registration.kernels import pairs as pairing
-from registration.layout import JOINT_SUMS, ONE_STEP_SUMS, PAIR, SYMMETRIC3, full_matrix
+from registration.layout import JOINT_SUMS, ONE_STEP_SUMS, PAIR, SYMMETRIC3
 from tests import reference
 
 from .scenes import correspondences, noisy_pairs
@@ -79,7 +79,9 @@ def test_joint_cost_and_information(seed):
     )
     information = np.empty(1, SYMMETRIC3)
     joint.joint_information(sums, theta, information[0])
-    np.testing.assert_allclose(full_matrix(information), reference.joint_information(theta, *measured), **CLOSE)
+    np.testing.assert_allclose(
+        of_arrays.full_matrix(information), reference.joint_information(theta, *measured), **CLOSE
+    )
 
 
 @given(SEEDS)
@@ -187,8 +189,8 @@ def test_compensated_sums_are_exact(seed):
             sums[:, k] = compensated.accumulated(*sums[:, k], row[k], 0.0)
     np.testing.assert_array_equal(sums[0], reference.exact_sums(terms))
     flat = sums.ravel()
-    compensated.compensated_add(flat, flat.copy(), -1.0)
-    np.testing.assert_array_equal(flat, 0.0)
+    np.testing.assert_array_equal(compensated.compensated_sum(flat, flat, 1.0), 2.0 * flat)
+    np.testing.assert_array_equal(compensated.compensated_sum(flat, flat, -1.0), 0.0)
 
 
 @njit
@@ -248,11 +250,7 @@ def test_gather(seed):
     map_segments, scan = noisy_pairs(rng, 9)
     scan = replace(scan, sigma=rng.choice([0.0, 1e-200, 1e-12, 0.3], 9))
     pairs = np.stack([rng.integers(0, 9, 12), rng.integers(0, 9, 12)], axis=1)
-    of_map, of_scan = (
-        pairing.SegmentArrays(s.directions, s.midpoints, s.lengths) for s in (map_segments, scan.segments)
-    )
-    points = pairing.PointArrays(scan.centroids, scan.spreads, scan.sigma, scan.points)
-    rows = pairing.gather(pairs[:, 0], pairs[:, 1], of_map, of_scan, points)
+    rows = Correspondences.of(map_segments, scan, pairs).rows
     np.testing.assert_array_equal(rows, reference.pair_rows(map_segments, scan, pairs))
     for least in (0.0, 0.25):
         inverses, known = pairing.inverse_variances(rows, least)
@@ -262,8 +260,9 @@ def test_gather(seed):
 
 
 def test_first_outside():
-    assert [pairing.first_outside(np.array([0, 4, 1, 5]), count) for count in (6, 5, 4, 0)] == [-1, 3, 1, 0]
-    assert [pairing.first_outside(np.array([3, 0, -1, 2]), count) for count in (4, 3)] == [2, 0]
+    pairs = np.array([[0, 3], [4, 0], [1, -1], [5, 2]])
+    assert [pairing.first_outside(pairs, pairing.SCAN, count) for count in (6, 5, 4, 0)] == [-1, 3, 1, 0]
+    assert [pairing.first_outside(pairs, pairing.MAP, count) for count in (4, 3)] == [2, 0]
 
 
 @given(SEEDS)
@@ -283,7 +282,7 @@ def test_middles_and_moved_origins(seed):
     expected["scan"]["y"] -= scan_y
     expected["scan"]["centroid_x"] -= scan_x
     expected["scan"]["centroid_y"] -= scan_y
-    moved = Correspondences(pairing.moved_origins(pairs.rows, *middles))
+    moved = pairs.about(middles[:2], middles[2:])
     np.testing.assert_allclose(moved.map_offsets, np.sum(moved.map_normals * moved.map_midpoints, axis=1), **CLOSE)
     expected["map"]["offset"] = moved.map_offsets
     np.testing.assert_array_equal(moved.rows, expected)
@@ -372,7 +371,7 @@ def test_inverses_and_carried(seed):
     out = np.empty(1, SYMMETRIC3)
 
     def error():
-        product = (full_matrix(out) * np.outer(scale, scale)) @ (matrix / np.outer(scale, scale))
+        product = (of_arrays.full_matrix(out) * np.outer(scale, scale)) @ (matrix / np.outer(scale, scale))
         return np.abs(product - np.eye(3)).max()
 
     matrices.invert3_scaled(symmetric(matrix)[0], out[0])
@@ -388,4 +387,4 @@ def test_inverses_and_carried(seed):
     lever = np.array([[1.0, 0.0, y], [0.0, 1.0, -x], [0.0, 0.0, 1.0]])
     expected = lever @ matrix @ lever.T
     matrices.carried(symmetric(matrix)[0], x, y, out[0])
-    np.testing.assert_allclose(full_matrix(out), expected, rtol=1e-12, atol=1e-12 * expected.max())
+    np.testing.assert_allclose(of_arrays.full_matrix(out), expected, rtol=1e-12, atol=1e-12 * expected.max())

@@ -1,4 +1,4 @@
-"""Slow, obviously right twins of ``simulation/_kernels.py``."""
+"""Slow, obviously right twins of ``simulation/kernels/``."""
 
 import numpy as np
 

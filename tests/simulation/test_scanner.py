@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from registration import RigidTransform, Segments
 from simulation import Scanner, SimulationError, scan
-from simulation._kernels import cast
+from simulation.kernels.casting import cast
 
 from . import reference
 

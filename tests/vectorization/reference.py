@@ -6,8 +6,7 @@ import math
 import numpy as np
 from scipy.optimize import least_squares
 
-from vectorization._kernels import BREAK_PENALTY, BREAK_REACH, GRAZING, MISSING_STEPS
-from vectorization._ray_kernels import LEAST_TRIPLES
+from vectorization.tuning import BREAK_PENALTY, BREAK_REACH, GRAZING, LEAST_TRIPLES, MISSING_STEPS
 
 
 def stretch_cost(points, rays, variance, floor):

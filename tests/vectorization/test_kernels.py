@@ -5,30 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vectorization._fit_kernels import BEGIN, CHI2, COUNT, END, LINE, MEAN, NX, NY, SPREAD, WEIGHT, P, fit_line, line_of
-from vectorization._kernels import (
-    best_break,
-    farthest_point,
-    find_gaps,
-    merge,
-    running_sums,
-    settle_breaks,
-    split,
-    stretch_cost,
-    sums_cost,
-)
-from vectorization._ray_kernels import (
-    MEDIAN_CHI,
-    TRUSTED,
-    TRUSTED_MEAN_SQUARE,
-    WINDOW,
-    clean,
-    gather,
-    quantum,
-    ray_noise,
-    window_noise,
-)
-from vectorization._trace_kernels import WORST_ANGLE, WORST_FIT, acceptable, large_enough
+from vectorization.kernels import lines, pieces, tracing
+from vectorization.kernels import rays as beams
+from vectorization.layout import FITTED, POINT, SCANNER, SUMS
+from vectorization.tuning import MEDIAN_CHI, TRUSTED, TRUSTED_MEAN_SQUARE, WINDOW, WORST_ANGLE, WORST_FIT
 
 from . import reference
 
@@ -48,8 +28,29 @@ def drawn(seed, n=40, isotropic=False):
     return ranges[:, None] * rays, np.zeros_like(rays) if isotropic else rays
 
 
-def columns(points, rays):
-    return (*np.ascontiguousarray(points.T), *np.ascontiguousarray(rays.T))
+def records(points, rays):
+    """Return points (n, 2) and their rays as the kernels take them."""
+    ranges = np.where((rays == 0).all(axis=1), 0.0, np.hypot(*points.T))
+    return np.array([(*p, *u, r) for p, u, r in zip(points, rays, ranges, strict=True)], POINT)
+
+
+def scanner_of(increment=0.01, variance=VARIANCE, floor=FLOOR, default_gap=0.0, max_gap=math.inf, longest=1.5):
+    """Return what is known of a scanner as the inner kernels take it."""
+    values = (increment, math.sqrt(variance), variance, floor, default_gap, max_gap, longest)
+    return np.array([values], SCANNER)[0]
+
+
+def line_with(**fields):
+    """Return a line whose other fields are 0."""
+    line = np.zeros(1, FITTED)
+    for name, value in fields.items():
+        line[name] = value
+    return line[0]
+
+
+def bounds(pieces):
+    """Return pieces as pairs."""
+    return [(int(piece["first"]), int(piece["end"])) for piece in pieces]
 
 
 @settings(deadline=None, max_examples=40)
@@ -57,17 +58,24 @@ def columns(points, rays):
 def test_the_cost_of_a_stretch_comes_from_running_sums(seed, isotropic, a, length):
     points, rays = drawn(seed, isotropic=isotropic)
     b = min(40, a + length)
-    sums = running_sums(*columns(points, rays))
+    sums = pieces.running_sums(records(points, rays))
     expected = reference.stretch_cost(points[a:b], rays[a:b], VARIANCE, FLOOR)
-    assert stretch_cost(sums, a, b, VARIANCE, FLOOR) == pytest.approx(expected, rel=1e-6, abs=1e-6)
-    assert sums_cost(sums[b] - sums[a], VARIANCE, FLOOR) == stretch_cost(sums, a, b, VARIANCE, FLOOR)
+    cost = pieces.line_cost(sums[a], sums[b], scanner_of())
+    assert cost == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    own = np.zeros(1, SUMS)
+    pieces.subtract(sums[b], sums[a], own[0])
+    assert pieces.line_cost(sums[0], own[0], scanner_of()) == cost
+    total = np.zeros(1, SUMS)
+    pieces.add(sums[a], own[0], total[0])
+    np.testing.assert_allclose(total.view(np.float64), sums[b : b + 1].view(np.float64), rtol=1e-14)
 
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, increment=st.sampled_from([0.0, 0.01]), max_gap=st.sampled_from([0.05, math.inf]))
 def test_gaps_are_where_the_twin_finds_them(seed, increment, max_gap):
     points, rays = drawn(seed)
-    starts = find_gaps(*columns(points, rays), increment, 0.02, 0.1, max_gap)
+    scanner = scanner_of(increment, default_gap=0.1, max_gap=max_gap)
+    starts = pieces.find_gaps(records(points, rays), scanner)
     assert starts.tolist() == reference.find_gaps(points, rays, increment, 0.02, 0.1, max_gap)
 
 
@@ -75,7 +83,7 @@ def test_gaps_are_where_the_twin_finds_them(seed, increment, max_gap):
 @given(seed=seeds, isotropic=st.booleans())
 def test_the_farthest_point_is_the_twins(seed, isotropic):
     points, rays = drawn(seed, isotropic=isotropic)
-    k, square = farthest_point(*columns(points, rays), 0, len(points), VARIANCE, FLOOR)
+    k, square = pieces.farthest_point(records(points, rays), 0, len(points), scanner_of())
     expected_k, expected_square = reference.farthest_point(points, rays, VARIANCE, FLOOR)
     assert k == expected_k
     assert square == pytest.approx(expected_square)
@@ -85,20 +93,20 @@ def test_the_farthest_point_is_the_twins(seed, isotropic):
 @given(seed=seeds)
 def test_pieces_cover_the_points_and_are_merged_and_settled_as_by_the_twin(seed):
     points, rays = drawn(seed)
-    xy = columns(points, rays)
-    gaps = find_gaps(*xy, 0.01, 0.02, 0.0, math.inf)
-    sums = running_sums(*xy)
-    pieces = split(*xy, sums, gaps, VARIANCE, FLOOR)
-    assert pieces[0, 0] == 0
-    assert pieces[-1, 1] == len(points)
-    np.testing.assert_array_equal(pieces[1:, 0], pieces[:-1, 1])
-    assert set(gaps) <= set(pieces[:, 0])
-    left = merge(pieces, sums, gaps, VARIANCE, FLOOR)
-    assert [tuple(p) for p in left] == reference.merge(pieces, points, rays, set(gaps), VARIANCE, FLOOR)
-    expected = reference.settle_breaks(left, points, rays, set(gaps), VARIANCE, FLOOR)
-    before = [tuple(p) for p in left]
-    moved = settle_breaks(left, sums, gaps, VARIANCE, FLOOR)
-    assert [tuple(p) for p in left] == expected
+    measured = records(points, rays)
+    gaps = pieces.find_gaps(measured, scanner_of())
+    sums = pieces.running_sums(measured)
+    parts = pieces.split(measured, sums, gaps, scanner_of())
+    assert parts["first"][0] == 0
+    assert parts["end"][-1] == len(points)
+    np.testing.assert_array_equal(parts["first"][1:], parts["end"][:-1])
+    assert set(gaps) <= set(parts["first"])
+    left = pieces.merge(parts, sums, gaps, scanner_of())
+    assert bounds(left) == reference.merge(bounds(parts), points, rays, set(gaps), VARIANCE, FLOOR)
+    before = bounds(left)
+    expected = reference.settle_breaks(before, points, rays, set(gaps), VARIANCE, FLOOR)
+    moved = pieces.settle_breaks(left, sums, gaps, scanner_of())
+    assert bounds(left) == expected
     assert moved == (before != expected)
 
 
@@ -106,8 +114,8 @@ def test_the_best_break_of_a_corner_is_the_corner():
     points = np.vstack(
         [np.stack([np.arange(10.0), np.zeros(10)], 1), np.stack([np.full(8, 9.5), np.arange(1.0, 9)], 1)]
     )
-    sums = running_sums(*columns(points, np.zeros_like(points)))
-    assert best_break(sums, 0, 18, 3, 15, 1, VARIANCE, FLOOR) == (10, pytest.approx(0.0, abs=1e-6))
+    sums = pieces.running_sums(records(points, np.zeros_like(points)))
+    assert pieces.best_break(sums, 0, 18, 3, 15, 1, scanner_of()) == (10, pytest.approx(0.0, abs=1e-6))
 
 
 def noisy_wall(seed, n=60, sigma=0.02):
@@ -119,43 +127,44 @@ def noisy_wall(seed, n=60, sigma=0.02):
     return ranges, rays
 
 
+def first_guess(points):
+    """Return the total least squares line of all points."""
+    line = line_with()
+    lines.line_of(pieces.running_sums(points)[-1], line)
+    return line
+
+
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
 def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed):
     ranges, rays = noisy_wall(seed)
-    xy = columns(ranges[:, None] * rays, rays)
-    line = np.empty(LINE)
-    line[[NX, NY, P]] = line_of(running_sums(*xy)[-1])
-    line[MEAN] = 0.0
+    points = records(ranges[:, None] * rays, rays)
+    line = first_guess(points)
     own = np.zeros(len(ranges), dtype=bool)
     # A variance this large lets no point be gated out; it cancels in the estimate.
-    assert fit_line(*xy, 0, len(ranges), 1.0, 0.0, line, own)
+    assert lines.fit_line(points, 0, len(ranges), scanner_of(variance=1.0, floor=0.0), line, own)
     assert own.all()
-    assert line[COUNT] == len(ranges)
-    (angle, distance), information = reference.fit_line(ranges, rays, math.atan2(line[NY], line[NX]), line[P])
-    assert math.atan2(line[NY], line[NX]) == pytest.approx(angle, abs=1e-5)
-    assert line[P] == pytest.approx(distance, abs=1e-5)
+    assert line["count"] == len(ranges)
+    (angle, distance), information = reference.fit_line(ranges, rays, math.atan2(line["ny"], line["nx"]), line["p"])
+    assert math.atan2(line["ny"], line["nx"]) == pytest.approx(angle, abs=1e-5)
+    assert line["p"] == pytest.approx(distance, abs=1e-5)
     # The information of (angle, distance): weight, weight times mean, and weight times the second moment about 0.
-    w, m = line[WEIGHT], line[MEAN]
-    expected = [[w * (line[SPREAD] + m * m), -w * m], [-w * m, w]]
+    w, m = line["weight"], line["mean"]
+    expected = [[w * (line["spread"] + m * m), -w * m], [-w * m, w]]
     np.testing.assert_allclose(np.abs(information), np.abs(expected), rtol=1e-3, atol=1e-3 * w)
-    residuals = ranges - line[P] / (rays @ line[[NX, NY]])
-    assert line[CHI2] == pytest.approx(residuals @ residuals, rel=1e-4)
+    residuals = ranges - line["p"] / (rays @ [line["nx"], line["ny"]])
+    assert line["chi2"] == pytest.approx(residuals @ residuals, rel=1e-4)
 
 
 def test_a_point_off_the_line_does_not_pull_it():
     ranges, rays = noisy_wall(1, sigma=0.0)
-    exact = ranges[:, None] * rays
-    xy = columns(exact, rays)
-    line = np.empty(LINE)
-    line[[NX, NY, P]] = line_of(running_sums(*xy)[-1])
-    line[MEAN] = 0.0
-    expected = line[[NX, NY, P]].copy()
+    line = first_guess(records(ranges[:, None] * rays, rays))
+    expected = [line["nx"], line["ny"], line["p"]]
     ranges[20] += 0.5
     own = np.zeros(len(ranges), dtype=bool)
-    fit_line(*columns(ranges[:, None] * rays, rays), 0, len(ranges), VARIANCE, FLOOR, line, own)
+    lines.fit_line(records(ranges[:, None] * rays, rays), 0, len(ranges), scanner_of(), line, own)
     assert np.flatnonzero(~own).tolist() == [20]
-    np.testing.assert_allclose(line[[NX, NY, P]], expected, atol=1e-9)
+    np.testing.assert_allclose([line["nx"], line["ny"], line["p"]], expected, atol=1e-9)
 
 
 @settings(deadline=None, max_examples=40)
@@ -165,22 +174,24 @@ def test_the_noise_estimates_are_the_twins(seed):
     ranges = np.linalg.norm(points, axis=1)
     angles = np.arctan2(rays[:, 1], rays[:, 0])
     expected = reference.ray_noise(ranges, angles, 0.01, TRUSTED, TRUSTED_MEAN_SQUARE)
-    assert ray_noise(ranges, *np.ascontiguousarray(rays.T), 0.01) == pytest.approx(expected)
+    measured = records(points, rays)
+    assert beams.ray_noise(measured, 0.01) == pytest.approx(expected)
     expected = reference.window_noise(points, WINDOW, MEDIAN_CHI)
-    assert window_noise(*np.ascontiguousarray(points.T)) == pytest.approx(expected)
+    assert beams.window_noise(measured) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("sigma", [0.005, 0.02, 0.05])
 def test_the_noise_of_a_wall_is_found(sigma):
     ranges, rays = noisy_wall(4, 4000, sigma)
     step = math.acos(rays[0] @ rays[1])
-    assert ray_noise(ranges, *np.ascontiguousarray(rays.T), step) == pytest.approx(sigma, rel=0.08)
+    assert beams.ray_noise(records(ranges[:, None] * rays, rays), step) == pytest.approx(sigma, rel=0.08)
 
 
 def test_too_few_points_say_nothing_of_noise():
     ranges, rays = noisy_wall(4, 9)
-    assert ray_noise(ranges, *np.ascontiguousarray(rays.T), 1.0) == 0.0
-    assert window_noise(*np.ascontiguousarray((ranges[:, None] * rays).T)) == 0.0
+    points = records(ranges[:, None] * rays, rays)
+    assert beams.ray_noise(points, 1.0) == 0.0
+    assert beams.window_noise(points) == 0.0
 
 
 @settings(deadline=None, max_examples=40)
@@ -190,17 +201,22 @@ def test_beams_are_gathered_as_by_the_twin(seed, backward, closed, lost):
     ranges = rng.uniform(1, 5, 30)
     ranges[rng.random(30) < lost] = rng.choice([np.nan, np.inf])
     angles = np.arange(30) * (-0.2 if backward else 0.2)
-    order, r, rays, points = gather(ranges, np.cos(angles), np.sin(angles), backward, closed)
+    order, points = beams.gather(ranges, np.cos(angles), np.sin(angles), backward, closed)
     expected_order, expected_r, expected_rays = reference.gather(ranges, angles, backward, closed)
     np.testing.assert_array_equal(order, expected_order)
-    np.testing.assert_array_equal(r, expected_r)
-    np.testing.assert_array_equal(rays, expected_rays)
-    np.testing.assert_allclose(points, r * rays)
+    np.testing.assert_array_equal(points["range"], expected_r)
+    np.testing.assert_array_equal([points["ray_x"], points["ray_y"]], expected_rays)
+    np.testing.assert_allclose([points["x"], points["y"]], expected_r * expected_rays)
+
+
+def test_placed_points_have_rays_where_they_have_ranges():
+    points = beams.place(np.array([[3.0, 4.0], [1.0, 2.0]]), np.array([5.0, 0.0]))
+    assert points.tolist() == [(3.0, 4.0, 0.6, 0.8, 5.0), (1.0, 2.0, 0.0, 0.0, 0.0)]
 
 
 def test_ranges_are_cleaned_by_rep_117():
     ranges = np.array([np.nan, np.inf, -np.inf, 0.05, 0.0, -1.0, 0.1, 5.0, 5.01])
-    cleaned = clean(ranges, 0.1, 5.0)
+    cleaned = beams.clean(ranges, 0.1, 5.0)
     np.testing.assert_array_equal(cleaned, [np.nan, np.inf, np.nan, np.nan, np.nan, np.nan, 0.1, 5.0, np.inf])
 
 
@@ -209,27 +225,37 @@ def test_ranges_are_cleaned_by_rep_117():
     [([1.05, 2.1, 3.15], 1.05), ([1.0, 1.05, 3.2], 0.05), ([0.99, 1.0], 0.01), ([1.0, 1.00013], 0.0), ([], 0.0)],
 )
 def test_the_quantum_is_what_all_ranges_are_multiples_of(ranges, expected):
-    assert quantum(np.array(ranges, dtype=np.float32).astype(np.float64)) == pytest.approx(expected)
+    points = np.zeros(len(ranges), POINT)
+    points["range"] = np.array(ranges, dtype=np.float32)
+    assert beams.quantum(points) == pytest.approx(expected)
+
+
+GOOD = {
+    "nx": 1.0,
+    "p": 2.0,
+    "spread": 0.1,
+    "weight": 1e5,
+    "count": 10.0,
+    "chi2": 8.0,
+    "begin": -0.5,
+    "end": 0.5,
+}
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "accepted"),
+    ("field", "value", "accepted"),
     [
-        (COUNT, 10.0, True), (COUNT, 9.0, False),
-        (END, 0.49, False),
-        (WEIGHT, 1.01 / (WORST_ANGLE**2 * 0.1), True), (WEIGHT, 0.99 / (WORST_ANGLE**2 * 0.1), False),
-        (CHI2, 0.99 * WORST_FIT * 8, True), (CHI2, 1.01 * WORST_FIT * 8, False),
-        (P, 0.0, False),
+        ("count", 10.0, True), ("count", 9.0, False),
+        ("end", 0.49, False),
+        ("weight", 1.01 / (WORST_ANGLE**2 * 0.1), True), ("weight", 0.99 / (WORST_ANGLE**2 * 0.1), False),
+        ("chi2", 0.99 * WORST_FIT * 8, True), ("chi2", 1.01 * WORST_FIT * 8, False),
+        ("p", 0.0, False),
     ],
 )  # fmt: skip
-def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(place, value, accepted):
-    line = np.zeros(LINE)
-    line[[NX, P, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END]] = 1.0, 2.0, 0.1, 1e5, 10.0, 8.0, -0.5, 0.5
-    line[place] = value
-    assert (large_enough(line, 10, 1.0) and acceptable(line, True)) is accepted
+def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(field, value, accepted):
+    line = line_with(**{**GOOD, field: value})
+    assert (tracing.large_enough(line, 10, 1.0) and tracing.acceptable(line, True)) is accepted
 
 
 def test_points_without_rays_may_lie_on_a_line_through_their_middle():
-    line = np.zeros(LINE)
-    line[[NX, P, SPREAD, WEIGHT, COUNT, CHI2, BEGIN, END]] = 1.0, 0.0, 0.1, 1e5, 10.0, 8.0, -0.5, 0.5
-    assert acceptable(line, False)
+    assert tracing.acceptable(line_with(**{**GOOD, "p": 0.0}), False)

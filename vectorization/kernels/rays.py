@@ -1,33 +1,31 @@
-"""Compiled preparation of ranges: what is known of each beam, in which order, and what noise they show.
+"""Preparation of ranges: what is known of each beam, in which order, and what noise they show."""
 
-Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in
-``tests/vectorization/reference.py``.
-"""
+from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration.compiling import kernel
+from registration.layout import Floats, Records, X, Y
 
-# Share of the triples of points that are trusted to lie on straight walls, and the mean square of that lower share of a
-# Gaussian's |z|. A mean, for quantised ranges make a quantile jump.
-TRUSTED = 0.5
-TRUSTED_MEAN_SQUARE = 0.14262
-
-# Points in a window where noise has no direction, and the median of chi-square of its five degrees of freedom over 5.
-WINDOW = 7
-MEDIAN_CHI = 0.8703
-
-LEAST_TRIPLES = 10
-
-# Ranges are quantised when all are multiples of a step of so many of these units (m).
-QUANTUM_UNIT = 1e-4
-LEAST_QUANTUM = 10
+from ..layout import POINT
+from ..tuning import (
+    LEAST_QUANTUM,
+    LEAST_TRIPLES,
+    MEDIAN_CHI,
+    QUANTUM_SLACK,
+    QUANTUM_UNIT,
+    TRIPLE_STEPS,
+    TRUSTED,
+    TRUSTED_MEAN_SQUARE,
+    WINDOW,
+)
 
 
 @kernel
-def clean(ranges, range_min, range_max):
+def clean(ranges: Floats, range_min: float, range_max: float) -> Floats:
     """Return the ranges with beams without return at inf and beams of which nothing is known at nan."""
     cleaned = ranges.copy()
     for i in range(len(ranges)):
@@ -39,8 +37,10 @@ def clean(ranges, range_min, range_max):
 
 
 @kernel
-def gather(cleaned, cosines, sines, backward, closed):
-    """Return indices, ranges, the rays' two components and the points' of the beams that have a range.
+def gather(
+    cleaned: Floats, cosines: Floats, sines: Floats, backward: bool, closed: bool
+) -> tuple[NDArray[np.int64], Records]:
+    """Return indices and points of the beams that have a range.
 
     Counter-clockwise, so from the last if the scan went `backward`. A `closed` scan is turned so that no wall lies
     across its seam: it begins at the farthest point, which is an end of its wall, as distance from a place grows along
@@ -60,27 +60,41 @@ def gather(cleaned, cosines, sines, backward, closed):
     if closed:
         order = np.concatenate((order[farthest:count], order[:farthest]))
     order = order[:count]
-    r = np.empty(count)
-    rays = np.empty((2, count))
-    points = np.empty((2, count))
+    points = np.empty(count, POINT)
     for k in range(count):
         i = order[k]
-        r[k] = cleaned[i]
-        rays[0, k] = cosines[i]
-        rays[1, k] = sines[i]
-        points[0, k] = r[k] * cosines[i]
-        points[1, k] = r[k] * sines[i]
-    return order, r, rays, points
+        point = points[k]
+        point.range = cleaned[i]
+        point.ray_x = cosines[i]
+        point.ray_y = sines[i]
+        point.x = cleaned[i] * cosines[i]
+        point.y = cleaned[i] * sines[i]
+    return order, points
 
 
 @kernel
-def quantum(ranges):
+def place(places: Floats, ranges: Floats) -> Records:
+    """Return the points at `places` (n, 2) about the sensor; one whose range is 0 has no ray."""
+    points = np.zeros(len(places), POINT)
+    for i in range(len(places)):
+        point = points[i]
+        point.x = places[i, X]
+        point.y = places[i, Y]
+        if ranges[i] > 0.0:
+            point.ray_x = places[i, X] / ranges[i]
+            point.ray_y = places[i, Y] / ranges[i]
+            point.range = ranges[i]
+    return points
+
+
+@kernel
+def quantum(points: Records) -> float:
     """Return the step that all ranges are multiples of, metres, 0 for none or one below a millimetre."""
     step = 0
-    for i in range(len(ranges)):
-        units = ranges[i] / QUANTUM_UNIT
+    for i in range(len(points)):
+        units = points[i].range / QUANTUM_UNIT
         whole = round(units)
-        if abs(units - whole) > 0.1:
+        if abs(units - whole) > QUANTUM_SLACK:
             return 0.0
         while whole > 0:
             step, whole = whole, step % whole
@@ -90,27 +104,31 @@ def quantum(ranges):
 
 
 @kernel
-def ray_noise(ranges, ux, uy, increment):
+def ray_noise(points: Records, increment: float) -> float:
     """Return the standard deviation of the ranges, or 0 where there are too few neighbours to tell.
 
     On a wall ``1 / r = (n.u) / p`` is linear in the ray's direction, so for any three rays
     ``sin(c - b) / r_a + sin(b - a) / r_c = sin(c - a) / r_b`` whatever the wall; what is missing is noise.
     """
-    n = len(ranges)
+    n = len(points)
     z = np.empty(max(0, n - 2))
+    widest = TRIPLE_STEPS * increment
     count = 0
     for i in range(1, n - 1):
-        before = ux[i - 1] * uy[i] - uy[i - 1] * ux[i]
-        after = ux[i] * uy[i + 1] - uy[i] * ux[i + 1]
-        if not (0.0 < before < 1.6 * increment and 0.0 < after < 1.6 * increment):
+        a = points[i - 1]
+        b = points[i]
+        c = points[i + 1]
+        before = a.ray_x * b.ray_y - a.ray_y * b.ray_x
+        after = b.ray_x * c.ray_y - b.ray_y * c.ray_x
+        if not (0.0 < before < widest and 0.0 < after < widest):
             continue
-        both = ux[i - 1] * uy[i + 1] - uy[i - 1] * ux[i + 1]
-        qa = after / ranges[i - 1]
-        qb = both / ranges[i]
-        qc = before / ranges[i + 1]
-        va = qa / ranges[i - 1]
-        vb = qb / ranges[i]
-        vc = qc / ranges[i + 1]
+        both = a.ray_x * c.ray_y - a.ray_y * c.ray_x
+        qa = after / a.range
+        qb = both / b.range
+        qc = before / c.range
+        va = qa / a.range
+        vb = qb / b.range
+        vc = qc / c.range
         z[count] = abs(qa + qc - qb) / math.sqrt(va * va + vb * vb + vc * vc)
         count += 1
     if count < LEAST_TRIPLES:
@@ -124,23 +142,29 @@ def ray_noise(ranges, ux, uy, increment):
 
 
 @kernel
-def window_noise(x, y):
+def window_noise(points: Records) -> float:
     """Return the standard deviation of points normal to the walls, from small windows, or 0 where there are too few."""
-    n = len(x)
-    windows = n - WINDOW + 1
+    windows = len(points) - WINDOW + 1
     if windows < LEAST_TRIPLES:
         return 0.0
     squares = np.empty(windows)
     for a in range(windows):
-        mx = np.mean(x[a : a + WINDOW])
-        my = np.mean(y[a : a + WINDOW])
+        mx = 0.0
+        my = 0.0
+        for i in range(a, a + WINDOW):
+            mx += points[i].x
+            my += points[i].y
+        mx /= WINDOW
+        my /= WINDOW
         cxx = 0.0
         cxy = 0.0
         cyy = 0.0
         for i in range(a, a + WINDOW):
-            cxx += (x[i] - mx) * (x[i] - mx)
-            cxy += (x[i] - mx) * (y[i] - my)
-            cyy += (y[i] - my) * (y[i] - my)
+            dx = points[i].x - mx
+            dy = points[i].y - my
+            cxx += dx * dx
+            cxy += dx * dy
+            cyy += dy * dy
         root = math.hypot(cxx - cyy, 2.0 * cxy)
         squares[a] = max(0.0, 0.5 * (cxx + cyy - root)) / (WINDOW - 2)
     k = windows // 2

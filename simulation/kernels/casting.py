@@ -1,14 +1,19 @@
-"""Compiled ray casting over flat float64 arrays.
+"""Ray casting.
 
-Nothing here validates: callers hand over finite arrays of the shapes that are named. Every kernel has a slow twin in
+Nothing here validates: callers hand over finite numbers. The kernel has a slow twin in
 ``tests/simulation/reference.py``.
 """
+
+from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration.compiling import kernel
+from registration.kernels import keep_alive
+from registration.layout import SEGMENT, Floats
 
 # rad; a ray this close to an end still meets the segment, so that none slips through the joint of two walls.
 END_TOLERANCE = 1e-12
@@ -18,7 +23,16 @@ BACK_FACE_HANDICAP = 1.0 + 1e-9
 
 
 @kernel
-def cast(endpoints, x, y, start, increment, cosines, sines, one_sided):
+def cast(
+    endpoints: Floats,
+    x: float,
+    y: float,
+    start: float,
+    increment: float,
+    cosines: Floats,
+    sines: Floats,
+    one_sided: bool,
+) -> tuple[Floats, NDArray[np.int64]]:
     """Intersect the beams from ``(x, y)`` with n segments, each over the beams that it subtends.
 
     Parameters are the ``(n, 4)`` endpoints, the sensor's place, the first beam's angle and the step from beam to beam
@@ -26,16 +40,17 @@ def cast(endpoints, x, y, start, increment, cosines, sines, one_sided):
     beams that come from its left. Returns ``(m,)`` ranges, inf where nothing is hit, and the segments' indices, -1
     there.
     """
+    segments = endpoints.reshape(-1).view(SEGMENT)
     beams = len(cosines)
     ranges = np.full(beams, np.inf)
     keys = np.full(beams, np.inf)
     hits = np.full(beams, -1, dtype=np.int64)
     step = abs(increment)
-    for k in range(len(endpoints)):
-        bx = endpoints[k, 0] - x
-        by = endpoints[k, 1] - y
-        ex = endpoints[k, 2] - x
-        ey = endpoints[k, 3] - y
+    for k in range(len(segments)):
+        bx = segments[k].begin_x - x
+        by = segments[k].begin_y - y
+        ex = segments[k].end_x - x
+        ey = segments[k].end_y - y
         nx = by - ey
         ny = ex - bx
         p = nx * bx + ny * by
@@ -64,4 +79,5 @@ def cast(endpoints, x, y, start, increment, cosines, sines, one_sided):
                     keys[i] = key
                     ranges[i] = r
                     hits[i] = k
+    keep_alive(segments)
     return ranges, hits

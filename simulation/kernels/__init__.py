@@ -1,0 +1,1 @@
+"""Compiled ray casting; see `casting`."""

@@ -1,0 +1,172 @@
+"""What every kernel keeps to, read from its source; see ``registration/layout.py`` and ``kernels/records.py``."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+MODULES = sorted(path for path in ROOT.glob("*/kernels/**/*.py") if not path.parts[len(ROOT.parts)].startswith("."))
+MOST_ARGUMENTS = 8
+
+
+def functions(source: str) -> Iterator[ast.FunctionDef]:
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef) and any(
+            isinstance(d, ast.Name) and d.id in ("kernel", "inlined") for d in node.decorator_list
+        ):
+            yield node
+
+
+def elements_of(node: ast.AST) -> Iterator[str]:
+    """Return the names of the arrays that elements are taken of, `a` for ``a[i]``, but not for ``a[i:j]``."""
+    for inner in ast.walk(node):
+        if isinstance(inner, ast.Subscript) and isinstance(inner.value, ast.Name):
+            index = inner.slice.elts if isinstance(inner.slice, ast.Tuple) else [inner.slice]
+            if not any(isinstance(part, ast.Slice) for part in index):
+                yield inner.value.id
+
+
+def whole_uses(function: ast.FunctionDef, array: str) -> list[int]:
+    """Return the lines that use an array itself, or a slice of it."""
+    elements = {
+        id(node.value)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Subscript) and array in elements_of(node) and isinstance(node.value, ast.Name)
+    }
+    return [
+        node.lineno
+        for node in ast.walk(function)
+        if isinstance(node, ast.Name)
+        and node.id == array
+        and isinstance(node.ctx, ast.Load)
+        and id(node) not in elements
+    ]
+
+
+def freed_too_early(function: ast.FunctionDef) -> list[str]:
+    """Return the arrays made in a kernel whose elements are used after the last use of the array itself."""
+    assignments = [
+        (node.targets[0].id, node.value)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)
+    ]
+    with_fields = {
+        node.value.id if isinstance(node.value, ast.Name) else node.value.value.id
+        for node in ast.walk(function)
+        if isinstance(node, ast.Attribute)
+        and (
+            isinstance(node.value, ast.Name)
+            or (isinstance(node.value, ast.Subscript) and isinstance(node.value.value, ast.Name))
+        )
+    }
+    found = []
+    for array in {name for name, value in assignments if isinstance(value, ast.Call)}:
+        typed = any(
+            name == array and any(isinstance(a, ast.Name) and a.id.isupper() for a in value.args)
+            for name, value in assignments
+            if isinstance(value, ast.Call)
+        )
+        aliases = {
+            name
+            for name, value in assignments
+            if isinstance(value, ast.Subscript | ast.Attribute)
+            and array in elements_of(value)
+            and (name in with_fields or typed)
+        }
+        if not (typed or aliases or array in with_fields.intersection(elements_of(function))):
+            continue
+        uses = [
+            node
+            for node in ast.walk(function)
+            if (isinstance(node, ast.Subscript) and array in elements_of(node))
+            or (isinstance(node, ast.Name) and node.id in aliases)
+        ]
+        returned = any(
+            use in set(ast.walk(node)) for node in ast.walk(function) if isinstance(node, ast.Return) for use in uses
+        )
+        last = max((use.lineno for use in uses), default=0)
+        if uses and (returned or max(whole_uses(function, array), default=0) <= last):
+            found.append(array)
+    return found
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_kernels_keep_the_rules(path: Path) -> None:
+    for function in functions(path.read_text()):
+        arguments = function.args
+        assert len(arguments.args) <= MOST_ARGUMENTS, function.name
+        assert all(argument.annotation is not None for argument in arguments.args), function.name
+        assert function.returns is not None, function.name
+        assert not freed_too_early(function), function.name
+
+
+GOOD = """
+@kernel
+def handed_back(n):
+    out = np.empty(n, LINE)
+    for i in range(n):
+        line = out[i]
+        line.dx = 1.0
+    return out[:n]
+@kernel
+def kept(n):
+    out = np.empty(1, LINE)
+    line = out[0]
+    line.dx = 1.0
+    total = line.dx + line.dy
+    keep_alive(out)
+    return total
+@kernel
+def numbers(n):
+    out = np.empty(n)
+    out[0] = 1.0
+    return out[0]
+@kernel
+def arguments(lines):
+    line = lines[0]
+    return line.dx
+"""
+BAD = """
+@kernel
+def element(n):
+    out = moved(n)
+    return out[0].dx
+@kernel
+def alias(n):
+    out = np.empty(1, LINE)
+    line = out[0]
+    line.dx = 1.0
+    return line.dx
+@kernel
+def handed_on(n):
+    out = np.empty(1, LINE)
+    fill(out[0])
+    return is_regular(out[0])
+@kernel
+def too_early(n):
+    out = np.empty(1, LINE)
+    line = out[0]
+    keep_alive(out)
+    other = np.empty(3)
+    line.dx = 1.0
+    return other
+@kernel
+def by_another_way(n):
+    out = np.empty(1, LINE)
+    line = out[0]
+    if n > 0:
+        return line.dx
+    keep_alive(out)
+    return 0.0
+"""
+
+
+def test_the_rule_finds_what_is_freed_too_early() -> None:
+    assert [function.name for function in functions(GOOD) if freed_too_early(function)] == []
+    assert [function.name for function in functions(BAD) if not freed_too_early(function)] == []
+    assert len(list(functions(GOOD))) == 4
+    assert len(list(functions(BAD))) == 5
