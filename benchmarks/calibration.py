@@ -68,7 +68,7 @@ class Fitted:
     def probabilities(self, examples: Sequence[Example]) -> np.ndarray:
         """Return the chance that each answer is right."""
         logits = np.array([self.model.logit(e.features) for e in examples])
-        return _shares(examples, self.temperature) / (1.0 + np.exp(-logits))
+        return np.asarray(_shares(examples, self.temperature) / (1.0 + np.exp(-logits)))
 
 
 def _shares(examples: Sequence[Example], temperature: float) -> np.ndarray:
@@ -158,7 +158,7 @@ def print_changes(old: np.ndarray, new: np.ndarray, examples: Sequence[Example])
 def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dict[str, Model]:
     """Print how present and new models do on one form of scans; return the new ones."""
     print(f"\n## Scans as {form}: {len(examples)} answers")
-    cells = []
+    cells: list[tuple[str, ...]] = []
     for temperature in TEMPERATURES:
         losses = [log_loss(cross_validated(examples, t, temperature), examples, t.strangers) for t in tasks]
         cells.append((f"{temperature:g}", *(f"{v:.4f}" for v in losses)))
@@ -168,10 +168,8 @@ def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dic
     tried = [cross_validated(examples, t, TWIN_TEMPERATURE) for t in tasks]
     present = [Fitted(t.current, TWIN_TEMPERATURE).probabilities(examples) for t in tasks]
     for title, found in (("cross-validated", tried), ("present", present)):
-        losses = ", ".join(
-            f"{t.name} {log_loss(p, examples, t.strangers):.4f}" for t, p in zip(tasks, found, strict=True)
-        )
-        print(f"\nLog-loss, {title}: {losses}")
+        told = (f"{t.name} {log_loss(p, examples, t.strangers):.4f}" for t, p in zip(tasks, found, strict=True))
+        print(f"\nLog-loss, {title}: {', '.join(told)}")
         print_bins(f"Scans as {form} in their own map, {title}", found[0][own], right[own])
         print_thresholds(f"Usable share of scans as {form}, {title}", found[0], found[-1], examples)
     print_changes(present[-1], tried[-1], examples)
@@ -197,7 +195,8 @@ def main() -> None:
     parser.add_argument("--stride", type=int, default=1, help="take one in so many queries")
     parser.add_argument("--write", action="store_true", help="write the models to the file that the verdict reads")
     args = parser.parse_args()
-    models, fitted_on = {}, {}
+    models: dict[str, Model] = {}
+    fitted_on: dict[str, str] = {}
     for form, tasks, cases in (
         ("segments", OF_SEGMENTS, segment_cases(args.stride)),
         ("ranges", OF_RANGES, range_cases(args.stride)),

@@ -157,7 +157,7 @@ def _twin_difference(name: str, map: Segments, scan: MeasuredSegments) -> float:
             theta = reference.mitsuta(angles, weights)[0] / weights.sum()
         # The translation is that of the scan turned first: the lines of Eq. (1) do not depend on the rotation.
         t = reference.one_step_translation(lines, weights)
-    return max(abs(wrap_angle(found.theta - theta)), abs(found.x - t[0]), abs(found.y - t[1]))
+    return float(max(abs(wrap_angle(found.theta - theta)), abs(found.x - t[0]), abs(found.y - t[1])))
 
 
 def estimators(trials: int) -> list[Row]:

@@ -52,20 +52,21 @@ def best_time(action: Callable[[], object], repeats: int) -> float:
 def sums_times(counts: tuple[int, ...]) -> list[tuple[float, float, float]]:
     """Time adding a pair to sums over many, solving, and summing anew; microseconds."""
     rng = np.random.default_rng(SEED)
-    times = []
-    for count in counts:
-        middles, angles = rng.uniform(-20.0, 20.0, (count + 1, 2)), rng.uniform(-math.pi, math.pi, count + 1)
-        half = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        segments = Segments.from_array(np.hstack([middles - half, middles + half]))
-        rows = np.repeat(np.arange(count + 1), 2).reshape(-1, 2)
-        pairs = Correspondences.of(segments, MeasuredSegments.from_segments(segments, SIGMA), rows)
-        everything, weights = pairs.take(slice(0, count)), np.full(count, 1e4)
-        sums = JointSums.of_set(everything, weights)
-        add = best_time(lambda sums=sums, pairs=pairs, k=count: sums.add(pairs, k, 1e4), 300)
-        solve = best_time(lambda sums=sums: sums.solve(0.0), 300)
-        anew = best_time(lambda e=everything, w=weights: JointSums.of_set(e, w), 30 if count < 100_000 else 5)
-        times.append((1e6 * add, 1e6 * solve, 1e6 * anew))
-    return times
+    return [_sums_times(count, rng) for count in counts]
+
+
+def _sums_times(count: int, rng: np.random.Generator) -> tuple[float, float, float]:
+    middles, angles = rng.uniform(-20.0, 20.0, (count + 1, 2)), rng.uniform(-math.pi, math.pi, count + 1)
+    half = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    segments = Segments.from_array(np.hstack([middles - half, middles + half]))
+    rows = np.repeat(np.arange(count + 1), 2).reshape(-1, 2)
+    pairs = Correspondences.of(segments, MeasuredSegments.from_segments(segments, SIGMA), rows)
+    everything, weights = pairs.take(slice(0, count)), np.full(count, 1e4)
+    sums = JointSums.of_set(everything, weights)
+    add = best_time(lambda: sums.add(pairs, count, 1e4), 300)
+    solve = best_time(lambda: sums.solve(0.0), 300)
+    anew = best_time(lambda: JointSums.of_set(everything, weights), 30 if count < 100_000 else 5)
+    return 1e6 * add, 1e6 * solve, 1e6 * anew
 
 
 def campus(size: int) -> Segments:

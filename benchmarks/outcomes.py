@@ -126,8 +126,12 @@ def other_logs(collections: Sequence[Collection]) -> list[Outcome]:
     for k, log in enumerate(collections):
         other = collections[(k + 1) % len(collections)]
         away = Collection(f"{log.name} in {other.name}", other.maps, log.queries[::4], log.distance, log.angle)
-        outcomes += run(away, key=lambda _query, maps=other.maps: next(iter(maps)))
+        outcomes += _run_in(away, next(iter(other.maps)))
     return outcomes
+
+
+def _run_in(collection: Collection, key: MapKey) -> list[Outcome]:
+    return run(collection, key=lambda _query: key)
 
 
 def progress(name: str, done: int, total: int) -> None:

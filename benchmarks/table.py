@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,12 +49,16 @@ def within(what: str, value: float, low: float, high: float, form: str = ".3f") 
     return Row(what, format(value, form), f"{low:g} to {high:g}", low <= value <= high)
 
 
-def _row(what: str, value: float, goals: tuple[float | None, float | None], form: str, sign: str, test: object) -> Row:
-    told, met = ["", ""], [None, None]
-    for k, limit in enumerate(goals):
-        if limit is not None:
-            told[k] = f"{sign}{limit:g}"
-            met[k] = None if math.isnan(value) else bool(test(limit))  # type: ignore[operator]
+def _row(
+    what: str,
+    value: float,
+    goals: tuple[float | None, float | None],
+    form: str,
+    sign: str,
+    test: Callable[[float], bool],
+) -> Row:
+    told = ["" if limit is None else f"{sign}{limit:g}" for limit in goals]
+    met = [None if limit is None or math.isnan(value) else test(limit) for limit in goals]
     return Row(what, "not measured" if math.isnan(value) else format(value, form), told[0], met[0], told[1], met[1])
 
 

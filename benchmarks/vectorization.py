@@ -12,6 +12,8 @@ import json
 import math
 import os
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -54,9 +56,9 @@ def floorplan_scenes(count: int) -> list[tuple[Segments, RigidTransform]]:
             plans[family, plan["id"]] = plan["segments"]
     scenes = []
     for query in queries:
-        family = next((f for f, name in plans if name == query["id"]), None)
-        if family is not None:
-            scenes.append((Segments.from_array(plans[family, query["id"]]), RigidTransform(*query["pose"])))
+        found = next((key for key in plans if key[1] == query["id"]), None)
+        if found is not None:
+            scenes.append((Segments.from_array(plans[found]), RigidTransform(*query["pose"])))
     return scenes
 
 
@@ -195,12 +197,12 @@ def accuracy(name: str, scenes: list[tuple[Segments, RigidTransform]], scanner: 
     )
 
 
-def best_time(function: object, repeats: int = 15) -> float:
+def best_time(function: Callable[[], object], repeats: int = 15) -> float:
     """Milliseconds of the fastest of some calls, the others being disturbed."""
     times = []
     for _ in range(repeats):
         begin = time.perf_counter()
-        function()  # type: ignore[operator]
+        function()
         times.append(time.perf_counter() - begin)
     return 1e3 * min(times)
 
@@ -211,8 +213,8 @@ def speed(scenes: list[tuple[Segments, RigidTransform]]) -> None:
     vector, caster, sizes = [], [], []
     for map, pose in scenes:
         laser = as_laser(scan(map, pose, scanner, rng))
-        vector.append(best_time(lambda laser=laser: vectorize(laser)))
-        caster.append(best_time(lambda map=map, pose=pose: scan(map, pose, scanner, rng)))
+        vector.append(best_time(partial(vectorize, laser)))
+        caster.append(best_time(partial(scan, map, pose, scanner, rng)))
         sizes.append(len(map))
     print(f"vectorize 1,080 beams: median {np.median(vector):.3f} ms, p95 {np.quantile(vector, 0.95):.3f} ms")
     per = np.array(caster)[np.array(sizes) >= 800]

@@ -1,4 +1,4 @@
 """Compiled parts of the search. They validate nothing and speak in the records of `association.layout`.
 
-Every kernel has a slow, obviously right twin in ``tests/association/reference.py``.
+Every kernel has a slow, obviously right twin in ``tests/association/reference``.
 """

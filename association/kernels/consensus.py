@@ -108,6 +108,8 @@ def refine(
                 held[i] = w
         if not changed:
             break
+        if sums.count == 0.0:
+            return 0.0  # of pairs that came and went the sums keep rounding, which fixes nothing
         x = estimate.x
         y = estimate.y
         hold(sums, x, y, 1.0)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration.compiling import kernel
+from registration.layout import Floats
+
+Indices = NDArray[np.int64]
 
 LEAST_SINE = math.sin(math.radians(20.0))  # of lines that make a corner
 
 
 @kernel
-def cross_lines(ends, reach):
+def cross_lines(ends: Floats, reach: float) -> Floats:
     """Return the corners of directed segments that come within `reach` of where their lines cross.
 
     Rows: x, y, heading of the first segment, turn to the second (0 to pi), where the first begins and ends along its
@@ -50,7 +54,7 @@ def cross_lines(ends, reach):
 
 
 @kernel
-def fit_corners(seen, known, order, gates):
+def fit_corners(seen: Floats, known: Floats, order: Indices, gates: Floats) -> Indices:
     """Return pairs of corners, of the scan and of the map, with like turns whose segments contain each other.
 
     `known` is sorted by its turn; `order` lists the scan's corners; `gates` are the radians that the turns and the
@@ -78,7 +82,7 @@ def fit_corners(seen, known, order, gates):
 
 
 @kernel
-def explained(scan, known, pose, gates):
+def explained(scan: Floats, known: Floats, pose: Floats, gates: Floats) -> float:
     """Return how many metres of the scan lie on the map at a pose; `gates` are metres and radians."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     total = 0.0
@@ -104,7 +108,7 @@ def explained(scan, known, pose, gates):
 
 
 @kernel
-def affinities(seen, known, pairs, widths):
+def affinities(seen: Floats, known: Floats, pairs: Indices, widths: Floats) -> Floats:
     """Return how well pairs of corners agree with each other: distances and headings; ``(k, k)``, 0 for not at all."""
     count = len(pairs)
     found = np.zeros((count, count))

@@ -155,7 +155,7 @@ def draw_query(segments: Floats, level: Level, rng: np.random.Generator) -> Peer
     middles = place + rng.uniform(-reach, reach, (outliers, 2))
     half = 0.5 * lengths[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     seen = np.vstack([parts, np.hstack([middles - half, middles + half])])
-    pose = RigidTransform(*place, rng.uniform(-math.pi, math.pi))
+    pose = RigidTransform(float(place[0]), float(place[1]), rng.uniform(-math.pi, math.pi))
     scan = pose.inverse().apply(seen.reshape(-1, 2)).reshape(-1, 4) + rng.normal(0.0, level.sigma, seen.shape)
     order = rng.permutation(len(scan))
     on_map = np.concatenate([walls, np.full(outliers, -1)])[order]

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from association._beam_kernels import beam_evidence, rank_beams
 
 from association import Beams, MapIndex, Scan, Status, associate
-from association._beam_kernels import beam_evidence, rank_beams
 from registration import MeasuredSegments, Segments
 
 from . import reference

@@ -6,9 +6,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from association._match_kernels import REACH, SECTORS
 
 from association import InvalidMapError, MapIndex
-from association._match_kernels import REACH, SECTORS
 from registration import Segments
 
 from .scenes import ROOM, maze

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from association.scan_rows import gates, scan_rows
 
 from association import AssociationOptions, MapIndex, SoftPrior, Status, associate
 from association.ranking import Ranked
-from association.scan_rows import gates, scan_rows
 from association.significance import significance
 from association.verdict import Evidence, judge
 from registration import MeasuredSegments, Segments, register

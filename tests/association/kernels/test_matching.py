@@ -1,0 +1,114 @@
+"""A scan is matched to the walls as its twin says, and no pose is given up that could have scored."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from association import AssociationOptions
+from association.kernels import matching
+from association.layout import MATCH
+from association.scan_segments import gates
+from registration.layout import Records
+
+from ..records import NOTHING_KNOWN, assert_records, estimate_of
+from ..reference import matching as twin
+from ..reference.geometry import moved
+from ..scenes import context_of, index_of, local, pose, scan_of
+from .drawn import GATES, INDEX, PLACE, SEEDS, TABLES, covariance, drawn
+
+WIDE = gates(AssociationOptions(offset_tolerance=0.3, angle_tolerance=0.2, min_overlap=0.1))
+
+
+def test_wrap() -> None:
+    for angle in (*np.linspace(-20.0, 20.0, 81), math.pi - 1e-9, 1e-9 - math.pi):
+        assert matching.wrap(angle) == pytest.approx(math.remainder(angle, math.tau), abs=1e-12)
+
+
+@given(SEEDS, st.sampled_from([GATES, WIDE]))
+@settings(max_examples=60, deadline=None)
+def test_match_scan(seed: int, gates: Records) -> None:
+    d = drawn(seed)
+    at, spread = d.near(), covariance(d.rng)
+    expected, total = twin.match_scan(d.scan, at, spread, PLACE, gates)
+    matches = np.zeros(len(d.scan), MATCH)
+
+    def got(threshold: float) -> float:
+        return matching.match_scan(d.scan, estimate_of(at, spread)[0], PLACE, gates[0], threshold, matches)
+
+    assert got(0.0) == pytest.approx(total)
+    found = expected["wall"] >= 0
+    assert found.any()
+    np.testing.assert_array_equal(matches["wall"], expected["wall"])
+    np.testing.assert_array_equal(matches["overlap"][~found], 0.0)
+    assert_records(matches[found], expected[found], atol=1e-9)
+    assert got(total - 1e-6) == pytest.approx(total)
+    assert got(total + 1e-6) == -1.0
+
+
+@pytest.mark.parametrize(("gap", "overlap"), [(1.0, 4.0 / 6.0), (2.0, 0.5)])
+def test_a_long_segment_bridges_a_doorway(gap: float, overlap: float) -> None:
+    """It lies on the walls on both sides; the gap counts against it, and a wider one is none that it bridges."""
+    index = index_of([[0.0, 0.0, 3.0, 0.0], [3.0 + gap, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
+    scan = context_of(index, scan_of([[0.0, 0.0, 6.0, 0.0]])).segments.rows
+    matches = np.zeros(1, MATCH)
+    matching.match_scan(scan, estimate_of(local(index, pose()))[0], index.tables.place, GATES[0], 0.0, matches)
+    assert matches["overlap"][0] == pytest.approx(overlap)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_long_segments_on_walls_with_doorways(seed: int) -> None:
+    """Several doorways of several widths, from both sides."""
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum(rng.uniform([0.3, 0.4], [3.0, 1.8], (6, 2)).ravel()).reshape(-1, 2)
+    walls = [[ends[k - 1, 1] if k else 0.0, 0.0, ends[k, 0], 0.0] for k in range(6)]
+    index = index_of([*walls, [20.0, 5.0, 0.0, 5.0]])
+    begin, length = rng.uniform(-1.0, 8.0), rng.uniform(2.0, 9.0)
+    scan = context_of(index, scan_of([[begin, 0.05, begin + length, 0.05]])).segments.rows
+    loose, at = gates(AssociationOptions(min_overlap=0.0)), local(index, pose())
+    matches = np.zeros(1, MATCH)
+    matching.match_scan(scan, estimate_of(at)[0], index.tables.place, loose[0], 0.0, matches)
+    expected, _ = twin.match_scan(scan, at, NOTHING_KNOWN, index.tables.place, loose)
+    assert_records(matches, expected, atol=1e-9)
+
+
+@given(SEEDS, st.floats(0.0, 1e-2), st.sampled_from([GATES, WIDE]))
+@settings(max_examples=20, deadline=None)
+def test_angle_spreads(seed: int, theta_var: float, gates: Records) -> None:
+    scan = drawn(seed).scan
+    spreads = np.zeros(len(scan))
+    matching.angle_spreads(scan, theta_var, gates[0], spreads)
+    np.testing.assert_allclose(spreads, twin.angle_spreads(scan, theta_var, gates), rtol=1e-12)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_may_score(seed: int) -> None:
+    """The bound is what the twin adds up, and no matching exceeds it."""
+    d = drawn(seed)
+    spread = covariance(d.rng)
+    spreads = twin.angle_spreads(d.scan, spread[2, 2], GATES)
+    for at in (d.at, d.near(0.3, 3.0, 3.0), d.near(2.0, 9.0, 9.0)):
+        bound = twin.reachable(d.scan, at, spreads, TABLES.raster)
+        assert matching.may_score(d.scan, estimate_of(at)[0], spreads, TABLES.raster, bound - 1e-6)
+        assert not matching.may_score(d.scan, estimate_of(at)[0], spreads, TABLES.raster, bound + 1e-6)
+        assert twin.match_scan(d.scan, at, spread, PLACE, GATES)[1] <= bound + 1e-9
+    far = moved(d.at, [0.0, 1e3, 0.0])
+    assert not matching.may_score(d.scan, estimate_of(far)[0], spreads, TABLES.raster, 1e-9)
+
+
+def test_a_pose_over_a_doorway_may_score() -> None:
+    """The raster has the direction of a run also where its walls are farther away than they are listed."""
+    segments = context_of(INDEX, scan_of([[0.0, 0.0, 6.0, 0.0]])).segments.rows
+    spreads, matches = twin.angle_spreads(segments, 0.0, GATES), np.zeros(1, MATCH)
+    for jamb in np.linspace(3.0, 3.5, 11):
+        index = index_of([[0.0, 0.0, jamb, 0.0], [jamb + 1.45, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
+        for slide in np.linspace(-3.0, 6.0, 46):
+            at = estimate_of(local(index, pose(float(slide))))[0]
+            total = matching.match_scan(segments, at, index.tables.place, GATES[0], 0.0, matches)
+            assert matching.may_score(segments, at, spreads, index.raster, total - 1e-9), (jamb, slide)

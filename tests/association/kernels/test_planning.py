@@ -1,0 +1,209 @@
+"""Bases are planned as the twins plan them, and the search ends when nothing can have been missed."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from association.kernels import planning
+from association.kernels.proposing import search_base
+from association.layout import FOUND, PROGRESS, RULES, Plan, Question, Words, Workspace, record
+from registration.layout import Records
+
+from ..reference import planning as twin
+from ..scenes import context_of, scan_of
+from .drawn import INDEX, SEEDS, TABLES, Drawn, drawn, oblique
+
+RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95)
+BASES = 8  # segments that bases are made of
+
+
+def uncertain(d: Drawn) -> Records:
+    """Return the scan with angles that are known more or less well: a base may tell much or little."""
+    scan = d.scan.copy()
+    scan["angle_variance"] *= 10.0 ** d.rng.uniform(0.0, 3.0, len(scan))
+    return scan
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_slack_tables(seed: int) -> None:
+    d = drawn(seed)
+    d.scan["length"] *= 1.5
+    runs = oblique(d.rng).runs
+    for got, expected in zip(planning.slack_tables(d.scan, 9, runs), twin.slack_tables(d.scan, 9, runs), strict=True):
+        np.testing.assert_allclose(got, expected, atol=1e-9)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_is_telling(seed: int) -> None:
+    d = drawn(seed)
+    scan = uncertain(d)
+    for a, b in itertools.combinations(range(len(scan)), 2):
+        assert planning.is_telling(scan, a, b) is twin.is_telling(scan, a, b)
+
+
+def test_a_base_tells_as_long_as_it_lays_the_others_off_by_a_quarter_of_a_metre() -> None:
+    """Two segments at the origin with an angle's deviation of 0.02 each, others 10 m and more away."""
+    scan = drawn(0).scan[:4].copy()
+    scan["x"], scan["y"], scan["gain"], scan["angle_variance"] = 0.0, 0.0, [0.0, 0.0, 1.0, 1.0], 2.0 * 0.02**2
+    for distance, telling in ((12.4, True), (12.6, False)):
+        scan["x"][2:], scan["y"][2:] = [distance, 0.0], [0.0, distance]
+        assert planning.is_telling(scan, 0, 1) is telling
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
+    d = drawn(seed)
+    scan, runs, area = uncertain(d), oblique(d.rng).runs, 10.0 ** d.rng.uniform(1.0, 4.0)
+    count = int(d.rng.integers(2, len(scan) + 1))
+    bases, expected = planning.plan_bases(scan, count, runs, area), twin.plan_bases(scan, count, runs, area)
+    assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
+    np.testing.assert_allclose(bases["merit"], [base[2] for base in expected], rtol=1e-9)
+    uses = np.zeros(count)
+    taken = [planning.next_base(bases, uses) for _ in range(len(expected) + 1)]
+    assert taken == [*twin.order_of(expected), -1]
+    assert uses.sum() == 2 * len(expected)
+
+
+def test_bound_is_never_below_what_can_have_been_missed() -> None:
+    """Brute force over all consensus sets that contain none of the bases; what is lowered is told."""
+    rng = np.random.default_rng(4)
+    gains = rng.uniform(1.0, 10.0, 9)
+    residual, bound = gains.copy(), float(gains.sum())
+    tried = []
+    for _ in range(12):
+        a, b = rng.choice(9, 2, replace=False).tolist()
+        bound -= planning.cover(residual, a, b)
+        tried.append((1 << a) | (1 << b))
+        free = [s for s in range(512) if not any(s & t == t for t in tried)]
+        missed = max(sum(gains[i] for i in range(9) if s >> i & 1) for s in free)
+        assert bound >= missed - 1e-9
+        assert bound >= residual.sum() - 1e-9
+    assert bound < 0.7 * gains.sum()
+
+
+def sampled(n: int, words: int, rng: np.random.Generator) -> Words:
+    """Sample sets among n segments: bit k of ``[m, i]`` says whether segment i is among the first m + 1 of draw k."""
+    ranks = rng.permuted(np.tile(np.arange(n), (64 * words, 1)), axis=1).T
+    bits = np.packbits(ranks[None] <= np.arange(n)[:, None, None], axis=-1)
+    return np.ascontiguousarray(bits).view(np.uint64)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_strike(seed: int) -> None:
+    """It counts the samples that are left, and leaves sets that are too small alone."""
+    rng = np.random.default_rng(seed)
+    inliers = sampled(7, 3, rng)
+    missing, fewest, tried = np.full((7, 3), ~np.uint64(0)), int(rng.integers(2, 6)), []
+    for _ in range(5):
+        a, b = rng.choice(7, 2, replace=False).tolist()
+        tried.append({"sliding": a, "crossing": b})
+        left = planning.strike(missing, inliers, a, b, fewest)
+        assert left == twin.missed_share(inliers, tried, fewest)
+    for m in range(7):
+        kept = np.unpackbits(missing[m].view(np.uint8)).mean()
+        assert kept == (twin.missed_share(inliers, tried, m + 1) if m + 1 >= fewest else 1.0)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_fewest_segments(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    gains = -np.sort(-rng.integers(1, 9, 6).astype(float))
+    beyond, needed = float(rng.choice([0.0, 3.0])), float(rng.integers(-1, 50))
+    assert planning.fewest_segments(gains, beyond, needed) == twin.fewest_segments(gains.tolist(), beyond, needed)
+
+
+def plan_of(scan: Records, rng: np.random.Generator) -> Plan:
+    n = min(len(scan), BASES)
+    return Plan(
+        bases=planning.plan_bases(scan, n, INDEX.runs, INDEX.area),
+        uses=np.zeros(n),
+        residual=scan["gain"].copy(),
+        best_gains=-np.sort(-scan["gain"][:n]),
+        inliers=sampled(n, 8, rng),
+        missing=np.full((n, 8), ~np.uint64(0)),
+    )
+
+
+def start_of(scan: Records) -> Records:
+    return record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
+
+
+def asked(d: Drawn) -> Question:
+    return context_of(INDEX, scan_of(d.endpoints)).question(RULE)
+
+
+def expected_end(d: Drawn, allowed: float) -> tuple[int, int, float, float]:
+    """Go through the bases one by one; return why it ends, how many there were, the bound and the share missed."""
+    question, found, state = asked(d), np.zeros(64, FOUND), start_of(d.scan)
+    plan, work = plan_of(question.scan, np.random.default_rng(0)), Workspace.of(len(d.scan))
+    beyond, residual, tried, bound, missed = (
+        d.scan["gain"][BASES:].sum(),
+        d.scan["gain"].copy(),
+        [],
+        d.scan["gain"].sum(),
+        1.0,
+    )
+    order = twin.order_of([base.item() for base in plan.bases])
+    for count, k in enumerate(order, 1):
+        base = plan.bases[k]
+        search_base(question, TABLES, base, found, state[0], work, 10**9)
+        needed = 0.95 * state["best_value"][0]
+        a, b = base["sliding"], base["crossing"]
+        if twin.is_telling(d.scan, a, b):
+            tried.append(base)
+            less = min(residual[[a, b]])
+            residual[[a, b]] -= less
+            bound -= less
+            fewest = twin.fewest_segments(plan.best_gains.tolist(), beyond, needed)
+            missed = twin.missed_share(plan.inliers, tried, fewest)
+        if allowed >= 0.0 and bound < needed:
+            return planning.PROVEN, count, bound, missed
+        if missed <= allowed:
+            return planning.CONFIDENT, count, bound, missed
+    return planning.EXHAUSTED, len(order), bound, missed
+
+
+def end_of(d: Drawn, allowed: float, budget: int) -> tuple[tuple[int, int, float, float], Records, int]:
+    """Advance until it ends; return how, what was found, and the number of calls."""
+    question, found, progress = asked(d), np.zeros(64, FOUND), start_of(d.scan)
+    plan, work = plan_of(question.scan, np.random.default_rng(0)), Workspace.of(len(d.scan))
+    why, calls = planning.BUDGET, 0
+    while why == planning.BUDGET:
+        why = planning.advance(question, TABLES, plan, found, progress, work, allowed, budget)
+        calls += 1
+    state = progress[0]
+    end = why, int(state["bases"]), float(state["bound"]), float(state["missed"])
+    return end, found[: int(state["count"])], calls
+
+
+@given(SEEDS)
+@settings(max_examples=12, deadline=None)
+def test_advance(seed: int) -> None:
+    """It ends where its twin does and for the same reason, with the same poses however often it is interrupted."""
+    d = drawn(seed, radius=8.0, clutter=seed % 4)
+    for allowed in (-1.0, 0.0, 0.02, 0.3):
+        end, found, calls = end_of(d, allowed, 10**9)
+        assert end == pytest.approx(expected_end(d, allowed))
+        assert calls == 1
+        again, same, calls = end_of(d, allowed, 300)
+        assert again == end
+        np.testing.assert_array_equal(same, found)
+        assert calls > 1 or allowed > 0.0
+
+
+def test_all_three_ends_are_met() -> None:
+    ends = {
+        expected_end(drawn(seed, radius=8.0, clutter=seed % 4), allowed)[0]
+        for seed in range(8)
+        for allowed in (-1.0, 0.0, 0.3)
+    }
+    assert ends == {planning.EXHAUSTED, planning.PROVEN, planning.CONFIDENT}

@@ -1,0 +1,220 @@
+"""All poses that a base allows are proposed, and no other, however often the search is interrupted."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+
+from association import HardPrior
+from association.kernels import proposing
+from association.layout import BASE, ESTIMATE, FOUND, PROGRESS, RULES, Question, Workspace, record
+from association.tuning import ROUNDS, TESTS_HYPOTHESIS, TESTS_REFINED, TESTS_REJECTED
+from registration.layout import Records
+
+from ..records import estimate_of, pose_of
+from ..reference import proposing as twin
+from ..reference.consensus import refine
+from ..reference.geometry import moved
+from ..reference.matching import angle_spreads, match_scan, reachable
+from ..scenes import context_of, index_of, same_pose, scan_of
+from .drawn import GATES, INDEX, PLACE, SEEDS, SMALL, TABLES, Drawn, drawn, oblique
+
+ALL = record(RULES, kept_share=0.0, distinct_distance=0.0, distinct_angle=0.0, rival_share=0.95)  # keep every pose
+
+
+def base_of(d: Drawn, least: float = 1.0) -> tuple[int, int] | None:
+    """Draw a base of two segments over a metre."""
+    long = [i for i in range(len(d.scan)) if d.scan["length"][i] > least]
+    angles = d.scan["angle"]
+    pairs = [(i, j) for i, j in itertools.permutations(long, 2) if abs(math.sin(angles[i] - angles[j])) > 0.3]
+    return pairs[int(d.rng.integers(len(pairs)))] if pairs else None
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_anchors(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    runs, out, length = oblique(rng).runs, np.zeros(60, np.int64), rng.uniform(0.3, 7.0)
+    count = proposing.anchors(length, runs.rows, runs.bin_starts, out)
+    need = length - 2.0 * twin.end_slack(length)
+    assert out[:count].tolist() == np.nonzero(runs.rows["end"] - runs.rows["begin"] >= need)[0].tolist()
+
+
+@given(SEEDS)
+@settings(max_examples=100, deadline=None)
+def test_base_pose(seed: int) -> None:
+    """The first tells more of the angle, or the second; at the ends of the walls, too."""
+    d = drawn(seed)
+    d.scan["angle_variance"] *= 10.0 ** d.rng.uniform(0.0, 2.0, len(d.scan))
+    runs = oblique(d.rng).runs.rows
+    a, b = d.scan[d.rng.choice(len(d.scan), 2, replace=False)]
+    for wa, wb in itertools.permutations(runs[d.rng.choice(len(runs), 4, replace=False)], 2):
+        if abs(wa["dx"] * wb["dy"] - wa["dy"] * wb["dx"]) < 0.1:
+            continue
+        at, inside = twin.base_pose(a, b, wa, wb)
+        out = np.zeros(1, ESTIMATE)
+        assert proposing.base_pose(a, b, wa, wb, out[0]) is inside
+        assert same_pose(pose_of(out[0]), at, 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize(("slide", "inside"), [(-0.01, False), (0.01, True), (2.99, True), (3.01, False)])
+@pytest.mark.parametrize("second", [False, True])
+def test_a_base_may_stick_out_of_its_walls_a_little(slide: float, inside: bool, second: bool) -> None:
+    """A segment of 2 m by 40 cm; hence on a wall of 4.2 m there are 3 m for its midpoint."""
+    rows = index_of([[0.0, 0.0, 4.2, 0.0], [20.0, -9.0, 20.0, 9.0]]).runs.rows
+    wa, wb = rows[np.argsort(rows["end"] - rows["begin"])]
+    d = drawn(0)
+    a, b = d.scan[:1].copy(), d.scan[1:2].copy()
+    for one, wall, along in ((a, wa, wa["begin"] + 0.6 + slide), (b, wb, 0.0)):
+        one["dx"], one["dy"], one["angle"], one["length"] = wall["dx"], wall["dy"], wall["angle"], 2.0
+        one["x"] = along * wall["dx"] - wall["offset"] * wall["dy"]
+        one["y"] = along * wall["dy"] + wall["offset"] * wall["dx"]
+    pair = (b[0], a[0], wb, wa) if second else (a[0], b[0], wa, wb)
+    assert proposing.base_pose(*pair, np.zeros(1, ESTIMATE)[0]) is inside
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of proposals: poses (k,) of `FOUND`, progress (1,), and how often the search was called."""
+
+    poses: Records
+    progress: Records
+    calls: int
+
+    @property
+    def proposed(self) -> int:
+        return int(self.progress["hypotheses"][0])
+
+
+def asked(d: Drawn, window: HardPrior | None = None) -> Question:
+    """Ask for all poses there are; the window is one of the index frame."""
+    if window is not None:
+        window = HardPrior(moved(window.pose, [0.0, *INDEX.origin]), window.radius, window.angle)
+    return context_of(INDEX, scan_of(d.endpoints), window).question(ALL)
+
+
+def swept(question: Question, base: tuple[int, int], budget: int = 10**9) -> Found:
+    """Go through a base."""
+    found, progress = np.zeros(20_000, FOUND), record(PROGRESS, slide=-np.inf)
+    chosen, work, calls = record(BASE, sliding=base[0], crossing=base[1]), Workspace.of(len(question.scan)), 0
+    while progress["bases"][0] == 0:
+        calls += 1
+        assert proposing.search_base(question, TABLES, chosen[0], found, progress[0], work, budget) > 0
+    assert (progress["anchor"][0], progress["slide"][0]) == (0, -math.inf)
+    return Found(found[: int(progress["count"][0])], progress, calls)
+
+
+def slid(question: Question, sliding: int, spacing: float, budget: int = 10**9) -> Found:
+    """Slide a segment."""
+    found, progress = np.zeros(20_000, FOUND), record(PROGRESS, slide=-np.inf)
+    work, calls, done = Workspace.of(len(question.scan)), 0, False
+    while not done:
+        calls += 1
+        done = proposing.search_slides(question, TABLES, sliding, found, progress, work, spacing, budget)
+    return Found(found[: int(progress["count"][0])], progress, calls)
+
+
+def assert_found(found: Found, scan: Records, proposals: list[twin.Proposal], window: HardPrior | None = None) -> None:
+    """Compare with the proposals, refined, that score and lie in the window."""
+    if window is not None:
+        proposals = [one for one in proposals if twin.may_be_refined_into(window, one.pose)]
+    refined = [refine(scan, one.pose, one.covariance, PLACE, GATES, ROUNDS) for one in proposals]
+    refined = [one for one in refined if one.score > 0.0 and (window is None or window.contains(one.pose))]
+    expected = np.array([(one.score, one.pose.x, one.pose.y) for one in refined]).reshape(-1, 3)
+    got = np.array(found.poses[["score", "x", "y"]].tolist()).reshape(-1, 3)
+    assert len(got) == len(expected)
+    off = np.abs(got[:, None] - expected).max(axis=2)
+    assert (off.min(axis=0, initial=np.inf) < 1e-4).all()
+    assert (off.min(axis=1, initial=np.inf) < 1e-4).all()
+
+
+@given(SEEDS)
+@settings(max_examples=12, deadline=None)
+def test_a_base_is_swept_whole(seed: int) -> None:
+    """Every pose that going through all pairs of walls gives is proposed, and no other."""
+    d = drawn(seed, radius=7.0)
+    base = base_of(d)
+    if base is None:
+        return
+    expected = twin.placements(d.scan, *base, INDEX.runs.rows, GATES)
+    whole, pieces = swept(asked(d), base), swept(asked(d), base, 1)
+    assert whole.proposed == pieces.proposed == len(expected)
+    np.testing.assert_array_equal(pieces.poses, whole.poses)
+    assert whole.calls == 1 < pieces.calls
+
+
+@given(SEEDS)
+@settings(max_examples=6, deadline=None)
+def test_what_a_base_proposes_is_refined_and_kept(seed: int) -> None:
+    """With a window all that lies in it, for which less is looked at."""
+    d = drawn(seed, radius=6.0)
+    base = base_of(d, 2.0)
+    if base is None:
+        return
+    proposals = twin.placements(d.scan, *base, INDEX.runs.rows, GATES)
+    assert_found(swept(asked(d), base), d.scan, proposals)
+    for radius, angle in ((0.3, 0.05), (4.0, 3.2)):
+        window = HardPrior(d.near(0.02, 0.1, 0.1), radius, angle)
+        some = swept(asked(d, window), base)
+        assert_found(some, d.scan, proposals, window)
+        assert some.proposed <= len(proposals)
+
+
+@given(SEEDS)
+@example(74845286)  # where a consensus set loses all its pairs
+@settings(max_examples=4, deadline=None)
+def test_a_segment_slides_along_every_wall(seed: int) -> None:
+    d = drawn(seed, radius=6.0)
+    sliding, spacing = int(d.rng.integers(len(d.scan))), 0.7
+    proposals = twin.slides(d.scan[sliding], INDEX.runs.rows, spacing)
+    whole, pieces = slid(asked(d), sliding, spacing), slid(asked(d), sliding, spacing, 1)
+    assert_found(whole, d.scan, proposals)
+    assert whole.proposed == pieces.proposed == len(proposals)
+    np.testing.assert_array_equal(pieces.poses, whole.poses)
+    assert whole.calls == 1 < pieces.calls
+    for radius, angle in ((0.3, 0.05), (1.0, 3.2)):
+        window = HardPrior(d.near(0.02, 0.1, 0.1), radius, angle)
+        some, within = slid(asked(d, window), sliding, 0.3), twin.slides(d.scan[sliding], INDEX.runs.rows, 0.3, window)
+        assert_found(some, d.scan, within, window)
+        assert some.proposed == len(within)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_try_pose(seed: int) -> None:
+    """A pose is looked at only as far as it may still be kept, and each step is counted."""
+    d = drawn(seed, radius=7.0)
+    covariance = SMALL * 10.0 ** d.rng.uniform(-1.0, 1.0)
+    window = HardPrior(d.near(), 0.5, 0.2) if seed % 2 else None
+    question, work = asked(d, window), Workspace.of(len(d.scan))
+    question.terms["rules"]["kept_share"] = 0.65
+    if whole := d.rng.random() < 0.7:
+        work.spreads[:] = angle_spreads(d.scan, covariance[2, 2], GATES)
+    else:
+        question.terms["gates"]["least_overlap"] = 0.4  # a midpoint may then be off the map: the raster knows nothing
+    gates = question.terms["gates"]
+    for at in (d.at, d.near(), d.near(0.1, 0.5, 0.5), d.near(0.3, 3.0, 3.0)):
+        progress, found = (
+            record(PROGRESS, best_value=d.rng.uniform(0.0, 1.5) * d.scan["gain"].sum()),
+            np.zeros(9, FOUND),
+        )
+        progress["least_kept"] = d.rng.choice([0.0, 0.7]) * progress["best_value"]
+        floor = max(0.65 * progress["best_value"][0], progress["least_kept"][0])
+        work.scratch["estimate"] = estimate_of(at, covariance)
+        spent = proposing.try_pose(question, PLACE, TABLES.raster, found, progress[0], work)
+        outside = window is not None and not twin.may_be_refined_into(window, at)
+        if outside or (whole and reachable(d.scan, at, work.spreads, TABLES.raster) < floor):
+            steps = (0, 0, TESTS_REJECTED)
+        elif match_scan(d.scan, at, covariance, PLACE, gates)[1] < floor:
+            steps = (0, 0, TESTS_HYPOTHESIS)
+        else:
+            refined = refine(d.scan, at, covariance, PLACE, gates, ROUNDS)
+            inside = window is None or window.contains(refined.pose)
+            steps = (1, int(refined.score > 0.0 and refined.score >= floor and inside), TESTS_REFINED)
+        assert (progress["verified"][0], progress["count"][0], spent) == steps
+        assert progress["hypotheses"][0] == 1

@@ -1,0 +1,37 @@
+"""Between plain values, which the twins speak in, and the records that kernels are handed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from association.layout import ESTIMATE, record
+from registration import RigidTransform
+from registration.layout import Floats, Record, Records
+
+UPPER = ("xx", "xy", "xt", "yy", "yt", "tt")
+NOTHING_KNOWN = np.zeros((3, 3))  # as a covariance: the pose is exact
+
+
+def estimate_of(at: RigidTransform, covariance: Floats = NOTHING_KNOWN) -> Records:
+    """Return a pose with its covariance, (1,) of `ESTIMATE`."""
+    upper = dict(zip(UPPER, covariance[np.triu_indices(3)], strict=True))
+    return record(ESTIMATE, theta=at.theta, x=at.x, y=at.y, **upper)
+
+
+def pose_of(estimate: Record) -> RigidTransform:
+    return RigidTransform(float(estimate["x"]), float(estimate["y"]), float(estimate["theta"]))
+
+
+def covariance_of(estimate: Record) -> Floats:
+    matrix = np.zeros((3, 3))
+    matrix[np.triu_indices(3)] = [estimate[name] for name in UPPER]
+    return np.asarray(matrix + np.triu(matrix, 1).T)
+
+
+def assert_records(got: Records, expected: Records, **tolerance: Any) -> None:
+    """Compare records field by field."""
+    assert got.dtype == expected.dtype
+    for name in expected.dtype.names or ():
+        np.testing.assert_allclose(got[name], expected[name], err_msg=name, **tolerance)

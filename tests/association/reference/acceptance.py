@@ -1,0 +1,68 @@
+"""Twins of the kernels that report a consensus set in the map's own pieces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from association.layout import Pieces
+from association.tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS
+from registration import RigidTransform
+from registration.layout import Floats, Records
+
+from .geometry import direction
+from .sight import count_blockers
+
+SAMPLES = 20_000  # points of a segment, to measure how much of it is covered
+
+Pair = tuple[int, int, float, list[int]]  # scan index, piece, overlap, other pieces
+
+
+def pieces_of(pieces: Pieces, wall: int) -> list[int]:
+    return pieces.items[pieces.starts[wall] : pieces.starts[wall + 1]].tolist()
+
+
+def run_of(walls: Records, wall: int) -> list[int]:
+    """List the walls of a run, by the neighbours that they name."""
+    run = [wall]
+    while walls[run[0]]["before"] >= 0:
+        run.insert(0, int(walls[run[0]]["before"]))
+    while walls[run[-1]]["after"] >= 0:
+        run.append(int(walls[run[-1]]["after"]))
+    return run
+
+
+def accept_matches(
+    matched: ArrayLike, order: ArrayLike, scan_ends: Floats, pose: RigidTransform, walls: Records, pieces: Pieces
+) -> list[Pair]:
+    """List the pairs by scan index; `matched` (n,) is the wall of each row, `order` (n,) its scan index."""
+    found = []
+    piece_ends = pieces.ends.view(np.float64).reshape(-1, 2, 2)
+    for i, wall in sorted(zip(np.asarray(order).tolist(), np.asarray(matched).tolist(), strict=True)):
+        if wall < 0:
+            continue
+        run = [wall]
+        if math.dist(scan_ends[i, :2], scan_ends[i, 2:]) > BRIDGING:
+            run = run_of(walls, wall)
+        d = direction(walls[run[0]])
+        low, high = sorted(pose.apply(scan_ends[i].reshape(2, 2)) @ d)
+        spans = {p: sorted(piece_ends[p] @ d) for w in run for p in pieces_of(pieces, w)}
+        lies_on = {p: min(last, high) - max(first, low) for p, (first, last) in spans.items()}
+        most = max(spans, key=lambda p: (lies_on[p], -p))
+        points = low + (high - low) * (np.arange(SAMPLES) + 0.5) / SAMPLES
+        on_any = np.any([(points >= first) & (points <= last) for first, last in spans.values()], axis=0)
+        others = [p for p in spans if p != most and lies_on[p] > 0.0]
+        found.append((i, most, float(on_any.mean()), others[:MAX_RIVALS]))
+    return found
+
+
+def missing_pieces(
+    scan: Records, matched: ArrayLike, viewpoint: ArrayLike, pose: RigidTransform, walls: Records, pieces: Pieces
+) -> list[int]:
+    """List the pieces of walls that at least half of the rays that count fully pass, and on which nothing was seen."""
+    on = np.asarray(matched)
+    counts = count_blockers(scan, on >= 0, viewpoint, pose, walls)
+    passed = [w for w, (to_matched, _) in counts.items() if to_matched >= BLOCKING_RAYS / 2 and w not in on]
+    return sorted(p for w in passed for p in pieces_of(pieces, w))

@@ -1,0 +1,84 @@
+"""Twins of the kernels of single beams."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from association.layout import Place, Rays
+from association.tuning import (
+    BEAM_GATES,
+    BEHIND,
+    CERTAIN,
+    LEAST_INCIDENCE,
+    LEAST_POINTS,
+    NEAR,
+    PASSED_SLACK,
+    SURE_LENGTH,
+)
+from registration import RigidTransform
+from registration.layout import SEEN
+
+from .consensus import solve
+from .geometry import direction, listed, normal
+from .sight import first_hit
+
+Evidence = tuple[float, float]  # read, passed
+
+
+def beam_evidence(rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place: Place) -> Evidence:
+    """Compare every beam with the first wall on its way."""
+    read = passed = 0.0
+    for angle, distance in zip(rays.angles + pose.theta, rays.ranges, strict=True):
+        if distance == math.inf:
+            continue
+        limit = min(rays.reach, distance + BEHIND)
+        expected, w = first_hit(pose.apply(viewpoint), angle, limit, place.walls)
+        if w >= 0:
+            wall = place.walls[w]
+            sine = abs(normal(wall) @ [math.cos(angle), math.sin(angle)])
+            across = (distance - expected) * max(LEAST_INCIDENCE, sine)
+            read += math.exp(-0.5 * (across / NEAR) ** 2)
+            passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
+    return read / max(1, len(rays.angles)), passed / max(1, len(rays.angles))
+
+
+def refine_by_beams(
+    rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place: Place, gate: float
+) -> RigidTransform:
+    """Lay the ends of the beams on the nearest of the walls that are listed where they are."""
+    ends, lines = [], []
+    for angle, distance in zip(rays.angles, rays.ranges, strict=True):
+        if distance == math.inf:
+            continue
+        end = np.asarray(viewpoint) + distance * np.array([math.cos(angle), math.sin(angle)])
+        there = pose.apply(end)
+        offsets = {}
+        for w in listed(place.grid, there):
+            wall = place.walls[w]
+            if wall["begin"] - NEAR <= direction(wall) @ there <= wall["end"] + NEAR:
+                offsets[w] = abs(normal(wall) @ there - wall["offset"])
+        nearest = min(offsets, key=lambda w: offsets[w], default=-1)
+        if nearest >= 0 and offsets[nearest] < gate:
+            ends.append(end)
+            lines.append(nearest)
+    if len(lines) < LEAST_POINTS:
+        return pose
+    seen = np.zeros(len(ends), SEEN)
+    seen["centroid_x"], seen["centroid_y"] = np.array(ends).T
+    return solve(seen, place.walls[lines], np.ones(len(lines)), pose)[0]
+
+
+def weigh_beams(
+    rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place: Place
+) -> tuple[RigidTransform, Evidence, Evidence]:
+    """Return where a pose is moved to, and what the beams say there and where it was."""
+    moved = pose
+    for gate in BEAM_GATES:
+        moved = refine_by_beams(rays, viewpoint, moved, place, gate)
+    before, after = (beam_evidence(rays, viewpoint, at, place) for at in (pose, moved))
+    if after[0] > before[0] and after[1] <= before[1] + PASSED_SLACK:
+        return moved, after, before
+    return pose, before, before

@@ -1,0 +1,102 @@
+"""Twins of the kernels that choose bases."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from association.layout import Walls
+from association.tuning import (
+    COST_ANCHOR,
+    COST_BASE,
+    COST_HYPOTHESIS,
+    COST_SLIDE,
+    GAIN_POWER,
+    HYPOTHESIS_SCALE,
+    MIN_CROSSING_BASE,
+    REUSE,
+    SHORT_LENGTH,
+    SHORT_POWER,
+    SINE_POWER,
+    TELLING,
+    UNTELLING,
+)
+from registration.layout import Floats, Record, Records
+
+from .geometry import point
+from .proposing import end_slack
+
+Base = tuple[int, int, float]  # sliding, crossing, merit
+
+
+def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats]:
+    """Look at every run of every bin."""
+    bins = len(runs.bin_starts) - 1
+    slides, fitting = np.zeros((count, bins)), np.zeros(count)
+    for i in range(count):
+        need = scan[i]["length"] - 2.0 * end_slack(scan[i]["length"])
+        for b in range(bins):
+            lengths = runs.longest[runs.bin_starts[b] : runs.bin_starts[b + 1]]
+            enough = lengths[lengths >= need]
+            slides[i, b] = (enough - max(0.0, need)).sum()
+            fitting[i] += len(enough)
+    return slides, fitting
+
+
+def is_telling(scan: Records, a: int, b: int) -> bool:
+    """Tell whether a base lays the others off by `TELLING` at most, root mean square by gain."""
+    va, vb = scan[a]["angle_variance"], scan[b]["angle_variance"]
+    pin = 0.5 * (point(scan[a]) + point(scan[b]))
+    squares = ((point(scan) - pin) ** 2).sum(axis=1) / (1.0 / va + 1.0 / vb)
+    return bool(math.sqrt(np.average(squares, weights=scan["gain"])) <= TELLING)
+
+
+def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> list[Base]:
+    """Weigh every pair by what it tells and what it will cost."""
+    slides, fitting = slack_tables(scan, count, runs)
+    bins = slides.shape[1]
+    sweeps = COST_ANCHOR * fitting + COST_SLIDE * slides.sum(axis=1)
+    bases = []
+    for i in range(count):
+        for j in range(i + 1, count):
+            turn = scan[j]["angle"] - scan[i]["angle"]
+            sine = abs(math.sin(turn))
+            if sine < MIN_CROSSING_BASE:
+                continue
+            shift = round(turn * bins / math.tau)
+            # The runs under j have the turned direction, up to a neighbouring bin.
+            expected = sum(slides[i] @ np.roll(slides[j], -shift - k) for k in (-1, 0, 1)) / area
+            shorter = min(scan[i]["length"], scan[j]["length"]) + SHORT_LENGTH
+            expected *= HYPOTHESIS_SCALE * sine**SINE_POWER * shorter**SHORT_POWER
+            cost = COST_BASE + min(sweeps[i], sweeps[j]) + COST_HYPOTHESIS * expected
+            worth = min(scan[i]["gain"], scan[j]["gain"]) ** GAIN_POWER * (1.0 if is_telling(scan, i, j) else UNTELLING)
+            sliding, crossing = (i, j) if sweeps[i] <= sweeps[j] else (j, i)
+            bases.append((sliding, crossing, math.log(worth / cost)))
+    return bases
+
+
+def order_of(bases: list[Base]) -> list[int]:
+    """Return the bases in the order in which they are taken: each use of a segment makes its others worth less."""
+    left, uses, order = list(range(len(bases))), dict.fromkeys(range(1000), 0), []
+    while left:
+        worth = {k: bases[k][2] + math.log(REUSE) * (uses[bases[k][0]] + uses[bases[k][1]]) for k in left}
+        best = max(worth, key=worth.__getitem__)
+        left.remove(best)
+        order.append(best)
+        for segment in bases[best][:2]:
+            uses[segment] += 1
+    return order
+
+
+def fewest_segments(best_gains: list[float], beyond: float, needed: float) -> int:
+    """Return how many of the largest gains, with all beyond, come to what is needed; two at least."""
+    enough = [m for m in range(len(best_gains) + 1) if beyond + sum(best_gains[:m]) >= needed]
+    return max(2, min(enough, default=len(best_gains)))
+
+
+def missed_share(inliers: np.ndarray, bases: list[Record], fewest: int) -> float:
+    """Return of the sampled sets of `fewest` segments the share that holds none of the bases."""
+    bits = np.unpackbits(inliers[fewest - 1].view(np.uint8), axis=-1).astype(bool)
+    held = [bits[base["sliding"]] & bits[base["crossing"]] for base in bases]
+    return float((~np.any(held, axis=0)).mean()) if held else 1.0

@@ -1,0 +1,75 @@
+"""Twins of the kernels that rank."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from association.layout import MERIT, Place
+from association.tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
+from registration import RigidTransform
+from registration.layout import Floats, Records
+
+from .consensus import refine
+from .geometry import direction, wrap
+from .sight import count_blockers, sight_penalty
+
+START = np.diag([START_VARIANCE, START_VARIANCE, START_ANGLE_VARIANCE])
+Ranked = tuple[RigidTransform, Floats, Records, Records]  # pose, covariance, merit (1,), matches
+
+
+def rank(
+    scan: Records, poses: list[RigidTransform], viewpoint: ArrayLike | None, place: Place, gates: Records
+) -> list[Ranked]:
+    """Refine one pose after the other; lines of sight from the viewpoint count for those that are not far behind."""
+    ranked: list[Ranked] = []
+    best = 0.0
+    for at in poses:
+        found = refine(scan, at, START, place, gates, ROUNDS)
+        score, matches, on, held = found.score, found.matches, found.matches["wall"] >= 0, found.held >= 0
+        merit = np.zeros(1, MERIT)
+        merit["length"] = scan["length"][on].sum()
+        merit["share"] = scan["length"][on].sum() / scan["length"].sum()
+        merit["reliability"] = reliability(direction(place.walls[found.held[held]]), scan["weight"][held])
+        merit["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
+        if viewpoint is not None and score > best - FAR_BEHIND:
+            score -= sight_penalty(count_blockers(scan, on, viewpoint, found.pose, place.walls), place.walls)
+            best = max(best, score)
+        merit["score"] = score
+        ranked.append((found.pose, found.covariance, merit, matches))
+    return ranked
+
+
+def reliability(directions: Floats, weights: Floats) -> float:
+    """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E, the mean of v v'."""
+    if not len(weights):
+        return 0.0
+    e = np.einsum("i,ij,ik->jk", weights, directions, directions) / weights.sum()
+    return 2.0 * math.sqrt(max(0.0, float(np.prod(np.linalg.eigvalsh(e)))))
+
+
+def distinct(
+    poses: list[RigidTransform],
+    covariances: Floats,
+    order: ArrayLike,
+    most: int,
+    distance: float,
+    angle: float,
+    family: float,
+) -> list[int]:
+    """Take the best pose, strike what it stands for, and so on."""
+    left, kept = np.asarray(order).tolist(), []
+    while left and len(kept) < most:
+        best = left.pop(0)
+        kept.append(best)
+        information = np.linalg.inv(covariances[best])
+        steps = {i: _step(poses[best], poses[i]) for i in left}
+        near = {i for i, s in steps.items() if np.hypot(s[0], s[1]) < distance and abs(s[2]) < angle}
+        left = [i for i in left if i not in near and steps[i] @ information @ steps[i] >= family]
+    return kept
+
+
+def _step(one: RigidTransform, other: RigidTransform) -> Floats:
+    return np.array([other.x - one.x, other.y - one.y, wrap(other.theta - one.theta)])
