@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 import numpy as np
 
-from registration.layout import PAIR
+from registration import MeasuredSegments, Segments
+from registration.layout import PAIR, Floats, Records
+
+Line = tuple[Floats, Floats, float]  # Eq. (1)'s P and v, and alpha
 
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
-def rotation(theta):
+def rotation(theta: float) -> Floats:
     return np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
 
 
-def pair_rows(map_segments, scan, pairs):
+def pair_rows(map_segments: Segments, scan: MeasuredSegments, pairs: Iterable[tuple[int, int]]) -> Records:
     """What is known of each pair, as `registration.layout.PAIR` has it."""
     rows = np.zeros(len(pairs), PAIR)
     for row, (i, j) in zip(rows, pairs, strict=True):
@@ -32,7 +36,9 @@ def pair_rows(map_segments, scan, pairs):
 # Joint estimator -----------------------------------------------------------------------------------------------------
 
 
-def joint_sums(normals, offsets, centroids, directions, spreads, weights):
+def joint_sums(
+    normals: Floats, offsets: Floats, centroids: Floats, directions: Floats, spreads: Floats, weights: Floats
+) -> Floats:
     """Upper triangle of Q = sum w (phi phi' + s psi psi'), Wahba's two sums, and the count."""
     q = np.zeros((5, 5))
     resultant = 0.0
@@ -45,7 +51,16 @@ def joint_sums(normals, offsets, centroids, directions, spreads, weights):
     return np.concatenate([q[np.triu_indices(5)], [resultant.real, resultant.imag, len(weights)]])
 
 
-def joint_cost(theta, t, normals, offsets, centroids, directions, spreads, weights):
+def joint_cost(
+    theta: float,
+    t: Floats,
+    normals: Floats,
+    offsets: Floats,
+    centroids: Floats,
+    directions: Floats,
+    spreads: Floats,
+    weights: Floats,
+) -> float:
     """Sum of squared distances of the centroids and of the points that the spreads stand for."""
     r = rotation(theta)
     total = 0.0
@@ -56,16 +71,16 @@ def joint_cost(theta, t, normals, offsets, centroids, directions, spreads, weigh
     return total
 
 
-def joint_solve(start, *pairs):
+def joint_solve(start: float, *pairs: Iterable[tuple[int, int]]) -> tuple[float, Floats]:
     """Minimise the cost: at each angle near `start` the best translation by least squares; the best angle by search."""
     normals, offsets, centroids, _, _, weights = pairs
     root = np.sqrt(weights)
 
-    def translation(theta):
+    def translation(theta: float) -> Floats:
         gaps = offsets - np.array([n @ rotation(theta) @ m for n, m in zip(normals, centroids, strict=True)])
         return np.linalg.lstsq(root[:, None] * normals, root * gaps, rcond=1e-9)[0]
 
-    def cost(theta):
+    def cost(theta: float) -> float:
         return joint_cost(theta, translation(theta), *pairs)
 
     grid = start + np.linspace(-0.5, 0.5, 501)
@@ -83,7 +98,16 @@ def joint_solve(start, *pairs):
     return theta, translation(theta)
 
 
-def _jacobian(theta, t, normals, offsets, centroids, directions, spreads, weights):
+def _jacobian(
+    theta: float,
+    t: Floats,
+    normals: Floats,
+    offsets: Floats,
+    centroids: Floats,
+    directions: Floats,
+    spreads: Floats,
+    weights: Floats,
+) -> tuple[Floats, Floats]:
     rows, residuals = [], []
     r = rotation(theta)
     for n, p, m, d, s, w in zip(normals, offsets, centroids, directions, spreads, weights, strict=True):
@@ -93,13 +117,13 @@ def _jacobian(theta, t, normals, offsets, centroids, directions, spreads, weight
     return np.array(rows), np.array(residuals)
 
 
-def joint_information(theta, *pairs):
+def joint_information(theta: float, *pairs: Iterable[tuple[int, int]]) -> Floats:
     """J'J of the residuals of the two points of each pair."""
     jacobian, _ = _jacobian(theta, np.zeros(2), *pairs)
     return jacobian.T @ jacobian
 
 
-def exact_sums(terms):
+def exact_sums(terms: Floats) -> Floats:
     """Add rows of doubles without any rounding but the last."""
     return np.array([float(sum(map(Fraction, map(float, column)))) for column in np.asarray(terms).T])
 
@@ -107,7 +131,7 @@ def exact_sums(terms):
 # The paper's estimator -----------------------------------------------------------------------------------------------
 
 
-def transformation_line(map_direction, map_midpoint, direction, midpoint):
+def transformation_line(map_direction: Floats, map_midpoint: Floats, direction: Floats, midpoint: Floats) -> Line:
     """Eq. (1), sign corrected: the point P and direction v of the ideal translations, and the angle alpha."""
     n_s, n_d = TURN @ map_direction, TURN @ direction
     point = (map_midpoint @ n_s - midpoint @ n_d) * n_s
@@ -115,19 +139,19 @@ def transformation_line(map_direction, map_midpoint, direction, midpoint):
     return point, map_direction, math.remainder(alpha, math.tau)
 
 
-def one_step_translation(lines, weights):
+def one_step_translation(lines: Sequence[Line], weights: Floats) -> Floats:
     """Minimise sum w (|T - P|^2 - ((T - P) . v)^2) as least squares of the distances along the normals."""
     a = np.array([math.sqrt(w) * (TURN @ v) for (_, v, _), w in zip(lines, weights, strict=True)])
     b = np.array([math.sqrt(w) * (TURN @ v) @ p for (p, v, _), w in zip(lines, weights, strict=True)])
     return np.linalg.lstsq(a, b, rcond=1e-9)[0]
 
 
-def translation_ambiguity(at, lines, weights):
+def translation_ambiguity(at: Floats, lines: Sequence[Line], weights: Floats) -> float:
     """Eq. (2) squared and summed: distances of a translation from the lines."""
     return sum(w * ((at - p)[0] * v[1] - (at - p)[1] * v[0]) ** 2 for (p, v, _), w in zip(lines, weights, strict=True))
 
 
-def mitsuta(angles, weights):
+def mitsuta(angles: Sequence[float], weights: Floats) -> tuple[float, float]:
     """Alg. 1, lines 15 and 16 corrected: the weighted sums of the unwrapped angles and of their squares."""
     old = angles[0]
     total, squares = weights[0] * old, weights[0] * old**2
@@ -143,7 +167,7 @@ def mitsuta(angles, weights):
     return total, squares
 
 
-def wahba_error(theta, map_directions, directions, weights):
+def wahba_error(theta: float, map_directions: Floats, directions: Floats, weights: Floats) -> float:
     """Eq. (11)."""
     return sum(
         w * float(np.sum((s - rotation(theta) @ d) ** 2))
@@ -151,7 +175,7 @@ def wahba_error(theta, map_directions, directions, weights):
     )
 
 
-def wahba(map_directions, directions, weights):
+def wahba(map_directions: Floats, directions: Floats, weights: Floats) -> float:
     """Minimise Eq. (11) by singular values, as for any dimension."""
     b = sum(w * np.outer(s, d) for s, d, w in zip(map_directions, directions, weights, strict=True))
     u, _, v = np.linalg.svd(b)
@@ -159,7 +183,14 @@ def wahba(map_directions, directions, weights):
     return math.atan2(r[1, 0], r[0, 0])
 
 
-def one_step_sums(map_directions, map_midpoints, directions, midpoints, weights, reference):
+def one_step_sums(
+    map_directions: Floats,
+    map_midpoints: Floats,
+    directions: Floats,
+    midpoints: Floats,
+    weights: Floats,
+    reference: tuple[float, float, float],
+) -> Floats:
     """The sums of Eqs. (5), (17), (19) and (15) about a reference ``(x, y, alpha)``."""
     total = np.zeros(12)
     for row in zip(map_directions, map_midpoints, directions, midpoints, weights, strict=True):
@@ -184,7 +215,7 @@ def one_step_sums(map_directions, map_midpoints, directions, midpoints, weights,
     return total
 
 
-def reliability(map_directions, weights):
+def reliability(map_directions: Floats, weights: Floats) -> float:
     """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E."""
     e = sum(w * np.outer(v, v) for v, w in zip(map_directions, weights, strict=True)) / sum(weights)
     return 2.0 * math.sqrt(max(0.0, float(np.prod(np.linalg.eigvalsh(e)))))

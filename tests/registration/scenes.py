@@ -5,30 +5,32 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from registration import Correspondences, MeasuredSegments, RigidTransform, Segments
+from registration import Correspondences, MeasuredSegments, RegistrationResult, RigidTransform, Segments
+from registration.layout import Floats
 
-ROOM = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0], [3, 3, 4, 5], [7, 2, 5, 1]]
+ROOM: list[list[float]] = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0], [3, 3, 4, 5], [7, 2, 5, 1]]
 POSE = RigidTransform(3.0, 2.0, 0.4)
 
 
-def diagonal(n):
+def diagonal(n: int) -> NDArray[np.intp]:
     """Pair i with i."""
     return np.repeat(np.arange(n)[:, None], 2, axis=1)
 
 
-def seen_from(pose, segments):
+def seen_from(pose: RigidTransform, segments: Segments) -> Segments:
     """Return map segments as a perfect scan from `pose` sees them."""
     ends = pose.inverse().apply(segments.endpoints.reshape(-1, 2, 2))
     return Segments.from_array(ends.reshape(-1, 4))
 
 
-def moved(pose, segments):
+def moved(pose: RigidTransform, segments: Segments) -> Segments:
     """Return segments carried along by a transform."""
     return Segments.from_array(pose.apply(segments.endpoints.reshape(-1, 2, 2)).reshape(-1, 4))
 
 
-def random_segments(rng, n, extent=10.0):
+def random_segments(rng: np.random.Generator, n: int, extent: float = 10.0) -> Segments:
     """Return n segments of 1 to 6 m in all directions."""
     begin = rng.uniform(-extent, extent, (n, 2))
     angle = rng.uniform(-math.pi, math.pi, n)
@@ -38,14 +40,16 @@ def random_segments(rng, n, extent=10.0):
     )
 
 
-def directed(degrees, length=1.0):
+def directed(degrees: ArrayLike, length: float = 1.0) -> Segments:
     """Return segments from the origin at these angles."""
     a = np.radians(np.asarray(degrees, dtype=float))
     ends = length * np.stack([np.cos(a), np.sin(a)], axis=1)
     return Segments.from_array(np.hstack([np.zeros_like(ends), ends]))
 
 
-def noisy_pairs(rng, n, noise=0.02, pose=POSE):
+def noisy_pairs(
+    rng: np.random.Generator, n: int, noise: float = 0.02, pose: RigidTransform = POSE
+) -> tuple[Segments, MeasuredSegments]:
     """Return a map and a scan of it whose endpoints have noise."""
     map_segments = random_segments(rng, n)
     clean = seen_from(pose, map_segments).endpoints
@@ -54,12 +58,14 @@ def noisy_pairs(rng, n, noise=0.02, pose=POSE):
     )
 
 
-def correspondences(map_segments, scan):
+def correspondences(map_segments: Segments, scan: MeasuredSegments) -> Correspondences:
     """Pair row by row."""
     return Correspondences.of(map_segments, scan, diagonal(len(scan)))
 
 
-def scanned_points(rng, map_segments, pose, sigma, count):
+def scanned_points(
+    rng: np.random.Generator, map_segments: Segments, pose: RigidTransform, sigma: float, count: int
+) -> Floats:
     """Return, per segment, `count` evenly spread points with normal noise across the wall, in the scan frame."""
     clean = seen_from(pose, map_segments)
     along = (np.arange(count) + 0.5) / count
@@ -67,7 +73,7 @@ def scanned_points(rng, map_segments, pose, sigma, count):
     return points + rng.normal(0.0, sigma, points.shape[:2])[..., None] * clean.normals[:, None]
 
 
-def fitted(points, sigma):
+def fitted(points: Floats, sigma: float) -> MeasuredSegments:
     """Fit a segment to each row of points by total least squares, with its moments."""
     rows, centroids, spreads = [], [], []
     for p in points:
@@ -83,6 +89,12 @@ def fitted(points, sigma):
     )
 
 
-def difference(a, b):
+def pose_of(result: RegistrationResult) -> RigidTransform:
+    """Return the pose of a result that has one."""
+    assert result.pose is not None
+    return result.pose
+
+
+def difference(a: RigidTransform, b: RigidTransform) -> Floats:
     """Return pose a minus pose b as (x, y, theta)."""
     return np.array([a.x - b.x, a.y - b.y, math.remainder(a.theta - b.theta, math.tau)])

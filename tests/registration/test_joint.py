@@ -1,5 +1,7 @@
 """Joint sums: adding, removing, costs and the parallel rule."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +16,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_sums_add_up(seed):
+def test_sums_add_up(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pairs = correspondences(*noisy_pairs(rng, 9))
     weights = rng.uniform(0.1, 5.0, 9)
@@ -27,20 +29,20 @@ def test_sums_add_up(seed):
     assert (a.count, a.add(pairs, 7, 2.5).count, both.count) == (4, 5, 9)
 
 
-def test_a_distant_pair_leaves_no_trace():
+def test_a_distant_pair_leaves_no_trace() -> None:
     pairs = correspondences(*noisy_pairs(np.random.default_rng(1), 5))
     far = pairs.about(np.array([1e8, -1e8]), np.array([1e8, 0.0]))
     sums = JointSums.of_set(pairs, np.ones(5))
     np.testing.assert_allclose(sums.add(far, 0, 1.0).remove(far, 0, 1.0).values, sums.values, rtol=1e-12)
 
 
-def test_sums_are_read_only():
+def test_sums_are_read_only() -> None:
     sums = JointSums.of_set(correspondences(*noisy_pairs(np.random.default_rng(1), 3)), np.ones(3))
     with pytest.raises(ValueError, match="read-only"):
         sums.values[0] = 1.0
 
 
-def test_the_cost_is_that_of_all_points_behind_the_segments():
+def test_the_cost_is_that_of_all_points_behind_the_segments() -> None:
     rng = np.random.default_rng(4)
     map_segments = random_segments(rng, 8)
     points = scanned_points(rng, map_segments, POSE, 0.01, 30)
@@ -56,7 +58,7 @@ def test_the_cost_is_that_of_all_points_behind_the_segments():
     assert sums.cost(POSE.theta, (POSE.x, POSE.y)) == pytest.approx(expected, rel=1e-3)
 
 
-def walls(degrees, sigma):
+def walls(degrees: list[float], sigma: float) -> JointSums:
     a = np.radians(degrees)
     directions = np.stack([np.cos(a), np.sin(a)], axis=1)
     begins = np.array([[0.0, 0.0], [5.0, 5.0], [-3.0, 8.0]])[: len(a)]
@@ -79,5 +81,5 @@ def walls(degrees, sigma):
         ([0, 0.25, -0.25], 0.02, True),
     ],
 )
-def test_parallel_within_three_standard_deviations(degrees, sigma, expected):
+def test_parallel_within_three_standard_deviations(degrees: list[float], sigma: float, expected: bool) -> None:
     assert walls(degrees, sigma).parallel is expected

@@ -54,15 +54,9 @@ def freed_too_early(function: ast.FunctionDef) -> list[str]:
         for node in ast.walk(function)
         if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name)
     ]
-    with_fields = {
-        node.value.id if isinstance(node.value, ast.Name) else node.value.value.id
-        for node in ast.walk(function)
-        if isinstance(node, ast.Attribute)
-        and (
-            isinstance(node.value, ast.Name)
-            or (isinstance(node.value, ast.Subscript) and isinstance(node.value.value, ast.Name))
-        )
-    }
+    owners = [node.value for node in ast.walk(function) if isinstance(node, ast.Attribute)]
+    owners = [node.value if isinstance(node, ast.Subscript) else node for node in owners]
+    with_fields = {node.id for node in owners if isinstance(node, ast.Name)}
     found = []
     for array in {name for name, value in assignments if isinstance(value, ast.Call)}:
         typed = any(

@@ -1,27 +1,36 @@
 """Every kernel does what its slow twin does."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
+from numpy.typing import NDArray
 
 from registration import Correspondences, RigidTransform
 from registration.kernels import compensated, joint, matrices, of_arrays, one_step
 from registration.kernels import pairs as pairing
-from registration.layout import JOINT_SUMS, ONE_STEP_SUMS, PAIR, SYMMETRIC3
+from registration.layout import JOINT_SUMS, ONE_STEP_SUMS, PAIR, SYMMETRIC3, Floats, Record, Records
 from tests import reference
 
 from .scenes import correspondences, noisy_pairs
 
 SEEDS = st.integers(0, 2**32 - 1)
-CLOSE = {"rtol": 1e-9, "atol": 1e-9}
+Measured = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 
-def drawn(seed, n=7):
+def assert_close(actual: Any, expected: Any) -> None:
+    np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-9)
+
+
+def drawn(seed: int, n: int = 7) -> tuple[np.random.Generator, Correspondences, Floats, Measured]:
     rng = np.random.default_rng(seed)
     pairs = correspondences(*noisy_pairs(rng, n, noise=0.05))
     weights = rng.uniform(0.1, 2.0, n)
@@ -29,7 +38,7 @@ def drawn(seed, n=7):
     return rng, pairs, weights, measured
 
 
-def rows_of(normals, offsets, centroids, directions, spreads):
+def rows_of(normals: Floats, offsets: Floats, centroids: Floats, directions: Floats, spreads: Floats) -> Records:
     """Return rows of which only the joint sums are right: map lines by normal and offset."""
     rows = np.zeros(len(offsets), PAIR)
     rows["map"]["dx"], rows["map"]["dy"], rows["map"]["offset"] = normals[:, 1], -normals[:, 0], offsets
@@ -38,39 +47,39 @@ def rows_of(normals, offsets, centroids, directions, spreads):
     return rows
 
 
-def plain(sums):
+def plain(sums: Records) -> Floats:
     """Return compensated sums as rows of doubles, values and errors."""
     return sums.view(np.float64).reshape(2, -1)
 
 
-def symmetric(matrix):
+def symmetric(matrix: Floats) -> Records:
     """Return the upper triangle of a matrix as a kernel takes it."""
     return np.array([tuple(matrix[np.triu_indices(3)])], SYMMETRIC3)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_joint_sums(seed):
+def test_joint_sums(seed: int) -> None:
     rng, pairs, weights, measured = drawn(seed)
     expected = reference.joint_sums(*measured)
     sums = joint.joint_sums_compensated(pairs.rows, weights)
-    np.testing.assert_allclose(plain(sums).sum(axis=0), expected, **CLOSE)
+    assert_close(plain(sums).sum(axis=0), expected)
     sums = np.zeros(1, JOINT_SUMS)
     for row, w in zip(pairs.rows, weights, strict=True):
         joint.joint_add(sums[0], row["map"], row["scan"], w, 1.0)
-    np.testing.assert_allclose(sums.view(np.float64), expected, **CLOSE)
+    assert_close(sums.view(np.float64), expected)
     for row, w in zip(pairs.rows, weights, strict=True):
         joint.joint_add(sums[0], row["map"], row["scan"], w, -1.0)
     np.testing.assert_allclose(sums.view(np.float64), 0.0, atol=1e-12 * np.abs(expected).max())
     counts = rng.random(7) < 0.5
     some = reference.joint_sums(*(values[counts] for values in measured))
     sums = joint.joint_sums_compensated(pairs.rows, np.where(counts, weights, 0.0))
-    np.testing.assert_allclose(plain(sums).sum(axis=0), some, **CLOSE)
+    assert_close(plain(sums).sum(axis=0), some)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_joint_cost_and_information(seed):
+def test_joint_cost_and_information(seed: int) -> None:
     rng, pairs, weights, measured = drawn(seed)
     theta, x, y = rng.uniform(-3.0, 3.0, 3)
     sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
@@ -79,26 +88,24 @@ def test_joint_cost_and_information(seed):
     )
     information = np.empty(1, SYMMETRIC3)
     joint.joint_information(sums, theta, information[0])
-    np.testing.assert_allclose(
-        of_arrays.full_matrix(information), reference.joint_information(theta, *measured), **CLOSE
-    )
+    assert_close(of_arrays.full_matrix(information), reference.joint_information(theta, *measured))
 
 
 @given(SEEDS)
 @settings(max_examples=5, deadline=None)
-def test_joint_solve(seed):
+def test_joint_solve(seed: int) -> None:
     _, pairs, weights, measured = drawn(seed)
     sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
     theta, x, y, cost, observable = joint.joint_solve(sums, 0.0, True)
     start = math.atan2(sums["wahba_sin"], sums["wahba_cos"])
     expected_theta, expected_t = reference.joint_solve(start, *measured)
     assert observable
-    np.testing.assert_allclose([theta, x, y], [expected_theta, *expected_t], **CLOSE)
+    assert_close([theta, x, y], [expected_theta, *expected_t])
     assert cost == pytest.approx(reference.joint_cost(theta, np.array([x, y]), *measured), rel=1e-9)
 
 
 @pytest.mark.parametrize("start", np.linspace(-3.0, 3.0, 13))
-def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start):
+def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start: float) -> None:
     _, pairs, weights, _ = drawn(3)
     sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
     theta, x, y, cost, _ = joint.joint_solve(sums, start, False)
@@ -108,7 +115,7 @@ def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start):
         assert cost < joint.joint_cost(sums, theta, x, y + step)
 
 
-def test_joint_solve_of_parallel_lines_gives_the_shortest_translation():
+def test_joint_solve_of_parallel_lines_gives_the_shortest_translation() -> None:
     # Two walls along 0.5 rad that face each other, seen in place but for 2 m across.
     along, across = np.array([math.cos(0.5), math.sin(0.5)]), np.array([-math.sin(0.5), math.cos(0.5)])
     rows = rows_of(
@@ -126,25 +133,26 @@ def test_joint_solve_of_parallel_lines_gives_the_shortest_translation():
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_one_step_sums(seed):
+def test_one_step_sums(seed: int) -> None:
     rng, pairs, weights, _ = drawn(seed)
-    at = (*rng.uniform(-5.0, 5.0, 2), 0.4 + rng.uniform(-1.0, 1.0))
+    x, y = rng.uniform(-5.0, 5.0, 2)
+    alpha = 0.4 + rng.uniform(-1.0, 1.0)
     for counts in (np.full(7, True), rng.random(7) < 0.5):
-        sums = one_step.one_step_sums(pairs.rows, *at, np.where(counts, weights, 0.0))
+        sums = one_step.one_step_sums(pairs.rows, x, y, alpha, np.where(counts, weights, 0.0))
         some = pairs.take(counts)
         expected = reference.one_step_sums(
-            some.map_directions, some.map_midpoints, some.directions, some.midpoints, weights[counts], at
+            some.map_directions, some.map_midpoints, some.directions, some.midpoints, weights[counts], (x, y, alpha)
         )
-        np.testing.assert_allclose(plain(sums).sum(axis=0), expected, **CLOSE)
+        assert_close(plain(sums).sum(axis=0), expected)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_one_step_moved(seed):
+def test_one_step_moved(seed: int) -> None:
     rng, pairs, weights, _ = drawn(seed)
     dx, dy, turn = rng.uniform(-0.5, 0.5, 3)
 
-    def about(x, y, alpha):
+    def about(x: float, y: float, alpha: float) -> Floats:
         return reference.one_step_sums(
             pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, weights, (x, y, alpha)
         )
@@ -152,14 +160,14 @@ def test_one_step_moved(seed):
     before = np.concatenate([about(1.0, 2.0, 0.3), np.zeros(12)]).view(ONE_STEP_SUMS)
     after = one_step.one_step_moved(before, dx, dy, turn)
     expected = about(1.0 + dx, 2.0 + dy, 0.3 + turn)
-    np.testing.assert_allclose(plain(after).sum(axis=0), expected, **CLOSE)
+    assert_close(plain(after).sum(axis=0), expected)
     costs = one_step.one_step_costs(before, dx, dy, turn)
-    np.testing.assert_allclose(costs, [expected[6], expected[8], 2.0 * expected[9]], **CLOSE)
+    assert_close(costs, [expected[6], expected[8], 2.0 * expected[9]])
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_one_step_solve(seed):
+def test_one_step_solve(seed: int) -> None:
     _, pairs, weights, _ = drawn(seed)
     values = reference.one_step_sums(
         pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, weights, (0.0, 0.0, 0.0)
@@ -170,7 +178,7 @@ def test_one_step_solve(seed):
 
     angle, x, y, observable = one_step.one_step_solve(values, True)
     assert observable
-    np.testing.assert_allclose([x, y], expected, **CLOSE)
+    assert_close([x, y], expected)
     assert angle == pytest.approx(reference.wahba(pairs.map_directions, pairs.directions, weights), abs=1e-9)
 
     total, _ = reference.mitsuta([alpha for *_, alpha in lines], weights)
@@ -180,21 +188,21 @@ def test_one_step_solve(seed):
 
 @given(SEEDS)
 @settings(max_examples=10, deadline=None)
-def test_compensated_sums_are_exact(seed):
+def test_compensated_sums_are_exact(seed: int) -> None:
     rng = np.random.default_rng(seed)
     terms = rng.normal(size=(200, 4)) * 10.0 ** rng.integers(-8, 12, (200, 4))
     sums = np.zeros((2, 4))
     for row in terms:
         for k in range(4):
-            sums[:, k] = compensated.accumulated(*sums[:, k], row[k], 0.0)
+            sums[:, k] = compensated.accumulated(sums[0, k], sums[1, k], row[k], 0.0)
     np.testing.assert_array_equal(sums[0], reference.exact_sums(terms))
-    flat = sums.ravel()
+    flat: Any = sums.ravel()
     np.testing.assert_array_equal(compensated.compensated_sum(flat, flat, 1.0), 2.0 * flat)
     np.testing.assert_array_equal(compensated.compensated_sum(flat, flat, -1.0), 0.0)
 
 
 @njit
-def joint_change(sums, row, weight, alpha, shift, sign):
+def joint_change(sums: Records, row: Record, weight: float, alpha: float, shift: float, sign: float) -> None:
     """Add or remove a pair whose map line is shifted meanwhile."""
     offset = row.map.offset
     row.map.offset = offset + shift
@@ -203,16 +211,16 @@ def joint_change(sums, row, weight, alpha, shift, sign):
 
 
 @njit
-def one_step_change(sums, row, weight, alpha, shift, sign):
+def one_step_change(sums: Records, row: Record, weight: float, alpha: float, shift: float, sign: float) -> None:
     gap = row.map.offset - pairing.offset_of(row.scan) + shift
     one_step.one_step_add(sums, row.map, row.scan, gap, alpha, weight, sign)
 
 
-def churner(change):
+def churner(change: Callable[..., None]) -> Callable[..., None]:
     """Return a function that adds and removes a pair for each of `order`, at once and all together: four changes."""
 
     @njit
-    def churn(sums, rows, weights, alpha, order):
+    def churn(sums: Records, rows: Records, weights: Floats, alpha: float, order: NDArray[np.int64]) -> None:
         for i in order:
             for sign in (1.0, -1.0):
                 change(sums, rows[i], weights[i], alpha, 0.125, sign)
@@ -220,17 +228,19 @@ def churner(change):
             for i in order:
                 change(sums, rows[i], weights[i], alpha, 0.25, sign)
 
-    return churn
+    return cast(Callable[..., None], churn)
 
 
 @pytest.mark.parametrize("offset", [0.0, 5e6], ids=["near", "utm"])
 @pytest.mark.parametrize(("change", "kind"), [(joint_change, JOINT_SUMS), (one_step_change, ONE_STEP_SUMS)])
-def test_a_million_changes_leave_the_sums_of_what_remains(change, kind, offset):
+def test_a_million_changes_leave_the_sums_of_what_remains(
+    change: Callable[..., None], kind: np.dtype[np.void], offset: float
+) -> None:
     rng, pairs, weights, _ = drawn(11, 40)
     rows = pairs.rows.copy()
     rows["map"]["offset"] += offset
 
-    def fresh():
+    def fresh() -> Records:
         sums = np.zeros(2, kind)
         for row, weight in zip(rows, weights, strict=True):
             change(sums, row, weight, 0.3, 0.0, 1.0)
@@ -245,7 +255,7 @@ def test_a_million_changes_leave_the_sums_of_what_remains(change, kind, offset):
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_gather(seed):
+def test_gather(seed: int) -> None:
     rng = np.random.default_rng(seed)
     map_segments, scan = noisy_pairs(rng, 9)
     scan = replace(scan, sigma=rng.choice([0.0, 1e-200, 1e-12, 0.3], 9))
@@ -259,7 +269,7 @@ def test_gather(seed):
             np.testing.assert_allclose(inverses, 1.0 / (rows["scan"]["variance"] + least), rtol=1e-15)
 
 
-def test_first_outside():
+def test_first_outside() -> None:
     pairs = np.array([[0, 3], [4, 0], [1, -1], [5, 2]])
     assert [pairing.first_outside(pairs, pairing.SCAN, count) for count in (6, 5, 4, 0)] == [-1, 3, 1, 0]
     assert [pairing.first_outside(pairs, pairing.MAP, count) for count in (4, 3)] == [2, 0]
@@ -267,12 +277,12 @@ def test_first_outside():
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_middles_and_moved_origins(seed):
+def test_middles_and_moved_origins(seed: int) -> None:
     rng, pairs, weights, _ = drawn(seed)
     counts = np.append(rng.random(6) < 0.5, True)
     some = pairs.take(counts)
     *middles, count = pairing.middles(pairs.rows, np.where(counts, weights, 0.0))
-    np.testing.assert_allclose(middles, [*some.map_midpoints.mean(axis=0), *some.centroids.mean(axis=0)], **CLOSE)
+    assert_close(middles, [*some.map_midpoints.mean(axis=0), *some.centroids.mean(axis=0)])
     assert count == counts.sum()
     map_x, map_y, scan_x, scan_y = middles
     expected = pairs.rows.copy()
@@ -282,15 +292,15 @@ def test_middles_and_moved_origins(seed):
     expected["scan"]["y"] -= scan_y
     expected["scan"]["centroid_x"] -= scan_x
     expected["scan"]["centroid_y"] -= scan_y
-    moved = pairs.about(middles[:2], middles[2:])
-    np.testing.assert_allclose(moved.map_offsets, np.sum(moved.map_normals * moved.map_midpoints, axis=1), **CLOSE)
+    moved = pairs.about((map_x, map_y), (scan_x, scan_y))
+    assert_close(moved.map_offsets, np.sum(moved.map_normals * moved.map_midpoints, axis=1))
     expected["map"]["offset"] = moved.map_offsets
     np.testing.assert_array_equal(moved.rows, expected)
 
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_residuals(seed):
+def test_residuals(seed: int) -> None:
     rng, pairs, weights, measured = drawn(seed)
     at = RigidTransform(*rng.uniform(-3.0, 3.0, 3))
     counts = np.append(rng.random(6) < 0.5, True)
@@ -298,11 +308,11 @@ def test_residuals(seed):
         pairs.rows, np.where(counts, 1.0, 0.0), np.where(counts, weights, 0.0), at.theta, at.x, at.y
     )
     expected = np.sum(pairs.map_normals * at.apply(pairs.midpoints), axis=1) - pairs.map_offsets
-    np.testing.assert_allclose(offsets, expected, **CLOSE)
+    assert_close(offsets, expected)
     rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
     alphas = [reference.transformation_line(*row)[2] for row in rows]
     turns = [math.remainder(alpha - at.theta, math.tau) for alpha in alphas]
-    np.testing.assert_allclose(angles, turns, **CLOSE)
+    assert_close(angles, turns)
     np.testing.assert_array_equal(pairing.relative_angles(pairs.rows, at.theta), angles)
     cost = reference.joint_cost(at.theta, np.array([at.x, at.y]), *(values[counts] for values in measured))
     assert chi2 == pytest.approx(cost, rel=1e-9)
@@ -310,7 +320,7 @@ def test_residuals(seed):
     assert rms_angle == pytest.approx(math.sqrt(np.mean(angles[counts] ** 2)))
 
 
-def definite(rng, size, spread=3.0):
+def definite(rng: np.random.Generator, size: int, spread: float = 3.0) -> Floats:
     """Draw a positive definite matrix whose rows differ in size by powers of ten."""
     root = rng.normal(size=(size, size + 1))
     scale = 10.0 ** rng.uniform(-spread, spread, size)
@@ -319,7 +329,7 @@ def definite(rng, size, spread=3.0):
 
 @given(SEEDS)
 @settings(max_examples=100, deadline=None)
-def test_eigen2(seed):
+def test_eigen2(seed: int) -> None:
     rng = np.random.default_rng(seed)
     matrix = definite(rng, 2)
     small, big, x, y = matrices.eigen2(matrix[0, 0], matrix[0, 1], matrix[1, 1])
@@ -329,7 +339,7 @@ def test_eigen2(seed):
     assert abs(axes[:, 0] @ [x, y]) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_eigen2_of_what_has_no_one_axis():
+def test_eigen2_of_what_has_no_one_axis() -> None:
     for a in (0.0, 2.0):
         small, big, x, y = matrices.eigen2(a, 0.0, a)
         np.testing.assert_allclose((small, big, x, y), (a, a, 1.0, 0.0), atol=1e-15)
@@ -338,7 +348,7 @@ def test_eigen2_of_what_has_no_one_axis():
 
 @given(SEEDS, st.sampled_from([1e-12, 1e-6, 1e-2]))
 @settings(max_examples=100, deadline=None)
-def test_is_regular3(seed, least):
+def test_is_regular3(seed: int, least: float) -> None:
     rng = np.random.default_rng(seed)
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     matrix = (axes * [1.0, 1.0, 10.0 ** rng.uniform(-8.0, 0.0)]) @ axes.T
@@ -349,7 +359,7 @@ def test_is_regular3(seed, least):
         assert matrices.is_regular3(symmetric(matrix * np.outer(units, units))[0], least) == (smallest > least)
 
 
-def test_is_regular3_of_what_is_not():
+def test_is_regular3_of_what_is_not() -> None:
     singular = [np.diag([1.0, 0.0, 1.0]), np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])]
     singular += [np.outer(row, row) for row in ([1.0, 1.0, 1.0], [1.0, -2.0, 0.0], [0.5, 0.0, 1e3])]
     for matrix in singular:
@@ -363,16 +373,16 @@ def test_is_regular3_of_what_is_not():
 
 @given(SEEDS)
 @settings(max_examples=100, deadline=None)
-def test_inverses_and_carried(seed):
+def test_inverses_and_carried(seed: int) -> None:
     rng = np.random.default_rng(seed)
     matrix = definite(rng, 3)
     scale = np.sqrt(np.diag(matrix))
     condition = np.linalg.cond(matrix / np.outer(scale, scale))
     out = np.empty(1, SYMMETRIC3)
 
-    def error():
+    def error() -> float:
         product = (of_arrays.full_matrix(out) * np.outer(scale, scale)) @ (matrix / np.outer(scale, scale))
-        return np.abs(product - np.eye(3)).max()
+        return float(np.abs(product - np.eye(3)).max())
 
     matrices.invert3_scaled(symmetric(matrix)[0], out[0])
     assert error() <= 1e-14 * condition

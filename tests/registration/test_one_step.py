@@ -1,5 +1,7 @@
 """The paper's estimator: closed forms, its errata, its sums."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -8,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from registration import Correspondences, MeasuredSegments, OneStepSums, RigidTransform, Segments
+from registration.options import Rotation
 from tests import reference
 
 from .scenes import POSE, ROOM, correspondences, diagonal, directed, noisy_pairs, seen_from
@@ -16,13 +19,15 @@ IDENTITY = RigidTransform(0.0, 0.0, 0.0)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def mean_angle(degrees, rotation, reference_degrees=None, weights=None):
+def mean_angle(
+    degrees: list[float], rotation: Rotation, reference_degrees: float | None = None, weights: list[float] | None = None
+) -> float:
     pairs = correspondences(directed(degrees), MeasuredSegments.from_segments(directed(np.zeros(len(degrees)))))
-    weights = np.ones(len(degrees)) if weights is None else weights
-    about = OneStepSums.of_set(pairs, weights).solve("wahba")[0].theta
+    used = np.ones(len(degrees)) if weights is None else weights
+    about = OneStepSums.of_set(pairs, used).solve("wahba")[0].theta
     if reference_degrees is not None:
         about = math.radians(reference_degrees)
-    sums = OneStepSums.of_set(pairs, weights, RigidTransform(0.0, 0.0, about))
+    sums = OneStepSums.of_set(pairs, used, RigidTransform(0.0, 0.0, about))
     return math.degrees(sums.solve(rotation)[0].theta)
 
 
@@ -38,22 +43,22 @@ def mean_angle(degrees, rotation, reference_degrees=None, weights=None):
         ([-90], "wahba", -90.0),
     ],
 )
-def test_mean_angles_in_closed_form(degrees, rotation, expected):
+def test_mean_angles_in_closed_form(degrees: list[float], rotation: Rotation, expected: float) -> None:
     assert mean_angle(degrees, rotation) == pytest.approx(expected, abs=1e-9)
 
 
-def test_mean_angles_take_weights():
+def test_mean_angles_take_weights() -> None:
     assert mean_angle([0, 60], "mitsuta", weights=[3.0, 1.0]) == pytest.approx(15.0)
     assert mean_angle([0, 90], "wahba", weights=[3.0, 1.0]) == pytest.approx(math.degrees(math.atan2(1.0, 3.0)))
 
 
 @pytest.mark.parametrize("about", [-40.0, 0.0, 30.0, 80.0])
-def test_the_reference_angle_does_not_change_the_mean(about):
+def test_the_reference_angle_does_not_change_the_mean(about: float) -> None:
     assert mean_angle([0, 0, 90], "mitsuta", about) == pytest.approx(30.0, abs=1e-9)
     assert mean_angle([0, 0, 90], "wahba", about) == pytest.approx(26.565051177, abs=1e-9)
 
 
-def test_the_sign_of_p_brings_the_scan_to_the_map():
+def test_the_sign_of_p_brings_the_scan_to_the_map() -> None:
     # One wall a metre up and one two metres right: as printed Eq. (1) would answer (-2, -1).
     scan = Segments.from_array([[0, 0, 1, 0], [0, 1, 0, 0]])
     map_segments = Segments.from_array([[2, 1, 3, 1], [2, 2, 2, 1]])
@@ -63,7 +68,7 @@ def test_the_sign_of_p_brings_the_scan_to_the_map():
     assert (pose.x, pose.y, pose.theta) == pytest.approx((2.0, 1.0, 0.0), abs=1e-12)
 
 
-def test_oblique_walls_show_the_signs_of_eq_8():
+def test_oblique_walls_show_the_signs_of_eq_8() -> None:
     map_segments = Segments.from_array(ROOM)
     pairs = correspondences(map_segments, MeasuredSegments.from_segments(seen_from(POSE, map_segments)))
     sums = OneStepSums.of_set(pairs, np.ones(6))
@@ -76,7 +81,7 @@ def test_oblique_walls_show_the_signs_of_eq_8():
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_ambiguity_at_any_transform_is_that_of_the_definition(seed):
+def test_ambiguity_at_any_transform_is_that_of_the_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     map_segments, scan = noisy_pairs(rng, 6, 0.1)
     weights = rng.uniform(0.2, 3.0, 6)
@@ -84,7 +89,7 @@ def test_ambiguity_at_any_transform_is_that_of_the_definition(seed):
     sums = OneStepSums.of_set(pairs, weights, RigidTransform(1.0, -2.0, 0.5))
     rows = zip(pairs.map_directions, pairs.map_midpoints, pairs.directions, pairs.midpoints, strict=True)
     lines = [reference.transformation_line(*row) for row in rows]
-    optimum = {rotation: sums.solve(rotation)[0] for rotation in ("wahba", "mitsuta")}
+    optimum: dict[Rotation, RigidTransform] = {rotation: sums.solve(rotation)[0] for rotation in ("wahba", "mitsuta")}
     for at in (IDENTITY, POSE, RigidTransform(-7.0, 3.0, 0.9), *optimum.values()):
         expected = reference.translation_ambiguity(np.array([at.x, at.y]), lines, weights)
         assert sums.translation_cost(at) == pytest.approx(expected, rel=1e-9)
@@ -99,7 +104,7 @@ def test_ambiguity_at_any_transform_is_that_of_the_definition(seed):
             assert sums.rotation_cost(aside, rotation) > sums.rotation_cost(pose, rotation)
 
 
-def test_the_printed_forms_hold_at_the_optimum():
+def test_the_printed_forms_hold_at_the_optimum() -> None:
     map_segments, scan = noisy_pairs(np.random.default_rng(2), 6, 0.1)
     sums = OneStepSums.of_set(correspondences(map_segments, scan), np.ones(6))
     pose, _ = sums.solve("mitsuta")
@@ -115,7 +120,7 @@ def test_the_printed_forms_hold_at_the_optimum():
     ("degrees", "expected"),
     [([0, 90], 1.0), ([0, 180], 0.0), ([0, 30], 0.5), ([0, 0, 90], 2.0 * math.sqrt(2.0) / 3.0)],
 )
-def test_reliability_in_closed_form(degrees, expected):
+def test_reliability_in_closed_form(degrees: list[float], expected: float) -> None:
     pairs = correspondences(directed(degrees), MeasuredSegments.from_segments(directed(degrees)))
     sums = OneStepSums.of_set(pairs, np.ones(len(degrees)))
     assert sums.reliability == pytest.approx(expected, abs=1e-7)
@@ -125,7 +130,7 @@ def test_reliability_in_closed_form(degrees, expected):
     assert sums.determinant == pytest.approx((0.5 * expected * len(degrees)) ** 2, abs=1e-12)
 
 
-def test_sums_of_nothing():
+def test_sums_of_nothing() -> None:
     pairs = Correspondences.of(directed([0]), MeasuredSegments.from_segments(directed([0])), [])
     sums = OneStepSums.of_set(pairs, [])
     assert sums.count == 0
@@ -135,7 +140,7 @@ def test_sums_of_nothing():
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_sums_add_up(seed):
+def test_sums_add_up(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pairs = correspondences(*noisy_pairs(rng, 9))
     weights = rng.uniform(0.1, 5.0, 9)
@@ -151,21 +156,21 @@ def test_sums_add_up(seed):
     np.testing.assert_allclose((a + b.about(POSE)).values, both.values, rtol=1e-9, atol=1e-9)
 
 
-def test_a_distant_pair_leaves_no_trace():
+def test_a_distant_pair_leaves_no_trace() -> None:
     pairs = correspondences(*noisy_pairs(np.random.default_rng(1), 5))
     far = pairs.about(np.array([1e8, -1e8]), np.zeros(2))
     sums = OneStepSums.of_set(pairs, np.ones(5))
     np.testing.assert_allclose(sums.add(far, 0, 1.0).remove(far, 0, 1.0).values, sums.values, rtol=1e-12)
 
 
-def test_an_angle_taken_out_across_the_wrap_is_gone():
+def test_an_angle_taken_out_across_the_wrap_is_gone() -> None:
     # With Alg. 1's principal values the sums would keep a multiple of 2 pi.
     pairs = correspondences(directed([175, -175, 178]), MeasuredSegments.from_segments(directed([0, 0, 0])))
     sums = OneStepSums.of_set(pairs, np.ones(3), RigidTransform(0.0, 0.0, math.pi)).remove(pairs, 1, 1.0)
     assert math.degrees(sums.solve("mitsuta")[0].theta) == pytest.approx(176.5, abs=1e-9)
 
 
-def test_pairs_are_chosen_by_index():
+def test_pairs_are_chosen_by_index() -> None:
     map_segments, scan = noisy_pairs(np.random.default_rng(1), 5)
     chosen = Correspondences.of(map_segments, scan, [[3, 3], [1, 1]])
     both = correspondences(map_segments, scan)

@@ -1,6 +1,9 @@
 """Segments, measured segments and transforms."""
 
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +23,7 @@ from registration import (
 POSES = st.builds(RigidTransform, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-10.0, 10.0))
 
 
-def test_a_segment_in_closed_form():
+def test_a_segment_in_closed_form() -> None:
     s = Segments.from_array([[1, 2, 1, 5]])
     np.testing.assert_array_equal(s.directions, [[0, 1]])
     np.testing.assert_array_equal(s.normals, [[-1, 0]])
@@ -33,7 +36,7 @@ def test_a_segment_in_closed_form():
     assert len(Segments.from_array([])) == 0
 
 
-def test_arrays_are_read_only_and_rows_can_be_taken():
+def test_arrays_are_read_only_and_rows_can_be_taken() -> None:
     s = Segments.from_array([[0, 0, 1, 0], [0, 0, 0, 2]])
     with pytest.raises(ValueError, match="read-only"):
         s.endpoints[0, 0] = 7.0
@@ -50,25 +53,25 @@ def test_arrays_are_read_only_and_rows_can_be_taken():
         ([0, 0, 2e4, 0], "longer"),
     ],
 )
-def test_bad_segments_are_refused_by_index(row, says):
+def test_bad_segments_are_refused_by_index(row: list[float], says: str) -> None:
     with pytest.raises(InvalidSegmentsError, match=says) as caught:
-        Segments.from_array([[0, 0, 1, 0], row], argument="map.segments")
+        Segments.from_array(np.array([[0, 0, 1, 0], row]), argument="map.segments")
     assert (caught.value.argument, caught.value.index) == ("map.segments", 1)
     assert isinstance(caught.value, RegistrationError)
 
 
 @pytest.mark.parametrize("array", [[[0, 0, 1]], [1, 2, 3, 4], [["0", "0", "1", "0"]], [[0, 0, 1, 0], [1]]])
-def test_what_is_no_array_of_segments_is_refused(array):
+def test_what_is_no_array_of_segments_is_refused(array: Any) -> None:
     with pytest.raises(InvalidArgumentError):
         Segments.from_array(array)
 
 
-def test_what_a_caller_does_not_know_is_filled_in():
-    measured = MeasuredSegments.from_segments(Segments.from_array([[0, 0, 6, 0], [0, 0, 0, 0.03]]))
+def test_what_a_caller_does_not_know_is_filled_in() -> None:
+    measured = MeasuredSegments.from_segments(Segments.from_array(np.array([[0, 0, 6, 0], [0, 0, 0, 0.03]])))
     np.testing.assert_allclose(measured.sigma, [0.02, 0.02])
     np.testing.assert_allclose(measured.points, [120, 2])
     np.testing.assert_allclose(measured.spreads, [3.0, 0.03**2 / 12])
-    np.testing.assert_allclose(measured.centroids, [[3, 0], [0, 0.015]])
+    np.testing.assert_allclose(measured.centroids, np.array([[3, 0], [0, 0.015]]))
 
 
 @pytest.mark.parametrize(
@@ -82,7 +85,7 @@ def test_what_a_caller_does_not_know_is_filled_in():
         ({"moments": ([[0, 0], [0, 0]], [-1, 1])}, "scan.spreads", 0),
     ],
 )
-def test_bad_measurements_are_refused(changes, argument, index):
+def test_bad_measurements_are_refused(changes: dict[str, Any], argument: str, index: int | None) -> None:
     with pytest.raises(InvalidArgumentError) as caught:
         MeasuredSegments.from_segments(Segments.from_array([[0, 0, 1, 0], [0, 0, 0, 1]]), **changes)
     assert (caught.value.argument, caught.value.index) == (argument, index)
@@ -92,23 +95,23 @@ def test_bad_measurements_are_refused(changes, argument, index):
     ("angle", "expected"),
     [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (1.5 * math.pi, -0.5 * math.pi), (7.0, 7.0 - math.tau)],
 )
-def test_wrapped_angles(angle, expected):
+def test_wrapped_angles(angle: float, expected: Any) -> None:
     assert wrap_angle(angle) == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_transform_in_closed_form():
+def test_a_transform_in_closed_form() -> None:
     pose = RigidTransform(1.0, 2.0, math.pi / 2)
     np.testing.assert_allclose(pose.apply([[1.0, 0.0], [0.0, 1.0]]), [[1.0, 3.0], [0.0, 2.0]], atol=1e-15)
 
 
 @given(POSES, POSES, st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)))
-def test_transforms_are_a_group(a, b, point):
+def test_transforms_are_a_group(a: RigidTransform, b: RigidTransform, point: Any) -> None:
     np.testing.assert_allclose(a.compose(b).apply(point), a.apply(b.apply(point)), atol=1e-9)
     np.testing.assert_allclose(a.inverse().apply(a.apply(point)), point, atol=1e-9)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_transform_is_finite(bad):
+def test_a_transform_is_finite(bad: Any) -> None:
     for values in ((bad, 0, 0), (0, bad, 0), (0, 0, bad)):
         with pytest.raises(ValueError, match="finite"):
             RigidTransform(*values)

@@ -1,9 +1,23 @@
 """Slow, obviously right twins of ``simulation/kernels/``."""
 
+from __future__ import annotations
+
 import numpy as np
+from numpy.typing import NDArray
+
+from registration.layout import Floats
 
 
-def cast(endpoints, x, y, start, increment, cosines, sines, one_sided):
+def cast(
+    endpoints: Floats,
+    x: float,
+    y: float,
+    start: float,
+    increment: float,
+    cosines: Floats,
+    sines: Floats,
+    one_sided: bool,
+) -> tuple[Floats, NDArray[np.int64]]:
     """Intersect every beam with every segment: solve ``[x, y] + r d = begin + u (end - begin)``."""
     ranges = np.full(len(cosines), np.inf)
     hits = np.full(len(cosines), -1)

@@ -1,4 +1,7 @@
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +20,7 @@ QUIET = Scanner(sigma=0.0)
 SQUARE = Segments.from_array([[-1, -1, 1, -1], [1, -1, 1, 1], [1, 1, -1, 1], [-1, 1, -1, -1]])
 
 
-def test_a_square_room_has_the_ranges_of_its_closed_form():
+def test_a_square_room_has_the_ranges_of_its_closed_form() -> None:
     seen = scan(SQUARE, ORIGIN, QUIET)
     expected = 1.0 / np.maximum(abs(np.cos(seen.angles)), abs(np.sin(seen.angles)))
     np.testing.assert_allclose(seen.ranges, expected, rtol=1e-12)
@@ -25,19 +28,19 @@ def test_a_square_room_has_the_ranges_of_its_closed_form():
     assert np.unique(seen.hits).tolist() == [0, 1, 2, 3]
 
 
-def test_the_hits_name_the_wall_that_each_beam_looks_at():
+def test_the_hits_name_the_wall_that_each_beam_looks_at() -> None:
     seen = scan(SQUARE, ORIGIN, Scanner(beams=4, angle_min=0.0, angle_increment=math.pi / 2, sigma=0.0))
     assert seen.hits.tolist() == [1, 2, 3, 0]
     np.testing.assert_allclose(seen.points, [[1, 0], [0, 1], [-1, 0], [0, -1]], atol=1e-15)
 
 
-def test_a_pose_turns_and_moves_what_is_seen():
+def test_a_pose_turns_and_moves_what_is_seen() -> None:
     seen = scan(SQUARE, RigidTransform(0.5, 0.25, math.pi / 2), Scanner.over(math.pi, 3, sigma=0.0))
     np.testing.assert_allclose(seen.ranges, [0.5, 0.75, 1.5])
     assert seen.hits.tolist() == [1, 2, 3]
 
 
-def test_nothing_within_the_limit_is_no_return():
+def test_nothing_within_the_limit_is_no_return() -> None:
     seen = scan(SQUARE, ORIGIN, Scanner(range_max=1.2, sigma=0.0))
     far = seen.true_ranges > 1.2
     assert far.any()
@@ -47,14 +50,14 @@ def test_nothing_within_the_limit_is_no_return():
     assert (seen.ranges[~far] <= 1.2).all()
 
 
-def test_noise_lifts_no_range_above_the_limit():
+def test_noise_lifts_no_range_above_the_limit() -> None:
     limit = 1.001  # the wall is at 1.0
     seen = scan(SQUARE, ORIGIN, Scanner(2000, -0.01, 1e-5, range_max=limit, sigma=0.05), np.random.default_rng(0))
     assert np.isinf(seen.ranges).any()
     assert seen.ranges[np.isfinite(seen.ranges)].max() <= limit
 
 
-def test_an_empty_map_gives_no_returns():
+def test_an_empty_map_gives_no_returns() -> None:
     seen = scan(Segments.from_array([]), ORIGIN, QUIET)
     assert np.isinf(seen.ranges).all()
     assert (seen.hits == -1).all()
@@ -62,7 +65,7 @@ def test_an_empty_map_gives_no_returns():
     assert seen.points.shape == (0, 2)
 
 
-def test_what_is_too_near_is_unknown():
+def test_what_is_too_near_is_unknown() -> None:
     seen = scan(SQUARE, RigidTransform(0.95, 0.0, 0.0), Scanner(range_min=0.1, sigma=0.0))
     near = seen.true_ranges < 0.1
     assert near.any()
@@ -71,22 +74,22 @@ def test_what_is_too_near_is_unknown():
 
 
 @pytest.mark.parametrize(("one_sided", "expected"), [(False, [0.5, 0]), (True, [1.0, 1])])
-def test_a_wall_seen_from_behind_stops_a_beam_unless_it_is_one_sided(one_sided, expected):
-    walls = Segments.from_array([[0.5, 1, 0.5, -1], [1, -1, 1, 1]])
+def test_a_wall_seen_from_behind_stops_a_beam_unless_it_is_one_sided(one_sided: bool, expected: list[float]) -> None:
+    walls = Segments.from_array(np.array([[0.5, 1, 0.5, -1], [1, -1, 1, 1]]))
     seen = scan(walls, ORIGIN, Scanner(1, 0.0, 0.1, sigma=0.0, one_sided=one_sided))
     assert [seen.ranges[0], seen.hits[0]] == pytest.approx(expected)
     assert seen.facing.tolist() == [one_sided]
 
 
 @pytest.mark.parametrize("order", [[0, 1], [1, 0]])
-def test_of_a_thin_wall_drawn_both_ways_the_facing_one_is_hit(order):
+def test_of_a_thin_wall_drawn_both_ways_the_facing_one_is_hit(order: Any) -> None:
     walls = Segments.from_array([[2, 1, 2, -1], [2, -1, 2, 1]]).take(order)
     seen = scan(walls, ORIGIN, Scanner.over(0.5, 21, sigma=0.0))
     assert seen.facing.all()
     assert (seen.hits == order.index(1)).all()
 
 
-def test_no_beam_slips_through_a_joint():
+def test_no_beam_slips_through_a_joint() -> None:
     turns = np.linspace(0, math.tau, 361)[:-1]
     ring = np.stack([3 * np.cos(turns), 3 * np.sin(turns)], axis=1)
     map = Segments.from_array(np.hstack([ring, np.roll(ring, -1, axis=0)]))
@@ -94,7 +97,7 @@ def test_no_beam_slips_through_a_joint():
     np.testing.assert_allclose(seen.ranges, 3.0)
 
 
-def test_noise_dropouts_and_quantisation_are_as_asked():
+def test_noise_dropouts_and_quantisation_are_as_asked() -> None:
     scanner = Scanner(20_000, -1.0, 1e-4, sigma=0.03, dropout=0.1)
     seen = scan(SQUARE, ORIGIN, scanner, np.random.default_rng(3))
     kept = np.isfinite(seen.ranges)
@@ -118,7 +121,9 @@ def test_noise_dropouts_and_quantisation_are_as_asked():
     clockwise=st.booleans(),
     one_sided=st.booleans(),
 )
-def test_the_kernel_agrees_with_its_twin(seed, beams, start, turn, clockwise, one_sided):
+def test_the_kernel_agrees_with_its_twin(
+    seed: int, beams: int, start: float, turn: float, clockwise: bool, one_sided: bool
+) -> None:
     rng = np.random.default_rng(seed)
     endpoints = rng.uniform(-5, 5, (12, 4))
     x, y = rng.uniform(-2, 2, 2)
@@ -133,7 +138,7 @@ def test_the_kernel_agrees_with_its_twin(seed, beams, start, turn, clockwise, on
 
 @settings(deadline=None, max_examples=30)
 @given(theta=st.floats(-3, 3), dx=st.floats(-50, 50), dy=st.floats(-50, 50))
-def test_moving_map_and_scanner_together_changes_nothing(theta, dx, dy):
+def test_moving_map_and_scanner_together_changes_nothing(theta: float, dx: float, dy: float) -> None:
     motion = RigidTransform(dx, dy, theta)
     moved = Segments.from_array(motion.apply(SQUARE.endpoints.reshape(-1, 2)).reshape(-1, 4))
     pose = RigidTransform(0.1, -0.2, 0.3)
@@ -150,14 +155,14 @@ def test_moving_map_and_scanner_together_changes_nothing(theta, dx, dy):
         ("dropout", 1.1), ("quantum", -0.05),
     ],
 )  # fmt: skip
-def test_a_scanner_that_cannot_be_is_refused(argument, value):
+def test_a_scanner_that_cannot_be_is_refused(argument: str, value: Any) -> None:
     with pytest.raises(SimulationError) as caught:
         Scanner(**{argument: value})
     assert caught.value.argument == argument
     assert repr(value) in caught.value.message
 
 
-def test_noise_without_a_generator_is_refused():
+def test_noise_without_a_generator_is_refused() -> None:
     with pytest.raises(SimulationError) as caught:
         scan(SQUARE, ORIGIN)
     assert caught.value.argument == "rng"

@@ -1,15 +1,22 @@
 """Slow, obviously right twins of the kernels in ``vectorization/``."""
 
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Container
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from registration.layout import Floats
 from vectorization.tuning import BREAK_PENALTY, BREAK_REACH, GRAZING, LEAST_TRIPLES, MISSING_STEPS
 
+Pieces = list[tuple[int, int]]
 
-def stretch_cost(points, rays, variance, floor):
+
+def stretch_cost(points: Floats, rays: Floats, variance: float, floor: float) -> float:
     """Chi-square of the total least squares line through points, by the singular values."""
     n = len(points)
     if n < 3:
@@ -17,16 +24,18 @@ def stretch_cost(points, rays, variance, floor):
     _, singular, basis = np.linalg.svd(points - points.mean(axis=0))
     normal = basis[1]
     cosines = np.where((rays == 0).all(axis=1), 1.0, rays @ normal)
-    return singular[1] ** 2 / np.mean(variance * cosines**2 + floor)
+    return float(singular[1] ** 2 / np.mean(variance * cosines**2 + floor))
 
 
-def find_gaps(points, rays, increment, sigma, default_gap, max_gap):
+def find_gaps(
+    points: Floats, rays: Floats, increment: float, sigma: float, default_gap: float, max_gap: float
+) -> list[int]:
     starts = [0] if len(points) else []
     for i in range(1, len(points)):
         limit = default_gap
         if increment > 0:
             step = math.acos(min(1.0, max(-1.0, rays[i - 1] @ rays[i])))
-            nearer = min(np.linalg.norm(points[i - 1]), np.linalg.norm(points[i]))
+            nearer = float(min(np.linalg.norm(points[i - 1]), np.linalg.norm(points[i])))
             limit = nearer * math.sin(step) / math.sin(max(GRAZING - step, GRAZING / 2)) + 4 * sigma
             if step > MISSING_STEPS * increment:
                 limit = 0.0
@@ -35,20 +44,20 @@ def find_gaps(points, rays, increment, sigma, default_gap, max_gap):
     return starts
 
 
-def farthest_point(points, rays, variance, floor):
+def farthest_point(points: Floats, rays: Floats, variance: float, floor: float) -> tuple[int, float]:
     along = points[-1] - points[0]
     along = along / np.linalg.norm(along)
     normal = np.array([-along[1], along[0]])
     cosines = np.where((rays == 0).all(axis=1), 1.0, rays @ normal)
     squares = ((points - points[0]) @ normal) ** 2 / (variance * cosines**2 + floor)
     k = int(np.argmax(squares[1:-1])) + 1
-    return k, squares[k]
+    return k, float(squares[k])
 
 
-def merge(pieces, points, rays, gaps, variance, floor):
-    pieces = [tuple(p) for p in pieces]
+def merge(pieces: Pieces, points: Floats, rays: Floats, gaps: Container[int], variance: float, floor: float) -> Pieces:
+    pieces = list(pieces)
 
-    def cost(a, b):
+    def cost(a: int, b: int) -> float:
         return stretch_cost(points[a:b], rays[a:b], variance, floor)
 
     while True:
@@ -63,10 +72,12 @@ def merge(pieces, points, rays, gaps, variance, floor):
         pieces[k : k + 2] = [(pieces[k][0], pieces[k + 1][1])]
 
 
-def settle_breaks(pieces, points, rays, gaps, variance, floor):
-    pieces = [list(p) for p in pieces]
-    for one, other in itertools.pairwise(pieces):
-        a, b, c = one[0], one[1], other[1]
+def settle_breaks(
+    pieces: Pieces, points: Floats, rays: Floats, gaps: Container[int], variance: float, floor: float
+) -> Pieces:
+    pieces = list(pieces)
+    for i in range(len(pieces) - 1):
+        (a, b), (_, c) = pieces[i : i + 2]
         if b in gaps or b - a < 2 or c - b < 2:
             continue
         costs = {
@@ -74,22 +85,25 @@ def settle_breaks(pieces, points, rays, gaps, variance, floor):
             + stretch_cost(points[k:c], rays[k:c], variance, floor)
             for k in range(max(a + 2, b - BREAK_REACH), min(c - 2, b + BREAK_REACH) + 1)
         }
-        one[1] = other[0] = min(costs, key=costs.get)
-    return [tuple(p) for p in pieces]
+        place = min(costs, key=lambda k: costs[k])
+        pieces[i : i + 2] = (a, place), (place, c)
+    return pieces
 
 
-def fit_line(ranges, rays, normal_angle, distance):
+def fit_line(ranges: Floats, rays: Floats, normal_angle: float, distance: float) -> tuple[Floats, Floats]:
     """Maximum likelihood line under range noise alone: normal's angle and distance, information times sigma^2."""
-    solution = least_squares(
-        lambda v: ranges - v[1] / (rays @ [np.cos(v[0]), np.sin(v[0])]),
-        [normal_angle, distance],
-        xtol=1e-15,
-        ftol=1e-15,
-    )
-    return solution.x, solution.jac.T @ solution.jac
+
+    def misses(line: Floats) -> Floats:
+        angle, distance = line
+        expected: Floats = distance / (rays @ [np.cos(angle), np.sin(angle)])
+        return ranges - expected
+
+    solution = least_squares(misses, [normal_angle, distance], xtol=1e-15, ftol=1e-15)
+    jacobian = np.asarray(solution.jac)
+    return solution.x, jacobian.T @ jacobian
 
 
-def ray_noise(ranges, angles, increment, trusted, mean_square):
+def ray_noise(ranges: Floats, angles: Floats, increment: float, trusted: float, mean_square: float) -> float:
     z = []
     for i in range(1, len(ranges) - 1):
         (ra, rb, rc), (a, b, c) = ranges[i - 1 : i + 2], angles[i - 1 : i + 2]
@@ -101,7 +115,7 @@ def ray_noise(ranges, angles, increment, trusted, mean_square):
     return math.sqrt(np.mean(np.square(np.sort(z)[: int(trusted * len(z))])) / mean_square)
 
 
-def window_noise(points, window, median):
+def window_noise(points: Floats, window: int, median: float) -> float:
     squares = []
     for a in range(len(points) - window + 1):
         p = points[a : a + window]
@@ -109,7 +123,7 @@ def window_noise(points, window, median):
     return math.sqrt(np.sort(squares)[len(squares) // 2] / median)
 
 
-def gather(cleaned, angles, backward, closed):
+def gather(cleaned: Floats, angles: Floats, backward: bool, closed: bool) -> tuple[NDArray[np.intp], Floats, Floats]:
     order = np.arange(len(cleaned))[:: -1 if backward else 1]
     order = order[np.isfinite(cleaned[order])]
     if closed and len(order):

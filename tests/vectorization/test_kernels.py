@@ -1,10 +1,14 @@
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from registration.layout import Floats, Record, Records
 from vectorization.kernels import lines, pieces, tracing
 from vectorization.kernels import rays as beams
 from vectorization.layout import FITTED, POINT, SCANNER, SUMS
@@ -18,7 +22,7 @@ FLOOR = 0.003**2
 seeds = st.integers(0, 100_000)
 
 
-def drawn(seed, n=40, isotropic=False):
+def drawn(seed: int, n: int = 40, isotropic: bool = False) -> tuple[Floats, Floats]:
     """A noisy scan of a jagged wall with a gap or two: points and rays."""
     rng = np.random.default_rng(seed)
     angles = np.cumsum(rng.choice([0.01, 0.01, 0.01, 0.02], n))
@@ -28,19 +32,26 @@ def drawn(seed, n=40, isotropic=False):
     return ranges[:, None] * rays, np.zeros_like(rays) if isotropic else rays
 
 
-def records(points, rays):
+def records(points: Floats, rays: Floats) -> Records:
     """Return points (n, 2) and their rays as the kernels take them."""
     ranges = np.where((rays == 0).all(axis=1), 0.0, np.hypot(*points.T))
     return np.array([(*p, *u, r) for p, u, r in zip(points, rays, ranges, strict=True)], POINT)
 
 
-def scanner_of(increment=0.01, variance=VARIANCE, floor=FLOOR, default_gap=0.0, max_gap=math.inf, longest=1.5):
+def scanner_of(
+    increment: float = 0.01,
+    variance: float = VARIANCE,
+    floor: float = FLOOR,
+    default_gap: float = 0.0,
+    max_gap: float = math.inf,
+    longest: float = 1.5,
+) -> Record:
     """Return what is known of a scanner as the inner kernels take it."""
     values = (increment, math.sqrt(variance), variance, floor, default_gap, max_gap, longest)
     return np.array([values], SCANNER)[0]
 
 
-def line_with(**fields):
+def line_with(**fields: float) -> Record:
     """Return a line whose other fields are 0."""
     line = np.zeros(1, FITTED)
     for name, value in fields.items():
@@ -48,14 +59,14 @@ def line_with(**fields):
     return line[0]
 
 
-def bounds(pieces):
+def bounds(pieces: Records) -> list[tuple[int, int]]:
     """Return pieces as pairs."""
     return [(int(piece["first"]), int(piece["end"])) for piece in pieces]
 
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, isotropic=st.booleans(), a=st.integers(0, 30), length=st.integers(0, 40))
-def test_the_cost_of_a_stretch_comes_from_running_sums(seed, isotropic, a, length):
+def test_the_cost_of_a_stretch_comes_from_running_sums(seed: int, isotropic: bool, a: int, length: int) -> None:
     points, rays = drawn(seed, isotropic=isotropic)
     b = min(40, a + length)
     sums = pieces.running_sums(records(points, rays))
@@ -72,7 +83,7 @@ def test_the_cost_of_a_stretch_comes_from_running_sums(seed, isotropic, a, lengt
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, increment=st.sampled_from([0.0, 0.01]), max_gap=st.sampled_from([0.05, math.inf]))
-def test_gaps_are_where_the_twin_finds_them(seed, increment, max_gap):
+def test_gaps_are_where_the_twin_finds_them(seed: int, increment: float, max_gap: float) -> None:
     points, rays = drawn(seed)
     scanner = scanner_of(increment, default_gap=0.1, max_gap=max_gap)
     starts = pieces.find_gaps(records(points, rays), scanner)
@@ -81,7 +92,7 @@ def test_gaps_are_where_the_twin_finds_them(seed, increment, max_gap):
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, isotropic=st.booleans())
-def test_the_farthest_point_is_the_twins(seed, isotropic):
+def test_the_farthest_point_is_the_twins(seed: int, isotropic: bool) -> None:
     points, rays = drawn(seed, isotropic=isotropic)
     k, square = pieces.farthest_point(records(points, rays), 0, len(points), scanner_of())
     expected_k, expected_square = reference.farthest_point(points, rays, VARIANCE, FLOOR)
@@ -91,7 +102,7 @@ def test_the_farthest_point_is_the_twins(seed, isotropic):
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
-def test_pieces_cover_the_points_and_are_merged_and_settled_as_by_the_twin(seed):
+def test_pieces_cover_the_points_and_are_merged_and_settled_as_by_the_twin(seed: int) -> None:
     points, rays = drawn(seed)
     measured = records(points, rays)
     gaps = pieces.find_gaps(measured, scanner_of())
@@ -110,15 +121,17 @@ def test_pieces_cover_the_points_and_are_merged_and_settled_as_by_the_twin(seed)
     assert moved == (before != expected)
 
 
-def test_the_best_break_of_a_corner_is_the_corner():
+def test_the_best_break_of_a_corner_is_the_corner() -> None:
     points = np.vstack(
         [np.stack([np.arange(10.0), np.zeros(10)], 1), np.stack([np.full(8, 9.5), np.arange(1.0, 9)], 1)]
     )
     sums = pieces.running_sums(records(points, np.zeros_like(points)))
-    assert pieces.best_break(sums, 0, 18, 3, 15, 1, scanner_of()) == (10, pytest.approx(0.0, abs=1e-6))
+    place, cost = pieces.best_break(sums, 0, 18, 3, 15, 1, scanner_of())
+    assert place == 10
+    assert cost == pytest.approx(0.0, abs=1e-6)
 
 
-def noisy_wall(seed, n=60, sigma=0.02):
+def noisy_wall(seed: int, n: int = 60, sigma: float = 0.02) -> tuple[Floats, Floats]:
     rng = np.random.default_rng(seed)
     angle, distance = rng.uniform(-3, 3), rng.uniform(1, 4)
     angles = angle + np.linspace(-0.9, rng.uniform(0.3, 1.2), n)
@@ -127,7 +140,7 @@ def noisy_wall(seed, n=60, sigma=0.02):
     return ranges, rays
 
 
-def first_guess(points):
+def first_guess(points: Records) -> Record:
     """Return the total least squares line of all points."""
     line = line_with()
     lines.line_of(pieces.running_sums(points)[-1], line)
@@ -136,7 +149,7 @@ def first_guess(points):
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
-def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed):
+def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed: int) -> None:
     ranges, rays = noisy_wall(seed)
     points = records(ranges[:, None] * rays, rays)
     line = first_guess(points)
@@ -156,7 +169,7 @@ def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed
     assert line["chi2"] == pytest.approx(residuals @ residuals, rel=1e-4)
 
 
-def test_a_point_off_the_line_does_not_pull_it():
+def test_a_point_off_the_line_does_not_pull_it() -> None:
     ranges, rays = noisy_wall(1, sigma=0.0)
     line = first_guess(records(ranges[:, None] * rays, rays))
     expected = [line["nx"], line["ny"], line["p"]]
@@ -169,7 +182,7 @@ def test_a_point_off_the_line_does_not_pull_it():
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds)
-def test_the_noise_estimates_are_the_twins(seed):
+def test_the_noise_estimates_are_the_twins(seed: int) -> None:
     points, rays = drawn(seed)
     ranges = np.linalg.norm(points, axis=1)
     angles = np.arctan2(rays[:, 1], rays[:, 0])
@@ -181,13 +194,13 @@ def test_the_noise_estimates_are_the_twins(seed):
 
 
 @pytest.mark.parametrize("sigma", [0.005, 0.02, 0.05])
-def test_the_noise_of_a_wall_is_found(sigma):
+def test_the_noise_of_a_wall_is_found(sigma: float) -> None:
     ranges, rays = noisy_wall(4, 4000, sigma)
     step = math.acos(rays[0] @ rays[1])
     assert beams.ray_noise(records(ranges[:, None] * rays, rays), step) == pytest.approx(sigma, rel=0.08)
 
 
-def test_too_few_points_say_nothing_of_noise():
+def test_too_few_points_say_nothing_of_noise() -> None:
     ranges, rays = noisy_wall(4, 9)
     points = records(ranges[:, None] * rays, rays)
     assert beams.ray_noise(points, 1.0) == 0.0
@@ -196,11 +209,11 @@ def test_too_few_points_say_nothing_of_noise():
 
 @settings(deadline=None, max_examples=40)
 @given(seed=seeds, backward=st.booleans(), closed=st.booleans(), lost=st.floats(0, 1))
-def test_beams_are_gathered_as_by_the_twin(seed, backward, closed, lost):
+def test_beams_are_gathered_as_by_the_twin(seed: int, backward: bool, closed: bool, lost: float) -> None:
     rng = np.random.default_rng(seed)
     ranges = rng.uniform(1, 5, 30)
     ranges[rng.random(30) < lost] = rng.choice([np.nan, np.inf])
-    angles = np.arange(30) * (-0.2 if backward else 0.2)
+    angles = np.arange(30.0) * (-0.2 if backward else 0.2)
     order, points = beams.gather(ranges, np.cos(angles), np.sin(angles), backward, closed)
     expected_order, expected_r, expected_rays = reference.gather(ranges, angles, backward, closed)
     np.testing.assert_array_equal(order, expected_order)
@@ -209,12 +222,12 @@ def test_beams_are_gathered_as_by_the_twin(seed, backward, closed, lost):
     np.testing.assert_allclose([points["x"], points["y"]], expected_r * expected_rays)
 
 
-def test_placed_points_have_rays_where_they_have_ranges():
+def test_placed_points_have_rays_where_they_have_ranges() -> None:
     points = beams.place(np.array([[3.0, 4.0], [1.0, 2.0]]), np.array([5.0, 0.0]))
     assert points.tolist() == [(3.0, 4.0, 0.6, 0.8, 5.0), (1.0, 2.0, 0.0, 0.0, 0.0)]
 
 
-def test_ranges_are_cleaned_by_rep_117():
+def test_ranges_are_cleaned_by_rep_117() -> None:
     ranges = np.array([np.nan, np.inf, -np.inf, 0.05, 0.0, -1.0, 0.1, 5.0, 5.01])
     cleaned = beams.clean(ranges, 0.1, 5.0)
     np.testing.assert_array_equal(cleaned, [np.nan, np.inf, np.nan, np.nan, np.nan, np.nan, 0.1, 5.0, np.inf])
@@ -224,7 +237,7 @@ def test_ranges_are_cleaned_by_rep_117():
     ("ranges", "expected"),
     [([1.05, 2.1, 3.15], 1.05), ([1.0, 1.05, 3.2], 0.05), ([0.99, 1.0], 0.01), ([1.0, 1.00013], 0.0), ([], 0.0)],
 )
-def test_the_quantum_is_what_all_ranges_are_multiples_of(ranges, expected):
+def test_the_quantum_is_what_all_ranges_are_multiples_of(ranges: Floats, expected: Any) -> None:
     points = np.zeros(len(ranges), POINT)
     points["range"] = np.array(ranges, dtype=np.float32)
     assert beams.quantum(points) == pytest.approx(expected)
@@ -252,10 +265,10 @@ GOOD = {
         ("p", 0.0, False),
     ],
 )  # fmt: skip
-def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(field, value, accepted):
+def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(field: str, value: Any, accepted: bool) -> None:
     line = line_with(**{**GOOD, field: value})
     assert (tracing.large_enough(line, 10, 1.0) and tracing.acceptable(line, True)) is accepted
 
 
-def test_points_without_rays_may_lie_on_a_line_through_their_middle():
+def test_points_without_rays_may_lie_on_a_line_through_their_middle() -> None:
     assert tracing.acceptable(line_with(**{**GOOD, "p": 0.0}), False)

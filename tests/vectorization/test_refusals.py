@@ -1,4 +1,7 @@
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +31,7 @@ from vectorization import InvalidOptionError, InvalidScanError, LaserScan, Vecto
         ("range_max", (0.0, 0.1, [1.0], 0.0, math.nan)),
     ],
 )
-def test_a_scan_that_cannot_be_is_refused(argument, arguments):
+def test_a_scan_that_cannot_be_is_refused(argument: str, arguments: Any) -> None:
     with pytest.raises(InvalidScanError) as caught:
         LaserScan(*arguments)
     assert caught.value.argument == argument
@@ -48,7 +51,7 @@ def test_a_scan_that_cannot_be_is_refused(argument, arguments):
         (0, [[2e9, 2.0]]),
     ],
 )
-def test_points_that_cannot_be_are_refused(index, points):
+def test_points_that_cannot_be_are_refused(index: int | None, points: Any) -> None:
     with pytest.raises(InvalidScanError) as caught:
         vectorize(points)
     assert caught.value.argument == "points"
@@ -56,7 +59,7 @@ def test_points_that_cannot_be_are_refused(index, points):
 
 
 @pytest.mark.parametrize("viewpoint", [(0.0,), (math.nan, 0.0), (2e4, 0.0)])
-def test_a_viewpoint_that_cannot_be_is_refused(viewpoint):
+def test_a_viewpoint_that_cannot_be_is_refused(viewpoint: Any) -> None:
     with pytest.raises(InvalidScanError) as caught:
         vectorize([[1.0, 1.0]], viewpoint=viewpoint)
     assert caught.value.argument == "viewpoint"
@@ -69,20 +72,20 @@ def test_a_viewpoint_that_cannot_be_is_refused(viewpoint):
         ("min_length", 0.0), ("min_length", math.inf), ("max_gap", 0.0), ("max_gap", math.inf), ("max_gap", math.nan),
     ],
 )  # fmt: skip
-def test_an_option_out_of_range_is_refused(argument, value):
+def test_an_option_out_of_range_is_refused(argument: str, value: Any) -> None:
     with pytest.raises(InvalidOptionError) as caught:
         VectorizationOptions(**{argument: value})
     assert caught.value.argument == argument
     assert repr(value) in caught.value.message
 
 
-def test_no_points_are_no_segments():
+def test_no_points_are_no_segments() -> None:
     for viewpoint in (None, (0.0, 0.0)):
         assert len(vectorize([], viewpoint=viewpoint).measured) == 0
         assert len(vectorize([[0.0, 0.0]], viewpoint=viewpoint).measured) == 0
         assert len(vectorize([[1.0, 1.0]] * 50, viewpoint=viewpoint).measured) == 0
 
 
-def test_everything_exported_exists_and_is_listed_in_order():
+def test_everything_exported_exists_and_is_listed_in_order() -> None:
     assert vectorization.__all__ == sorted(vectorization.__all__)
     assert all(hasattr(vectorization, name) for name in vectorization.__all__)

@@ -1,4 +1,7 @@
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,27 +9,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from registration import RigidTransform, Segments
-from simulation import Scanner, l_room, oblique, offices, scan, square_room
-from vectorization import LaserScan, VectorizationOptions, vectorize
+from registration.layout import Floats
+from simulation import Scanner, SimulatedScan, World, l_room, oblique, offices, scan, square_room
+from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
 
 POSE = RigidTransform(0.7, -0.4, 0.3)
 SQUARE = square_room(6.0).segments
 
 
-def laser(seen):
+def laser(seen: SimulatedScan) -> LaserScan:
     s = seen.scanner
     return LaserScan(s.angle_min, s.angle_increment, seen.ranges, s.range_min, s.range_max)
 
 
-def seen_from(pose, segments, scanner, seed=0):
+def seen_from(pose: RigidTransform, segments: Segments, scanner: Scanner, seed: int = 0) -> SimulatedScan:
     return scan(segments, pose, scanner, np.random.default_rng(seed))
 
 
-def in_map(pose, found):
+def in_map(pose: RigidTransform, found: Vectorization) -> Floats:
     return pose.apply(found.measured.segments.endpoints.reshape(-1, 2)).reshape(-1, 4)
 
 
-def assert_same_walls(actual, expected, atol):
+def assert_same_walls(actual: Floats, expected: Any, atol: float) -> None:
     assert len(actual) == len(expected)
     for wall in expected:
         assert np.abs(actual - wall).max(axis=1).min() <= atol
@@ -34,7 +38,7 @@ def assert_same_walls(actual, expected, atol):
 
 @pytest.mark.parametrize("pose", [RigidTransform(0, 0, 0), POSE, RigidTransform(-2, 2.4, 3.0)])
 @pytest.mark.parametrize("world", [square_room(6.0), l_room()], ids=["square", "l"])
-def test_a_room_without_noise_gives_exactly_its_walls(world, pose):
+def test_a_room_without_noise_gives_exactly_its_walls(world: World, pose: RigidTransform) -> None:
     pose = RigidTransform(world.poses[0].x + 0.3 * pose.x, world.poses[0].y + 0.3 * pose.y, pose.theta)
     found = vectorize(laser(seen_from(pose, world.segments, Scanner(sigma=0.0))))
     assert_same_walls(in_map(pose, found), world.segments.endpoints, 1e-9)
@@ -43,13 +47,13 @@ def test_a_room_without_noise_gives_exactly_its_walls(world, pose):
 
 @settings(deadline=None, max_examples=40)
 @given(x=st.floats(-2.5, 2.5), y=st.floats(-2.5, 2.5), theta=st.floats(-3, 3))
-def test_wherever_the_sensor_stands_the_room_is_exact(x, y, theta):
+def test_wherever_the_sensor_stands_the_room_is_exact(x: float, y: float, theta: float) -> None:
     pose = RigidTransform(x, y, theta)
     found = vectorize(laser(seen_from(pose, SQUARE, Scanner(sigma=0.0))))
     assert_same_walls(in_map(pose, found), SQUARE.endpoints, 1e-9)
 
 
-def test_a_wall_alone_has_the_numbers_of_its_closed_form():
+def test_a_wall_alone_has_the_numbers_of_its_closed_form() -> None:
     # Five beams on the wall x = 2, one step of 0.1 rad apart.
     a = 0.1 * np.arange(-2, 3)
     found = vectorize(LaserScan(-0.2, 0.1, 2 / np.cos(a)), VectorizationOptions(sigma=0.01))
@@ -66,14 +70,14 @@ def test_a_wall_alone_has_the_numbers_of_its_closed_form():
     assert found.sigma == 0.01
 
 
-def test_segments_have_the_sensor_on_their_left():
+def test_segments_have_the_sensor_on_their_left() -> None:
     world = oblique(0.02)
     found = vectorize(laser(seen_from(world.poses[3], world.segments, Scanner(sigma=0.01))))
     assert len(found.measured) >= 8
     assert (found.measured.segments.offsets < 0).all()
 
 
-def test_a_clockwise_scan_gives_the_same_segments_with_their_beams_counted_down():
+def test_a_clockwise_scan_gives_the_same_segments_with_their_beams_counted_down() -> None:
     scanner = Scanner(700, -2.5, 0.007, sigma=0.02)
     seen = seen_from(POSE, SQUARE, scanner)
     one = vectorize(laser(seen))
@@ -85,7 +89,7 @@ def test_a_clockwise_scan_gives_the_same_segments_with_their_beams_counted_down(
 
 @settings(deadline=None, max_examples=15)
 @given(start=st.floats(-3, 3), steps=st.integers(0, 719))
-def test_where_the_angles_start_turns_the_segments_and_nothing_else(start, steps):
+def test_where_the_angles_start_turns_the_segments_and_nothing_else(start: float, steps: int) -> None:
     step = math.tau / 720
     seen = seen_from(POSE, SQUARE, Scanner(720, -math.pi, step, sigma=0.02))
     one = vectorize(laser(seen)).measured
@@ -96,8 +100,8 @@ def test_where_the_angles_start_turns_the_segments_and_nothing_else(start, steps
     assert np.sort(other.points).tolist() == np.sort(one.points).tolist()
 
 
-def test_a_door_parts_a_wall():
-    walls = Segments.from_array([[3, -2, 3, -0.4], [3, 0.4, 3, 2], [6, -3, 6, 3]])
+def test_a_door_parts_a_wall() -> None:
+    walls = Segments.from_array(np.array([[3, -2, 3, -0.4], [3, 0.4, 3, 2], [6, -3, 6, 3]]))
     found = vectorize(laser(seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(1.1, 400, sigma=0.01))))
     ends = found.measured.segments.endpoints
     near = ends[ends[:, 0] < 4]
@@ -107,8 +111,8 @@ def test_a_door_parts_a_wall():
     np.testing.assert_allclose(near[1, 1], 0.4, atol=0.02)
 
 
-def test_a_thin_post_does_not_part_a_wall():
-    walls = Segments.from_array([[3, -2, 3, 2], [1.5, -0.004, 1.5, 0.004]])
+def test_a_thin_post_does_not_part_a_wall() -> None:
+    walls = Segments.from_array(np.array([[3, -2, 3, 2], [1.5, -0.004, 1.5, 0.004]]))
     seen = seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(1.0, 401, sigma=0.01))
     assert (seen.hits == 1).any()
     found = vectorize(laser(seen))
@@ -117,8 +121,8 @@ def test_a_thin_post_does_not_part_a_wall():
     assert found.measured.points[0] == pytest.approx(401 - np.sum(seen.hits == 1), abs=1)
 
 
-def test_a_slit_that_is_seen_through_parts_a_wall():
-    walls = Segments.from_array([[3, -2, 3, -0.01], [3, 0.01, 3, 2], [5, -1, 5, 1]])
+def test_a_slit_that_is_seen_through_parts_a_wall() -> None:
+    walls = Segments.from_array(np.array([[3, -2, 3, -0.01], [3, 0.01, 3, 2], [5, -1, 5, 1]]))
     seen = seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(1.0, 401, sigma=0.01))
     assert 1 <= np.sum(seen.hits == 2) <= 4
     found = vectorize(laser(seen))
@@ -126,7 +130,7 @@ def test_a_slit_that_is_seen_through_parts_a_wall():
     assert found.measured.segments.endpoints[0, 3] < 0.0 < found.measured.segments.endpoints[1, 1]
 
 
-def test_a_point_beside_the_end_of_a_wall_is_not_its_own():
+def test_a_point_beside_the_end_of_a_wall_is_not_its_own() -> None:
     a = 0.01 * np.arange(31)
     ranges = 2 / np.cos(a)
     ranges[-1] += 0.06
@@ -136,7 +140,7 @@ def test_a_point_beside_the_end_of_a_wall_is_not_its_own():
     np.testing.assert_allclose(found.measured.segments.endpoints[0], [2, 0, 2, 2 * math.tan(0.29)], atol=1e-7)
 
 
-def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does():
+def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does() -> None:
     ranges = 2 / np.cos(np.arange(-30, 31) * 0.01)
     ranges[[10, 40]] = np.nan, np.inf
     scan_ = LaserScan(-0.3, 0.01, ranges)
@@ -146,7 +150,7 @@ def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does():
     assert parted.beams.tolist() == [[0, 9], [11, 39], [41, 60]]
 
 
-def test_corners_are_cut_where_the_walls_meet():
+def test_corners_are_cut_where_the_walls_meet() -> None:
     world = oblique(0.02)
     pose = world.poses[4]
     found = vectorize(laser(seen_from(pose, world.segments, Scanner(sigma=0.01))))
@@ -160,7 +164,7 @@ def test_corners_are_cut_where_the_walls_meet():
     assert same.sum() >= 8
 
 
-def test_a_bend_too_slight_for_any_one_point_is_found_by_many():
+def test_a_bend_too_slight_for_any_one_point_is_found_by_many() -> None:
     # 3 degrees; 4 cm off the chord in the middle at 2 cm of noise.
     walls = Segments.from_array([[3, -1.5, 3, 0], [3, 0, 3 - 1.5 * math.sin(0.06), 1.5 * math.cos(0.06)]])
     found = vectorize(laser(seen_from(RigidTransform(0, 0, 0), walls, Scanner.over(0.9, 540))))
@@ -169,7 +173,7 @@ def test_a_bend_too_slight_for_any_one_point_is_found_by_many():
 
 
 @pytest.mark.parametrize("quantum", [0.01, 0.05])
-def test_quantised_ranges_neither_split_walls_nor_promise_too_much(quantum):
+def test_quantised_ranges_neither_split_walls_nor_promise_too_much(quantum: float) -> None:
     scanner = Scanner(360, -math.pi, math.tau / 360, sigma=0.003, quantum=quantum)
     for seed in range(5):
         found = vectorize(laser(seen_from(POSE, SQUARE, scanner, seed)))
@@ -178,14 +182,20 @@ def test_quantised_ranges_neither_split_walls_nor_promise_too_much(quantum):
         assert_same_walls(in_map(POSE, found), SQUARE.endpoints, 2 * quantum)
 
 
-def test_sigma_is_estimated_from_the_scan():
+def test_the_least_sigma_of_quantised_ranges_is_that_of_rounding() -> None:
+    ranges = np.round(2 / np.cos(0.01 * np.arange(-40, 41)) / 0.05) * 0.05
+    assert vectorize(LaserScan(-0.4, 0.01, ranges)).sigma == pytest.approx(0.05 / math.sqrt(12))
+    assert vectorize(LaserScan(-0.4, 0.01, 2 / np.cos(0.01 * np.arange(-40, 41)))).sigma == 0.001
+
+
+def test_sigma_is_estimated_from_the_scan() -> None:
     for sigma in (0.005, 0.02, 0.05):
         estimates = [vectorize(laser(seen_from(POSE, SQUARE, Scanner(sigma=sigma), k))).sigma for k in range(10)]
         assert np.mean(estimates) == pytest.approx(sigma, rel=0.1)
         assert vectorize(laser(seen_from(POSE, SQUARE, Scanner(sigma=sigma)))).measured.sigma.max() < 1.2 * sigma
 
 
-def test_what_a_segment_claims_is_what_it_is_off_by():
+def test_what_a_segment_claims_is_what_it_is_off_by() -> None:
     """Offset and angle against the claimed variance: chi-square with two degrees of freedom, mean 2."""
     pose = RigidTransform(-1.9, 1.2, 0.3)
     offsets, angles = [], []
@@ -206,7 +216,7 @@ def test_what_a_segment_claims_is_what_it_is_off_by():
     assert abs(np.mean(offsets)) < 4 / math.sqrt(600)
 
 
-def test_grazing_noise_counts_with_its_incidence():
+def test_grazing_noise_counts_with_its_incidence() -> None:
     found = vectorize(laser(seen_from(POSE, SQUARE, Scanner())), VectorizationOptions(sigma=0.02))
     m = found.measured
     for k in range(4):
@@ -218,7 +228,7 @@ def test_grazing_noise_counts_with_its_incidence():
     assert m.sigma.max() < 0.0195
 
 
-def test_a_rough_wall_has_its_sigma_widened():
+def test_a_rough_wall_has_its_sigma_widened() -> None:
     rng = np.random.default_rng(0)
     a = np.linspace(-0.4, 0.4, 200)
     rough = 2 / np.cos(a) + rng.normal(0, 0.02, 200)
@@ -228,7 +238,7 @@ def test_a_rough_wall_has_its_sigma_widened():
 
 
 @pytest.mark.parametrize("value", [math.inf, math.nan, 0.0])
-def test_a_scan_without_returns_has_no_segments(value):
+def test_a_scan_without_returns_has_no_segments(value: Any) -> None:
     found = vectorize(LaserScan(-1.0, 0.01, np.full(200, value), 0.1, 10.0))
     assert len(found.measured) == 0
     assert found.beams.shape == (0, 2)
@@ -238,23 +248,23 @@ def test_a_scan_without_returns_has_no_segments(value):
 
 
 @pytest.mark.parametrize("ranges", [[], [1.0], [1.0, None, 1.0]])
-def test_a_scan_too_short_for_a_segment_has_none(ranges):
+def test_a_scan_too_short_for_a_segment_has_none(ranges: Any) -> None:
     assert len(vectorize(LaserScan(0.0, 0.1, ranges)).measured) == 0
 
 
-def test_beams_are_handed_out_as_evidence():
-    found = vectorize(LaserScan(0.5, 0.1, [1.0, None, math.inf, 12.0, 0.01], 0.1, 10.0))
+def test_beams_are_handed_out_as_evidence() -> None:
+    found = vectorize(LaserScan(0.5, 0.1, np.array([1.0, None, math.inf, 12.0, 0.01]), 0.1, 10.0))
     np.testing.assert_allclose(found.angles, [0.5, 0.6, 0.7, 0.8, 0.9])
     np.testing.assert_array_equal(found.ranges, [1.0, np.nan, np.inf, np.inf, np.nan])
 
 
-def test_a_heap_of_points_is_no_wall():
+def test_a_heap_of_points_is_no_wall() -> None:
     rng = np.random.default_rng(1)
     ranges = rng.uniform(2.0, 4.0, 300)
     assert len(vectorize(LaserScan(-1.5, 0.01, ranges), VectorizationOptions(sigma=0.02)).measured) <= 2
 
 
-def test_short_walls_and_few_points_are_left_out_as_asked():
+def test_short_walls_and_few_points_are_left_out_as_asked() -> None:
     ranges = 2 / np.cos(np.arange(-10, 11) * 0.01)  # 0.40 m, 21 points
     for options, expected in [
         (VectorizationOptions(min_length=0.39), 1), (VectorizationOptions(min_length=0.42), 0),
@@ -263,7 +273,7 @@ def test_short_walls_and_few_points_are_left_out_as_asked():
         assert len(vectorize(LaserScan(-0.1, 0.01, ranges), options).measured) == expected
 
 
-def test_none_is_smaller_than_asked_for_after_its_corners_were_cut():
+def test_none_is_smaller_than_asked_for_after_its_corners_were_cut() -> None:
     rng = np.random.default_rng(0)
     world = offices(rng)
     least = []
@@ -275,7 +285,7 @@ def test_none_is_smaller_than_asked_for_after_its_corners_were_cut():
     assert np.min(least, axis=0).min() >= -1e-9
 
 
-def test_points_with_a_viewpoint_are_what_the_laser_saw():
+def test_points_with_a_viewpoint_are_what_the_laser_saw() -> None:
     scanner = Scanner(700, -2.5, 0.007, sigma=0.02)
     seen = seen_from(POSE, SQUARE, scanner)
     by_laser = vectorize(laser(seen)).measured.segments.endpoints
@@ -287,7 +297,7 @@ def test_points_with_a_viewpoint_are_what_the_laser_saw():
     np.testing.assert_allclose(moved.measured.segments.endpoints, expected, atol=1e-6)
 
 
-def test_a_wall_whose_points_run_the_other_way_still_has_the_viewpoint_on_its_left():
+def test_a_wall_whose_points_run_the_other_way_still_has_the_viewpoint_on_its_left() -> None:
     y = 0.03 * np.arange(60)
     onward = np.stack([np.full(60, 3.0), y], axis=1)
     contrary = np.stack([np.full(30, -3.0), y[:30]], axis=1)
@@ -296,7 +306,7 @@ def test_a_wall_whose_points_run_the_other_way_still_has_the_viewpoint_on_its_le
     np.testing.assert_allclose(found.measured.segments.endpoints, [[3, 0, 3, y[59]], [-3, y[29], -3, 0]], atol=1e-9)
 
 
-def test_points_without_a_viewpoint_run_as_they_come():
+def test_points_without_a_viewpoint_run_as_they_come() -> None:
     seen = seen_from(POSE, SQUARE, Scanner(700, -2.5, 0.007, sigma=0.005))
     forth = vectorize(seen.points, viewpoint=None)
     back = vectorize(seen.points[::-1], viewpoint=None)
@@ -308,7 +318,7 @@ def test_points_without_a_viewpoint_run_as_they_come():
     assert (forth.beams[:, 0] < forth.beams[:, 1]).all()
 
 
-def test_points_far_from_the_origin_lose_nothing():
+def test_points_far_from_the_origin_lose_nothing() -> None:
     seen = seen_from(POSE, SQUARE, Scanner(700, -2.5, 0.007, sigma=0.0))
     far = np.array([4e5, 5e6])
     for viewpoint in (None, (4e5, 5e6)):
