@@ -86,6 +86,13 @@ class Case:
     pose: RigidTransform
     clutter: float
 
+    @property
+    def points(self) -> Floats:
+        """The measured points in the scan frame as the declared scanner has them, ``(k, 2)`` metres."""
+        seen = np.isfinite(self.ranges)
+        angles, r = self.scanner.angles[seen], self.ranges[seen]
+        return np.stack([r * np.cos(angles), r * np.sin(angles)], axis=1)
+
 
 def draw_case(world: str, condition: str, number: int) -> Case:
     """Draw a case; the same three draw the same.
@@ -139,12 +146,15 @@ def _attempt(world: str, condition: str, number: int, rng: np.random.Generator) 
     seen = scan(scene, pose, laser, rng)
     drawn = rule.draw_map(known, rng).laid(rng)
     truth = drawn.pose(pose)
+    told = declared
+    if rule.corrected:
+        told = replace(declared, angle_min=laser.angle_min, angle_increment=laser.angle_increment)
     return Case(
         world=world,
         condition=condition,
         number=number,
         map=drawn.segments,
-        scanner=replace(declared, angle_increment=laser.angle_increment) if rule.corrected else declared,
+        scanner=told,
         ranges=seen.ranges,
         truth=truth if rule.stranger is None else None,
         window=_window_elsewhere(truth, drawn.segments, rng) if rule.stranger is Stranger.WINDOW else None,

@@ -60,7 +60,7 @@ class Condition:
     full_turn : bool
         Whether lasers of 360 degrees occur; else all see 270.
     corrected : bool
-        Whether the angle between two beams is declared as it really is: the robot knows how fast it turned.
+        Whether the beams' angles are declared as they really are: the robot knows how fast it turned.
     stranger : Stranger or None
         Why no pose is right; None where the truth is in the map.
     """
@@ -97,9 +97,14 @@ def _noisier(scanner: Scanner, _rng: np.random.Generator) -> Scanner:
     return replace(scanner, sigma=2.0 * scanner.sigma)
 
 
-def _stepping(share: float) -> Callable[[Scanner, np.random.Generator], Scanner]:
-    """Return a laser whose beams are farther apart, or nearer to each other, by a share."""
-    return lambda scanner, rng: replace(scanner, angle_increment=scanner.angle_increment * (1.0 + _sign(rng) * share))
+def _wrong_step(scanner: Scanner, rng: np.random.Generator) -> Scanner:
+    return replace(scanner, angle_increment=scanner.angle_increment * (1.0 + _sign(rng) * WRONG_STEP))
+
+
+def _turning(scanner: Scanner, rng: np.random.Generator) -> Scanner:
+    """Let the laser sweep more or less than it says, for it turns with its robot; the pose is that of mid-sweep."""
+    share = 1.0 + _sign(rng) * TURNING * SWEEP / math.tau
+    return replace(scanner, angle_min=scanner.angle_min * share, angle_increment=scanner.angle_increment * share)
 
 
 def _saturated(scanner: Scanner, _rng: np.random.Generator) -> Scanner:
@@ -113,9 +118,6 @@ def _upside_down(scanner: Scanner, _rng: np.random.Generator) -> Scanner:
 def _sign(rng: np.random.Generator) -> float:
     return float(rng.choice([-1.0, 1.0]))
 
-
-# A laser that turns with the robot sweeps more or less than its own step from beam to beam.
-_TURNED = TURNING * SWEEP / math.tau
 
 CONDITIONS: dict[str, Condition] = {
     "clean": Condition("nothing"),
@@ -134,11 +136,11 @@ CONDITIONS: dict[str, Condition] = {
     "bias": Condition("all ranges are too long or too short by 2 cm", laser=_biased),
     "noisier": Condition("the noise is declared two times too small", laser=_noisier),
     "wrong_step": Condition("the angle between two beams is declared wrong by half a percent",
-                            laser=_stepping(WRONG_STEP), full_turn=False),
-    "turning": Condition("the robot turns at 90 degrees/s, ten scans a second", laser=_stepping(_TURNED),
+                            laser=_wrong_step, full_turn=False),
+    "turning": Condition("the robot turns at 90 degrees/s, ten scans a second", laser=_turning,
                          full_turn=False),
     "turning_corrected": Condition("the robot turns at 90 degrees/s and corrects its scan for it",
-                                   laser=_stepping(_TURNED), full_turn=False, corrected=True),
+                                   laser=_turning, full_turn=False, corrected=True),
     "saturated": Condition("a beam without return reads range_max", laser=_saturated),
     "unmapped": Condition("from a part of the building that is not mapped", stranger=Stranger.UNMAPPED),
     "sister": Condition("in another building of the same style", stranger=Stranger.SISTER),

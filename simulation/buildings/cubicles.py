@@ -29,18 +29,22 @@ class Cubicles:
         Between clusters.
     bay : float
         Between columns.
+    tidy : bool
+        Whether every cell has its desk, and chairs are pushed under it.
     """
 
     cell: tuple[float, float]
     entrance: float
     aisle: float
     bay: float
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Cubicles:
         """Draw a style."""
         cell = (rng.uniform(2.0, 2.6), rng.uniform(2.0, 2.6))
-        return cls(cell, rng.uniform(0.9, 1.1), rng.uniform(1.3, 1.8), rng.uniform(7.0, 9.0))
+        return cls(cell, rng.uniform(0.9, 1.1), rng.uniform(1.3, 1.8), rng.uniform(7.0, 9.0),
+                   bool(rng.random() < 0.5))  # fmt: skip
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many clusters of how many cells, what is left out, meeting rooms along one side."""
@@ -79,9 +83,9 @@ class Cubicles:
             for k in range(count):
                 right = (k + 1) * across
                 part.block(box(k * across + self.entrance, deep - THIN, min(right + THIN, count * across), deep))
-                if rng.random() < 0.9:
+                if self.tidy or rng.random() < 0.9:
                     part.thing("desk", box(k * across + THIN + 0.05, 0.03, right - 0.1, DESK))
-                if rng.random() < 0.6:
+                if not self.tidy and rng.random() < 0.6:
                     part.thing("chair", oblong(k * across + rng.uniform(0.7, 1.4), DESK + 0.45, 0.5, 0.5,
                                                rng.uniform(0.0, 1.5)))  # fmt: skip
 

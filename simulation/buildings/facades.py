@@ -28,19 +28,25 @@ class Facades:
         How far fronts vary.
     door : (float, float)
         Width and depth of the recess of a door.
+    terraced : bool
+        Whether all houses are alike.
     """
 
     house: tuple[float, float]
     street: float
     setback: float
     door: tuple[float, float]
+    terraced: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Facades:
         """Draw a style."""
         low = rng.uniform(5.0, 7.0)
         door = (rng.uniform(1.1, 1.6), rng.uniform(0.25, 0.6))
-        return cls((low, low + rng.uniform(0.5, 8.0)), rng.uniform(10.0, 17.0), rng.uniform(0.0, 0.8), door)
+        if rng.random() < 0.4:
+            return cls((low, low), rng.uniform(10.0, 17.0), 0.0, door, terraced=True)
+        house = (low, low + rng.uniform(0.5, 8.0))
+        return cls(house, rng.uniform(10.0, 17.0), rng.uniform(0.0, 0.8), door, terraced=False)
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a street with a side street: how many houses, how wide, what is parked."""
@@ -72,10 +78,10 @@ class Facades:
         """Draw a house: a front with a door, and a bay where there is room."""
         corners = [(width, 0.0), (width, DEEP), (0.0, DEEP), (0.0, 0.0)]
         recess, deep = self.door
-        at = rng.uniform(0.4, 0.35 * width)
+        at = 0.6 if self.terraced else rng.uniform(0.4, 0.35 * width)
         front = [(at, 0.0), (at, deep), (at + recess, deep), (at + recess, 0.0)]
         bay = at + recess + 0.6
-        if width - bay > 2.2 and rng.random() < 0.5:
+        if width - bay > 2.2 and (self.terraced or rng.random() < 0.5):
             front += [(bay, 0.0), (bay + 0.4, -0.6), (bay + 1.6, -0.6), (bay + 2.0, 0.0)]
         plan.block(np.array([*front, *corners]))
 

@@ -33,6 +33,8 @@ class MirroredFlats:
         Depth of the rooms in front and of the hall behind them.
     stairs : float
         Width of a stairwell.
+    tidy : bool
+        Whether the furniture stands alike in all flats, as holiday homes have it.
     """
 
     size: tuple[float, float]
@@ -40,13 +42,14 @@ class MirroredFlats:
     front: float
     hall: float
     stairs: float
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> MirroredFlats:
         """Draw a style."""
         size = (rng.uniform(8.5, 11.0), rng.uniform(9.0, 11.5))
         return cls(size, rng.uniform(0.5, 0.56) * size[0], rng.uniform(3.8, 4.6), rng.uniform(1.3, 1.7),
-                   rng.uniform(2.4, 3.0))  # fmt: skip
+                   rng.uniform(2.4, 3.0), bool(rng.random() < 0.4))  # fmt: skip
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many stairwells, what furniture people have."""
@@ -89,7 +92,9 @@ class MirroredFlats:
             ("cot", (0.5 * (0.5 * width + bath), depth - 0.6, 1.2, 0.7)),
         ]  # fmt: skip
         for kind, (x, y, long, deep) in furniture:
-            if rng.random() < 0.85:
+            if self.tidy:
+                plan.thing(kind, oblong(x, y, long, deep))
+            elif rng.random() < 0.85:
                 plan.thing(kind, oblong(x + rng.uniform(-0.04, 0.04), y + rng.uniform(-0.2, 0.2), long, deep))
 
 

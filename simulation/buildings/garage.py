@@ -42,7 +42,9 @@ class Garage:
     def draw(cls, rng: np.random.Generator) -> Garage:
         """Draw a style."""
         slot = (rng.uniform(2.4, 2.7), rng.uniform(4.8, 5.2))
-        return cls(slot, rng.uniform(5.6, 6.5), rng.uniform(0.3, 0.45), int(rng.integers(2, 4)), rng.uniform(0.4, 0.75))
+        return cls(
+            slot, rng.uniform(5.6, 6.5), rng.uniform(0.3, 0.45), int(rng.integers(2, 4)), rng.uniform(0.03, 0.75)
+        )
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a level: how many lanes and slots, which are taken, where stairs and ramp are."""

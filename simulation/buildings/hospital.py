@@ -29,18 +29,23 @@ class Hospital:
         Its width.
     bathroom : (float, float)
         Inside each room, beside its door.
+    tidy : bool
+        Whether every bed stands in its place.
     """
 
     module: float
     depth: float
     corridor: float
     bathroom: tuple[float, float]
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Hospital:
         """Draw a style."""
         bathroom = (rng.uniform(1.7, 2.0), rng.uniform(1.8, 2.2))
-        return cls(rng.uniform(4.0, 4.6), rng.uniform(5.6, 6.8), rng.uniform(2.4, 3.2), bathroom)
+        return cls(
+            rng.uniform(4.0, 4.6), rng.uniform(5.6, 6.8), rng.uniform(2.4, 3.2), bathroom, bool(rng.random() < 0.5)
+        )
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many rooms, which of them serve staff, where beds are."""
@@ -90,8 +95,11 @@ class Hospital:
         plan.block(box(left + 0.3, 0.0, left + 0.75, 0.6))
         plan.thing("locker", oblong(width - 0.3, 0.5 * (deep + self.depth), 0.45, 0.4))
         for y in (deep + 0.85, self.depth - 0.75):
-            if rng.random() < 0.9:
-                plan.thing("bed", oblong(width - 0.15 - 0.5 * BED[0], y, *BED, rng.normal(0.0, 0.02)))
+            if self.tidy:
+                plan.thing("bed", oblong(width - 0.1 - 0.5 * BED[0], y, *BED))
+            elif rng.random() < 0.85:
+                x = width - rng.uniform(0.08, 0.25) - 0.5 * BED[0]
+                plan.thing("bed", oblong(x, y + rng.uniform(-0.05, 0.05), *BED, rng.normal(0.0, 0.02)))
 
     def _staff(self, plan: Plan, width: float, rng: np.random.Generator) -> None:
         """Draw a nurses' room or a store."""

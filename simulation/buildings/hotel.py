@@ -30,6 +30,8 @@ class Hotel:
         Between corridor and room.
     bed : float
         Its width.
+    tidy : bool
+        Whether the furniture stands alike in all rooms.
     """
 
     module: float
@@ -37,13 +39,14 @@ class Hotel:
     corridor: float
     bathroom: tuple[float, float]
     bed: float
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Hotel:
         """Draw a style."""
         bathroom = (rng.uniform(1.6, 2.0), rng.uniform(2.0, 2.6))
-        bed = float(rng.choice([1.0, 1.4, 1.8]))
-        return cls(rng.uniform(3.4, 4.2), rng.uniform(6.2, 7.8), rng.uniform(1.5, 2.0), bathroom, bed)
+        bed, tidy = float(rng.choice([1.0, 1.4, 1.8])), bool(rng.random() < 0.5)
+        return cls(rng.uniform(3.4, 4.2), rng.uniform(6.2, 7.8), rng.uniform(1.5, 2.0), bathroom, bed, tidy)
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many rooms, where the lifts and stairs are, how guests left the furniture."""
@@ -76,11 +79,14 @@ class Hotel:
         plan.block(box(width - 0.75, 0.0, width - 0.02, 1.5))
         plan.recess((0.7 * width, self.depth), (0.3 * width, self.depth), 0.15)
         middle = deep + 0.55 * (self.depth - deep)
-        plan.thing("bed", oblong(width - 1.02, middle, 2.0, self.bed, rng.normal(0.0, 0.01)))
-        plan.thing("desk", oblong(0.32, middle + rng.uniform(-0.1, 0.1), 0.5, 1.4))
-        plan.thing("chair", oblong(0.9, middle + rng.uniform(-0.8, 0.8), 0.5, 0.5, rng.uniform(0.0, 1.5)))
-        if rng.random() < 0.7:
-            plan.thing("armchair", oblong(rng.uniform(0.6, 1.2), self.depth - 0.6, 0.75, 0.7, rng.uniform(0.0, 1.5)))
+        plan.thing("bed", oblong(width - 1.02, middle, 2.0, self.bed))
+        loose = 0.0 if self.tidy else 1.0
+        plan.thing("desk", oblong(0.32, middle + loose * rng.uniform(-0.1, 0.1), 0.5, 1.4))
+        y, turn = middle + loose * rng.uniform(-0.8, 0.8), loose * rng.uniform(0.0, 1.5)
+        plan.thing("chair", oblong(0.85, y, 0.5, 0.5, turn))
+        if self.tidy or rng.random() < 0.7:
+            x, turn = 0.9 + loose * rng.uniform(-0.3, 0.3), 0.8 + loose * rng.uniform(-0.8, 0.8)
+            plan.thing("armchair", oblong(x, self.depth - 0.6, 0.75, 0.7, turn))
 
     def _service(self, plan: Plan, width: float, *, lift: bool) -> None:
         """Draw two lift doors in a lobby, or a linen room."""

@@ -26,17 +26,21 @@ class Museum:
         Width.
     wall : float
         Thickness.
+    crowded : bool
+        Whether anything stands in the galleries.
     """
 
     gallery: tuple[float, float]
     doorway: float
     wall: float
+    crowded: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Museum:
         """Draw a style."""
         low = rng.uniform(6.0, 8.0)
-        return cls((low, low + rng.uniform(1.0, 7.0)), rng.uniform(1.4, 2.4), rng.uniform(0.35, 0.7))
+        gallery = (low, low + float(rng.choice([0.0, rng.uniform(1.0, 7.0)])))
+        return cls(gallery, rng.uniform(1.4, 2.4), rng.uniform(0.35, 0.7), bool(rng.random() < 0.6))
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many galleries of what size, which doorways there are, what is shown."""
@@ -52,7 +56,8 @@ class Museum:
             for j in range(rows):
                 room = (xs[k], ys[j], xs[k + 1] - self.wall, ys[j + 1] - self.wall)
                 plan.room(box(*room))
-                self._shown(plan.at(room[0], room[1]), room[2] - room[0], room[3] - room[1], rng)
+                if self.crowded:
+                    self._shown(plan.at(room[0], room[1]), room[2] - room[0], room[3] - room[1], rng)
         for j in range(rows):
             closed = int(rng.integers(columns - 1)) if j and rng.random() < 0.4 else -1
             for k in range(columns - 1):

@@ -25,17 +25,21 @@ class OfficeFloors:
     room_width : (float, float)
         Least and greatest; near to each other in a building that repeats itself.
     depth, corridor_width : float
+    tidy : bool
+        Whether every desk stands in the middle of its room, and nothing else.
     """
 
     room_width: tuple[float, float]
     depth: float
     corridor_width: float
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> OfficeFloors:
         """Draw a style."""
-        low = rng.uniform(2.5, 3.5)
-        return cls((low, low + rng.uniform(0.0, 3.0)), rng.uniform(4.0, 5.5), rng.uniform(1.6, 2.4))
+        low, tidy = rng.uniform(2.5, 3.5), bool(rng.random() < 0.5)
+        width = (low, low if tidy else low + rng.uniform(0.0, 3.0))
+        return cls(width, rng.uniform(4.0, 5.5), rng.uniform(1.6, 2.4), tidy)
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many corridors and rooms, how wide, where doors and desks are."""
@@ -52,6 +56,9 @@ class OfficeFloors:
             part = plan.at(before.x, before.y + side * (0.5 * layout.corridor_width + layout.wall),
                            0.0 if side > 0.0 else math.pi)  # fmt: skip
             part.leaf((-0.5 * layout.door_width, 0.0), (0.5 * layout.door_width, 0.0))
+            if self.tidy:
+                plan.thing("desk", oblong(room.x, room.y, 1.6, 0.8))
+                continue
             x, y = room.x + rng.uniform(-0.15, 0.15), room.y + rng.uniform(-0.6, 0.6)
             plan.thing("desk", oblong(x, y, 1.6, 0.8, float(rng.choice([0.0, 0.5 * math.pi]))))
             if rng.random() < 0.6:

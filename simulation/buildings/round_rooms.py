@@ -35,16 +35,20 @@ class RoundRooms:
         Width.
     side : float
         About the length of a wall: circles are drawn as polygons.
+    furnished : bool
+        Whether there are benches and altars.
     """
 
     radius: tuple[float, float]
     passage: float
     side: float
+    furnished: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> RoundRooms:
         """Draw a style."""
-        return cls((rng.uniform(5.0, 8.0), rng.uniform(2.4, 3.8)), rng.uniform(1.4, 2.2), rng.uniform(0.7, 1.5))
+        radius, furnished = (rng.uniform(5.0, 8.0), rng.uniform(2.4, 3.8)), bool(rng.random() < 0.6)
+        return cls(radius, rng.uniform(1.4, 2.2), rng.uniform(0.7, 1.5), furnished)
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a building: how many rooms, where the small ones are, what stands in them."""
@@ -120,7 +124,7 @@ class RoundRooms:
     def _furnish(self, plan: Plan, room: Rotunda, rng: np.random.Generator) -> None:
         """Put columns or a table into a large room, an altar into a small one."""
         if room.radius < 4.5:
-            if rng.random() < 0.7:
+            if self.furnished and rng.random() < 0.7:
                 x, y = rng.uniform(-0.4, 0.4, 2) * room.radius
                 plan.thing("altar", oblong(x, y, 1.2, 0.6, rng.uniform(0.0, 3.0)))
             return
@@ -130,6 +134,6 @@ class RoundRooms:
                 at = first + k * math.tau / count
                 radius = 0.62 * room.radius
                 plan.block(ring(radius * math.cos(at), radius * math.sin(at), 0.3, 8))
-        for _ in range(int(rng.integers(1, 5))):
+        for _ in range(int(rng.integers(1, 5)) if self.furnished else 0):
             x, y = rng.uniform(-0.35, 0.35, 2) * room.radius
             plan.thing("bench", oblong(x, y, 1.8, 0.5, rng.uniform(0.0, 3.0)))

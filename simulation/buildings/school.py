@@ -31,18 +31,22 @@ class School:
         Depth of the rows of lockers along the corridor's walls, 0 for none.
     one_sided : bool
         Whether rooms lie on one side alone, and windows on the other.
+    tidy : bool
+        Whether tables stand in line.
     """
 
     classroom: tuple[float, float]
     corridor: float
     lockers: float
     one_sided: bool
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> School:
         """Draw a style."""
         room = (rng.uniform(8.2, 10.0), rng.uniform(6.8, 8.2))
-        return cls(room, rng.uniform(2.8, 4.2), float(rng.choice([0.0, 0.4])), bool(rng.random() < 0.4))
+        one_sided, tidy = rng.random(2) < [0.4, 0.5]
+        return cls(room, rng.uniform(2.8, 4.2), float(rng.choice([0.0, 0.4])), bool(one_sided), bool(tidy))
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a floor: how many rooms, in what order, how the tables stand."""
@@ -78,14 +82,14 @@ class School:
         if self.lockers > 0.0:
             # In the corridor, beside the door.
             plan.thing("lockers", box(0.45 * width, -WALL - self.lockers, 0.9 * width, -WALL - 0.02))
-        plan.thing("teacher's desk", oblong(1.6, 0.65 * depth, 0.7, 1.5, rng.normal(0.0, 0.05)))
-        plan.thing("cupboard", box(width - 0.5, 0.4, width - 0.02, 0.4 + rng.uniform(1.0, 2.0)))
-        for x in np.arange(3.2, width - 1.3, rng.uniform(1.5, 1.9)):
+        loose = 0.0 if self.tidy else 1.0
+        plan.thing("teacher's desk", oblong(1.6, 0.65 * depth, 0.7, 1.5, loose * rng.normal(0.0, 0.05)))
+        plan.thing("cupboard", box(width - 0.5, 0.4, width - 0.02, 1.8 + loose * rng.uniform(-0.4, 0.6)))
+        for x in np.arange(3.2, width - 1.3, 1.7 + loose * rng.uniform(-0.2, 0.2)):
             for y in np.linspace(1.3, depth - 1.0, 3):
-                if rng.random() < 0.85:
-                    shift = rng.normal(0.0, 0.08, 2)
-                    turn = 0.5 * math.pi + rng.normal(0.0, 0.04)
-                    plan.thing("table", oblong(x + shift[0], y + shift[1], *TABLE, turn))
+                if self.tidy or rng.random() < 0.85:
+                    shift, turn = loose * rng.normal(0.0, 0.08, 2), loose * rng.normal(0.0, 0.04)
+                    plan.thing("table", oblong(x + shift[0], y + shift[1], *TABLE, 0.5 * math.pi + turn))
 
     def _small(self, plan: Plan, width: float, rng: np.random.Generator) -> None:
         plan.room(box(0.0, 0.0, width, self.classroom[1]))

@@ -25,17 +25,20 @@ class Supermarket:
         Between rows.
     checkout : float
         From one checkout to the next.
+    displays : float
+        Share of the places for displays and pallets that are taken.
     """
 
     shelf: tuple[float, float]
     aisle: float
     checkout: float
+    displays: float
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Supermarket:
         """Draw a style."""
         return cls((float(rng.choice([1.0, 1.25, 1.33])), rng.uniform(0.9, 1.2)), rng.uniform(1.8, 2.6),
-                   rng.uniform(1.9, 2.4))  # fmt: skip
+                   rng.uniform(1.9, 2.4), float(rng.choice([0.1, 0.5])))  # fmt: skip
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a shop: how many rows of how many elements, where displays stand."""
@@ -62,9 +65,9 @@ class Supermarket:
         """Draw a row of shelves, its end displays, and what stands before them."""
         plan.block(box(x, y, x + self.shelf[1], y + deep))
         for end in (y - 0.6, y + deep + 0.1):
-            if rng.random() < 0.5:
+            if rng.random() < self.displays:
                 plan.thing("display", box(x + 0.1, end, x + self.shelf[1] - 0.1, end + 0.5))
-        if rng.random() < 0.3:
+        if rng.random() < 0.6 * self.displays:
             side = rng.choice([x - 0.35, x + self.shelf[1] + 0.35])
             plan.thing("box pallet", oblong(side, rng.uniform(y + 0.5, y + deep - 0.5), 0.6, 0.8))
 

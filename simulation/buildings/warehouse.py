@@ -59,15 +59,19 @@ class Warehouse:
     racks : Racks
     full : float
         Share of the bays that hold a load.
+    tidy : bool
+        Whether all loads are of one size and stand in line.
     """
 
     racks: Racks
     full: float
+    tidy: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Warehouse:
         """Draw a style."""
-        return cls(Racks.draw(rng, (3, 4), (5, 7)), rng.uniform(0.75, 0.95))
+        tidy = bool(rng.random() < 0.5)
+        return cls(Racks.draw(rng, (3, 4), (5, 7)), rng.uniform(0.9, 1.0) if tidy else rng.uniform(0.7, 0.95), tidy)
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a hall: how many racks, which bays are full, where the gates are."""
@@ -77,10 +81,10 @@ class Warehouse:
                 rack.block(box(k * racks.bay, 0.0, k * racks.bay + racks.post, racks.depth))
             for k in range(bays):
                 if rng.random() < self.full:
-                    width = (racks.bay - racks.post) * rng.uniform(0.75, 0.97)
+                    width = (racks.bay - racks.post) * (0.9 if self.tidy else rng.uniform(0.75, 0.97))
                     middle = k * racks.bay + 0.5 * (racks.bay + racks.post)
-                    front = 0.5 * racks.depth + rng.uniform(-0.12, 0.05)
-                    rack.thing("load", oblong(middle, front, width, racks.depth - 0.15, rng.normal(0.0, 0.01)))
+                    front = 0.5 * racks.depth - (0.05 if self.tidy else rng.uniform(-0.05, 0.12))
+                    rack.thing("load", oblong(middle, front, width, racks.depth - 0.15))
         return plan.building("warehouse")
 
 
@@ -101,7 +105,7 @@ class RackLegs:
     @classmethod
     def draw(cls, rng: np.random.Generator) -> RackLegs:
         """Draw a style."""
-        return cls(Racks.draw(rng, (2, 4), (5, 9)), rng.uniform(0.05, 0.15))
+        return cls(Racks.draw(rng, (2, 4), (5, 9)), float(rng.choice([0.0, 0.03, 0.12])))
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a hall: how many racks, where pallets stand and gates are."""
