@@ -161,7 +161,9 @@ def quantile_bins(outcomes: Outcomes, size: int) -> list[tuple[int, float, float
         Answers in a bin; what is left over goes to the last.
     """
     answered = sorted((o for o in outcomes if o.pose is not None), key=lambda o: o.probability)
-    starts = list(range(0, max(1, len(answered) - size + 1), size)) if answered else []
+    if not answered:
+        return []
+    starts = list(range(0, max(1, len(answered) - size + 1), size))
     bins = []
     for start, end in zip(starts, [*starts[1:], len(answered)], strict=True):
         group = answered[start:end]
