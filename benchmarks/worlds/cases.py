@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from association import Beams, HardPrior, MapIndex, Scan
 from registration import MeasuredSegments
 from simulation import CONDITIONS, FAMILIES, Case, Scanner, draw_case
@@ -68,7 +70,7 @@ def question(case: Case) -> Question:
     return Question(case, MapIndex.build(case.map), scans, prior)
 
 
-def laser(scanner: Scanner, ranges: object) -> LaserScan:
+def laser(scanner: Scanner, ranges: np.ndarray) -> LaserScan:
     """Return what a scanner reports."""
     return LaserScan(scanner.angle_min, scanner.angle_increment, ranges, scanner.range_min, scanner.range_max)
 

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
+from scipy.special import chdtri
 
 from association import Status
-from registration.chi_square import chi_square_quantile
 from simulation import CONDITIONS, FAMILIES
 
 from ..table import mean, print_table, quantile
@@ -18,7 +18,8 @@ from .outcomes import WorldOutcome
 
 TOLD = 0.98  # of the beams; where as many read what the map shows, no scan could tell the answer from the truth
 MAP_ERRORS = ("clean", "walls_5mm", "walls_2cm", "walls_5cm", "cut", "bias", "noisier", "scaled_1")
-WALLS = ((1, 2), (3, 3), (4, 5), (6, 8), (9, 999))
+MANY = 1000
+WALLS = ((1, 2), (3, 3), (4, 5), (6, 8), (9, MANY))
 BINS = 10
 
 Outcomes = Sequence[WorldOutcome]
@@ -54,13 +55,15 @@ def _wrong(outcomes: Outcomes) -> str:
 def print_in_map(outcomes: Outcomes) -> None:
     """Print right, usable and wrong of the scans whose truth is in their map, by condition and by world."""
     here = [o for o in outcomes if not o.stranger]
-    head = ("", "scans", "right first %", "usable and right %", "usable but wrong", "of usable", "no_match %")
+    head = ("", "scans", "right first %", "within 0.1 m %", "usable and right %", "usable but wrong", "of usable",
+            "no_match %")  # fmt: skip
 
     def cells(name: str, group: Outcomes) -> tuple[str, ...]:
         return (
             name,
             str(len(of_form(group, FORMS[0]))),
             _both(group, lambda g: _percent(o.right for o in g)),
+            _both(group, lambda g: _percent(o.fine for o in g)),
             _both(group, lambda g: _percent(o.usable and o.right for o in g)),
             _both(group, _wrong),
             _both(group, lambda g: str(sum(o.usable for o in g))),
@@ -132,13 +135,17 @@ def print_covariances(outcomes: Outcomes) -> None:
         for low, high in WALLS:
             group = [o for o in outcomes if o.condition == condition and low <= o.walls <= high and judged(o)]
             if group:
+                walls = f"{low} and more" if high == MANY else f"{low} to {high}" if low < high else f"{low}"
+                held_share = _both(group, lambda g: _percent((held(o) for o in g), 1))
                 rows.append(
-                    (condition, f"{low}" if low == high else f"{low} and more" if high > 99 else f"{low} to {high}",
-                     _both(group, lambda g: str(len(g))), _both(group, lambda g: f"{mean(o.nees for o in g):.1f}"),
-                     _both(group, lambda g: _percent((held(o) for o in g), 1)))
-                )  # fmt: skip
+                    (condition, walls, _both(group, lambda g: str(len(g))), _both(group, _mean_nees), held_share)
+                )
     head = ("condition", "walls", "right answers", "mean NEES (3)", "within 95 %, %")
     print_table("Covariance, ranges / segments", head, rows)
+
+
+def _mean_nees(outcomes: Outcomes) -> str:
+    return f"{mean(o.nees for o in outcomes if o.nees is not None):.1f}" if outcomes else ""
 
 
 def judged(outcome: WorldOutcome) -> bool:
@@ -148,7 +155,7 @@ def judged(outcome: WorldOutcome) -> bool:
 
 def held(outcome: WorldOutcome) -> bool:
     """Tell whether the truth lies within the ellipsoid of 95 %."""
-    return outcome.nees is not None and outcome.nees <= chi_square_quantile(3, 0.05)
+    return outcome.nees is not None and outcome.nees <= float(chdtri(3, 0.05))
 
 
 def quantile_bins(outcomes: Outcomes, size: int) -> list[tuple[int, float, float]]:
