@@ -70,7 +70,9 @@ class Facades:
             if gap is not None and x < gap[1] and x + width > gap[0]:
                 x = gap[1]
                 continue
-            self._house(plan.at(x, rng.uniform(0.0, self.setback)), width, rng)
+            # Houses that were built one by one do not stand quite in line.
+            turn = 0.0 if self.terraced else rng.normal(0.0, 0.02)
+            self._house(plan.at(x, rng.uniform(0.0, self.setback), turn), width, rng)
             # Most houses stand wall to wall; some leave an alley.
             x += width + (rng.uniform(1.2, 3.0) if rng.random() < 0.15 else 0.0)
 

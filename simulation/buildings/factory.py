@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,16 +28,21 @@ class Factory:
         Between stations.
     column : float
         Side of the columns, one at every second corner of the stations.
+    slant : float
+        Angle of the lower wall, which follows the plot, to the others; radians, 0 for a rectangular hall.
     """
 
     station: tuple[float, float]
     way: float
     column: float
+    slant: float
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Factory:
         """Draw a style."""
-        return cls((rng.uniform(8.0, 11.0), rng.uniform(6.5, 8.5)), rng.uniform(2.6, 3.6), rng.uniform(0.3, 0.6))
+        slant = float(rng.choice([0.0, rng.uniform(0.01, 0.05)]))
+        station = (rng.uniform(8.0, 11.0), rng.uniform(6.5, 8.5))
+        return cls(station, rng.uniform(2.6, 3.6), rng.uniform(0.3, 0.6), slant)
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw a hall: how many stations, what is made at each."""
@@ -44,7 +50,7 @@ class Factory:
         columns, rows = int(rng.integers(4, 8)), int(rng.integers(3, 6))
         across, deep = self.station[0] + self.way, self.station[1] + self.way
         length, width = columns * across + self.way, rows * deep + self.way
-        plan.room(box(0.0, 0.0, length, width))
+        plan.room([(0.0, 0.0), (length, -length * math.tan(self.slant)), (length, width), (0.0, width)])
         for k in range(columns):
             for j in range(rows):
                 x, y = self.way + k * across, self.way + j * deep

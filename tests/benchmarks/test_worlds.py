@@ -128,7 +128,7 @@ def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_pa
 
 
 def test_wrong_answers_and_strangers_are_counted() -> None:
-    found = [ANSWER] * 8 + [WRONG] * 2 + [replace(ANSWER, usable=False, status="ambiguous")] * 10
+    found = [ANSWER] * 8 + [WRONG] * 2 + [replace(o, usable=False, status="ambiguous") for o in (ANSWER, WRONG)] * 5
     assert judged(found, "ranges: in the map: usable but wrong") == "20.00 (2 of 10)"
     assert judged(found, "ranges:   in the worst world, museum") == "20.00 (2 of 10)"
     before = BEFORE["clean"][0]

@@ -173,7 +173,7 @@ def test_outlines_that_cross_are_told_from_those_that_touch():
     assert crosses(square, np.array([[0.5, 0.5, 2.0, 0.5]]))
     assert not crosses(square, np.array([[1.0, 0.0, 1.0, 1.0], [1.5, 0.0, 1.5, 1.0], [0.2, 0.2, 0.8, 0.8]]))
     assert not crosses(square, np.zeros((0, 4)))
-    # In the corner of the box about a diamond, across the lines of its sides and yet outside.
-    diamond = edges(oblong(0, 0, 2, 2, 0.25 * math.pi))
-    assert not crosses(diamond, np.array([[1.3, 1.0, 1.0, 1.3], [0.9, 0.6, 1.3, 0.6]]))
-    assert crosses(diamond, np.array([[0.5, 0.5, 1.3, 0.6]]))
+    # Across the line of a side, but not across the side.
+    angle = edges(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]))
+    assert not crosses(angle, np.array([[0.5, 0.5, 0.5, 1.5], [1.2, 1.2, 1.8, 1.8]]))
+    assert crosses(angle, np.array([[0.5, 0.5, 1.5, 1.5]]))
