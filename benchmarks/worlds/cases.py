@@ -14,6 +14,7 @@ from simulation import CONDITIONS, FAMILIES, Case, Scanner, draw_case
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 FORMS = ("ranges", "segments")
+HALVES = {"fitting": False, "reporting": True}  # of the worlds: whether nothing may be fitted on them
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,9 @@ FINE_DISTANCE, FINE_ANGLE = 0.1, 1.0
 TOLERANCE = 0.03  # m; a beam reads what the map shows within this and
 SIGMAS = 4.0  # times the noise
 
+DIAGNOSTICS = ("inlier_fraction", "score", "runner_up", "margin", "significance")
+OF_THE_REGISTRATION = ("chi2", "dof", "reliability")
+
 
 @dataclass(frozen=True, slots=True)
 class WorldOutcome:
@@ -115,7 +118,8 @@ class WorldOutcome:
         return self.usable and not self.right
 
     def _within(self, distance: float, angle: float) -> bool:
-        return self.distance is not None and self.distance < distance and (self.angle or 0.0) < angle
+        off = self.distance, self.angle
+        return off[0] is not None and off[0] < distance and off[1] is not None and off[1] < angle
 
 
 def answer(question: Question, form: str) -> WorldOutcome:
@@ -123,11 +127,10 @@ def answer(question: Question, form: str) -> WorldOutcome:
     start = time.thread_time()
     result = associate(question.index, question.scans[form], question.prior)
     took = 1e3 * (time.thread_time() - start)
-    case, diagnostics = question.case, result.diagnostics
-    off: tuple[float, float] | None = None
+    case = question.case
+    distance, angle = None, None
     if case.truth is not None and result.pose is not None:
-        off = offset(result.pose, case.truth)
-    inner = None if diagnostics is None else diagnostics.registration
+        distance, angle = offset(result.pose, case.truth)
     return WorldOutcome(
         world=case.world,
         condition=case.condition,
@@ -139,8 +142,8 @@ def answer(question: Question, form: str) -> WorldOutcome:
         status=str(result.status),
         usable=result.usable,
         probability=result.probability,
-        distance=None if off is None else off[0],
-        angle=None if off is None else off[1],
+        distance=distance,
+        angle=angle,
         read=None if result.pose is None else share_read(case, result.pose),
         covariance=None if result.covariance is None else result.covariance[np.triu_indices(3)].tolist(),
         nees=_nees(result, case.truth),
@@ -149,18 +152,20 @@ def answer(question: Question, form: str) -> WorldOutcome:
         missing=len(result.missing_map),
         scan_segments=len(question.scans[form].measured),
         map_segments=len(case.map),
-        inlier_fraction=None if diagnostics is None else diagnostics.inlier_fraction,
-        score=None if diagnostics is None else diagnostics.score,
-        runner_up=None if diagnostics is None else diagnostics.runner_up,
-        margin=None if diagnostics is None else diagnostics.margin,
-        significance=None if diagnostics is None else diagnostics.significance,
-        chi2=None if inner is None else inner.chi2,
-        reliability=None if inner is None else inner.reliability,
-        dof=None if inner is None else inner.dof,
         alternatives=len(result.alternatives),
         complete=result.search.complete,
         milliseconds=took,
+        **_diagnostics(result),
     )
+
+
+def _diagnostics(result: AssociationResult) -> dict[str, float | None]:
+    """Return the answer's diagnostics by name, None where there are none."""
+    if result.diagnostics is None:
+        return dict.fromkeys((*DIAGNOSTICS, *OF_THE_REGISTRATION))
+    registration = result.diagnostics.registration
+    found = {name: getattr(result.diagnostics, name) for name in DIAGNOSTICS}
+    return found | {name: getattr(registration, name) for name in OF_THE_REGISTRATION}
 
 
 def share_read(case: Case, pose: RigidTransform) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from simulation import CONDITIONS, FAMILIES
 
 from ..table import Row, print_rows, print_table
-from .cases import in_map
+from .cases import FORMS, HALVES, in_map
 from .goals import rows
 from .outcomes import WorldOutcome
 from .running import Choice, run
@@ -22,12 +22,12 @@ from .tables import (
 
 
 def worlds(quick: int) -> list[Row]:
-    """Draw and search one in `quick` of everything, print all tables, return the rows that were judged."""
+    """Draw and search one in `quick` of everything, print all tables, return the rows of the worlds for reporting."""
     return report(run(Choice(quick=quick)))
 
 
 def report(outcomes: Sequence[WorldOutcome]) -> list[Row]:
-    """Print all tables of some outcomes; return the rows that were judged."""
+    """Print all tables of some outcomes; return the rows of the worlds for reporting."""
     _print_legend()
     print_in_map(outcomes)
     print_strangers(outcomes)
@@ -35,10 +35,15 @@ def report(outcomes: Sequence[WorldOutcome]) -> list[Row]:
     print_covariances(outcomes)
     print_calibration(outcomes)
     print_times(outcomes)
-    judged = rows(outcomes)
-    here = sum(not o.stranger for o in outcomes) // 2
-    print_rows(f"Drawn worlds, {here:,} scans in their map and {len(outcomes) // 2 - here:,} strangers", judged)
-    return judged
+    judged: dict[str, list[Row]] = {}
+    for half, held_out in HALVES.items():
+        group = [o for o in outcomes if o.held_out == held_out]
+        if group:
+            here = sum(not o.stranger for o in group) // len(FORMS)
+            counts = f"{here:,} scans in their map and {len(group) // len(FORMS) - here:,} strangers"
+            judged[half] = rows(group, half)
+            print_rows(f"Drawn worlds for {half}, {counts}", judged[half])
+    return judged.get("reporting", [])
 
 
 def _print_legend() -> None:

@@ -35,15 +35,15 @@ class Choice:
     Attributes
     ----------
     worlds, conditions : tuple of str
-    quick : int
-        Draw one in so many.
+    quick : float
+        Draw one in so many; below 1 more than usual.
     first : int
         The number of the first case of each world and condition; another one draws other cases.
     """
 
     worlds: tuple[str, ...] = tuple(FAMILIES)
     conditions: tuple[str, ...] = tuple(CONDITIONS)
-    quick: int = 1
+    quick: float = 1.0
     first: int = 0
 
     @property

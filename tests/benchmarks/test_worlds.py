@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from association import Status
+from benchmarks.worlds.__main__ import _worlds as worlds_named
+from benchmarks.worlds.__main__ import main
 from benchmarks.worlds.cases import FORMS, question, questions
 from benchmarks.worlds.goals import BEFORE, rows
 from benchmarks.worlds.outcomes import WorldOutcome, answer, read, share_read, write
+from benchmarks.worlds.pictures import draw_worlds
 from benchmarks.worlds.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
 from benchmarks.worlds.tables import could_be_told, held, quantile_bins, worst_gap
 from registration import RigidTransform
@@ -35,7 +38,7 @@ def timeless(outcomes: list[WorldOutcome]) -> list[WorldOutcome]:
 
 
 def judged(outcomes: list[WorldOutcome], what: str) -> str:
-    (row,) = [row for row in rows(outcomes) if row.what.startswith(what)]
+    (row,) = [row for row in rows(outcomes, "reporting") if row.what.startswith(what)]
     return row.measured
 
 
@@ -128,10 +131,15 @@ def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_pa
 
 
 def test_wrong_answers_and_strangers_are_counted() -> None:
-    found = [ANSWER] * 8 + [WRONG] * 2 + [replace(o, usable=False, status="ambiguous") for o in (ANSWER, WRONG)] * 5
+    found = (
+        [replace(WRONG, world="school", held_out=False)] * 50
+        + [ANSWER] * 8
+        + [WRONG] * 2
+        + [replace(o, usable=False, status="ambiguous") for o in (ANSWER, WRONG)] * 5
+    )
     assert judged(found, "ranges: in the map: usable but wrong") == "20.00 (2 of 10)"
     assert judged(found, "ranges:   in the worst world, museum") == "20.00 (2 of 10)"
-    before = BEFORE["clean"][0]
+    before = BEFORE["reporting"]["clean"][0]
     assert judged(found, "ranges: clean") == f"{4000.0 / before:.1f} (40.0 of {before:.1f} % of the scans)"
     away = [AWAY] * 3 + [replace(AWAY, read=0.99)] + [replace(AWAY, usable=False, status="no_match", pose=None)] * 4
     assert judged(away, "ranges: sister") == "37.50"
@@ -150,6 +158,33 @@ def test_covariances_are_judged_by_right_answers_of_many_and_of_few_walls() -> N
     assert judged(found, "ranges: fewer than 6 walls: truths") == "100.0"
     assert held(replace(ANSWER, nees=7.8))
     assert not held(replace(ANSWER, nees=7.9))
+
+
+def test_halves_of_the_worlds_can_be_named(monkeypatch, capsys) -> None:
+    halves = worlds_named("fitting"), worlds_named("reporting")
+    assert sorted(halves[0] + halves[1]) == sorted(FAMILIES)
+    assert all(FAMILIES[name].held_out for name in halves[1])
+    assert worlds_named("mine,hotel") == ("mine", "hotel")
+    assert worlds_named("") == tuple(FAMILIES)
+    for wrong, told in (
+        (["--worlds", "palace"], "palace"),
+        (["--conditions", "rain"], "rain"),
+        (["--quick", "0"], "0"),
+    ):
+        monkeypatch.setattr("sys.argv", ["worlds", *wrong])
+        with pytest.raises(SystemExit) as caught:
+            main()
+        assert caught.value.code == 2
+        assert told in capsys.readouterr().err
+
+
+def test_worlds_are_drawn_as_pictures(monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr("benchmarks.pictures.FOLDER", tmp_path)
+    monkeypatch.setattr("benchmarks.worlds.pictures.FOLDER", tmp_path)
+    draw_worlds(["museum"])
+    drawn = (tmp_path / "worlds" / "museum.png").read_bytes()
+    assert drawn.startswith(b"\x89PNG")
+    assert len(drawn) > 10_000
 
 
 def test_bins_hold_as_many_answers_as_asked_and_the_rest_in_the_last() -> None:
