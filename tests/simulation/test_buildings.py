@@ -176,4 +176,4 @@ def test_outlines_that_cross_are_told_from_those_that_touch():
     # Across the line of a side, but not across the side.
     angle = edges(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]))
     assert not crosses(angle, np.array([[0.5, 0.5, 0.5, 1.5], [1.2, 1.2, 1.8, 1.8]]))
-    assert crosses(angle, np.array([[0.5, 0.5, 1.5, 1.5]]))
+    assert crosses(angle, np.array([[0.5, 0.6, 1.5, 1.8]]))
