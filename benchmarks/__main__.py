@@ -16,6 +16,7 @@ from .queries import DATA, data_found
 from .ranges import ranges
 from .sums import sums
 from .table import Row, machine, print_rows
+from .worlds import worlds
 
 DEFAULT = ("localization", "estimators", "lookalikes")
 
@@ -78,6 +79,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "ranges": _ranges,
     "peers": _peers,
     "sums": _sums,
+    "worlds": worlds,
 }
 
 

@@ -1,8 +1,13 @@
 """A virtual laser scanner and worlds to put it in: for experiments, benchmarks and the analysis of maps."""
 
+from .buildings import FAMILIES, Building, Family
+from .cases import Case, Window, draw_case
+from .conditions import CONDITIONS, Condition, Stranger
 from .errors import SimulationError
 from .offices import OfficePlan, offices
+from .places import free_place
 from .scanner import Scanner, SimulatedScan, scan
+from .walls import wall_of_segment
 from .worlds import (
     World,
     corridor,
@@ -16,13 +21,23 @@ from .worlds import (
 )
 
 __all__ = [
+    "CONDITIONS",
+    "FAMILIES",
+    "Building",
+    "Case",
+    "Condition",
+    "Family",
     "OfficePlan",
     "Scanner",
     "SimulatedScan",
     "SimulationError",
+    "Stranger",
+    "Window",
     "World",
     "corridor",
     "cut_square",
+    "draw_case",
+    "free_place",
     "l_room",
     "oblique",
     "offices",
@@ -30,5 +45,6 @@ __all__ = [
     "rectangle_room",
     "scan",
     "square_room",
+    "wall_of_segment",
     "with_obstacles",
 ]

@@ -38,6 +38,10 @@ class Scanner:
         Chance that a beam brings no return whatever it hits, 0 to 1; the range is inf, as a real scanner reports it.
     quantum : float
         Step to which ranges are rounded, metres, 0 for none.
+    bias : float
+        What is added to every range, metres: a scanner that measures too long or too short.
+    saturated : bool
+        Whether a beam without return reads `range_max`, as some drivers report it, instead of inf.
     one_sided : bool
         Whether a segment is seen from its left only and let through from its right. By default every segment stops
         every beam, and `SimulatedScan.facing` says from which side.
@@ -56,6 +60,8 @@ class Scanner:
     sigma: float = 0.02
     dropout: float = 0.0
     quantum: float = 0.0
+    bias: float = 0.0
+    saturated: bool = False
     one_sided: bool = False
 
     def __post_init__(self) -> None:
@@ -69,6 +75,7 @@ class Scanner:
             ("sigma", 0.0 <= self.sigma < math.inf, "from 0 up"),
             ("dropout", 0.0 <= self.dropout <= 1.0, "from 0 to 1"),
             ("quantum", 0.0 <= self.quantum < math.inf, "from 0 up"),
+            ("bias", abs(self.bias) < math.inf, "of metres"),
         ]  # fmt: skip
         for argument, good, what in checks:
             if not good:
@@ -99,9 +106,10 @@ class SimulatedScan:
     scanner : Scanner
     pose : RigidTransform
         The truth, map_from_scan.
-    ranges : (m,) metres as measured; inf where nothing came back, nan nearer than `range_min`
+    ranges : (m,) metres as measured; inf (`range_max` where the scanner is saturated) where nothing came back, nan
+        nearer than `range_min`
     true_ranges : (m,) metres without noise, dropouts and limits; inf where the map is open
-    hits : (m,) index of the map segment behind each finite range, -1 for none
+    hits : (m,) index of the map segment behind each range that was measured, -1 for none
     facing : (m,) whether that segment was hit from its left, its free side
     """
 
@@ -161,7 +169,7 @@ def scan(
         map.endpoints, pose.x, pose.y, angles[0], scanner.angle_increment, np.cos(angles), np.sin(angles),
         scanner.one_sided,
     )  # fmt: skip
-    ranges = np.where(true_ranges <= scanner.range_max, true_ranges, np.inf)
+    ranges = np.where(true_ranges <= scanner.range_max, true_ranges + scanner.bias, np.inf)
     if rng is not None and scanner.sigma > 0.0:
         ranges += rng.normal(0.0, scanner.sigma, scanner.beams)
     if scanner.quantum > 0.0:
@@ -172,6 +180,8 @@ def scan(
     if rng is not None and scanner.dropout > 0.0:
         ranges[rng.random(scanner.beams) < scanner.dropout] = np.inf
     hits = np.where(np.isfinite(ranges), hits, -1)
+    if scanner.saturated:
+        ranges[np.isinf(ranges)] = scanner.range_max
     return SimulatedScan(scanner, pose, ranges, true_ranges, hits, _facing(map, pose, hits))
 
 

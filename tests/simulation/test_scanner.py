@@ -112,6 +112,16 @@ def test_noise_dropouts_and_quantisation_are_as_asked() -> None:
     np.testing.assert_allclose(stepped / 0.05, np.round(stepped / 0.05), atol=1e-9)
 
 
+def test_a_biased_scanner_measures_too_long_and_a_saturated_one_reads_its_limit():
+    plain, biased = (scan(SQUARE, ORIGIN, Scanner(sigma=0.0, bias=bias)).ranges for bias in (0.0, 0.02))
+    np.testing.assert_allclose(biased - plain, 0.02)
+    full = scan(SQUARE, ORIGIN, Scanner(range_max=1.2, sigma=0.0, saturated=True))
+    far = full.true_ranges > 1.2
+    assert (full.ranges[far] == 1.2).all()
+    assert (full.hits[far] == -1).all()
+    assert (full.hits[~far] >= 0).all()
+
+
 @settings(deadline=None, max_examples=60)
 @given(
     seed=st.integers(0, 10_000),
@@ -152,7 +162,7 @@ def test_moving_map_and_scanner_together_changes_nothing(theta: float, dx: float
     [
         ("beams", 0), ("beams", 100_001), ("angle_min", math.nan), ("angle_increment", 0.0), ("angle_increment", 0.1),
         ("range_min", -1.0), ("range_max", 0.0), ("range_max", math.inf), ("sigma", -0.1), ("sigma", math.nan),
-        ("dropout", 1.1), ("quantum", -0.05),
+        ("dropout", 1.1), ("quantum", -0.05), ("bias", math.nan),
     ],
 )  # fmt: skip
 def test_a_scanner_that_cannot_be_is_refused(argument: str, value: Any) -> None:

@@ -1,0 +1,198 @@
+"""Drawn worlds are asked, recorded and judged as the table says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from association import Status
+from benchmarks.worlds.__main__ import _worlds as worlds_named
+from benchmarks.worlds.__main__ import main
+from benchmarks.worlds.cases import FORMS, question, questions
+from benchmarks.worlds.goals import BEFORE, rows
+from benchmarks.worlds.outcomes import WorldOutcome, answer, read, share_read, write
+from benchmarks.worlds.pictures import draw_worlds
+from benchmarks.worlds.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
+from benchmarks.worlds.tables import could_be_told, held, quantile_bins, worst_gap
+from registration import RigidTransform
+from simulation import CONDITIONS, FAMILIES, draw_case
+
+FEW = Choice(worlds=("museum", "garage"), conditions=("clean", "sister"), quick=125)
+
+ANSWER = WorldOutcome(
+    world="museum", condition="clean", number=0, held_out=True, form="ranges", truth=[0.0, 0.0, 0.0],
+    pose=[0.1, 0.0, 0.0], status="ok", usable=True, probability=0.99, distance=0.1, angle=0.0, read=1.0,
+    covariance=[1.0, 0.0, 0.0, 1.0, 0.0, 1.0], nees=3.0, walls=7, matched=9, missing=0, scan_segments=9,
+    map_segments=100, inlier_fraction=0.9, score=100.0, runner_up=None, margin=None, significance=1e-9, chi2=20.0,
+    reliability=0.5, dof=18, alternatives=0, complete=True, milliseconds=1.0,
+)  # fmt: skip
+WRONG = replace(ANSWER, pose=[5.0, 0.0, 0.0], distance=5.0, read=0.5, nees=900.0)
+AWAY = replace(WRONG, condition="sister", truth=None, distance=None, angle=None, nees=None)
+
+
+def timeless(outcomes: list[WorldOutcome]) -> list[WorldOutcome]:
+    return [replace(o, milliseconds=0.0) for o in outcomes]
+
+
+def judged(outcomes: list[WorldOutcome], what: str) -> str:
+    (row,) = [row for row in rows(outcomes, "reporting") if row.what.startswith(what)]
+    return row.measured
+
+
+def test_both_forms_are_of_one_scan_and_the_segments_come_without_beams() -> None:
+    case = draw_case("hotel", "clean", 0)
+    asked = question(case)
+    assert set(asked.scans) == set(FORMS)
+    ranges, segments = asked.scans["ranges"], asked.scans["segments"]
+    assert ranges.beams is not None
+    assert segments.beams is None
+    np.testing.assert_array_equal(ranges.measured.segments.endpoints, segments.measured.segments.endpoints)
+    assert (segments.measured.sigma == case.scanner.sigma).all()
+    assert asked.prior is None
+    window = draw_case("hotel", "window", 0).window
+    prior = question(draw_case("hotel", "window", 0)).prior
+    assert prior is not None
+    assert prior.pose == window.pose
+    assert prior.radius == window.radius
+
+
+def test_questions_are_drawn_by_world_condition_and_number() -> None:
+    drawn = list(questions(["museum", "garage"], ["clean", "doors"], [0, 4]))
+    named = [(q.case.world, q.case.condition, q.case.number) for q in drawn]
+    assert named == [(w, c, n) for w in ("museum", "garage") for c in ("clean", "doors") for n in (0, 4)]
+    alone = next(iter(questions(["garage"], ["doors"], [4])))
+    np.testing.assert_array_equal(alone.case.ranges, drawn[-1].case.ranges)
+
+
+def test_an_answer_is_held_against_the_truth() -> None:
+    asked = question(draw_case("factory", "clean", 0))
+    for form in FORMS:
+        found = answer(asked, form)
+        assert found.status == Status.OK
+        assert found.right
+        assert found.fine
+        assert not found.wrong
+        assert found.read > 0.98
+        assert found.nees < 30.0
+        assert 2 <= found.walls <= found.matched
+    moved = replace(asked.case, truth=RigidTransform(asked.case.truth.x + 0.2, asked.case.truth.y, 0.0))
+    moved = replace(moved, truth=replace(moved.truth, theta=asked.case.truth.theta))
+    off = answer(replace(asked, case=moved), "ranges")
+    assert off.right
+    assert not off.fine
+    assert off.distance == pytest.approx(0.2, abs=0.05)
+
+
+def test_beams_tell_where_a_scan_was_not_taken() -> None:
+    case = draw_case("hospital", "clean", 2)
+    assert share_read(case, case.truth) > 0.99
+    beside = replace(case.truth, x=case.truth.x + 0.5)
+    assert share_read(case, beside) < 0.6
+    # Half of the beams read 1 m too short, one in four is not known.
+    ranges = case.ranges.copy()
+    ranges[::2] -= 1.0
+    ranges[1::4] = np.nan
+    assert share_read(replace(case, ranges=ranges), case.truth) == pytest.approx(1.0 / 3.0, abs=0.04)
+
+
+def test_what_brings_no_return_agrees_with_a_map_that_shows_nothing() -> None:
+    case = draw_case("garage", "clean", 0)
+    nothing = np.isinf(case.ranges)
+    assert nothing.any()
+    assert share_read(case, case.truth) > 0.99
+    near = replace(case, ranges=np.where(nothing, 0.5 * case.scanner.range_max, case.ranges))
+    assert share_read(near, case.truth) == pytest.approx(1.0 - nothing.mean(), abs=0.02)
+
+
+def test_what_is_drawn_is_as_much_as_was_promised() -> None:
+    everything = Choice().chunks
+    drawn = dict.fromkeys((False, True), 0)
+    for chunk in everything:
+        drawn[CONDITIONS[chunk.condition].stranger is not None] += len(chunk.numbers)
+    assert min(drawn.values()) >= 10_000
+    assert len(everything) == len(FAMILIES) * len(CONDITIONS)
+    assert {len(c.numbers) for c in Choice(quick=10).chunks} == {round(IN_MAP / 10), round(STRANGERS / 10)}
+    assert Choice(quick=10**6, first=7).chunks[0].numbers == range(7, 8)
+
+
+def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_path) -> None:
+    alone, together = run(FEW, processes=1), run(FEW, processes=2)
+    assert timeless(alone) == timeless(together)
+    assert [(o.world, o.condition, o.form) for o in alone] == [
+        (w, c, f) for c in FEW.conditions for w in FEW.worlds for f in FORMS
+    ]
+    assert timeless(outcomes_of(Chunk("garage", "sister", range(1)))) == timeless(alone[-2:])
+    write(tmp_path / "answers.jsonl", alone)
+    assert list(read(tmp_path / "answers.jsonl")) == alone
+    assert len((tmp_path / "answers.jsonl").read_bytes().splitlines()) == len(alone)
+
+
+def test_wrong_answers_and_strangers_are_counted() -> None:
+    found = (
+        [replace(WRONG, world="school", held_out=False)] * 50
+        + [ANSWER] * 8
+        + [WRONG] * 2
+        + [replace(o, usable=False, status="ambiguous") for o in (ANSWER, WRONG)] * 5
+    )
+    assert judged(found, "ranges: in the map: usable but wrong") == "20.00 (2 of 10)"
+    assert judged(found, "ranges:   in the worst world, museum") == "20.00 (2 of 10)"
+    before = BEFORE["reporting"]["clean"][0]
+    assert judged(found, "ranges: clean") == f"{4000.0 / before:.1f} (40.0 of {before:.1f} % of the scans)"
+    away = [AWAY] * 3 + [replace(AWAY, read=0.99)] + [replace(AWAY, usable=False, status="no_match", pose=None)] * 4
+    assert judged(away, "ranges: sister") == "37.50"
+    assert judged(away, "ranges: in another building: no_match") == "50.0"
+    assert judged(away, "ranges: mirrored") == "not measured"
+    assert judged([replace(ANSWER, form="segments", condition="turning")] * 2, "segments: turning") == "100.0"
+    assert could_be_told(AWAY)
+    assert not could_be_told(replace(AWAY, read=0.98))
+
+
+def test_covariances_are_judged_by_right_answers_of_many_and_of_few_walls() -> None:
+    found = [ANSWER] * 18 + [replace(ANSWER, nees=9.0)] * 2 + [WRONG] * 5
+    found += [replace(ANSWER, walls=2, nees=1.0)] * 20
+    assert judged(found, "ranges: 6 walls and more: truths") == "90.0"
+    assert judged(found, "ranges: 6 walls and more: mean NEES") == "3.60"
+    assert judged(found, "ranges: fewer than 6 walls: truths") == "100.0"
+    assert held(replace(ANSWER, nees=7.8))
+    assert not held(replace(ANSWER, nees=7.9))
+
+
+def test_halves_of_the_worlds_can_be_named(monkeypatch, capsys) -> None:
+    halves = worlds_named("fitting"), worlds_named("reporting")
+    assert sorted(halves[0] + halves[1]) == sorted(FAMILIES)
+    assert all(FAMILIES[name].held_out for name in halves[1])
+    assert worlds_named("mine,hotel") == ("mine", "hotel")
+    assert worlds_named("") == tuple(FAMILIES)
+    for wrong, told in (
+        (["--worlds", "palace"], "palace"),
+        (["--conditions", "rain"], "rain"),
+        (["--quick", "0"], "0"),
+    ):
+        monkeypatch.setattr("sys.argv", ["worlds", *wrong])
+        with pytest.raises(SystemExit) as caught:
+            main()
+        assert caught.value.code == 2
+        assert told in capsys.readouterr().err
+
+
+def test_worlds_are_drawn_as_pictures(monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr("benchmarks.pictures.FOLDER", tmp_path)
+    monkeypatch.setattr("benchmarks.worlds.pictures.FOLDER", tmp_path)
+    draw_worlds(["museum"])
+    drawn = (tmp_path / "worlds" / "museum.png").read_bytes()
+    assert drawn.startswith(b"\x89PNG")
+    assert len(drawn) > 10_000
+
+
+def test_bins_hold_as_many_answers_as_asked_and_the_rest_in_the_last() -> None:
+    found = [replace(ANSWER, probability=k / 25, distance=0.1 if k >= 10 else 5.0) for k in range(25)]
+    found.append(replace(ANSWER, pose=None))
+    bins = quantile_bins(found, 10)
+    assert [count for count, _, _ in bins] == [10, 15]
+    assert bins[0][1:] == (pytest.approx(0.18), 0.0)
+    assert bins[1][1:] == (pytest.approx(0.68), 1.0)
+    assert worst_gap(bins) == pytest.approx(32.0)
+    assert math.isnan(worst_gap(quantile_bins([], 10)))
