@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
 
-from ._kernels import cast
 from .buildings.building import FIXED, Building
 from .buildings.shapes import box, edges, oblong, ring, turned
 from .crossings import crosses
+from .kernels.casting import cast
 from .scanner import Scanner
 
 Floats = NDArray[np.float64]

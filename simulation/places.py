@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from registration import RigidTransform, Segments
 
-from ._kernels import cast
 from .errors import SimulationError
+from .kernels.casting import cast
 
 Floats = NDArray[np.float64]
 

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import orjson
@@ -159,7 +160,7 @@ def answer(question: Question, form: str) -> WorldOutcome:
     )
 
 
-def _diagnostics(result: AssociationResult) -> dict[str, float | None]:
+def _diagnostics(result: AssociationResult) -> dict[str, Any]:
     """Return the answer's diagnostics by name, None where there are none."""
     if result.diagnostics is None:
         return dict.fromkeys((*DIAGNOSTICS, *OF_THE_REGISTRATION))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from registration import Segments
+from registration.layout import Floats
 from simulation import Case, draw_case
 
 from ..pictures import COLOURS, FOLDER, INK, save
@@ -29,11 +30,10 @@ def draw_worlds(worlds: Iterable[str], number: int = 0) -> None:
 
 def draw_scene(ax: Axes, case: Case) -> None:
     """Draw what stood there, short strokes on the free sides, the scanner and the ends of its beams."""
-    ax.add_collection(LineCollection(_lines(case.scene), colors=INK, linewidths=0.7))
+    ax.add_collection(LineCollection(_lines(case.scene.endpoints), colors=INK, linewidths=0.7))
     normals = case.scene.midpoints + NORMAL * case.scene.normals
-    ax.add_collection(
-        LineCollection(list(zip(case.scene.midpoints, normals, strict=True)), colors=COLOURS[0], linewidths=0.4)
-    )
+    strokes = _lines(np.hstack([case.scene.midpoints, normals]))
+    ax.add_collection(LineCollection(strokes, colors=COLOURS[0], linewidths=0.4))
     points = case.pose.apply(case.points)
     ax.plot(points[:, 0], points[:, 1], ".", color=COLOURS[1], markersize=2)
     ax.plot(case.pose.x, case.pose.y, "o", color=COLOURS[3])
@@ -41,5 +41,5 @@ def draw_scene(ax: Axes, case: Case) -> None:
     ax.set_title(f"{case.world}, {case.condition}: {len(case.scene)} segments", color=INK)
 
 
-def _lines(segments: Segments) -> list[object]:
-    return list(segments.endpoints.reshape(-1, 2, 2))
+def _lines(endpoints: Floats) -> list[Floats]:
+    return list(endpoints.reshape(-1, 2, 2))

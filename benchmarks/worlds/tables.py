@@ -187,13 +187,15 @@ def print_calibration(outcomes: Outcomes) -> None:
         for count, p, share in quantile_bins(answered, max(1, len(answered) // BINS)):
             rows.append((form, str(count), f"{p:.3f}", f"{share:.3f}", f"{100.0 * (share - p):+.1f}"))
     print_table("Probability, scans in their map", ("form", "answers", "stated", "right", "points off"), rows)
-    rows = []
+    by_world: list[tuple[str, ...]] = []
     for world in FAMILIES:
         group = [o for o in here if o.world == world]
         if group:
             size = max(50, len(group) // 10)
-            rows.append((_world(world), *(_worst(quantile_bins(of_form(group, form), size)) for form in FORMS)))
-    print_table("Probability, by world: stated, right, greatest distance of a bin in points", ("world", *FORMS), rows)
+            by_world.append((_world(world), *(_worst(quantile_bins(of_form(group, form), size)) for form in FORMS)))
+    print_table(
+        "Probability, by world: stated, right, greatest distance of a bin in points", ("world", *FORMS), by_world
+    )
 
 
 def _worst(bins: Sequence[tuple[int, float, float]]) -> str:

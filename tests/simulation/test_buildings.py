@@ -25,7 +25,7 @@ def area(outline: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_robot_sees_free_sides_alone(name, seed):
+def test_a_robot_sees_free_sides_alone(name: str, seed: int) -> None:
     building, rng = draw(name, seed), np.random.default_rng(seed)
     for _ in range(6):
         pose = free_place(building.segments, rng)
@@ -37,7 +37,7 @@ def test_a_robot_sees_free_sides_alone(name, seed):
 
 
 @pytest.mark.parametrize("name", [name for name in FAMILIES if name != "facades"])
-def test_a_building_is_closed_but_for_a_street(name):
+def test_a_building_is_closed_but_for_a_street(name: str) -> None:
     building = draw(name, 3)
     pose = free_place(building.segments, np.random.default_rng(3))
     assert np.isfinite(scan(building.segments, pose, ALL_AROUND).ranges).all()
@@ -45,7 +45,7 @@ def test_a_building_is_closed_but_for_a_street(name):
 
 @pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_sizes_are_those_of_buildings(name, seed):
+def test_sizes_are_those_of_buildings(name: str, seed: int) -> None:
     building = draw(name, seed)
     corners = building.segments.endpoints.reshape(-1, 2)
     assert 40 <= len(building.segments) <= 1700
@@ -56,7 +56,7 @@ def test_sizes_are_those_of_buildings(name, seed):
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_the_same_seed_draws_the_same_building_and_sisters_differ(name):
+def test_the_same_seed_draws_the_same_building_and_sisters_differ(name: str) -> None:
     one, again, other = draw(name, 5), draw(name, 5), draw(name, 6)
     np.testing.assert_array_equal(one.segments.endpoints, again.segments.endpoints)
     np.testing.assert_array_equal(one.things, again.things)
@@ -70,7 +70,7 @@ def test_the_same_seed_draws_the_same_building_and_sisters_differ(name):
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_things_are_closed_outlines_that_stand_apart(name):
+def test_things_are_closed_outlines_that_stand_apart(name: str) -> None:
     building = draw(name, 4)
     assert building.things.shape == (len(building.segments),)
     assert set(building.things.tolist()) == {FIXED, *range(len(building.kinds))}
@@ -82,7 +82,7 @@ def test_things_are_closed_outlines_that_stand_apart(name):
 
 
 @pytest.mark.parametrize("name", FAMILIES)
-def test_what_can_be_moved_is_marked(name):
+def test_what_can_be_moved_is_marked(name: str) -> None:
     found = [draw(name, seed) for seed in range(6)]
     assert sum(len(building.kinds) for building in found) > 0
     if name not in ("mine", "facades", "round_rooms", "museum"):
@@ -92,12 +92,12 @@ def test_what_can_be_moved_is_marked(name):
         assert ((widths > 0.7) & (widths < 2.6)).all()
 
 
-def test_half_of_the_families_are_kept_for_the_report():
+def test_half_of_the_families_are_kept_for_the_report() -> None:
     assert len(FAMILIES) >= 14
     assert sum(family.held_out for family in FAMILIES.values()) == len(FAMILIES) // 2
 
 
-def test_an_opening_joins_two_rooms():
+def test_an_opening_joins_two_rooms() -> None:
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0, 3.0))
     plan.room(box(4.2, 0.0, 8.0, 3.0))
@@ -112,7 +112,7 @@ def test_an_opening_joins_two_rooms():
     assert building.doors.tolist() == [[4.0, 1.0, 4.0, 2.0]]
 
 
-def test_a_recess_sets_a_wall_back():
+def test_a_recess_sets_a_wall_back() -> None:
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0, 3.0))
     plan.recess((1.0, 0.0), (3.0, 0.0), 0.5)
@@ -122,7 +122,7 @@ def test_a_recess_sets_a_wall_back():
     assert len(drawn) == 8
 
 
-def test_an_opening_in_no_wall_is_refused():
+def test_an_opening_in_no_wall_is_refused() -> None:
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0, 3.0))
     plan.opening((1.0, 0.0), (2.0, 0.0), 0.2)
@@ -132,7 +132,7 @@ def test_an_opening_in_no_wall_is_refused():
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_parts_lie_where_they_are_put_with_free_space_on_the_left(mirrored):
+def test_parts_lie_where_they_are_put_with_free_space_on_the_left(mirrored: bool) -> None:
     plan = Plan()
     part = plan.at(10.0, 5.0, 0.5 * math.pi, mirrored=mirrored)
     part.room(box(0.0, 0.0, 4.0, 3.0))
@@ -150,7 +150,7 @@ def test_parts_lie_where_they_are_put_with_free_space_on_the_left(mirrored):
     assert end.tolist() == pytest.approx([9.5, 5.0 + 3.5 * sign])
 
 
-def test_a_thing_in_a_wall_or_in_another_is_left_out():
+def test_a_thing_in_a_wall_or_in_another_is_left_out() -> None:
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0, 3.0))
     plan.thing("first", box(1.0, 1.0, 2.0, 2.0))
@@ -160,7 +160,7 @@ def test_a_thing_in_a_wall_or_in_another_is_left_out():
     assert plan.building("room").kinds == ("first", "last")
 
 
-def test_shapes_are_counter_clockwise_and_of_their_size():
+def test_shapes_are_counter_clockwise_and_of_their_size() -> None:
     assert area(edges(box(0, 0, 2, 1))) == pytest.approx(2.0)
     assert area(edges(oblong(3, 4, 2, 1, 0.7))) == pytest.approx(2.0)
     assert area(edges(chamfered(0, 0, 2, 1, 0.3, 0.2))) == pytest.approx(2.0 - 4 * 0.5 * 0.2**2)
@@ -168,7 +168,7 @@ def test_shapes_are_counter_clockwise_and_of_their_size():
     np.testing.assert_allclose(arc(0, 0, 1.0, 0.0, math.pi, 2), [[1, 0], [0, 1], [-1, 0]], atol=1e-12)
 
 
-def test_outlines_that_cross_are_told_from_those_that_touch():
+def test_outlines_that_cross_are_told_from_those_that_touch() -> None:
     square = edges(box(0, 0, 1, 1))
     assert crosses(square, np.array([[0.5, 0.5, 2.0, 0.5]]))
     assert not crosses(square, np.array([[1.0, 0.0, 1.0, 1.0], [1.5, 0.0, 1.5, 1.0], [0.2, 0.2, 0.8, 0.8]]))

@@ -5,17 +5,19 @@ import numpy as np
 import pytest
 
 from registration import RigidTransform, Segments
-from simulation import CONDITIONS, FAMILIES, Scanner, SimulationError, Stranger, draw_case, scan
+from registration.layout import Floats
+from simulation import CONDITIONS, FAMILIES, Case, Scanner, SimulationError, Stranger, draw_case, scan
 from simulation.cases import BEAMS, RANGE_MAX, _unmapped_part, _window_elsewhere
 from simulation.places import distances
 
 
-def shown(case):
+def shown(case: Case) -> Floats:
     """What the declared scanner would measure from the truth in the map, without noise; 1e4 where there is nothing."""
+    assert case.truth is not None
     return np.minimum(1e4, scan(case.map, case.truth, replace(case.scanner, sigma=0.0)).true_ranges)
 
 
-def residuals(case):
+def residuals(case: Case) -> Floats:
     """Measured less shown, of beams that are near neither an edge nor the limits."""
     expected = shown(case)
     steady = np.abs(expected - np.roll(expected, 1)) + np.abs(expected - np.roll(expected, -1)) < 0.15
@@ -24,7 +26,7 @@ def residuals(case):
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-def test_every_condition_draws_the_same_twice_and_has_a_truth_where_it_says_so(condition):
+def test_every_condition_draws_the_same_twice_and_has_a_truth_where_it_says_so(condition: str) -> None:
     rule = CONDITIONS[condition]
     one, again = draw_case("offices", condition, 3), draw_case("offices", condition, 3)
     np.testing.assert_array_equal(one.ranges, again.ranges)
@@ -38,7 +40,7 @@ def test_every_condition_draws_the_same_twice_and_has_a_truth_where_it_says_so(c
 
 
 @pytest.mark.parametrize("world", FAMILIES)
-def test_a_clean_scan_shows_the_map_from_its_truth(world):
+def test_a_clean_scan_shows_the_map_from_its_truth(world: str) -> None:
     case = draw_case(world, "clean", 1)
     off = residuals(case)
     assert len(off) > 100
@@ -47,13 +49,13 @@ def test_a_clean_scan_shows_the_map_from_its_truth(world):
 
 
 @pytest.mark.parametrize("world", ["school", "hotel"])
-def test_a_changed_building_shows_most_of_the_map(world):
+def test_a_changed_building_shows_most_of_the_map(world: str) -> None:
     rest = [residuals(draw_case(world, "changed", number)) for number in range(6)]
     share = np.mean([np.mean(np.abs(off) < 0.15) for off in rest])
     assert 0.6 < share < 0.999
 
 
-def test_noise_bias_and_no_return_are_what_they_are_called():
+def test_noise_bias_and_no_return_are_what_they_are_called() -> None:
     noisy, biased = draw_case("museum", "noisier", 0), draw_case("museum", "bias", 0)
     assert residuals(noisy).std() == pytest.approx(2.0 * noisy.scanner.sigma, rel=0.2)
     assert abs(np.median(residuals(biased))) == pytest.approx(0.02, abs=0.004)
@@ -66,7 +68,7 @@ def test_noise_bias_and_no_return_are_what_they_are_called():
     assert np.isinf(clean.ranges[shown(clean) > clean.scanner.range_max]).all()
 
 
-def test_a_turning_laser_sweeps_more_or_less_than_it_says():
+def test_a_turning_laser_sweeps_more_or_less_than_it_says() -> None:
     # Seen by the angles that it really has, the scan shows the map; by those declared it does not.
     case = draw_case("museum", "turning", 2)
     spread = []
@@ -84,7 +86,7 @@ def test_a_turning_laser_sweeps_more_or_less_than_it_says():
     assert abs(corrected.scanner.angle_increment) != pytest.approx(1.5 * math.pi / (BEAMS - 1), rel=0.01)
 
 
-def test_a_wrong_step_is_wrong_by_half_a_percent():
+def test_a_wrong_step_is_wrong_by_half_a_percent() -> None:
     case = draw_case("museum", "wrong_step", 2)
     spread = [
         np.median(
@@ -104,20 +106,20 @@ def test_a_wrong_step_is_wrong_by_half_a_percent():
     ("condition", "low", "high"),
     [("walls_5mm", 0.0, 0.03), ("walls_2cm", 0.01, 0.08), ("walls_5cm", 0.02, 0.2), ("cut", 0.01, 0.08)],
 )
-def test_maps_are_off_by_as_much_as_they_are_called(condition, low, high):
+def test_maps_are_off_by_as_much_as_they_are_called(condition: str, low: float, high: float) -> None:
     cases = [without_noise(draw_case("museum", condition, number)) for number in range(8)]
     medians = [np.median(np.abs(residuals(case))) for case in cases]
     assert low < np.mean(medians) < high
 
 
-def without_noise(case):
+def without_noise(case: Case) -> Case:
     """The same scan as a scanner without noise would have taken it."""
     quiet = scan(case.scene, case.pose, replace(case.scanner, sigma=0.0))
     return replace(case, ranges=quiet.ranges)
 
 
 @pytest.mark.parametrize(("condition", "size"), [("scaled_1", 0.01), ("scaled_2", 0.02)])
-def test_a_scaled_map_has_that_scale(condition, size):
+def test_a_scaled_map_has_that_scale(condition: str, size: float) -> None:
     scales = set()
     for number in range(8):
         case = draw_case("offices", condition, number)
@@ -127,7 +129,7 @@ def test_a_scaled_map_has_that_scale(condition, size):
     assert len(scales) == 2
 
 
-def test_a_sheared_map_has_other_angles():
+def test_a_sheared_map_has_other_angles() -> None:
     case = draw_case("offices", "sheared", 0)
     angles = [np.degrees(np.arctan2(*s.directions.T[::-1])) for s in (case.scene, case.map)]
     turns = (angles[1] - angles[0] + 180.0) % 360.0 - 180.0
@@ -135,7 +137,7 @@ def test_a_sheared_map_has_other_angles():
 
 
 @pytest.mark.parametrize(("condition", "share"), [("clutter_33", 0.33), ("clutter_66", 0.66)])
-def test_so_many_beams_end_on_clutter(condition, share):
+def test_so_many_beams_end_on_clutter(condition: str, share: float) -> None:
     for world in ("hospital", "mine", "warehouse"):
         case = draw_case(world, condition, 1)
         seen = scan(case.scene, case.pose, replace(case.scanner, sigma=0.0))
@@ -144,7 +146,7 @@ def test_so_many_beams_end_on_clutter(condition, share):
 
 
 @pytest.mark.parametrize("world", FAMILIES)
-def test_a_scan_of_the_unmapped_part_shows_nothing_of_the_map(world):
+def test_a_scan_of_the_unmapped_part_shows_nothing_of_the_map(world: str) -> None:
     rng = np.random.default_rng(7)
     style = FAMILIES[world].draw(rng)
     for _ in range(20):
@@ -163,7 +165,7 @@ def test_a_scan_of_the_unmapped_part_shows_nothing_of_the_map(world):
     assert case.map.lengths.sum() < 0.95 * case.scene.lengths.sum()
 
 
-def test_strangers_maps_are_of_other_buildings():
+def test_strangers_maps_are_of_other_buildings() -> None:
     for number in range(5):
         sister = draw_case("warehouse", "sister", number)
         other = draw_case("warehouse", "other_type", number)
@@ -175,7 +177,7 @@ def test_strangers_maps_are_of_other_buildings():
         assert set(depths[0].tolist()) & set(depths[1].tolist())
 
 
-def test_a_mirrored_scan_is_the_scan_read_backwards():
+def test_a_mirrored_scan_is_the_scan_read_backwards() -> None:
     case = draw_case("hotel", "mirrored", 0)
     upright = scan(case.scene, case.pose, replace(case.scanner, sigma=0.0))
     turned = upright.ranges[::-1] if abs(case.scanner.angle_min) < 3.1 else np.roll(upright.ranges[::-1], 1)
@@ -185,21 +187,23 @@ def test_a_mirrored_scan_is_the_scan_read_backwards():
     assert np.mean(np.abs(case.ranges - upright.ranges)[known] < 0.2) < 0.6
 
 
-def test_a_window_does_not_hold_the_truth():
+def test_a_window_does_not_hold_the_truth() -> None:
     segments = Segments.from_array([[x, 0.0, x + 1.0, 0.0] for x in range(30)])
     rng = np.random.default_rng(0)
     for _ in range(50):
         truth = RigidTransform(rng.uniform(0, 30), 1.0, 0.0)
         window = _window_elsewhere(truth, segments, rng)
+        assert window is not None
         away = math.hypot(window.pose.x - truth.x, window.pose.y - truth.y)
         assert away > window.radius
         assert distances(segments, window.pose.x, window.pose.y).min() < 1.5
     drawn = draw_case("offices", "window", 0).window
+    assert drawn is not None
     assert 2.0 <= drawn.radius <= 6.0
 
 
 @pytest.mark.parametrize(("world", "condition"), [("palace", "clean"), ("hotel", "raining")])
-def test_unknown_names_are_refused(world, condition):
+def test_unknown_names_are_refused(world: str, condition: str) -> None:
     with pytest.raises(SimulationError) as caught:
         draw_case(world, condition, 0)
     assert caught.value.argument == ("world" if world == "palace" else "condition")

@@ -5,7 +5,7 @@ import pytest
 
 from registration import RigidTransform, Segments
 from simulation import FAMILIES, Scanner, free_place, scan
-from simulation.buildings import FIXED
+from simulation.buildings import FIXED, Building
 from simulation.buildings.plan import Plan
 from simulation.buildings.shapes import box
 from simulation.changes import clutter, rearranged, with_doors
@@ -14,7 +14,7 @@ from simulation.crossings import crosses
 AHEAD = Scanner(1, 0.0, 0.1, sigma=0.0, range_max=100.0)
 
 
-def two_rooms():
+def two_rooms() -> Building:
     """Two rooms of 4 m by 4 m, a doorway of 1 m between them at y = 1 to 2."""
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0, 4.0))
@@ -23,7 +23,7 @@ def two_rooms():
     return plan.building("two rooms")
 
 
-def store(count=40):
+def store(count: int = 40) -> Building:
     plan = Plan()
     plan.room(box(0.0, 0.0, 4.0 * count, 6.0))
     for k in range(count):
@@ -35,7 +35,7 @@ def ahead(segments: Segments, x: float, y: float, theta: float) -> float:
     return float(scan(segments, RigidTransform(x, y, theta), AHEAD).ranges[0])
 
 
-def test_a_fifth_is_moved_or_gone():
+def test_a_fifth_is_moved_or_gone() -> None:
     before = store()
     after = rearranged(before, np.random.default_rng(3))
     assert len(before.kinds) == 40
@@ -49,7 +49,7 @@ def test_a_fifth_is_moved_or_gone():
 
 
 @pytest.mark.parametrize("name", ["school", "garage", "hotel"])
-def test_what_is_moved_keeps_its_shape_and_stands_free(name):
+def test_what_is_moved_keeps_its_shape_and_stands_free(name: str) -> None:
     rng = np.random.default_rng(8)
     before = FAMILIES[name].draw(rng).build(rng)
     after = rearranged(before, rng)
@@ -64,14 +64,14 @@ def test_what_is_moved_keeps_its_shape_and_stands_free(name):
     assert {round(float(v), 6) for v in after.segments.lengths[np.isin(after.things, moved)]} <= lengths
 
 
-def test_nothing_is_changed_where_the_share_is_0():
+def test_nothing_is_changed_where_the_share_is_0() -> None:
     before = store()
     after = rearranged(before, np.random.default_rng(0), share=0.0)
     np.testing.assert_array_equal(before.segments.endpoints, after.segments.endpoints)
     assert after.kinds == before.kinds
 
 
-def test_a_shut_door_is_a_wall_and_an_open_one_stands_in_the_room():
+def test_a_shut_door_is_a_wall_and_an_open_one_stands_in_the_room() -> None:
     building = two_rooms()
     assert ahead(building.segments, 1.0, 1.5, 0.0) == pytest.approx(7.2)
     shut = with_doors(building, np.random.default_rng(0), shut=1.0)
@@ -84,7 +84,7 @@ def test_a_shut_door_is_a_wall_and_an_open_one_stands_in_the_room():
     assert ahead(opened.segments, 3.5, 3.5, -0.5 * math.pi) == pytest.approx(2.5, abs=0.35)
 
 
-def test_half_of_the_doors_are_shut():
+def test_half_of_the_doors_are_shut() -> None:
     rng = np.random.default_rng(2)
     before = FAMILIES["hotel"].draw(rng).build(rng)
     after = with_doors(before, rng)
@@ -100,13 +100,15 @@ def test_half_of_the_doors_are_shut():
 
 @pytest.mark.parametrize("share", [0.33, 0.66])
 @pytest.mark.parametrize("name", ["hotel", "garage", "facades"])
-def test_clutter_takes_the_share_of_beams_that_was_asked_for(name, share):
+def test_clutter_takes_the_share_of_beams_that_was_asked_for(name: str, share: float) -> None:
     rng = np.random.default_rng(4)
     segments = FAMILIES[name].draw(rng).build(rng).segments
     scanner = Scanner.over(1.5 * math.pi, 720, range_max=25.0, sigma=0.0)
     for _ in range(8):
         pose = free_place(segments, rng, clearance=0.9)
-        outlines, reached = clutter(segments, pose, scanner, share, rng)
+        placed = clutter(segments, pose, scanner, share, rng)
+        assert placed is not None
+        outlines, reached = placed
         seen = scan(Segments.from_array(np.vstack([segments.endpoints, outlines])), pose, scanner)
         assert reached == pytest.approx(np.mean(seen.hits >= len(segments)), abs=1e-9)
         assert reached == pytest.approx(share, abs=0.03)
@@ -114,7 +116,7 @@ def test_clutter_takes_the_share_of_beams_that_was_asked_for(name, share):
         assert not crosses(outlines, segments.endpoints)
 
 
-def test_where_there_is_no_room_for_clutter_there_is_none():
+def test_where_there_is_no_room_for_clutter_there_is_none() -> None:
     cell = Segments.from_array([[0, 0, 1, 0], [1, 0, 1, 1], [1, 1, 0, 1], [0, 1, 0, 0]])
     scanner = Scanner.over(math.tau, 90, sigma=0.0)
     assert clutter(cell, RigidTransform(0.5, 0.5, 0.0), scanner, 0.5, np.random.default_rng(0)) is None

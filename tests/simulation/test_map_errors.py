@@ -4,19 +4,21 @@ import numpy as np
 import pytest
 
 from registration import RigidTransform, Segments
+from registration.layout import Floats
 from simulation import FAMILIES, Scanner, free_place, scan, wall_of_segment
 from simulation.map_errors import clipped, exact, in_pieces, stretched, walls_off
 
 # A wall with a doorway, one that faces it, one in line with the first but far off, and one across.
-WALLS = Segments.from_array([[0, 0, 2, 0], [3, 0, 6, 0], [6, 3, 0, 3], [9, 0, 12, 0], [6, 0, 6, 3], [6, 0.1, 0, 0.1]])
+ENDS = [[0.0, 0.0, 2.0, 0.0], [3.0, 0.0, 6.0, 0.0], [6.0, 3.0, 0.0, 3.0], [9.0, 0.0, 12.0, 0.0], [6.0, 0.0, 6.0, 3.0]]
+WALLS = Segments.from_array([*ENDS, [6.0, 0.1, 0.0, 0.1]])
 
 
-def school(seed=1):
+def school(seed: int = 1) -> Segments:
     rng = np.random.default_rng(seed)
     return FAMILIES["school"].draw(rng).build(rng).segments
 
 
-def test_pieces_of_one_wall_are_told_from_walls_in_line():
+def test_pieces_of_one_wall_are_told_from_walls_in_line() -> None:
     numbers = wall_of_segment(WALLS)
     assert numbers[0] == numbers[1]
     assert len(set(numbers.tolist())) == 5
@@ -24,14 +26,14 @@ def test_pieces_of_one_wall_are_told_from_walls_in_line():
     assert wall_of_segment(Segments.from_array([])).shape == (0,)
 
 
-def test_the_order_of_segments_does_not_matter():
+def test_the_order_of_segments_does_not_matter() -> None:
     order = np.random.default_rng(0).permutation(len(WALLS))
     numbers, shuffled = wall_of_segment(WALLS), wall_of_segment(WALLS.take(order))
     same = numbers[order][:, None] == numbers[order][None]
     np.testing.assert_array_equal(same, shuffled[:, None] == shuffled[None])
 
 
-def test_walls_are_off_along_their_normals_pieces_together():
+def test_walls_are_off_along_their_normals_pieces_together() -> None:
     segments = school()
     drawn = walls_off(segments, np.random.default_rng(2), 0.02)
     off = drawn.segments.offsets - segments.offsets
@@ -45,7 +47,7 @@ def test_walls_are_off_along_their_normals_pieces_together():
     assert len(firsts) < len(segments)
 
 
-def test_pieces_lie_on_their_wall_without_gaps():
+def test_pieces_lie_on_their_wall_without_gaps() -> None:
     segments = school()
     drawn = in_pieces(segments, np.random.default_rng(2), 0.02)
     whole = walls_off(segments, np.random.default_rng(2), 0.02).segments
@@ -59,7 +61,7 @@ def test_pieces_lie_on_their_wall_without_gaps():
 
 
 @pytest.mark.parametrize("linear", [1.01 * np.eye(2), np.array([[1.0, 0.01], [0.0, 0.99]])])
-def test_a_pose_goes_with_its_map(linear):
+def test_a_pose_goes_with_its_map(linear: Floats) -> None:
     segments, pose = school(), RigidTransform(3.0, 2.0, 0.4)
     drawn = stretched(segments, linear).laid(np.random.default_rng(5))
     there = drawn.pose(pose)
@@ -72,7 +74,7 @@ def test_a_pose_goes_with_its_map(linear):
     np.testing.assert_allclose(drawn.segments.endpoints[7, :2], drawn.linear @ corner + drawn.shift)
 
 
-def test_a_map_in_another_frame_shows_the_same():
+def test_a_map_in_another_frame_shows_the_same() -> None:
     segments, rng = school(), np.random.default_rng(6)
     pose = free_place(segments, rng)
     drawn = exact(segments, rng).laid(rng)
@@ -82,7 +84,7 @@ def test_a_map_in_another_frame_shows_the_same():
     assert abs(drawn.shift).max() > 0.1
 
 
-def test_clipping_cuts_walls_at_the_line():
+def test_clipping_cuts_walls_at_the_line() -> None:
     kept = clipped(WALLS, np.array([1.0, 0.0]), 4.0)
     expected = [[0, 0, 2, 0], [3, 0, 4, 0], [4, 3, 0, 3], [4, 0.1, 0, 0.1]]
     assert sorted(kept.endpoints.tolist()) == sorted(np.array(expected, dtype=float).tolist())

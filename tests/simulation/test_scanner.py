@@ -112,7 +112,7 @@ def test_noise_dropouts_and_quantisation_are_as_asked() -> None:
     np.testing.assert_allclose(stepped / 0.05, np.round(stepped / 0.05), atol=1e-9)
 
 
-def test_a_biased_scanner_measures_too_long_and_a_saturated_one_reads_its_limit():
+def test_a_biased_scanner_measures_too_long_and_a_saturated_one_reads_its_limit() -> None:
     plain, biased = (scan(SQUARE, ORIGIN, Scanner(sigma=0.0, bias=bias)).ranges for bias in (0.0, 0.02))
     np.testing.assert_allclose(biased - plain, 0.02)
     full = scan(SQUARE, ORIGIN, Scanner(range_max=1.2, sigma=0.0, saturated=True))
