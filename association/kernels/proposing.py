@@ -182,7 +182,8 @@ def search_base(
     lever = 2.0 * math.hypot(a.x, a.y) * math.sin(0.5 * min(widest, math.pi))
     window = prior.radius + WINDOW_MARGIN + lever + swing
     while progress.anchor < n_anchors:
-        wa = runs[anchor_list[progress.anchor]]
+        w = anchor_list[progress.anchor]
+        wa = runs[w]
         progress.anchor += 1
         spent += TESTS_ANCHOR
         dx = wa.dx
@@ -291,7 +292,8 @@ def search_slides(
     anchor_list = np.empty(len(runs), dtype=np.int32)
     n_anchors = anchors(a.length, runs, tables.sweep.bin_starts, anchor_list)
     while state.anchor < n_anchors:
-        wall = runs[anchor_list[state.anchor]]
+        w = anchor_list[state.anchor]
+        wall = runs[w]
         state.anchor += 1
         first = state.step
         state.step = 0

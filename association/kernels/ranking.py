@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from registration.compiling import kernel
-from registration.kernels import invert3
+from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Records
 
 from ..layout import BLOCKER, Blockers, Integers, Place, Question, Workspace
@@ -102,4 +102,5 @@ def distinct(poses: Records, order: Integers, most: int, distance: float, angle:
             kept[count] = i
             known[count] = invert3(poses[i], informations[count])
             count += 1
+    keep_alive(informations)
     return kept[:count]

@@ -60,7 +60,11 @@ def freed_too_early(function: ast.FunctionDef) -> list[str]:
     found = []
     for array in {name for name, value in assignments if isinstance(value, ast.Call)}:
         typed = any(
-            name == array and any(isinstance(a, ast.Name) and a.id.isupper() for a in value.args)
+            name == array
+            and any(
+                isinstance(a, ast.Name) and a.id.isupper()
+                for a in (*value.args[1:], *(k.value for k in value.keywords))
+            )
             for name, value in assignments
             if isinstance(value, ast.Call)
         )
