@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, Sea
 from association.candidates import Candidates, find_candidates
 from association.kernels.planning import plan_bases
 from association.tuning import BASE_SEGMENTS, KEPT_SHARE, KEPT_SHARE_FOR_BEAMS
-from registration.layout import Floats
+from registration.layout import Records
 
 from .reference import planning
 from .scenes import (
@@ -50,8 +51,8 @@ class EndsAfter(Deadline):
         return self.looked > self.looks
 
 
-def found(index: MapIndex, scan: Scan, **how: object) -> Candidates:
-    return find_candidates(context_of(index, scan, **how))  # type: ignore[arg-type]
+def found(index: MapIndex, scan: Scan, **how: Any) -> Candidates:
+    return find_candidates(context_of(index, scan, **how))
 
 
 def test_what_is_found_comes_best_first() -> None:
@@ -125,7 +126,7 @@ def test_the_confidence_is_the_share_of_sets_that_cannot_have_been_missed(confid
     """Six walls of four metres and more among twelve segments: a better set has six of them at least."""
     clutter = [[30.0 + 3.0 * k, 0.0, 30.0 + 3.0 * k + 4.5 * math.cos(k), 4.5 * math.sin(k)] for k in range(6)]
     walls = [[0, 0, 9, 0], [9, 0, 9, 4.5], [9, 4.5, 4.6, 4.5], [4.6, 4.5, 4.6, 9], [4.6, 9, 0, 9], [0, 9, 0, 0]]
-    index, scan = index_of(walls), scan_of(np.vstack([walls, clutter]))
+    index, scan = index_of(walls), scan_of([*walls, *clutter])
     report, least = found(index, scan, confidence=confidence).report, found(index, scan, confidence=0.5).report
     assert report.confidence >= confidence
     assert report.confidence == pytest.approx(1.0 - missed(index, scan, report.bases, 6), abs=0.015)
@@ -144,7 +145,7 @@ def test_where_beams_are_to_decide_more_is_kept() -> None:
     assert found_at(plain, index, 23.0) == 0.0
 
 
-def found_at(poses: Floats, index: MapIndex, x: float) -> float:
+def found_at(poses: Records, index: MapIndex, x: float) -> float:
     """Return the value of the pose at an abscissa of the map, 0 where there is none."""
     near = np.abs(poses["x"] + index.origin[0] - x) < 0.1
     return float(poses["value"][near].max(initial=0.0))

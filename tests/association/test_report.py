@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def given_answer() -> Answer:
     return answer_with(ranked(80.0, -2.0, share=0.6), registered, accepted=accepted, significance=1e-5)
 
 
-def told(answer: Answer | None, verdict: Verdict = SURE, **options: int) -> AssociationResult:
+def told(answer: Answer | None, verdict: Verdict = SURE, **options: Any) -> AssociationResult:
     """Report an answer beside four others."""
     context = context_of(ROOM_INDEX, SCAN, **options)
     return report(context, explanations_of(answer, *OTHERS), verdict)
@@ -74,6 +75,7 @@ def test_other_poses_best_first(most: int) -> None:
     for k, other in enumerate(alternatives):
         assert other.pose == RigidTransform(k + x, 0.5 + y, 0.1)
         assert (other.score, other.inlier_fraction, other.reliability) == (60.0 - k, 0.1 * k, 0.2 * k)
+        assert other.covariance is not None
         np.testing.assert_allclose(other.covariance, (k + 1.0) * SHARP)
 
 
@@ -147,7 +149,7 @@ def test_walls_that_are_matched_are_not_missing() -> None:
     assert report(context, replace(explanations, answer=on_screen), verdict).missing_map == (8,)
 
 
-def codes(endpoints: Floats, viewpoint: tuple[float, float] | None = (0.0, 0.0), **options: bool) -> dict[str, str]:
+def codes(endpoints: Floats, viewpoint: tuple[float, float] | None = (0.0, 0.0), **options: Any) -> dict[str, str]:
     """Return the warnings about a scan of the square room."""
     result = answer_of(index_of(SQUARE), scan_of(endpoints, viewpoint=viewpoint), **options)
     return {warning.code: warning.message for warning in result.warnings}

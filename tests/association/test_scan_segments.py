@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def test_with_raw_ranges_neighbouring_points_have_an_error_in_common() -> None:
     ],
 )
 def test_a_wide_tolerance_says_that_the_map_is_that_far_off(
-    options: dict[str, float], offset: float, angle: float
+    options: dict[str, Any], offset: float, angle: float
 ) -> None:
     """It is three standard deviations; one that is narrower than the sigmas' own says nothing of them."""
     row = context_of(ROOM_INDEX, scan_of([[0, 0, 9, 0]], 1e-6), **options).segments.rows[0]
