@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from association import (
     AssociationOptions,
@@ -67,7 +67,7 @@ def equal_rooms(count: int) -> Floats:
 
 
 def seen(
-    walls: ArrayLike,
+    walls: Any,
     at: RigidTransform,
     *,
     noise: float = 0.0,
@@ -103,12 +103,12 @@ def seen(
     return local[order], truth[order]
 
 
-def index_of(endpoints: ArrayLike, sigma: float = 0.0) -> MapIndex:
+def index_of(endpoints: Any, sigma: float = 0.0) -> MapIndex:
     return MapIndex.build(Segments.from_array(endpoints), sigma)
 
 
 def scan_of(
-    endpoints: ArrayLike, sigma: float = 0.02, viewpoint: tuple[float, float] | None = None, beams: Beams | None = None
+    endpoints: Any, sigma: float = 0.02, viewpoint: tuple[float, float] | None = None, beams: Beams | None = None
 ) -> Scan:
     """Wrap scan-frame endpoints; by default not seen from one place, since `seen` lets every wall be seen."""
     return Scan(MeasuredSegments.from_segments(Segments.from_array(endpoints), sigma), viewpoint, beams)

@@ -225,7 +225,7 @@ def test_covariance_is_that_of_the_errors() -> None:
     points = np.maximum(2, (lengths / 0.05).astype(int))
     total = 0.0
     for _ in range(300):
-        noisy = [_fitted(rng, *ends, count) for ends, count in zip(local, points.tolist(), strict=True)]
+        noisy = [_fitted(rng, begin, end, count) for (begin, end), count in zip(local, points.tolist(), strict=True)]
         result = answer_of(ROOM_INDEX, scan_of(noisy))
         found = pose_in(result)
         error = np.array([found.x - INSIDE.x, found.y - INSIDE.y, found.theta - INSIDE.theta])

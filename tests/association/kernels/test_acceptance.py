@@ -29,7 +29,7 @@ def test_union_length() -> None:
 def test_union_length_of_many(seed: int) -> None:
     rng = np.random.default_rng(seed)
     lows = rng.integers(0, 40, 12).astype(float)
-    highs = lows + rng.integers(0, 9, 12)
+    highs = lows + rng.integers(0, 9, 12).astype(float)
     cells = {x for low, high in zip(lows, highs, strict=True) for x in range(int(low), int(high))}
     assert acceptance.union_length(lows, highs, 12) == len(cells)
 

@@ -30,9 +30,9 @@ def agreement(scan: Records, viewpoint: np.ndarray, at: RigidTransform) -> float
 @settings(max_examples=40, deadline=None)
 def test_scan_distances(seed: int) -> None:
     d = drawn(seed)
-    viewpoint, distances = d.rng.normal(size=2), np.zeros(RAYS)
-    farthest = comparing.scan_distances(d.scan, *viewpoint.tolist(), distances)
-    expected, reach = twin.scan_distances(d.scan, viewpoint, RAYS)
+    (x, y), distances = d.rng.normal(size=2), np.zeros(RAYS)
+    farthest = comparing.scan_distances(d.scan, x, y, distances)
+    expected, reach = twin.scan_distances(d.scan, (x, y), RAYS)
     assert farthest == pytest.approx(reach)
     np.testing.assert_array_equal(np.isinf(distances), np.isinf(expected))
     np.testing.assert_allclose(distances, expected, rtol=1e-9)

@@ -16,7 +16,7 @@ from registration.layout import Records
 from ..records import estimate_of, pose_of
 from ..reference import beams as twin
 from ..reference.geometry import moved
-from ..scenes import ANGLES, INSIDE, ROOM, index_of, local, read, same_pose
+from ..scenes import ANGLES, INSIDE, ROOM, index_of, local, pose, read, same_pose
 from .drawn import INDEX, PLACE, SEEDS
 
 ROOM_INDEX = index_of(ROOM)
@@ -25,21 +25,22 @@ HERE = local(ROOM_INDEX, INSIDE)
 
 def drawn_rays(rng: np.random.Generator, count: int) -> tuple[Rays, RigidTransform, tuple[float, float], Records]:
     """Return what a sensor beside the origin of its frame reads in the maze, with noise, people and mirrors."""
-    at = RigidTransform(*rng.uniform(-7.0, 7.0, 2).tolist(), rng.uniform(-3.0, 3.0))
-    viewpoint = tuple(rng.uniform(-0.3, 0.3, 2).tolist())
-    sensor = at.compose(RigidTransform(*viewpoint, 0.0))
+    at = moved(pose(), rng.uniform(-1.0, 1.0, 3) * [3.0, 7.0, 7.0])
+    x, y = viewpoint = rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3)
+    sensor = at.compose(pose(x, y))
     ranges = read(INDEX, moved(sensor, [0.0, *INDEX.origin]))
     ranges += rng.normal(size=len(ranges)) * 0.02
     ranges *= np.where(rng.random(len(ranges)) < 0.2, rng.uniform(0.3, 1.5, len(ranges)), 1.0)
     some = np.sort(rng.permutation(len(ANGLES))[:count])
-    return Rays(ANGLES[some], ranges[some], 20.0), at, viewpoint, record(VIEW, x=viewpoint[0], y=viewpoint[1])
+    return Rays(ANGLES[some], ranges[some], 20.0), at, viewpoint, record(VIEW, x=x, y=y)
 
 
 def evidence_of(ranges: np.ndarray) -> tuple[float, float]:
     out, rays = np.zeros(1, BEAM_EVIDENCE), Rays(ANGLES, ranges, 20.0)
     place, view = ROOM_INDEX.tables.place, np.zeros(1, VIEW)
     beams.beam_evidence(rays, view[0], estimate_of(HERE)[0], place, np.zeros(1, RAY)[0], out[0])
-    return tuple(out[0].item())
+    read, passed = out[0].item()
+    return read, passed
 
 
 def test_evidence_at_the_truth_and_elsewhere() -> None:

@@ -42,7 +42,7 @@ def record_of(prior: Prior | None) -> Records:
 @settings(max_examples=100, deadline=None)
 def test_prior_value(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    at = pose(*rng.normal(size=2).tolist(), rng.uniform(-3.1, 3.1))
+    at = moved(pose(), rng.normal(size=3) * [2.0, 1.0, 1.0])
     root = rng.normal(size=(3, 3))
     poses = [moved(at, rng.normal(size=3)) for _ in range(8)]
     table = np.concatenate([estimate_of(one) for one in poses])

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from association.layout import Pieces
 from association.tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
-from .geometry import direction
+from .geometry import Vector, direction
 from .sight import count_blockers
 
 SAMPLES = 20_000  # points of a segment, to measure how much of it is covered
@@ -21,7 +21,7 @@ Pair = tuple[int, int, float, list[int]]  # scan index, piece, overlap, other pi
 
 
 def pieces_of(pieces: Pieces, wall: int) -> list[int]:
-    return pieces.items[pieces.starts[wall] : pieces.starts[wall + 1]].tolist()
+    return [int(piece) for piece in pieces.items[pieces.starts[wall] : pieces.starts[wall + 1]]]
 
 
 def run_of(walls: Records, wall: int) -> list[int]:
@@ -35,7 +35,7 @@ def run_of(walls: Records, wall: int) -> list[int]:
 
 
 def accept_matches(
-    matched: ArrayLike, order: ArrayLike, scan_ends: Floats, pose: RigidTransform, walls: Records, pieces: Pieces
+    matched: Any, order: Any, scan_ends: Floats, pose: RigidTransform, walls: Records, pieces: Pieces
 ) -> list[Pair]:
     """List the pairs by scan index; `matched` (n,) is the wall of each row, `order` (n,) its scan index."""
     found = []
@@ -59,7 +59,7 @@ def accept_matches(
 
 
 def missing_pieces(
-    scan: Records, matched: ArrayLike, viewpoint: ArrayLike, pose: RigidTransform, walls: Records, pieces: Pieces
+    scan: Records, matched: Any, viewpoint: Vector, pose: RigidTransform, walls: Records, pieces: Pieces
 ) -> list[int]:
     """List the pieces of walls that at least half of the rays that count fully pass, and on which nothing was seen."""
     on = np.asarray(matched)

@@ -6,7 +6,6 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from association.layout import WALL
 from association.tuning import (
@@ -24,7 +23,7 @@ from association.tuning import (
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
-from .geometry import direction, normal, point
+from .geometry import Vector, direction, normal, point
 from .sight import first_hit
 
 
@@ -32,7 +31,7 @@ def angles_of(rays: int) -> Floats:
     return np.asarray(math.tau * (np.arange(rays) + 0.5) / rays)
 
 
-def scan_distances(scan: Records, viewpoint: ArrayLike, rays: int) -> tuple[Floats, float]:
+def scan_distances(scan: Records, viewpoint: Vector, rays: int) -> tuple[Floats, float]:
     """Send rays at the segments as if they were walls; return distances, and how far the scan reaches."""
     walls = np.zeros(len(scan), WALL)
     along = np.einsum("ij,ij->i", direction(scan), point(scan))
@@ -55,7 +54,7 @@ def in_view(distances: Floats) -> list[bool]:
     return [k not in blind for k in range(rays)]
 
 
-def agreement(scan: Records, viewpoint: ArrayLike, pose: RigidTransform, walls: Records) -> float:
+def agreement(scan: Records, viewpoint: Vector, pose: RigidTransform, walls: Records) -> float:
     """Compare along each ray the first scan segment with the first wall."""
     distances, farthest = scan_distances(scan, viewpoint, RAYS)
     agree = against = 0
@@ -66,10 +65,10 @@ def agreement(scan: Records, viewpoint: ArrayLike, pose: RigidTransform, walls: 
             continue
         tolerance = AGREEING + AGREEING_SHARE * distance
         if distance < math.inf:
-            agree += abs(distance - reach) < tolerance
-            against += distance - reach >= tolerance
+            agree += bool(abs(distance - reach) < tolerance)
+            against += bool(distance - reach >= tolerance)
         else:
             sine = abs(normal(walls[w]) @ [math.cos(towards), math.sin(towards)])
             near = reach < min(farthest, MISSING_RANGE)
-            against += near and walls[w]["end"] - walls[w]["begin"] > MISSING_LENGTH and sine > MISSING_SINE
+            against += bool(near and walls[w]["end"] - walls[w]["begin"] > MISSING_LENGTH and sine > MISSING_SINE)
     return agree / (agree + against) if agree + against else NEUTRAL

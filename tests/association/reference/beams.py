@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from association.layout import Place, Rays
 from association.tuning import (
@@ -22,13 +21,13 @@ from registration import RigidTransform
 from registration.layout import SEEN
 
 from .consensus import solve
-from .geometry import direction, listed, normal
+from .geometry import Vector, direction, listed, normal
 from .sight import first_hit
 
 Evidence = tuple[float, float]  # read, passed
 
 
-def beam_evidence(rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place: Place) -> Evidence:
+def beam_evidence(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place) -> Evidence:
     """Compare every beam with the first wall on its way."""
     read = passed = 0.0
     for angle, distance in zip(rays.angles + pose.theta, rays.ranges, strict=True):
@@ -45,9 +44,7 @@ def beam_evidence(rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place:
     return read / max(1, len(rays.angles)), passed / max(1, len(rays.angles))
 
 
-def refine_by_beams(
-    rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place: Place, gate: float
-) -> RigidTransform:
+def refine_by_beams(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:
     """Lay the ends of the beams on the nearest of the walls that are listed where they are."""
     ends, lines = [], []
     for angle, distance in zip(rays.angles, rays.ranges, strict=True):
@@ -72,7 +69,7 @@ def refine_by_beams(
 
 
 def weigh_beams(
-    rays: Rays, viewpoint: ArrayLike, pose: RigidTransform, place: Place
+    rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place
 ) -> tuple[RigidTransform, Evidence, Evidence]:
     """Return where a pose is moved to, and what the beams say there and where it was."""
     moved = pose

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -42,8 +43,8 @@ def solve(seen: Records, lines: Records, weights: Floats, start: RigidTransform)
     def jacobian(x: Floats) -> Floats:
         return _linearised(seen, lines, weights, start, x)[1]
 
-    least = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    x = least_squares(residuals, [start.x, start.y, start.theta], jacobian, method="lm", **least).x
+    begin = [start.x, start.y, start.theta]
+    x = least_squares(residuals, begin, jacobian, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
     return RigidTransform(*x.tolist()), jacobian(x).T @ jacobian(x)
 
 
@@ -52,12 +53,13 @@ def _linearised(
 ) -> tuple[Floats, Floats]:
     """Return the residuals at (x, y, theta), and their derivatives."""
     r, t, spring = rotation(x[2]), x[:2], math.sqrt(SPRING)
-    residuals, rows = list(spring * (t - translation(start))), [[spring, 0.0, 0.0], [0.0, spring, 0.0]]
+    residuals: list[float] = list(spring * (t - translation(start)))
+    rows: list[Any] = [[spring, 0.0, 0.0], [0.0, spring, 0.0]]
     for one, line, weight in zip(seen, lines, weights, strict=True):
         n, root = normal(line), math.sqrt(weight)
         mean = r @ point(one, "centroid_x", "centroid_y")
         spread = math.sqrt(one["spread"]) * r @ direction(one)
-        residuals += [root * (n @ (mean + t) - line["offset"]), root * (n @ spread)]
+        residuals += [root * float(n @ (mean + t) - line["offset"]), root * float(n @ spread)]
         rows += [root * np.array([*n, n @ TURN @ mean]), root * np.array([0.0, 0.0, n @ TURN @ spread])]
     return np.array(residuals), np.array(rows)
 
@@ -96,7 +98,7 @@ def refine(
         if not some.any():
             return Refined(0.0, pose, covariance, matches, held)
         solved, information = solve(scan[some], place.walls[held[some]], scan["weight"][some], pose)
-        covariance = np.linalg.inv(information)
+        covariance = np.asarray(np.linalg.inv(information), np.float64)
         if abs(wrap(solved.theta - pose.theta)) > MAX_TURN or np.hypot(solved.x - pose.x, solved.y - pose.y) > MAX_STEP:
             break
         pose = solved

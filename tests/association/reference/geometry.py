@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from association.layout import Grid
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
+
+Vector: TypeAlias = Any  # two numbers
 
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])  # by 90 degrees
 
@@ -33,14 +35,14 @@ def direction(record: Record) -> Floats:
 
 def normal(record: Record) -> Floats:
     """Return the left normal, (2,) or (n, 2)."""
-    return direction(record) @ TURN.T
+    return np.asarray(direction(record) @ TURN.T)
 
 
 def translation(pose: RigidTransform) -> Floats:
     return np.array([pose.x, pose.y])
 
 
-def moved(pose: RigidTransform, by: ArrayLike) -> RigidTransform:
+def moved(pose: RigidTransform, by: Any) -> RigidTransform:
     """Add (theta, x, y) to a pose."""
     theta, x, y = np.asarray(by, dtype=float).tolist()
     return RigidTransform(pose.x + x, pose.y + y, pose.theta + theta)
@@ -57,4 +59,4 @@ def cell_of(shape: Records, at: Floats) -> int | None:
 def listed(grid: Grid, at: Floats) -> list[int]:
     """Return what a grid lists at a point."""
     cell = cell_of(grid.shape, at)
-    return [] if cell is None else grid.items[grid.starts[cell] : grid.starts[cell + 1]].tolist()
+    return [] if cell is None else [int(k) for k in grid.items[grid.starts[cell] : grid.starts[cell + 1]]]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from association.layout import MERIT, Place
 from association.tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
@@ -13,7 +13,7 @@ from registration import RigidTransform
 from registration.layout import Floats, Records
 
 from .consensus import refine
-from .geometry import direction, wrap
+from .geometry import Vector, direction, wrap
 from .sight import count_blockers, sight_penalty
 
 START = np.diag([START_VARIANCE, START_VARIANCE, START_ANGLE_VARIANCE])
@@ -21,7 +21,7 @@ Ranked = tuple[RigidTransform, Floats, Records, Records]  # pose, covariance, me
 
 
 def rank(
-    scan: Records, poses: list[RigidTransform], viewpoint: ArrayLike | None, place: Place, gates: Records
+    scan: Records, poses: list[RigidTransform], viewpoint: Vector | None, place: Place, gates: Records
 ) -> list[Ranked]:
     """Refine one pose after the other; lines of sight from the viewpoint count for those that are not far behind."""
     ranked: list[Ranked] = []
@@ -53,14 +53,15 @@ def reliability(directions: Floats, weights: Floats) -> float:
 def distinct(
     poses: list[RigidTransform],
     covariances: Floats,
-    order: ArrayLike,
+    order: Any,
     most: int,
     distance: float,
     angle: float,
     family: float,
 ) -> list[int]:
     """Take the best pose, strike what it stands for, and so on."""
-    left, kept = np.asarray(order).tolist(), []
+    left: list[int] = np.asarray(order).tolist()
+    kept: list[int] = []
     while left and len(kept) < most:
         best = left.pop(0)
         kept.append(best)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from association.tuning import (
     BLOCKED,
@@ -20,12 +20,12 @@ from association.tuning import (
 from registration import RigidTransform
 from registration.layout import Record, Records
 
-from .geometry import direction, normal, point
+from .geometry import Vector, direction, normal, point
 
 Counts = dict[int, list[int]]  # of each wall the rays to matched segments that pass through it, and of those to others
 
 
-def first_hit(at: ArrayLike, angle: float, limit: float, walls: Records) -> tuple[float, int]:
+def first_hit(at: Vector, angle: float, limit: float, walls: Records) -> tuple[float, int]:
     """Cross the ray with all walls."""
     d = np.array([math.cos(angle), math.sin(angle)])
     across = normal(walls) @ d
@@ -45,9 +45,7 @@ def rays_to(segment: Record) -> list[np.ndarray]:
     return [point(segment) + share * usable * direction(segment) for share in (np.arange(count) + 0.5) / count - 0.5]
 
 
-def count_blockers(
-    scan: Records, matched: ArrayLike, viewpoint: ArrayLike, pose: RigidTransform, walls: Records
-) -> Counts:
+def count_blockers(scan: Records, matched: Any, viewpoint: Vector, pose: RigidTransform, walls: Records) -> Counts:
     """Send the rays one by one."""
     counts: Counts = {}
     eye = pose.apply(viewpoint)

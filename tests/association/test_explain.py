@@ -1,0 +1,65 @@
+"""Explanations: which of them is the answer, which are its rivals, and what is worked out of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from association import Deadline, HardPrior
+from association.explain import explain
+from association.sight import agreement
+from association.significance import significance
+
+from .answers import ROOM_INDEX, SCAN, answer_with, explanations_of, ranked
+from .scenes import INSIDE, ROOM, context_of, equal_rooms, index_of, pose, same_pose, scan_of
+
+
+def test_rivals_lie_within_the_window_and_others_anywhere() -> None:
+    best, second, third = ranked(90.0), ranked(80.0), ranked(70.0)
+    outside = ranked(95.0, inside=False)
+    explanations = explanations_of(answer_with(best), third, outside, second)
+    assert explanations.ranked == (best, second, third, outside)
+    assert explanations.rivals == (second, third)
+    assert explanations.others == (second, third, outside)
+    nothing = explanations_of(None, outside)
+    assert nothing.rivals == ()
+    assert nothing.others == (outside,)
+
+
+def test_the_answer_is_the_best_within_the_window() -> None:
+    index = index_of(equal_rooms(2))
+    context = context_of(index, SCAN, HardPrior(pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta), 0.5, 0.3))
+    explanations = explain(context)
+    assert explanations.answer is not None
+    assert explanations.answer.best is explanations.ranked[0]
+    assert context.in_map(explanations.answer.best.pose).x == pytest.approx(INSIDE.x + 12.0)
+    found = explanations.answer.registered.pose
+    assert found is not None
+    assert same_pose(found, pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta), 1e-6, 1e-6)
+
+
+def test_nothing_within_the_window_is_no_answer() -> None:
+    """What was found outside is told."""
+    explanations = explain(context_of(ROOM_INDEX, SCAN, HardPrior(pose(-30.0, 0.0), 0.5, 0.3)))
+    assert explanations.answer is None
+    assert len(explanations.ranked) > 0
+    assert not any(one.inside for one in explanations.ranked)
+
+
+def test_what_is_worked_out_of_the_answer() -> None:
+    """Chance is asked for the worth of the matches alone, not for what lines of sight speak against them."""
+    context = context_of(index_of(np.vstack([ROOM, [[4.5, 0.5, 4.5, 3.5]]])), SCAN)
+    explanations = explain(context)
+    answer = explanations.answer
+    assert answer is not None
+    worth = float(answer.best.matches["worth"].sum())
+    assert worth > answer.best.score + 3.0
+    assert answer.significance == significance(context, worth) < significance(context, answer.best.score)
+    assert answer.agreement == agreement(context, answer.best) < 1.0
+    assert len(answer.accepted.pairs) == int(answer.best.matched.sum()) == 8
+    assert explanations.search.complete
+
+
+def test_the_report_of_the_search_is_handed_on() -> None:
+    assert not explain(context_of(ROOM_INDEX, SCAN, deadline=Deadline(at=0.0))).search.complete
+    assert explain(context_of(ROOM_INDEX, scan_of(np.zeros((0, 4))), seed=9)).search.seed == 9

@@ -1,0 +1,213 @@
+"""Explanations come in order: within the window first, by score and prior, none twice."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from association import Beams, HardPrior, MapIndex, Prior, SoftPrior
+from association.candidates import Candidates, find_candidates
+from association.context import SearchContext
+from association.layout import FOUND, Rays
+from association.ranking import Ranked, rank_candidates
+from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LEAST_DISTINCT, MOST_BEAMS
+from registration import RigidTransform
+from registration.layout import Floats
+
+from .answers import explanations_of, ranked
+from .reference import beams as beams_twin
+from .reference import ranking as twin
+from .reference.best_poses import prior_value
+from .scenes import (
+    ANGLES,
+    INSIDE,
+    ROOM,
+    beams_of,
+    context_of,
+    equal_rooms,
+    index_of,
+    local,
+    pose,
+    read,
+    same_pose,
+    scan_of,
+    seen,
+)
+
+ENDPOINTS = seen(ROOM, INSIDE)[0]
+ROOM_SCAN = scan_of(ENDPOINTS)
+
+
+def room(k: int) -> RigidTransform:
+    """Return where the sensor stands in room k of `equal_rooms`."""
+    return pose(INSIDE.x + 12.0 * k, INSIDE.y, INSIDE.theta)
+
+
+def candidates_of(index: MapIndex, poses: list[RigidTransform]) -> Candidates:
+    """Return poses of the map frame as if a search had found them, in that order."""
+    found = np.zeros(len(poses), FOUND)
+    for row, at in zip(found, poses, strict=True):
+        here = local(index, at)
+        row["theta"], row["x"], row["y"] = here.theta, here.x, here.y
+    return Candidates(found, explanations_of(None).search)
+
+
+def ranked_at(context: SearchContext, *poses: RigidTransform) -> list[Ranked]:
+    return rank_candidates(context, candidates_of(context.index, list(poses)))
+
+
+def places(context: SearchContext, found: list[Ranked]) -> list[RigidTransform]:
+    return [context.in_map(one.pose) for one in found]
+
+
+def test_what_an_explanation_says_of_its_pose() -> None:
+    covariance = np.array([[0.09, 0.02, 0.001], [0.02, 0.04, 0.002], [0.001, 0.002, 1e-3]])
+    one = ranked(at=pose(1.0, -2.0, 0.3), covariance=covariance, matched=3)
+    assert one.pose == pose(1.0, -2.0, 0.3)
+    np.testing.assert_allclose(one.covariance, covariance)
+    assert one.deviation == pytest.approx(math.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[1]))
+    assert one.matched.tolist() == [True] * 3 + [False] * 5
+
+
+def test_the_best_comes_first_with_what_belongs_to_it() -> None:
+    """Of three rooms the second lacks no wall, the first one and the third two; a fourth pose lies nowhere."""
+    walls = np.vstack([ROOM[:-1], equal_rooms(2)[8:], ROOM[1:-1] + np.tile([24.0, 0.0], 2)])
+    context = context_of(index_of(walls), ROOM_SCAN)
+    found = ranked_at(context, room(0), pose(500.0), room(2), room(1))
+    assert [same_pose(at, room(k), 1e-6, 1e-6) for at, k in zip(places(context, found), (1, 0, 2), strict=True)] == [
+        True
+    ] * 3
+    here = [local(context.index, room(k)) for k in (1, 0, 2)]
+    expected = twin.rank(context.segments.rows, here, None, context.index.tables.place, context.gates)
+    for one, (at, covariance, merit, matches) in zip(found, expected, strict=True):
+        assert same_pose(one.pose, at, 1e-6, 1e-6)
+        np.testing.assert_allclose(one.covariance, covariance, rtol=1e-4, atol=1e-9)
+        score, length, share, reliability, misfit = merit[0].item()
+        assert (one.score, one.value, one.length) == pytest.approx((score, score, length))
+        assert (one.share, one.reliability, one.misfit) == pytest.approx((share, reliability, misfit), abs=1e-6)
+        np.testing.assert_array_equal(one.matches["wall"], matches["wall"])
+        assert one.inside
+    assert [round(one.share, 3) for one in found] == [1.0, round(26.5 / 32.0, 3), round(17.5 / 32.0, 3)]
+
+
+def test_lines_of_sight_count_where_there_are_no_beams() -> None:
+    index = index_of(np.vstack([ROOM, [[4.5, 0.5, 4.5, 3.5]]]))
+    blind, sighted = (
+        ranked_at(context_of(index, scan_of(ENDPOINTS, viewpoint=at)), INSIDE)[0] for at in (None, (0.0, 0.0))
+    )
+    assert blind.score - sighted.score > 3.0
+
+
+@pytest.mark.parametrize(("wanted", "count"), [(5, LEAST_DISTINCT), (LEAST_DISTINCT + 2, LEAST_DISTINCT + 3), (50, 30)])
+def test_so_many_are_told_apart_as_may_be_asked_for(wanted: int, count: int) -> None:
+    """One more than the alternatives, and enough for the verdict."""
+    context = context_of(index_of(equal_rooms(30)), ROOM_SCAN, max_alternatives=wanted)
+    assert len(ranked_at(context, *map(room, range(30)))) == count
+
+
+@pytest.mark.parametrize(
+    ("by", "count"),
+    [
+        (pose(0.2), 1),
+        (pose(0.5), 2),
+        (pose(0.0, 0.0, 0.05), 1),
+        (pose(0.0, 0.0, 0.2), 2),
+    ],
+)
+def test_explanations_near_each_other_are_one(by: RigidTransform, count: int) -> None:
+    """On a map that has a room twice, the second time moved as the sensor would be."""
+    moved = INSIDE.compose(by).compose(INSIDE.inverse())
+    again = moved.apply(ROOM.reshape(-1, 2, 2)).reshape(-1, 4)
+    context = context_of(index_of(np.vstack([ROOM, again])), ROOM_SCAN, angle_tolerance=0.02, offset_tolerance=0.05)
+    assert len(ranked_at(context, INSIDE, INSIDE.compose(by))) == count
+
+
+def test_a_soft_prior_counts_in_the_order() -> None:
+    prior = SoftPrior(room(2), np.diag([16.0, 1.0, 1.0]))
+    context = context_of(index_of(equal_rooms(3)), ROOM_SCAN, prior)
+    found = ranked_at(context, room(0), room(1), room(2))
+    for one, k in zip(found, (2, 1, 0), strict=True):
+        assert same_pose(context.in_map(one.pose), room(k), 1e-6, 1e-6)
+        assert one.value - one.score == pytest.approx(prior_value(prior, room(k)), abs=1e-5)
+        assert one.inside
+
+
+def test_poses_within_a_window_come_first() -> None:
+    """However good the others are; the window counts in no value."""
+    index = index_of(np.vstack([ROOM, ROOM[2:] + np.tile([12.0, 0.0], 2)]))
+    context = context_of(index, ROOM_SCAN, HardPrior(room(1), 0.5, 0.3))
+    found = ranked_at(context, room(0), room(1))
+    assert [one.inside for one in found] == [True, False]
+    assert found[0].score < found[1].score - 10.0
+    assert all(one.value == one.score for one in found)
+    assert same_pose(context.in_map(found[0].pose), room(1), 1e-6, 1e-6)
+
+
+def with_gaps(ranges: Floats, unknown: int) -> Beams:
+    """Return beams of which some are not known."""
+    told = ranges.copy()
+    told[:unknown] = math.nan
+    return Beams(ANGLES, told, 20.0)
+
+
+@pytest.mark.parametrize("unknown", [0, 70])
+def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
+    """At most 180 of those of which something is known, evenly spread."""
+    index = index_of(equal_rooms(2))
+    beams = with_gaps(read(index, INSIDE), unknown)
+    context = context_of(index, scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams))
+    found = ranked_at(context, INSIDE)[0]
+    known = ~np.isnan(beams.ranges)
+    step = math.ceil(known.sum() / MOST_BEAMS)
+    rays = Rays(beams.angles[known][::step], beams.ranges[known][::step], 20.0)
+    place, here = index.tables.place, local(index, INSIDE)
+    moved, (reading, passed), _ = beams_twin.weigh_beams(rays, (0.0, 0.0), here, place)
+    ((_, _, merit, _),) = twin.rank(context.segments.rows, [moved], None, place, context.gates)
+    expected = merit["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
+    assert found.score == pytest.approx(expected, abs=0.01)
+
+
+def test_beams_that_pass_through_walls_speak_against_a_pose() -> None:
+    """A room and its twin with a screen, before which and behind which the beams end."""
+    index = index_of(np.vstack([equal_rooms(2), [[19.5, 0.5, 19.5, 3.8]]]))
+    context = context_of(index, scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE)))
+    found = ranked_at(context, room(1), room(0))
+    assert same_pose(context.in_map(found[0].pose), room(0), 1e-3, 1e-3)
+    assert found[0].score - found[1].score > 0.1 * BEAMS_READ
+
+
+def test_what_beams_speak_against_altogether_is_none() -> None:
+    """All of them pass through a wall that is a metre before them."""
+    index = index_of(ROOM)
+    beams = Beams(ANGLES, read(index, INSIDE) + 1.0, 20.0)
+    context = context_of(index, scan_of(ENDPOINTS[:1], viewpoint=(0.0, 0.0), beams=beams))
+    assert ranked_at(context, INSIDE) == []
+
+
+def crowded(prior: Prior | None) -> list[Ranked]:
+    """Rank 40 equal rooms and one that lacks walls, all of them candidates."""
+    poor = ROOM[3:] + np.tile([0.0, 50.0], 2)
+    index = index_of(np.vstack([equal_rooms(40), poor]))
+    scan = scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE))
+    context = context_of(index, scan, prior, max_alternatives=50)
+    return ranked_at(context, *map(room, range(40)), pose(INSIDE.x, INSIDE.y + 50.0, INSIDE.theta))
+
+
+def test_single_beams_are_looked_at_for_the_best_alone() -> None:
+    assert len(crowded(None)) == BEAM_FINALISTS
+
+
+def test_what_lies_in_a_window_is_looked_at_however_good_the_others_are() -> None:
+    found = crowded(HardPrior(pose(INSIDE.x, INSIDE.y + 50.0, INSIDE.theta), 0.5, 0.3))
+    assert [one.inside for one in found] == [True] + [False] * (len(found) - 1)
+    assert found[0].score < found[1].score
+
+
+def test_nothing_found_is_nothing_ranked() -> None:
+    index = index_of(ROOM)
+    beams = beams_of(index, INSIDE)
+    for scan in (scan_of(np.zeros((0, 4))), scan_of(np.zeros((0, 4)), viewpoint=(0.0, 0.0), beams=beams)):
+        context = context_of(index, scan)
+        assert rank_candidates(context, find_candidates(context)) == []

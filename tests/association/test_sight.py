@@ -1,0 +1,43 @@
+"""Lines of sight at the answer, where the scan was taken from one place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from association.explain import explain
+from association.sight import agreement, missing_segments
+from association.tuning import NEUTRAL
+
+from .answers import SCAN
+from .reference import acceptance as missing_twin
+from .reference import agreement as agreement_twin
+from .scenes import INSIDE, ROOM, context_of, index_of, scan_of, seen
+
+SCREENED = np.vstack([ROOM, [[4.5, 0.5, 4.5, 3.5]]])  # by a wall that is not seen
+ENDPOINTS = seen(ROOM, INSIDE)[0]
+
+
+@pytest.mark.parametrize("oriented", [True, False])
+def test_what_should_have_been_seen_is_missing(oriented: bool) -> None:
+    """By the index that was sent, once; without a viewpoint nothing is."""
+    context = context_of(index_of(SCREENED), SCAN, oriented=oriented)
+    best = explain(context).ranked[0]
+    assert missing_segments(context, best) == (8,)
+    rows, walls = context.segments.rows, context.index.walls.rows
+    expected = missing_twin.missing_pieces(
+        rows, best.matches["wall"], (0.0, 0.0), best.pose, walls, context.index.pieces
+    )
+    assert expected == ([8] if oriented else [17]), "the same wall, the other way round"
+    nowhere = context_of(index_of(SCREENED), scan_of(ENDPOINTS), oriented=oriented)
+    assert missing_segments(nowhere, explain(nowhere).ranked[0]) == ()
+
+
+def test_agreement_is_that_of_the_pose() -> None:
+    context = context_of(index_of(SCREENED), SCAN)
+    best = explain(context).ranked[0]
+    expected = agreement_twin.agreement(context.segments.rows, (0.0, 0.0), best.pose, context.index.walls.rows)
+    assert agreement(context, best) == pytest.approx(expected)
+    assert 0.5 < expected < 0.95
+    elsewhere = context_of(index_of(SCREENED), scan_of(ENDPOINTS))
+    assert agreement(elsewhere, best) == NEUTRAL
