@@ -131,7 +131,7 @@ def _attempt(world: str, condition: str, number: int, rng: np.random.Generator) 
     known: Segments | None = _searched(world, style, building.segments, rule.stranger, rng)
     pose = free_place(standing, rng)
     if rule.stranger is Stranger.UNMAPPED:
-        pose, known = _unmapped_part(building.segments, rng)
+        pose, known = _unmapped_part(building.segments, standing, rng)
     if known is None:
         return None
     declared = _laser(rng, full_turn=rule.full_turn)
@@ -182,10 +182,20 @@ def _searched(world: str, style: Style, own: Segments, stranger: Stranger | None
     return own
 
 
-def _unmapped_part(segments: Segments, rng: np.random.Generator) -> tuple[RigidTransform, Segments | None]:
+def _unmapped_part(
+    segments: Segments, standing: Segments, rng: np.random.Generator
+) -> tuple[RigidTransform, Segments | None]:
     """Find a place from which nothing is seen of some part of the building that is large enough for a map.
 
     The part is cut off by a line along or across the building, just beyond what a laser sees at its farthest.
+
+    Parameters
+    ----------
+    segments : Segments
+        Of the building as it was mapped.
+    standing : Segments
+        Of the same when it is scanned.
+    rng : numpy.random.Generator
 
     Returns
     -------
@@ -193,17 +203,17 @@ def _unmapped_part(segments: Segments, rng: np.random.Generator) -> tuple[RigidT
     Segments or None
         The part; None where no place was found.
     """
-    pose = free_place(segments, rng)
+    pose = free_place(standing, rng)
     total = segments.lengths.sum()
     for _ in range(PLACES):
-        seen = scan(segments, pose, Scanner.over(math.tau, BEAMS, range_max=RANGE_MAX[1], sigma=0.0))
+        seen = scan(standing, pose, Scanner.over(math.tau, BEAMS, range_max=RANGE_MAX[1], sigma=0.0))
         points = pose.apply(seen.points)
         for axis in rng.permutation(4):
             normal = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][axis])
             part = clipped(segments, normal, float((points @ normal).min()) - MARGIN)
             if MAPPED[0] <= part.lengths.sum() / total <= MAPPED[1]:
                 return pose, part
-        pose = free_place(segments, rng)
+        pose = free_place(standing, rng)
     return pose, None
 
 

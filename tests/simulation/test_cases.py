@@ -151,7 +151,7 @@ def test_a_scan_of_the_unmapped_part_shows_nothing_of_the_map(world: str) -> Non
     style = FAMILIES[world].draw(rng)
     for _ in range(20):
         building = style.build(rng).segments
-        pose, part = _unmapped_part(building, rng)
+        pose, part = _unmapped_part(building, building, rng)
         if part is not None:
             break
     assert part is not None
