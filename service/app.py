@@ -20,19 +20,19 @@ from starlette.routing import Match
 from association import CancelledError
 from registration import InputError
 
-from .compiling import compile_kernels, is_compiled
-from .context import RequestContext, note, request_id_of
-from .keys import KeyGuard
-from .openapi import describe
-from .part import WHOLE, Part
-from .problems import ProblemError, faults_of, internal, invalid
-from .routes import associate, maps, operations, pages, register, vectorize
+from .admission.keys import KeyGuard
+from .http.openapi import describe
+from .http.problems import ProblemError, faults_of, internal, invalid
+from .http.reception import RequestContext, note, request_id_of
+from .http.routes import associate, maps, operations, pages, register, vectorize
+from .http.translation import problem_of
+from .process.compiling import compile_kernels, is_compiled
+from .process.part import WHOLE, Part
+from .process.warmup import warm_up
 from .runtime import HangUpError, Runtime
 from .schemas.strict import TooLargeError
 from .settings import Settings
-from .translation import problem_of
 from .version import VERSION
-from .warmup import warm_up
 
 logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do

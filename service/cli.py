@@ -65,8 +65,8 @@ def unknown_settings() -> list[str]:
 
 def run(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
-    from .listening import listen
-    from .logs import configure
+    from .process.listening import listen
+    from .telemetry.logs import configure
 
     configure(settings.log_level)
     try:
@@ -76,11 +76,11 @@ def run(settings: Settings) -> int:
         return 1
     if settings.workers > 1:
         # What computes is not loaded into the process that only looks after the others.
-        from .workers import Workers
+        from .process.workers import Workers
 
         return Workers(settings, listener).run()
-    from .part import WHOLE
-    from .server import answer
+    from .process.part import WHOLE
+    from .process.server import answer
 
     return answer(settings, listener, WHOLE)
 

@@ -12,20 +12,20 @@ from starlette.requests import Request
 
 from association import Deadline
 
-from .bodies import BodyReader, wait_for_hang_up
-from .doors import Doors
-from .gate import ANNOUNCED, SearchGate, end_announcement
-from .keys import Keyring
-from .lookup import LARGE, MapLookup
+from .admission.entrance import Doors
+from .admission.fair_queue import Holder
+from .admission.gate import ANNOUNCED, SearchGate, end_announcement
+from .admission.keys import Keyring
+from .http.bodies import BodyReader, wait_for_hang_up
+from .http.problems import ProblemError
 from .maps import IndexCache, MapStore
-from .metrics import Metrics
-from .parser_process import ParserProcess
-from .parsing import Limits, unpack
-from .part import WHOLE, Part
-from .problems import ProblemError
+from .maps.lookup import LARGE, MapLookup
+from .parsing.parser_process import ParserProcess
+from .parsing.reading import Limits, unpack
+from .process.part import WHOLE, Part
 from .settings import Settings
-from .stopwatch import Stopwatch
-from .turns import Holder
+from .telemetry.metrics import Metrics
+from .work.stopwatch import Stopwatch
 
 T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]

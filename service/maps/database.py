@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import Connection
 
-from ..problems import ProblemError
+from ..http.problems import ProblemError
 
 BUSY_SECONDS = 5.0
 # Up to 3.51.2 a WAL that is reset while another connection checkpoints can corrupt the database.

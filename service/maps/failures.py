@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
-from ..problems import ProblemError
+from ..http.problems import ProblemError
 
 FULL = ("storage_full", "the disk that holds the maps is full")
 READ_ONLY = ("read_only", "the maps cannot be written")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..problems import ProblemError
+from ..http.problems import ProblemError
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from alembic.config import Config
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, inspect, text
 
-from ..problems import ProblemError
+from ..http.problems import ProblemError
 from .failures import failures_as_problems
 from .tables import maps
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, literal, select, update
 from sqlalchemy.exc import IntegrityError
 
-from ..problems import ProblemError
+from ..http.problems import ProblemError
 from .database import make_directory, open_engine
 from .failures import DAMAGED, failures_as_problems
 from .preconditions import Preconditions

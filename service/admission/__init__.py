@@ -1,0 +1,1 @@
+"""Who is let in: keys, a fair queue, one ticket per request."""
