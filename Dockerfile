@@ -26,7 +26,7 @@ RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir 
 # For any x86-64 processor: the processor's name is part of a kernel's key, so it has to be the same at run time.
 ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
 WORKDIR /
-RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.process.warmup import warm_up; warm_up()"
+RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.warmup import warm_up; warm_up()"
 # From here on nobody writes to them; see the file.
 COPY deploy/kernel_cache.py /tmp/
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
@@ -50,7 +50,7 @@ ENV PATH=/opt/linefix/bin:$PATH \
     LINEFIX_PORT=8000 \
     LINEFIX_DATA_DIR=/data
 # Once through as at a start: leaves the bytecode of what is used of Python itself, which its slim image comes without.
-RUN python -c "import service.process.server; from service.process.warmup import warm_up; warm_up()"
+RUN python -c "import service.process.protocol, service.app; from service.work.warmup import warm_up; warm_up()"
 ENV PYTHONDONTWRITEBYTECODE=1
 USER linefix
 WORKDIR /data

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import logging.config
 import os
 import sys
 import tempfile
@@ -66,23 +67,20 @@ def unknown_settings() -> list[str]:
 def run(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
     from .process.listening import listen
-    from .telemetry.logs import configure
+    from .process.server import serve_alone
+    from .telemetry.logs import log_config
 
-    configure(settings.log_level)
+    logging.config.dictConfig(log_config(settings.log_level))
     try:
         listener = listen(settings)
     except OSError as error:
         logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
         return 1
     if settings.workers > 1:
-        # What computes is not loaded into the process that only looks after the others.
-        from .process.workers import Workers
+        from .process.workers import supervise
 
-        return Workers(settings, listener).run()
-    from .process.part import WHOLE
-    from .process.server import answer
-
-    return answer(settings, listener, WHOLE)
+        return supervise(settings, listener)
+    return serve_alone(settings, listener)
 
 
 def main() -> None:

@@ -60,7 +60,7 @@ class FairQueue:
         self._lines[holder].remove(turn)
         self._left(holder, turn)
 
-    def next(self) -> tuple[Holder, Turn] | None:
+    def next(self) -> Turn | None:
         """Take the turn that is next and count it as running; None when nobody waits."""
         waiting = [holder for holder, line in self._lines.items() if line]
         if not waiting:
@@ -70,7 +70,7 @@ class FairQueue:
         turn = self._lines[holder].popleft()
         self.started(holder)
         self._left(holder, turn)
-        return holder, turn
+        return turn
 
     def take_from_the_greediest(self, share: float) -> Turn | None:
         """Take the youngest turn of whoever has the most places, if these are more than a share."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
 
-from ..http.problems import ProblemError
+from .errors import AdmissionError, DeadlinePassedError, QueueFullError, ShareUsedError
 from .fair_queue import FairQueue, Holder, Turn
+from .ticket import Ticket
 
 T = TypeVar("T")
 HEARING_SECONDS = 0.5  # s that a search has to notice that it shall end
@@ -29,6 +30,11 @@ class SearchGate:
         Searches that run at once.
     queue : int
         Searches that may wait.
+
+    Attributes
+    ----------
+    running : int
+        Slots that are taken.
     """
 
     def __init__(self, slots: int, queue: int) -> None:
@@ -38,7 +44,7 @@ class SearchGate:
         self._queue = FairQueue()
         self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
         self.running = 0
-        self.announced = 0
+        self._expected = 0
         self._over: asyncio.Future[None] | None = None
         self._ended = threading.Event()
         self._counting = threading.Lock()
@@ -52,65 +58,63 @@ class SearchGate:
     @property
     def full(self) -> bool:
         """Whether everything is taken or spoken for; a holder with less than its share may still be let in."""
-        return self.running + self.waiting + self.announced >= self._places
+        return self.running + self.waiting + self._expected >= self._places
 
-    def announce(self, holder: Holder = None) -> Announcement:
+    def expect(self, holder: Holder) -> None:
         """Note that a request is on its way to the gate, its body complete."""
-        self.announced += 1
+        self._expected += 1
         self._queue.expect(holder)
-        return Announcement(self, holder)
 
-    def arrived(self, holder: Holder) -> None:
-        """Note that one that was announced is there, or will never come."""
-        self.announced -= 1
+    def expect_no_longer(self, holder: Holder) -> None:
+        """Note that one that was expected is there, or will never come."""
+        self._expected -= 1
         self._queue.expect_no_longer(holder)
 
-    def refusal(self, holder: Holder = None) -> ProblemError | None:
-        """Return why a request whose body is still to be read is not let in, or None when it is.
+    def require_place(self, holder: Holder = None) -> None:
+        """Refuse a request whose body is still to be read, when there is no place for it.
 
         A full queue is shared: a holder that has less than its share of the places is let in all the same, and whoever
         has the most gives up one.
-        """
-        return self._refusal(holder) if self.full else None
-
-    def _refusal(self, holder: Holder) -> ProblemError | None:
-        mine = self._queue.places_of(holder)
-        holders = self._queue.holders + (mine == 0)
-        share = self._places / holders
-        if holders > 1 and mine >= share:
-            return rate_limited()
-        if holders > 1 and mine + 1 <= share:
-            return None
-        return overloaded()
-
-    async def run(
-        self, function: Callable[[], T], deadline: Deadline, holder: Holder = None, *, admitted: bool = False
-    ) -> T:
-        """Run a function when its turn comes.
-
-        A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns, so that there
-        are never more running than slots. Cancel the deadline to make it return soon. With `admitted` it waits however
-        long the queue is: for the further parts of a request that was let in.
 
         Raises
         ------
-        ProblemError
-            When the queue is full, or the deadline passes before the turn comes, or the place went to somebody who has
-            fewer.
+        QueueFullError, ShareUsedError
+        """
+        if self.full:
+            refusal = self._refusal(holder)
+            if refusal is not None:
+                raise refusal
+
+    async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket) -> T:
+        """Run a function when its turn comes.
+
+        A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns, so that there
+        are never more running than slots. Cancel the deadline to make it return soon. A further turn of a request that
+        had one is waited for however long the queue is.
+
+        Raises
+        ------
+        QueueFullError, ShareUsedError
+            When the queue is full, or the place went to somebody who has fewer.
+        DeadlinePassedError
+            When the deadline passes before the turn comes.
         CancelledError
             When everything is told to give up.
         """
-        await self._enter(deadline, holder, admitted)
+        ticket.arrive()
+        await self._enter(deadline, ticket)
+        ticket.admitted = True
         begun = time.monotonic()
+        loop = asyncio.get_running_loop()
         try:
-            work = asyncio.get_running_loop().run_in_executor(self._executor, self._run, function)
+            work = loop.run_in_executor(self._executor, self._run, function)
         except BaseException:
-            self._leave(holder, 0.0)
+            self._leave(ticket.holder, 0.0)
             raise
         self._deadlines[work] = deadline
-        work.add_done_callback(lambda done: self._finish(done, holder, begun))
+        work.add_done_callback(lambda done: self._finish(done, ticket.holder, begun))
         if self._over is None:
-            self._over = asyncio.get_running_loop().create_future()
+            self._over = loop.create_future()
         either: set[asyncio.Future[Any]] = {work, self._over}
         await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
         if work.done():
@@ -136,6 +140,16 @@ class SearchGate:
         """Give the threads back; does not wait for them."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
+    def _refusal(self, holder: Holder) -> AdmissionError | None:
+        mine = self._queue.places_of(holder)
+        holders = self._queue.holders + (mine == 0)
+        share = self._places / holders
+        if holders > 1 and mine >= share:
+            return ShareUsedError()
+        if holders > 1 and mine + 1 <= share:
+            return None
+        return QueueFullError()
+
     def _run(self, function: Callable[[], T]) -> T:
         with self._counting:
             self._busy += 1
@@ -150,16 +164,17 @@ class SearchGate:
         if not over.done():
             over.set_result(None)
 
-    async def _enter(self, deadline: Deadline, holder: Holder, admitted: bool) -> None:
+    async def _enter(self, deadline: Deadline, ticket: Ticket) -> None:
         if deadline.passed:
-            raise too_late()
+            raise DeadlinePassedError
+        holder = ticket.holder
         if self.running < self.slots and not self.waiting:
             self.running += 1
             self._queue.started(holder)
             return
-        if not admitted:
+        if not ticket.admitted:
             self._make_room(holder)
-        turn = self._queue.join(holder, fixed=admitted)
+        turn = self._queue.join(holder, fixed=ticket.admitted)
         left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
         try:
             await asyncio.wait({turn}, timeout=left)
@@ -168,7 +183,7 @@ class SearchGate:
             raise
         if not turn.done():
             self._queue.leave(holder, turn)
-            raise too_late()
+            raise DeadlinePassedError
         turn.result()
 
     def _make_room(self, holder: Holder) -> None:
@@ -180,8 +195,8 @@ class SearchGate:
             raise refusal
         taken = self._queue.take_from_the_greediest(self._queue.places_of(holder) + 1)
         if taken is None:
-            raise overloaded()
-        taken.set_exception(rate_limited())
+            raise QueueFullError
+        taken.set_exception(ShareUsedError())
 
     def _give_up(self, holder: Holder, turn: Turn) -> None:
         """Leave the queue, or hand on the turn that has just come."""
@@ -203,45 +218,4 @@ class SearchGate:
         if following is None:
             self.running -= 1
         else:
-            following[1].set_result(None)
-
-
-ANNOUNCED = "announced"
-
-
-class Announcement:
-    """A request on its way from the socket to the gate; without it all that come together would find room."""
-
-    def __init__(self, gate: SearchGate, holder: Holder) -> None:
-        self._gate: SearchGate | None = gate
-        self._holder = holder
-
-    def end(self) -> None:
-        """Say that it is there, or will never come."""
-        if self._gate is not None:
-            self._gate.arrived(self._holder)
-            self._gate = None
-
-
-def too_late() -> ProblemError:
-    """Return the problem of a deadline that passed before the search started."""
-    return ProblemError("deadline_exceeded", "the deadline passed before the search started")
-
-
-def end_announcement(scope: MutableMapping[str, Any]) -> None:
-    """Say that a request has come to the gate, or never will, if it was announced."""
-    announcement = scope["state"].get(ANNOUNCED)
-    if announcement is not None:
-        announcement.end()
-
-
-def overloaded() -> ProblemError:
-    """Return the problem of a full queue."""
-    return ProblemError("overloaded", "every core is searching and the queue is full", headers={"Retry-After": "1"})
-
-
-def rate_limited() -> ProblemError:
-    """Return the problem of a key that has its share of a full queue."""
-    return ProblemError(
-        "rate_limited", "the queue is full, and this key has its share of it", headers={"Retry-After": "1"}
-    )
+            following.set_result(None)

@@ -5,91 +5,86 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
 from starlette.requests import Request
 
-from ..parsing.reading import Body, too_large
-from .problems import ProblemError
+from ..admission.budget import ByteBudget
+from ..schemas.errors import BodyTooLargeError
+from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 
-class BodyReader:
-    """Reads bodies, and knows how many bytes of them are being read.
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body as it arrived."""
+
+    data: bytearray
+    gzipped: bool
+
+
+class BodyReceiver:
+    """Receives bodies.
 
     Parameters
     ----------
     max_bytes : int
-        Of one body, as it arrives and unpacked.
-    max_bytes_at_once : int
+        Of one body, as it arrives.
+    budget : ByteBudget
         Of all bodies that are being read or parsed.
     timeout : float
         Seconds that a request may take to arrive, its head included.
     """
 
-    def __init__(self, max_bytes: int, max_bytes_at_once: int, timeout: float) -> None:
+    def __init__(self, max_bytes: int, budget: ByteBudget, timeout: float) -> None:
         self._max_bytes = max_bytes
-        self._max_at_once = max_bytes_at_once
+        self._budget = budget
         self._timeout = timeout
-        self.held = 0
 
     @asynccontextmanager
-    async def reading(self, request: Request) -> AsyncIterator[Body]:
-        """Read a body whole; its bytes count as held until the block ends.
+    async def receiving(self, request: Request, arrived: float) -> AsyncIterator[Body]:
+        """Receive a body whole; its bytes count as held until the block ends.
+
+        Parameters
+        ----------
+        request : Request
+        arrived : float
+            When its first byte came, by the event loop's clock, seconds.
 
         Raises
         ------
-        ProblemError
-            When it is no JSON by its headers, larger than allowed, too slow, or too much is in memory already.
+        MediaTypeError, EncodingError
+            When it is no JSON by its head.
+        BodyTooLargeError
+            When it is larger than allowed.
+        TooMuchHeldError
+            When too much of all requests is in memory already.
+        BodyTooSlowError
+            When it does not come in time.
         """
-        gzipped = _check_headers(request)
-        self._check_length(request)
-        data = bytearray()
-        now = asyncio.get_running_loop().time()
-        try:
-            async with asyncio.timeout_at(request.scope["state"].get("arrived", now) + self._timeout):
-                async for piece in request.stream():
-                    if len(data) + len(piece) > self._max_bytes:
-                        raise too_large(self._max_bytes)
-                    if self.held + len(piece) > self._max_at_once:
-                        raise ProblemError(
-                            "overloaded", "too many large requests at once", headers={"Connection": "close"}
-                        )
-                    data += piece
-                    self.held += len(piece)
+        gzipped = _is_gzip(request)
+        with self._budget.account() as account:
+            data = bytearray()
+            try:
+                async with asyncio.timeout_at(arrived + self._timeout):
+                    async for piece in request.stream():
+                        if len(data) + len(piece) > self._max_bytes:
+                            raise BodyTooLargeError(self._max_bytes)
+                        account.take(len(piece))
+                        data += piece
+            except TimeoutError:
+                raise BodyTooSlowError(self._timeout) from None
             yield Body(data, gzipped)
-        except TimeoutError:
-            raise ProblemError(
-                "request_timeout",
-                f"the request did not arrive within {self._timeout:g} seconds",
-                headers={"Connection": "close"},
-            ) from None
-        finally:
-            self.held -= len(data)
-
-    def _check_length(self, request: Request) -> None:
-        length = request.headers.get("content-length")
-        if length is not None and int(length) > self._max_bytes:
-            raise too_large(self._max_bytes)
 
 
-def _check_headers(request: Request) -> bool:
-    """Refuse what is not JSON by its headers; tell whether it is gzip."""
+def _is_gzip(request: Request) -> bool:
+    """Tell whether a body is gzip; refuse what is not JSON by its head."""
     media_type = request.headers.get("content-type", "application/json").split(";")[0].strip().lower()
     if media_type != "application/json" and not (
         media_type.startswith("application/") and media_type.endswith("+json")
     ):
-        raise ProblemError("unsupported_media_type", "the body has to be application/json")
+        raise MediaTypeError
     encodings = [part.strip().lower() for part in request.headers.get("content-encoding", "").split(",")]
     encodings = [part for part in encodings if part not in ("", "identity")]
     if encodings not in ([], ["gzip"], ["x-gzip"]):
-        raise ProblemError(
-            "unsupported_media_type", "the only content encoding taken is gzip", headers={"Accept-Encoding": "gzip"}
-        )
+        raise EncodingError
     return bool(encodings)
-
-
-async def wait_for_hang_up(request: Request) -> None:
-    """Return when the client is gone; the body has been read before."""
-    while True:
-        message = await request.receive()
-        if message["type"] == "http.disconnect":
-            return

@@ -7,7 +7,7 @@ import re
 from starlette.requests import Request
 
 from ..maps import Preconditions
-from .problems import Fault, invalid
+from ..schemas.errors import Fault, InvalidRequestError
 
 _TAG = re.compile(r'(W/)?"([^"]*)"')
 _REVISION = re.compile(r"[1-9][0-9]{0,17}")
@@ -23,7 +23,7 @@ def demands_of(request: Request) -> Preconditions:
 
     Raises
     ------
-    ProblemError
+    InvalidRequestError
         When one is not of the form of RFC 9110: taken for no demand it could cost a map.
     """
     match, none_match = _joined(request, "if-match"), _joined(request, "if-none-match")
@@ -33,7 +33,7 @@ def demands_of(request: Request) -> Preconditions:
         if value is not None and not _is_well_formed(value)
     ]
     if wrong:
-        raise invalid(wrong)
+        raise InvalidRequestError(wrong)
     return Preconditions(
         # A weak tag never matches strongly: RFC 9110, 8.8.3.2.
         if_match=None if match in (None, "*") else _revisions(match or "", weak=False),

@@ -1,7 +1,8 @@
-"""The outermost layer of the application: request ids, the log, the counts, and the last catch of what escaped."""
+"""The outermost layer of the application: a request's state, its key, the log, the counts, and the last catch."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import random
 import re
@@ -9,22 +10,14 @@ import time
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from ..admission.gate import end_announcement
-from ..telemetry.metrics import Metrics
-from .problems import internal
+from .problems import INTERNAL, problem_of
+from .services import Services
+from .state import RequestState, attach, state_of
 
 logger = logging.getLogger("linefix")
+GUARDED = "/v1/"
+"""What asks for a key begins so; probes and pages stay open."""
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
-
-
-def request_id_of(scope: Scope) -> str:
-    """Return the id of a request, made by `RequestContext`."""
-    return str(scope["state"]["request_id"])
-
-
-def note(scope: Scope, **fields: object) -> None:
-    """Have something more in the log's line of a request."""
-    scope["state"].setdefault("noted", {}).update(fields)
 
 
 def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
@@ -35,20 +28,23 @@ def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
     return f"{random.getrandbits(128):032x}"  # unique, and no secret
 
 
-class RequestContext:
-    """Pure ASGI: what wraps responses instead would hide a client that hung up."""
+class Reception:
+    """Pure ASGI: what wraps responses instead would hide a client that hung up.
 
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+    A request comes with its ticket where the server has admitted it; otherwise it is admitted here.
+    """
+
+    def __init__(self, app: ASGIApp, services: Services) -> None:
         self._app = app
-        self._metrics = metrics
+        self._services = services
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        request_id = taken_or_made(scope["headers"])
-        scope.setdefault("state", {})["request_id"] = request_id
+        state = _arrived(scope)
+        state.request_id = taken_or_made(scope["headers"])
         started = time.perf_counter()
         status = 0
         # Whoever can be read can be asked for its headers: the server leaves the body away.
@@ -58,29 +54,51 @@ class RequestContext:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [*message.get("headers", ()), (b"x-request-id", request_id.encode("ascii"))]
+                identity = (b"x-request-id", state.request_id.encode("ascii"))
+                message["headers"] = [*message.get("headers", ()), identity]
             await send(message)
 
         try:
+            self._admit(scope, state)
             await self._app(inner, receive, send_with_id)
-        except Exception:
-            logger.exception("a defect", extra={"request_id": request_id})
+        except Exception as error:
+            problem = problem_of(error)
+            if problem is None:
+                logger.exception("a defect", extra={"request_id": state.request_id})
             if status:
                 raise
-            await internal().response(request_id)(scope, receive, send_with_id)
+            await (problem or INTERNAL).response(state.request_id)(scope, receive, send_with_id)
         finally:
-            end_announcement(scope)
-            seconds = time.perf_counter() - started
-            route = getattr(inner.get("route"), "path", "unmatched")
-            self._metrics.observe_request(route, scope["method"], status, seconds)
-            logger.info(
-                "request",
-                extra={
-                    "request_id": request_id,
-                    "method": scope["method"],
-                    "route": route,
-                    "status": status,
-                    "ms": round(1e3 * seconds, 3),
-                    **scope["state"].get("noted", {}),
-                },
-            )
+            if state.ticket is not None:
+                state.ticket.arrive()
+            self._tell(inner, scope["method"], status, time.perf_counter() - started)
+
+    def _admit(self, scope: Scope, state: RequestState) -> None:
+        if state.ticket is None:
+            state.ticket = self._services.entrance.admit(scope["method"], scope["path"], scope["headers"])
+        if scope["path"].startswith(GUARDED):
+            state.ticket.require_key()
+
+    def _tell(self, scope: Scope, method: str, status: int, seconds: float) -> None:
+        """Count and log a request; status 0 is a client that was gone before it was answered."""
+        state = state_of(scope)
+        assert state is not None
+        route = getattr(scope.get("route"), "path", "unmatched")
+        self._services.metrics.observe_request(route, method, status, seconds)
+        usual = {
+            "request_id": state.request_id,
+            "method": method,
+            "route": route,
+            "status": status,
+            "ms": round(1e3 * seconds, 3),
+        }
+        logger.info("request", extra={**usual, **state.noted})
+
+
+def _arrived(scope: Scope) -> RequestState:
+    """Return the state that the server gave a request, or a new one."""
+    state = state_of(scope)
+    if state is None:
+        state = RequestState(asyncio.get_running_loop().time())
+        attach(scope, state)
+    return state

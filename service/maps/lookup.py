@@ -10,15 +10,16 @@ import numpy as np
 from association import InvalidMapError, MapIndex
 from registration import Segments
 
-from ..parsing.parser_process import ParserProcess
+from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
 from ..schemas.parts import InlineMap, StoredMap
 from ..schemas.requests import MapDocument
-from . import CachedMap, IndexCache, MapRecord, MapStore
+from .cache import CachedMap, IndexCache
+from .records import Bounds, MapRecord
+from .store import MapStore
 
 MAX_EXTENT = 1e5  # m
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
-LARGE = 500_000  # bytes; larger documents would hold up everything else for too long
 
 
 class MapLookup:
@@ -46,8 +47,10 @@ class MapLookup:
 
         Raises
         ------
-        ProblemError
+        StoreError
             When no such map is stored, or it is damaged, or the store does not answer.
+        ParserEndedError
+            When the process that parses a large one ends meanwhile.
         InvalidSegmentsError, InvalidMapError
             When the map of the request cannot be searched.
         """
@@ -80,8 +83,8 @@ class MapLookup:
         return CachedMap(index, asked.frame_id, index.nbytes)
 
 
-def checked_segments(document: MapDocument) -> Segments:
-    """Return the segments of a map that is to be stored, after the checks that indexing it would make.
+def summary_of(document: MapDocument) -> tuple[int, Bounds]:
+    """Return the number of segments, and the bounds, of a map that is to be stored.
 
     Raises
     ------
@@ -94,7 +97,9 @@ def checked_segments(document: MapDocument) -> Segments:
     corners = segments.endpoints.reshape(-1, 2)
     if np.ptp(corners, axis=0).max() > MAX_EXTENT:
         raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="segments")
-    return segments
+    # No negative zeros: not every database keeps them.
+    low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
+    return len(segments), (low[0], low[1], high[0], high[1])
 
 
 class _ChangedError(Exception):

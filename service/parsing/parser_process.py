@@ -8,21 +8,25 @@ take is taken there, too.
 from __future__ import annotations
 
 import gc
+import os
+import pickle
 import socket
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from ..http.problems import ProblemError
-from ..process.memory import return_large_blocks
-from .channel import Channel
+from .channel import receive, send
+from .errors import ParserEndedError
 
 T = TypeVar("T")
+LARGE = 500_000  # bytes; parsing more would hold up everything else for too long
 END_SECONDS = 1.0
-COMMAND = "import sys; sys.path[:] = {path!r}; from service.parsing.parser_process import work; work({end})"
+# glibc's malloc: every block beyond a megabyte is mapped by itself, and given back when it is freed.
+ENVIRONMENT = {"MALLOC_ARENA_MAX": "2", "MALLOC_MMAP_THRESHOLD_": str(1 << 20)}
 
 
 class ParserProcess:
@@ -31,7 +35,7 @@ class ParserProcess:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
-        self._channel: Channel | None = None
+        self._connection: Connection | None = None
 
     @property
     def pid(self) -> int | None:
@@ -46,23 +50,25 @@ class ParserProcess:
     def call(self, function: Callable[..., T], *arguments: Any) -> T:
         """Return what a function of a module returns there, or raise what it raises.
 
+        Bytes among the arguments, and in a tuple that comes back, are not copied on the way.
+
         Raises
         ------
-        ProblemError
+        ParserEndedError
             When the process ends meanwhile; the next call has a new one.
         """
         with self._lock:
-            channel = self._started()
+            connection = self._started()
             try:
-                channel.send((function, *arguments))
-                kind, *answer = channel.receive()
+                send(connection, (function, *map(_wrapped, arguments)))
+                found, error = receive(connection)
             except (OSError, EOFError):
                 self._end()
-                raise ProblemError("overloaded", "the process that parses large bodies has ended") from None
-        if kind is Exception:
-            raise answer[0]
-        found: T = tuple(answer) if kind is tuple else answer[0]  # type: ignore[assignment]
-        return found
+                raise ParserEndedError from None
+        if error is not None:
+            raise error
+        answer: T = found
+        return answer
 
     def close(self) -> None:
         """End the process; what it works at is lost."""
@@ -72,52 +78,59 @@ class ParserProcess:
         with self._lock:
             self._end()
 
-    def _started(self) -> Channel:
+    def _started(self) -> Connection:
         if self._process is not None and self._process.poll() is not None:
             self._end()
-        if self._channel is None:
-            # Not by multiprocessing, which keeps one more process beside each that it starts. In a group of its own, so
-            # that Ctrl-C is for the service, which then ends this.
+        if self._connection is None:
             ours, theirs = socket.socketpair()
             with theirs:
-                command = COMMAND.format(path=sys.path, end=theirs.fileno())
+                # In a group of its own, so that Ctrl-C is for the service, which then ends this.
                 self._process = subprocess.Popen(
-                    [sys.executable, "-c", command],
+                    [sys.executable, "-m", __name__, str(theirs.fileno())],
                     pass_fds=[theirs.fileno()],
                     process_group=0,
                     stdin=subprocess.DEVNULL,
+                    env={**os.environ, **ENVIRONMENT},
                 )
-            self._channel = Channel(ours)
-        return self._channel
+            self._connection = Connection(ours.detach())
+        return self._connection
 
     def _end(self) -> None:
-        if self._channel is not None:
-            self._channel.close()
+        if self._connection is not None:
+            self._connection.close()
         if self._process is not None:
             self._process.kill()
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_SECONDS)
-        self._process = self._channel = None
+        self._process = self._connection = None
 
 
-def work(end: int) -> None:
+def _wrapped(value: object) -> object:
+    return pickle.PickleBuffer(value) if isinstance(value, bytes | bytearray) else value
+
+
+def work(connection: Connection) -> None:
     """Answer calls until the other end is gone, which it also is when the service was killed."""
-    channel = Channel(socket.socket(fileno=end))
-    return_large_blocks()
     gc.disable()  # parsed JSON has no cycles, and looking for them takes longer than parsing
     while True:
+        found: Any = None
+        error: Exception | None = None
         try:
-            function, *arguments = channel.receive()
+            function, *arguments = receive(connection)
         except (EOFError, OSError):
             return
-        answer: tuple[Any, ...]
         try:
             found = function(*arguments)
-            answer = (tuple, *found) if isinstance(found, tuple) else (object, found)
-        except Exception as error:
-            answer = Exception, error
+        except Exception as raised:
+            error = raised
+        if isinstance(found, tuple):
+            found = tuple(map(_wrapped, found))
         try:
-            channel.send(answer)
+            send(connection, (found, error))
         except OSError:
             return
-        function = arguments = found = answer = None  # type: ignore[assignment]
+        function = arguments = found = error = None  # nothing large is kept while this waits
+
+
+if __name__ == "__main__":
+    work(Connection(int(sys.argv[1])))

@@ -1,32 +1,22 @@
-"""From the bytes of a body to a checked request; light to import, since a process of its own does it for large ones."""
+"""From JSON to a checked request; light to import, since a process of its own does it for large bodies."""
 
 from __future__ import annotations
 
 import re
-import zlib
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import orjson
 from pydantic import BaseModel, ValidationError
 
-from ..http.problems import ProblemError, faults_of, invalid
 from ..schemas.encoding import encode
+from ..schemas.errors import InvalidRequestError, RequestError, TooManyError
+from ..schemas.faults import faults_of
+from ..schemas.limits import Limits
 from ..schemas.requests import BatchItem, BatchRequest, MapDocument
-from ..schemas.strict import TooLargeError
+from .errors import NotJsonError
 
 M = TypeVar("M", bound=BaseModel)
-Limits = dict[str, int]
-_PIECE = 1 << 20
 _NO_NUMBER = re.compile(r"-?(NaN|Inf)", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A body as it arrived."""
-
-    data: bytes | bytearray
-    gzipped: bool = False
 
 
 def read_model(model: type[M], data: bytes | bytearray, limits: Limits) -> M:
@@ -34,23 +24,25 @@ def read_model(model: type[M], data: bytes | bytearray, limits: Limits) -> M:
 
     Raises
     ------
-    ProblemError
-        When it is not JSON, or not what the model takes.
-    TooLargeError
+    NotJsonError
+        When it is not JSON.
+    InvalidRequestError
+        When it is not what the model takes.
+    TooManyError
         When an array, or the whole, is longer than `limits` allow.
     """
     return validate(model, parse(data, limits), limits)
 
 
-def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, list[BatchItem | Exception]]:
+def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, list[BatchItem | RequestError]]:
     """Return a batch without its scans, and each scan by itself: checked, or why it is none."""
     asked = read_model(BatchRequest, data, limits)
-    items: list[BatchItem | Exception] = []
+    items: list[BatchItem | RequestError] = []
     for index, scan in enumerate(asked.scans):
         prior = None if asked.priors is None else asked.priors[index]
         try:
             items.append(validate(BatchItem, {"scan": scan, "prior": prior}, limits))
-        except (ProblemError, TooLargeError) as error:
+        except RequestError as error:
             items.append(error)
     return asked.model_copy(update={"scans": [], "priors": None}), items
 
@@ -67,49 +59,19 @@ def read_stored(document: bytes) -> MapDocument:
     return MapDocument.model_validate(orjson.loads(document))
 
 
-def unpack(body: Body, max_bytes: int) -> bytes | bytearray:
-    """Return a body's bytes, at most as many as are allowed; takes a while for a large one.
-
-    Raises
-    ------
-    ProblemError
-        When it is not gzip though it says so, or unpacks to more than is allowed.
-    """
-    if not body.gzipped:
-        return body.data
-    unpacked = bytearray()
-    stream = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
-    packed = memoryview(body.data)
-    try:
-        for begin in range(0, len(packed), _PIECE):
-            rest: bytes | memoryview = packed[begin : begin + _PIECE]
-            while rest and not stream.eof:
-                unpacked += stream.decompress(rest, max_bytes + 1 - len(unpacked))
-                rest = stream.unconsumed_tail
-                if len(unpacked) > max_bytes:
-                    raise too_large(max_bytes)
-            if stream.eof and (stream.unused_data or begin + _PIECE < len(packed)):
-                raise ProblemError("invalid_json", "something follows the gzip body")
-        unpacked += stream.flush()
-    except zlib.error:
-        raise ProblemError("invalid_json", "the body is not gzip, though Content-Encoding says so") from None
-    if not stream.eof:
-        raise ProblemError("invalid_json", "the gzip body is cut short")
-    return unpacked
-
-
 def parse(data: bytes | bytearray, limits: Limits) -> Any:
     """Parse JSON; NaN, infinities, lone surrogates and nesting beyond 1,024 levels are not JSON here.
 
     Raises
     ------
-    ProblemError
+    NotJsonError
         When it is not JSON.
-    TooLargeError
+    TooManyError
         When there are more values than allowed: each takes some hundred bytes of memory, however short it is.
     """
-    if len(data) > limits["values"] and sum(map(data.count, b",:[{")) > limits["values"]:
-        raise TooLargeError("", limits["values"], "values")
+    # Every value but the first follows one of these. Commas in strings count, too, which is cheap and on the safe side.
+    if len(data) > limits.values and sum(map(data.count, b",:[{")) > limits.values:
+        raise TooManyError("", limits.values, "values")
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as error:
@@ -117,7 +79,7 @@ def parse(data: bytes | bytearray, limits: Limits) -> Any:
         what = f"{error.msg} at line {error.lineno} column {error.colno}"
         if _NO_NUMBER.match(error.doc, error.pos):
             what += ": NaN and Infinity are not JSON; a range without a return is null"
-        raise ProblemError("invalid_json", what) from None
+        raise NotJsonError(what) from None
 
 
 def validate(model: type[M], value: Any, limits: Limits) -> M:
@@ -125,17 +87,12 @@ def validate(model: type[M], value: Any, limits: Limits) -> M:
 
     Raises
     ------
-    ProblemError
+    InvalidRequestError
         When it is not what the model takes.
-    TooLargeError
+    TooManyError
         When an array is longer than `limits` allow.
     """
     try:
         return model.model_validate(value, context=limits)
     except ValidationError as error:
-        raise invalid(faults_of(error.errors(include_url=False, include_input=False))) from None
-
-
-def too_large(max_bytes: int) -> ProblemError:
-    """Return the problem of a body that is too long; its rest is of no use, so the connection ends with the answer."""
-    return ProblemError("too_large", f"a body has at most {max_bytes} bytes, unpacked", headers={"Connection": "close"})
+        raise InvalidRequestError(faults_of(error.errors(include_url=False, include_input=False))) from None

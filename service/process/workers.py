@@ -1,11 +1,14 @@
-"""Several worker processes on one port: started, replaced when they die or hang, and ended together.
+"""Several worker processes on one port, under uvicorn's supervisor.
 
-uvicorn has a supervisor of its own, which builds its own servers: ours drain, count into shared files, and are ready
-before they take the place of a dead one.
+It starts them, replaces those that die or do not answer, and passes signals on. What it does not know is here: which
+share of the service each of them is, that their counts are one, that one stands still though it answers, and that they
+end in time.
 """
 
 from __future__ import annotations
 
+import asyncio
+import faulthandler
 import logging
 import multiprocessing
 import os
@@ -14,152 +17,86 @@ import socket
 import tempfile
 import threading
 import time
-from contextlib import suppress
-from dataclasses import replace
-from multiprocessing.connection import wait
-from multiprocessing.process import BaseProcess
+from functools import partial
+from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from uvicorn.config import STARTUP_FAILURE
+from filelock import FileLock, Timeout
+from uvicorn.supervisors import Multiprocess
 
+from ..part import Part
 from ..settings import Settings
-from ..telemetry.logs import configure
 from ..telemetry.metrics import forget_worker, share_counts
-from .part import Part
+from .server import build, config_of
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
 
 logger = logging.getLogger("linefix")
 ALL_ENDED = 9.8  # s after the signal whoever is left is killed
-SHORT_LIFE = 10.0  # s; who lives no longer again and again is started again ever later
-LONGEST_PAUSE = 30.0  # s
-LOOK_SECONDS = 1.0  # between looks at the signs of life
-LONGEST_START = 300  # looks without a first sign of life; kernels may have to be compiled
+LOOK_SECONDS = 1.0  # between looks whether the event loop turns
 
 
-class Workers:
-    """Keeps as many workers as are set.
+class Supervisor(Multiprocess):
+    """Keeps as many workers as are set."""
 
-    Parameters
-    ----------
-    settings : Settings
-    listener : socket.socket
-        They all accept connections from it; it stays open while any of them is being replaced.
+    def join_all(self) -> None:
+        """Wait for all to end; kill who has not in time."""
+        last = time.monotonic() + ALL_ENDED
+        for process in self.processes:
+            process.process.join(max(0.0, last - time.monotonic()))
+            if process.exitcode is None:
+                process.process.kill()
+        super().join_all()
+
+    @property
+    def status(self) -> int:
+        """The status to exit with: 0 when all ended as they were told."""
+        return int(any(process.exitcode not in (0, -signal.SIGTERM, -signal.SIGINT) for process in self.processes))
+
+
+def supervise(settings: Settings, listener: socket.socket) -> int:
+    """Run workers until a signal comes; return the status to exit with."""
+    # Counts live in memory where there is a file system for that; nothing else need be writable.
+    shared = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="linefix-workers-", dir=shared) as directory:
+        supervisor = Supervisor(config_of(settings, partial(build_worker, settings, Path(directory))), [listener])
+        supervisor.run()
+        return supervisor.status
+
+
+def build_worker(settings: Settings, directory: Path) -> FastAPI:
+    """Make this process one of several, and return its application; called by uvicorn in its event loop."""
+    part, lock = take_part(directory, settings.workers)
+    forget_worker(str(directory), part.index)  # what a dead one had running; its counts stay
+    share_counts(str(directory), part.index)
+    _follow_parent()
+    app = build(settings, part)
+    app.state.part = lock  # held as long as this process lives
+    _watch(asyncio.get_running_loop(), settings.hang_seconds)
+    return app
+
+
+def take_part(directory: Path, workers: int) -> tuple[Part, FileLock]:
+    """Return the first part that nobody has, and the lock that says so; the system takes it from whoever dies.
+
+    Who takes the part of another stands in for it, as does who comes while nobody has gone yet.
     """
-
-    def __init__(self, settings: Settings, listener: socket.socket) -> None:
-        self._settings = settings
-        self._listener = listener
-        self._context = multiprocessing.get_context("spawn")
-        self._processes: dict[int, BaseProcess] = {}
-        self._started: dict[int, float] = {}
-        self._short_lives: dict[int, int] = {}
-        self._due: dict[int, float] = {}
-        self._signs: dict[int, int] = {}
-        self._silent: dict[int, int] = {}
-        self._looked = 0.0
-        self._signals = 0
-        self._status = 0
-
-    def run(self) -> int:
-        """Run until a signal comes; return the status to exit with."""
-        # Counts live in memory where there is a file system for that; nothing else need be writable.
-        shared = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, self._note)
-        heard, woken = socket.socketpair()
-        for end in (heard, woken):
-            end.setblocking(False)
-        signal.set_wakeup_fd(woken.fileno())
-        with tempfile.TemporaryDirectory(prefix="linefix-metrics-", dir=shared) as directory:
-            for index in range(self._settings.workers):
-                self._start(directory, Part(index, self._settings.workers))
-            while not self._signals:
-                soonest = min(self._due.values(), default=float("inf")) - time.monotonic()
-                timeout = min(LOOK_SECONDS, max(0.0, soonest))
-                wait([heard, *(process.sentinel for process in self._processes.values())], timeout)
-                self._kill_hung(Path(directory))
-                self._replace_dead(directory)
-            self._end_all(heard)
-        return self._status
-
-    def _note(self, number: int, frame: object) -> None:
-        self._signals += 1
-
-    def _start(self, directory: str, part: Part) -> None:
-        self._signs[part.index] = self._silent[part.index] = 0
-        sign_of_life(Path(directory), part.index).unlink(missing_ok=True)
-        arguments = (self._settings, self._listener, part, directory)
-        process = self._context.Process(target=_work, args=arguments, name=f"linefix-worker-{part.index}")
-        process.start()
-        self._processes[part.index] = process
-        self._started[part.index] = time.monotonic()
-
-    def _kill_hung(self, directory: Path) -> None:
-        """Kill whose event loop shows no sign of life.
-
-        Looks are counted, not seconds: when everything was stopped for a while it takes as many again.
-        """
-        if time.monotonic() - self._looked < LOOK_SECONDS:
-            return
-        self._looked = time.monotonic()
-        for index, process in self._processes.items():
-            try:
-                sign = sign_of_life(directory, index).stat().st_mtime_ns
-            except FileNotFoundError:
-                sign = 0
-            self._silent[index] = self._silent[index] + 1 if sign == self._signs[index] else 0
-            self._signs[index] = sign
-            if self._silent[index] * LOOK_SECONDS > (self._settings.hang_seconds if sign else LONGEST_START):
-                logger.error("a worker hangs", extra={"worker": index})
-                process.kill()
-                process.join()
-
-    def _replace_dead(self, directory: str) -> None:
-        now = time.monotonic()
-        for index, process in list(self._processes.items()):
-            if process.is_alive():
-                continue
-            del self._processes[index]
-            forget_worker(directory, index)
-            if process.exitcode == STARTUP_FAILURE:
-                logger.error("a worker cannot start")
-                self._signals, self._status = 1, 1
-                return
-            short = now - self._started[index] < SHORT_LIFE
-            self._short_lives[index] = self._short_lives.get(index, 0) + 1 if short else 0
-            # The first time at once.
-            pause = min(LONGEST_PAUSE, 2.0 ** (self._short_lives[index] - 2)) if self._short_lives[index] > 1 else 0.0
-            self._due[index] = now + pause
-            logger.error("a worker has died", extra={"worker": index, "exitcode": process.exitcode, "again_in": pause})
-        for index in [index for index, due in self._due.items() if due <= now]:
-            del self._due[index]
-            self._start(directory, replace(Part(index, self._settings.workers), replaces=bool(self._processes)))
-
-    def _end_all(self, heard: socket.socket) -> None:
-        """Have them all drain; a second signal, or the end of the time, kills."""
-        self._listener.close()
-        self._signal_all(signal.SIGTERM)
-        told, last = self._signals, time.monotonic() + ALL_ENDED
-        while left := [process for process in self._processes.values() if process.is_alive()]:
-            wait([heard, *(process.sentinel for process in left)], max(0.0, last - time.monotonic()))
-            with suppress(BlockingIOError):
-                heard.recv(64)
-            if self._signals > told or time.monotonic() >= last:
-                self._signal_all(signal.SIGKILL)
-                self._status = 1
-                told, last = self._signals, time.monotonic() + ALL_ENDED
-        if any(process.exitcode for process in self._processes.values()):
-            self._status = 1
-
-    def _signal_all(self, number: int) -> None:
-        for process in self._processes.values():
-            if process.is_alive() and process.pid is not None:
-                os.kill(process.pid, number)
+    for index in count():
+        path = directory / f"worker-{index}"
+        replaces = path.exists() or index >= workers
+        lock = FileLock(path)
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            continue
+        return Part(index, workers, replaces), lock
+    raise AssertionError
 
 
-def _work(settings: Settings, listener: socket.socket, part: Part, directory: str) -> None:
-    """Be a worker; ends when the process above it has ended, however that came."""
-    configure(settings.log_level)
-    share_counts(directory, part.index)
+def _follow_parent() -> None:
+    """End when the process above has ended, however that came."""
     above = multiprocessing.parent_process()
     assert above is not None
 
@@ -168,11 +105,27 @@ def _work(settings: Settings, listener: socket.socket, part: Part, directory: st
         os.kill(os.getpid(), signal.SIGTERM)
 
     threading.Thread(target=follow, daemon=True).start()
-    from .server import answer
-
-    raise SystemExit(answer(settings, listener, part, sign_of_life(Path(directory), part.index)))
 
 
-def sign_of_life(directory: Path, index: int) -> Path:
-    """Return the file that a worker touches every second, from its event loop."""
-    return directory / f"alive-{index}"
+def _watch(loop: asyncio.AbstractEventLoop, seconds: float) -> None:
+    """End this process when its event loop stands still; uvicorn only sees whether any of its threads answers.
+
+    Looks are counted, not seconds: when everything was stopped for a while it takes as many again.
+    """
+    turned = threading.Event()
+
+    def watch() -> None:
+        silent = 0.0
+        while silent < seconds:
+            turned.clear()
+            try:
+                loop.call_soon_threadsafe(turned.set)
+            except RuntimeError:  # it has ended
+                return
+            time.sleep(LOOK_SECONDS)
+            silent = 0.0 if turned.is_set() else silent + LOOK_SECONDS
+        logger.error("the event loop hangs")
+        faulthandler.dump_traceback()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import logging.config
 from datetime import UTC, datetime
 from typing import Any
 
@@ -29,16 +28,14 @@ class JsonFormatter(logging.Formatter):
         return orjson.dumps(line, default=str).decode()
 
 
-def configure(level: str) -> None:
-    """Send every logger of the process to stderr, as JSON."""
-    logging.config.dictConfig(
-        {
-            "version": 1,
-            "disable_existing_loggers": False,
-            "formatters": {"json": {"()": JsonFormatter}},
-            "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
-            "root": {"level": level.upper(), "handlers": ["stderr"]},
-            # Numba tells every pass of its compiler at debug, Alembic each start that nothing had to be done.
-            "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},
-        }
-    )
+def log_config(level: str) -> dict[str, Any]:
+    """Return what sends every logger of a process to stderr, as JSON; in the form of `logging.config.dictConfig`."""
+    return {
+        "version": 1,
+        "disable_existing_loggers": False,
+        "formatters": {"json": {"()": JsonFormatter}},
+        "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+        "root": {"level": level.upper(), "handlers": ["stderr"]},
+        # Numba tells every pass of its compiler at debug, Alembic each start that nothing had to be done.
+        "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},
+    }

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from association import Alternative, AssociationResult, Correspondence
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
+from vectorization import Vectorization
 
 Json = dict[str, Any]
 
@@ -133,3 +134,17 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
     if "missing_map" in include:
         answer["missing_map"] = list(result.missing_map)
     return answer
+
+
+def vectorization_json(found: Vectorization) -> Json:
+    """Return the answer of a vectorization."""
+    measured = found.measured
+    return {
+        "segments": measured.segments.endpoints.tolist(),
+        "points": measured.points.astype(int).tolist(),
+        "centroids": measured.centroids.tolist(),
+        "spreads": measured.spreads.tolist(),
+        "sigma": found.sigma,
+        "sigmas": measured.sigma.tolist(),
+        "rms": found.rms.tolist(),
+    }

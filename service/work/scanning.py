@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from association import Beams, Scan
 from vectorization import LaserScan, Vectorization, VectorizationError, VectorizationOptions, vectorize
 
-from ..http.problems import Fault, invalid
+from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.parts import Laser
 
 Floats = NDArray[np.float64]
@@ -69,4 +69,4 @@ def _placed(scan: str, options: str) -> Iterator[None]:
     except VectorizationError as error:
         place = f"{options if error.argument in _OPTIONS else scan}/{error.argument}"
         row = "" if error.index is None else f"/{error.index}"
-        raise invalid([Fault(place + row, error.message)]) from error
+        raise InvalidRequestError([Fault(place + row, error.message)]) from error

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from ...maps import Bounds
-from ...maps.lookup import checked_segments
+from ...maps.lookup import summary_of
 from ...parsing.reading import read_map
-from ...runtime import runtime_of
 from ...schemas import examples
 from ...schemas.encoding import encode
 from ...schemas.replies import MapList, MapSummaryAnswer
 from ...schemas.requests import MapDocument
 from ..etags import demands_of, etag, is_conditional, is_unchanged
-from ..reception import note
-from .answering import EVERYWHERE, READS_BODY, REQUEST_ID, json_response, problems, takes
+from ..exchange import Exchange, json_response
+from .documenting import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 
 router = APIRouter(tags=["maps"])
 MapIdPath = Annotated[
@@ -53,20 +52,15 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
 )
 async def put_map(request: Request, map_id: MapIdPath) -> Response:
     """Store a map; once answered it survives the loss of process and power."""
-    runtime = runtime_of(request)
-    demands = demands_of(request)
-    (asked, document), _ = await runtime.read(request, read_map)
-
-    def summary() -> tuple[int, Bounds]:
-        corners = checked_segments(asked).endpoints.reshape(-1, 2)
-        # No negative zeros: not every database keeps them.
-        low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
-        return len(asked.segments), (low[0], low[1], high[0], high[1])
-
-    count, bounds = await runtime.in_parser(summary)
-    revision, created = await runtime.in_store(lambda: runtime.store.put(map_id, document, (count, bounds), demands))
-    runtime.metrics.map_changes.labels("created" if created else "replaced").inc()
-    note(request.scope, map={"map_id": map_id, "revision": revision})
+    exchange, demands = Exchange(request), demands_of(request)
+    services = exchange.services
+    asked, document = await exchange.read(read_map)
+    summary = await services.parse_threads.run(partial(summary_of, asked))
+    put = partial(services.store.put, map_id, document, summary, demands)
+    revision, created = await services.store_threads.run(put)
+    services.metrics.map_changes.labels("created" if created else "replaced").inc()
+    exchange.note(map={"map_id": map_id, "revision": revision})
+    count, bounds = summary
     answer = {"map_id": map_id, "revision": revision, "segments": count, "bounds": bounds}
     return json_response(encode(answer), 201 if created else 200, {"ETag": etag(revision)})
 
@@ -84,12 +78,12 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
 )
 async def get_map(request: Request, map_id: MapIdPath) -> Response:
     """Give a map back as it was stored."""
-    runtime = runtime_of(request)
+    services = Exchange(request).services
     if is_conditional(request):
-        record = await runtime.in_store(lambda: runtime.store.record(map_id))
+        record = await services.store_threads.run(partial(services.store.record, map_id))
         if is_unchanged(request, record.revision):
             return Response(status_code=304, headers={"ETag": etag(record.revision)})
-    stored = await runtime.in_store(lambda: runtime.store.load(map_id))
+    stored = await services.store_threads.run(partial(services.store.load, map_id))
     return json_response(stored.document, headers={"ETag": etag(stored.record.revision)})
 
 
@@ -107,8 +101,8 @@ async def list_maps(
     ] = "",
 ) -> Response:
     """List what is stored, by id."""
-    runtime = runtime_of(request)
-    page = await runtime.in_store(lambda: runtime.store.list(limit, cursor))
+    services = Exchange(request).services
+    page = await services.store_threads.run(partial(services.store.list, limit, cursor))
     items = [
         {"map_id": item.map_id, "revision": item.revision, "segments": item.segments, "bounds": item.bounds}
         for item in page.maps
@@ -128,9 +122,9 @@ async def list_maps(
 )
 async def delete_map(request: Request, map_id: MapIdPath) -> Response:
     """Forget a map."""
-    runtime = runtime_of(request)
-    demands = demands_of(request)
-    await runtime.in_store(lambda: runtime.store.delete(map_id, demands))
-    runtime.metrics.map_changes.labels("deleted").inc()
-    note(request.scope, map={"map_id": map_id})
+    exchange, demands = Exchange(request), demands_of(request)
+    services = exchange.services
+    await services.store_threads.run(partial(services.store.delete, map_id, demands))
+    services.metrics.map_changes.labels("deleted").inc()
+    exchange.note(map={"map_id": map_id})
     return Response(status_code=204)

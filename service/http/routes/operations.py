@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
-
 from fastapi import APIRouter, Request, Response
 
-from ...runtime import runtime_of
 from ...schemas.encoding import encode
 from ...schemas.replies import Limits, Live, Version
 from ...version import VERSION
-from ..problems import ProblemError
-from .answering import EVERYWHERE, json_response, problems
+from ..exchange import json_response
+from ..services import services_of
+from .documenting import EVERYWHERE, problems
 
 router = APIRouter(tags=["operations"])
-STORE_ANSWERS_WITHIN = 2.0  # s
 
 
 @router.get("/livez", response_model=Live, responses=problems("internal"), summary="Is the process alive?")
@@ -31,21 +28,9 @@ async def livez() -> Response:
 )
 async def readyz(request: Request) -> Response:
     """Answer 200 once the kernels are warm and the store answers, and until the service is told to end."""
-    runtime = runtime_of(request)
-    if runtime.draining:
-        raise ProblemError("not_ready", "the service is going down")
-    if not runtime.warm:
-        raise ProblemError("not_ready", "the kernels are being compiled")
-    try:
-        async with asyncio.timeout(STORE_ANSWERS_WITHIN):
-            await runtime.check_store()
-    except TimeoutError:
-        raise ProblemError("not_ready", "the store does not answer") from None
-    except ProblemError as problem:
-        # A full, busy or damaged store is for the callers of maps to know; to a balancer it is all the same.
-        if problem.status == 503:
-            raise
-        raise ProblemError("not_ready", problem.detail) from problem
+    services = services_of(request.scope)
+    services.readiness.require_all()
+    await services.probe.check()
     return json_response(b'{"status":"ok"}')
 
 
@@ -58,7 +43,7 @@ async def version() -> Response:
 @router.get("/v1/limits", response_model=Limits, responses=problems(*EVERYWHERE), summary="What is too much?")
 async def limits(request: Request) -> Response:
     """Name the limits beyond which a request is refused with 413, or waits no longer."""
-    settings = runtime_of(request).settings
+    settings = services_of(request.scope).settings
     names = (
         "max_body_bytes",
         "max_values",
@@ -85,5 +70,5 @@ async def limits(request: Request) -> Response:
 )
 async def metrics(request: Request) -> Response:
     """Give the counts, over all workers."""
-    text = runtime_of(request).metrics.exposition()
+    text = services_of(request.scope).metrics.exposition()
     return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")

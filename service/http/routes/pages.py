@@ -8,7 +8,7 @@ from fastapi import APIRouter
 from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
-from ..problems import ProblemError
+from ..errors import NotFoundError
 
 router = APIRouter(include_in_schema=False)
 ASSETS = {
@@ -63,6 +63,6 @@ async def asset(name: str) -> Response:
     """Give one of the page's files."""
     media_type = ASSETS.get(name)
     if media_type is None:
-        raise ProblemError("not_found", "there is no such file")
+        raise NotFoundError("there is no such file")
     data = files("fastapi_offline").joinpath("static", name).read_bytes()
     return Response(data, media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})

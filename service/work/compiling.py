@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from importlib.util import find_spec
 from pathlib import Path
+
+from filelock import FileLock
 
 PACKAGES = ("registration", "vectorization", "association")
 
@@ -29,8 +30,7 @@ def compile_kernels() -> None:
     """
     place = Path(os.environ.get("NUMBA_CACHE_DIR", _home("association") / "__pycache__"))
     place.mkdir(parents=True, exist_ok=True)
-    with open(place / "linefix.lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(place / "linefix.lock"):
         if not is_compiled():
             from .warmup import warm_up
 
