@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..schemas.errors import BodyTooLargeError
-from .errors import AdmissionError
+from .errors import MissingKeyError, UnknownKeyError
 from .gate import SearchGate
 from .keys import Keyring
 from .ticket import Ticket
@@ -14,6 +14,11 @@ SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "
 """Paths whose POST needs a turn at the gate."""
 
 Headers = Sequence[tuple[bytes, bytes]]
+
+
+def is_search(method: str, path: str) -> bool:
+    """Tell whether a request needs a turn at the gate."""
+    return method == "POST" and path in SEARCHING
 
 
 class Entrance:
@@ -54,9 +59,9 @@ class Entrance:
             self._check_length(headers)
         try:
             holder = self._keyring.holder(headers)
-        except AdmissionError as error:
-            return Ticket(key_error=error)
-        if method != "POST" or path not in SEARCHING:
+        except (MissingKeyError, UnknownKeyError) as error:
+            return Ticket(key_error=type(error))
+        if not is_search(method, path):
             return Ticket(holder)
         self._gate.require_place(holder)
         return Ticket(holder, self._gate)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +10,7 @@ from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
 
-from .errors import AdmissionError, DeadlinePassedError, QueueFullError, ShareUsedError
+from .errors import DeadlinePassedError, QueueFullError, ShareUsedError
 from .fair_queue import FairQueue, Holder, Turn
 from .ticket import Ticket
 
@@ -46,9 +45,6 @@ class SearchGate:
         self.running = 0
         self._expected = 0
         self._over: asyncio.Future[None] | None = None
-        self._ended = threading.Event()
-        self._counting = threading.Lock()
-        self._busy = 0
 
     @property
     def waiting(self) -> int:
@@ -81,9 +77,7 @@ class SearchGate:
         QueueFullError, ShareUsedError
         """
         if self.full:
-            refusal = self._refusal(holder)
-            if refusal is not None:
-                raise refusal
+            self._require_share(holder)
 
     async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket) -> T:
         """Run a function when its turn comes.
@@ -107,7 +101,7 @@ class SearchGate:
         begun = time.monotonic()
         loop = asyncio.get_running_loop()
         try:
-            work = loop.run_in_executor(self._executor, self._run, function)
+            work = loop.run_in_executor(self._executor, function)
         except BaseException:
             self._leave(ticket.holder, 0.0)
             raise
@@ -121,14 +115,6 @@ class SearchGate:
             return work.result()
         raise CancelledError
 
-    def rest(self, seconds: float) -> None:
-        """Hold the event loop for a time, or until a slot stands empty; not at all where one does."""
-        with self._counting:
-            self._ended.clear()
-            all_busy = self._busy == self.slots
-        if all_busy:
-            self._ended.wait(seconds)
-
     def cancel_all(self) -> None:
         """Tell everything that runs to give up, and soon wait no longer for what does not hear, as indexing a map."""
         for deadline in self._deadlines.values():
@@ -140,25 +126,15 @@ class SearchGate:
         """Give the threads back; does not wait for them."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
-    def _refusal(self, holder: Holder) -> AdmissionError | None:
+    def _require_share(self, holder: Holder) -> None:
+        """Raise unless a holder has less than its share of a full queue."""
         mine = self._queue.places_of(holder)
         holders = self._queue.holders + (mine == 0)
         share = self._places / holders
         if holders > 1 and mine >= share:
-            return ShareUsedError()
-        if holders > 1 and mine + 1 <= share:
-            return None
-        return QueueFullError()
-
-    def _run(self, function: Callable[[], T]) -> T:
-        with self._counting:
-            self._busy += 1
-        try:
-            return function()
-        finally:
-            with self._counting:
-                self._busy -= 1
-                self._ended.set()
+            raise ShareUsedError
+        if holders == 1 or mine + 1 > share:
+            raise QueueFullError
 
     def _end(self, over: asyncio.Future[None]) -> None:
         if not over.done():
@@ -190,9 +166,7 @@ class SearchGate:
         """Raise when the queue is full; for a holder with less than its share take a place from another."""
         if self.running + self.waiting < self._places:
             return
-        refusal = self._refusal(holder)
-        if refusal is not None:
-            raise refusal
+        self._require_share(holder)
         taken = self._queue.take_from_the_greediest(self._queue.places_of(holder) + 1)
         if taken is None:
             raise QueueFullError

@@ -30,8 +30,9 @@ class Ticket:
         Whose key it came with.
     gate : Expecting, or None
         Where it is on its way to; None for what does not search.
-    key_error : AdmissionError, or None
-        What is wrong with its key, for routes that ask for one.
+    key_error : type of AdmissionError, or None
+        What is wrong with its key, for routes that ask for one. The type alone: an exception that was raised would keep
+        everything that led to it.
 
     Attributes
     ----------
@@ -42,7 +43,7 @@ class Ticket:
     __slots__ = ("_announced", "_gate", "admitted", "holder", "key_error")
 
     def __init__(
-        self, holder: Holder = None, gate: Expecting | None = None, key_error: AdmissionError | None = None
+        self, holder: Holder = None, gate: Expecting | None = None, key_error: type[AdmissionError] | None = None
     ) -> None:
         self.holder = holder
         self.key_error = key_error

@@ -8,7 +8,6 @@ take is taken there, too.
 from __future__ import annotations
 
 import gc
-import os
 import pickle
 import socket
 import subprocess
@@ -19,14 +18,13 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from ..memory import return_large_blocks
 from .channel import receive, send
 from .errors import ParserEndedError
 
 T = TypeVar("T")
 LARGE = 500_000  # bytes; parsing more would hold up everything else for too long
 END_SECONDS = 1.0
-# glibc's malloc: every block beyond a megabyte is mapped by itself, and given back when it is freed.
-ENVIRONMENT = {"MALLOC_ARENA_MAX": "2", "MALLOC_MMAP_THRESHOLD_": str(1 << 20)}
 
 
 class ParserProcess:
@@ -90,7 +88,6 @@ class ParserProcess:
                     pass_fds=[theirs.fileno()],
                     process_group=0,
                     stdin=subprocess.DEVNULL,
-                    env={**os.environ, **ENVIRONMENT},
                 )
             self._connection = Connection(ours.detach())
         return self._connection
@@ -111,6 +108,7 @@ def _wrapped(value: object) -> object:
 
 def work(connection: Connection) -> None:
     """Answer calls until the other end is gone, which it also is when the service was killed."""
+    return_large_blocks()
     gc.disable()  # parsed JSON has no cycles, and looking for them takes longer than parsing
     while True:
         found: Any = None

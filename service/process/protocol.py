@@ -5,28 +5,26 @@ What is refused there never meets the application: under a flood the answers "no
 
 from __future__ import annotations
 
-import asyncio
 from typing import cast
 
 from starlette.types import Scope
 from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
-from ..admission.entrance import SEARCHING
-from ..http.problems import Problem, problem_of
+from ..admission.entrance import is_search
+from ..admission.errors import AdmissionError
+from ..http.problems import RAISED
 from ..http.reception import taken_or_made
 from ..http.state import state_of
+from ..schemas.errors import RequestError
 from .receipt import ReceiptProtocol
 
 UNREAD = 65_536  # bytes; what is left of a refused body up to here is read and dropped, beyond it the connection ends
-NAP_SECONDS = 0.01
 OTHER = "unmatched"
 
 
 class AdmittingProtocol(ReceiptProtocol):
     """Gives each request its ticket, or sends it away."""
-
-    _nap: asyncio.Handle | None = None
 
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
         scope = cast("Scope", cycle.scope)
@@ -34,11 +32,8 @@ class AdmittingProtocol(ReceiptProtocol):
         assert state is not None
         try:
             state.ticket = self._services.entrance.admit(scope["method"], scope["path"], scope["headers"])
-        except Exception as error:
-            problem = problem_of(error)
-            if problem is None:
-                raise
-            self._refuse(cycle, Problem(problem.kind, problem.detail))
+        except (AdmissionError, RequestError) as error:
+            self._refuse(cycle, error)
             return
         if not cycle.more_body:
             state.ticket.announce()
@@ -51,24 +46,21 @@ class AdmittingProtocol(ReceiptProtocol):
             state.ticket.announce()
         super().on_message_complete()
 
-    def _refuse(self, cycle: RequestResponseCycle, problem: Problem) -> None:
+    def _refuse(self, cycle: RequestResponseCycle, error: AdmissionError | RequestError) -> None:
         """Answer in place of the application."""
         scope = cast("Scope", cycle.scope)
         close = not (cycle.keep_alive and _is_short(cycle, scope))
         cycle.response_started = cycle.response_complete = True
-        self.write_problem(problem, taken_or_made(scope["headers"]), close=close)
-        self._tell(scope, problem)
-        if not close:
-            if self.pipeline:
-                # Not within each other: there may be thousands.
-                self.loop.call_soon(self.on_response_complete)
-            else:
-                self.on_response_complete()
-
-    def _tell(self, scope: Scope, problem: Problem) -> None:
-        services, path = self._services, scope["path"]
-        searches = path in SEARCHING
-        services.refusals.count(path if searches else OTHER, scope["method"], problem.kind.code, problem.kind.status)
+        self.write_refusal(error, taken_or_made(scope["headers"]), close=close)
+        kind, method, path = RAISED[type(error)], scope["method"], scope["path"]
+        self._services.refusals.count(path if is_search(method, path) else OTHER, method, kind.code, kind.status)
+        if close:
+            return
+        if self.pipeline:
+            # Not within each other: there may be thousands.
+            self.loop.call_soon(self.on_response_complete)
+        else:
+            self.on_response_complete()
 
 
 def _is_short(cycle: RequestResponseCycle, scope: Scope) -> bool:

@@ -14,7 +14,7 @@ from http import HTTPStatus
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from ..http.errors import NotHttpError
-from ..http.problems import KINDS, Kind, Problem
+from ..http.problems import KINDS, RAISED, Problem
 from ..http.reception import taken_or_made
 from ..http.services import KEY, Services
 from ..http.state import RequestState, attach
@@ -90,8 +90,7 @@ class ReceiptProtocol(HttpToolsProtocol):
         if self.cycle is not None and not self.cycle.response_complete:
             self.transport.close()
             return
-        problem = Problem(KINDS["invalid_http"], str(NotHttpError()))
-        self.write_problem(problem, taken_or_made([]), close=True)
+        self.write_refusal(NotHttpError(), taken_or_made([]), close=True)
 
     def _unsupported_upgrade_warning(self) -> None:
         # The parser has taken the body for another protocol: nothing after it can be a request.
@@ -111,9 +110,9 @@ class ReceiptProtocol(HttpToolsProtocol):
             self._write_timer = None
         super().resume_writing()
 
-    def write_problem(self, problem: Problem, request_id: str, *, close: bool) -> None:
+    def write_refusal(self, error: Exception, request_id: str, *, close: bool) -> None:
         """Answer without the application, and hear nothing of the connection any more where it closes."""
-        self.transport.write(_rendered(problem, request_id, self.server_state.default_headers, close=close))
+        self.transport.write(_rendered(error, request_id, self.server_state.default_headers, close=close))
         if close:
             self._deaf = True
             self._unset_keepalive_if_required()
@@ -148,18 +147,19 @@ def _without_upgrade(data: bytes) -> bytes:
     return _UPGRADE.sub(rb"\1x-\2", head) + end + rest if end and _UPGRADE.search(head) else data
 
 
-def _rendered(problem: Problem, request_id: str, default: list[tuple[bytes, bytes]], *, close: bool) -> bytes:
-    """Return a problem as it goes over the wire; `default` are the headers that all answers have."""
+def _rendered(error: Exception, request_id: str, default: list[tuple[bytes, bytes]], *, close: bool) -> bytes:
+    """Return a refusal as it goes over the wire; `default` are the headers that all answers have."""
     usual = len(request_id) == len(SOME_ID)
-    begin, rest = _parts(problem.kind, problem.detail, SOME_ID if usual else request_id, close)
+    begin, rest = _parts(RAISED[type(error)].code, str(error), SOME_ID if usual else request_id, close)
     if usual:
         rest = rest.replace(SOME_ID.encode(), request_id.encode())
     return begin + b"".join(b"%b: %b\r\n" % header for header in default) + rest
 
 
 @lru_cache(maxsize=64)
-def _parts(kind: Kind, detail: str, request_id: str, close: bool) -> tuple[bytes, bytes]:
+def _parts(code: str, detail: str, request_id: str, close: bool) -> tuple[bytes, bytes]:
     """Return the first line of an answer, and what follows the headers that all answers have."""
+    kind = KINDS[code]
     answer = Problem(kind, detail).response(request_id)
     headers = [*answer.raw_headers, (b"x-request-id", request_id.encode())]
     if close:
