@@ -26,7 +26,7 @@ RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir 
 # For any x86-64 processor: the processor's name is part of a kernel's key, so it has to be the same at run time.
 ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
 WORKDIR /
-RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.warmup import warm_up; warm_up()"
+RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.warmup import warm_up; warm_up()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
     && $COMPILE registration vectorization association simulation service \
     && chmod -R u=rwX,go=rX /opt/linefix
@@ -46,7 +46,7 @@ ENV PATH=/opt/linefix/bin:$PATH \
     LINEFIX_PORT=8000 \
     LINEFIX_DATA_DIR=/data
 # Once through as at a start: leaves the bytecode of what is used of Python itself, which its slim image comes without.
-RUN python -c "import service.server; from service.warmup import warm_up; warm_up()"
+RUN python -c "import service.process.protocol, service.app; from service.work.warmup import warm_up; warm_up()"
 ENV PYTHONDONTWRITEBYTECODE=1
 USER linefix
 WORKDIR /data

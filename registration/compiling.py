@@ -58,6 +58,7 @@ logger = logging.getLogger("linefix")
 SHARED = "registration"  # the package whose kernels those of every other may call
 SOURCES = ("layout.py", "tuning.py", "_*kernels.py", "kernels/**/*.py")
 VERSIONS = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
+DIRECTORY = "LINEFIX_KERNELS"  # names where compiled kernels are kept
 KEPT_STAMPS = 8  # of a package in one place: of other versions and processors, and of checkouts in use
 
 
@@ -103,7 +104,7 @@ def cache_directory(package: str) -> Path:
         As it is imported, such as ``association``.
     """
     name = f"{package}-{stamp(package)}"
-    named = os.environ.get("LINEFIX_KERNELS") or os.environ.get("NUMBA_CACHE_DIR")
+    named = os.environ.get(DIRECTORY) or os.environ.get("NUMBA_CACHE_DIR")
     if named:
         return Path(named).absolute() / name
     home = _home(package)
@@ -241,7 +242,7 @@ def _own_directory() -> Path:
     except OSError:
         return kept  # nothing can be written here at all; kernels work from memory
     atexit.register(shutil.rmtree, fresh, ignore_errors=True)
-    os.environ["LINEFIX_KERNELS"] = fresh  # the processes that this one starts share it
+    os.environ[DIRECTORY] = fresh  # the processes that this one starts share it
     return Path(fresh)
 
 

@@ -10,32 +10,36 @@ from contextlib import asynccontextmanager, suppress
 from functools import partial
 from typing import Any
 
-from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
-from starlette.responses import Response
-from starlette.routing import Match
+from fastapi import FastAPI
 
-from association import CancelledError
-from registration import InputError
-
-from .compiling import compile_kernels, is_compiled
-from .context import RequestContext, note, request_id_of
-from .keys import KeyGuard
-from .openapi import describe
+from .admission.budget import ByteBudget
+from .admission.entrance import Entrance
+from .admission.gate import SearchGate
+from .admission.keys import Keyring
+from .admission.readiness import Readiness
+from .http.bodies import BodyReceiver
+from .http.openapi import describe
+from .http.probe import StoreProbe
+from .http.reception import Reception
+from .http.refusing import handle_errors
+from .http.routes import associate, batch, maps, operations, pages, register, vectorize
+from .http.services import KEY, Services
+from .maps import IndexCache, MapStore
+from .maps.errors import StoreError
+from .maps.lookup import MapLookup
+from .parsing.errors import ParserEndedError
+from .parsing.parser_process import ParserProcess
 from .part import WHOLE, Part
-from .problems import ProblemError, faults_of, internal, invalid
-from .routes import associate, maps, operations, pages, register, vectorize
-from .runtime import HangUpError, Runtime
-from .schemas.strict import TooLargeError
 from .settings import Settings
-from .translation import problem_of
+from .telemetry.metrics import Metrics
+from .telemetry.refusals import RefusalTally
+from .threads import Threads
 from .version import VERSION
-from .warmup import warm_up
+from .work.association import Associator
+from .work.compiling import compile_kernels, is_compiled
+from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
-CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do
 
 
 def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
@@ -47,32 +51,20 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     part : Part
         Which of several processes this is.
     """
-    runtime = Runtime(settings, part)
+    services = _services(settings, part)
     app = FastAPI(
         title="Linefix",
         version=VERSION,
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
-        lifespan=partial(_lifespan, runtime=runtime, part=part),
+        lifespan=partial(_lifespan, services=services, part=part),
     )
-    app.state.runtime = runtime
-    for module in (register, associate, vectorize, maps, operations, pages):
+    app.state.services = services
+    for module in (register, associate, batch, vectorize, maps, operations, pages):
         app.include_router(module.router)
-    for kind in (
-        ProblemError,
-        TooLargeError,
-        InputError,
-        CancelledError,
-        RequestValidationError,
-        HTTPException,
-    ):
-        app.add_exception_handler(kind, _refuse)
-    for gone in (HangUpError, ClientDisconnect):
-        app.add_exception_handler(gone, _nobody)
-    # The last added is the outermost.
-    app.add_middleware(KeyGuard, keyring=runtime.keyring)
-    app.add_middleware(RequestContext, metrics=runtime.metrics)
+    handle_errors(app)
+    app.add_middleware(Reception, services=services)
     document: dict[str, Any] = {}
 
     def openapi() -> dict[str, Any]:
@@ -84,74 +76,70 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     return app
 
 
+def _services(settings: Settings, part: Part) -> Services:
+    """Put the parts together; of several processes each has its share."""
+    metrics = Metrics()
+    gate = SearchGate(part.share(settings.searches), part.share(settings.queue))
+    budget = ByteBudget(max(settings.max_body_bytes, part.share(settings.max_bodies_bytes)))
+    store = MapStore(settings.url)
+    cache = IndexCache(part.share(settings.cache_bytes), metrics)
+    parser = ParserProcess()
+    readiness = Readiness()
+    metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
+    metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
+    metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)
+    metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: budget.held)
+    metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes)
+    metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(cache))
+    return Services(
+        settings=settings,
+        metrics=metrics,
+        refusals=RefusalTally(metrics),
+        readiness=readiness,
+        entrance=Entrance(gate, Keyring(settings.keys), settings.max_body_bytes),
+        gate=gate,
+        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout),
+        parser=parser,
+        store=store,
+        probe=StoreProbe(store),
+        associator=Associator(MapLookup(cache, store, parser), metrics),
+        parse_threads=Threads(2, "parse"),
+        store_threads=Threads(4, "store"),
+    )
+
+
 @asynccontextmanager
-async def _lifespan(app: FastAPI, runtime: Runtime, part: Part) -> AsyncIterator[None]:
-    tasks = [asyncio.create_task(_get_ready(runtime)), asyncio.create_task(runtime.metrics.refresh_now_and_then())]
+async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterator[dict[str, Services]]:
+    getting_ready = asyncio.create_task(_get_ready(services))
+    refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
     if part.replaces:
-        await tasks[0]
+        await getting_ready
     try:
-        yield
+        yield {KEY: services}
     finally:
-        for task in tasks:
-            task.cancel()
-        runtime.doors.report()
-        runtime.close()
+        getting_ready.cancel()
+        refreshing.cancel()
+        services.close()
 
 
-async def _get_ready(runtime: Runtime) -> None:
+async def _get_ready(services: Services) -> None:
     """Open the store and warm the kernels while probes are answered already."""
     try:
-        await runtime.open_store()
-    except ProblemError as problem:
+        await services.probe.open()
+    except StoreError as error:
         # readyz goes on trying; meanwhile it says what is wrong.
-        where = runtime.settings.url.render_as_string(hide_password=True)
-        logger.error("the store does not open: %s", problem.detail, extra={"store": where})
+        where = services.settings.url.render_as_string(hide_password=True)
+        logger.error("the store does not open: %s", error, extra={"store": where})
+    threads, parser = services.parse_threads, services.parser
     if not is_compiled():
         logger.info("compiling, which takes half a minute; what comes of it is kept for the next start")
-        with suppress(ProblemError):  # if that process ends early this one compiles what is missing
-            await runtime.in_parser(partial(runtime.parser.call, compile_kernels))
-        runtime.parser.close()
-    await asyncio.gather(runtime.in_parser(warm_up), runtime.in_parser(runtime.parser.start))
+        with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
+            await threads.run(partial(parser.call, compile_kernels))
+        parser.close()
+    await asyncio.gather(threads.run(warm_up), threads.run(parser.start))
     # What is there now stays: no need to look through it for garbage ever again.
     gc.collect()
     gc.freeze()
-    runtime.warm = True
-    runtime.metrics.refresh()
+    services.readiness.warm = True
+    services.metrics.refresh()
     logger.info("ready")
-
-
-async def _refuse(request: Request, error: Exception) -> Response:
-    problem = _of_framework(request, error) or problem_of(error)
-    if problem is None:
-        logger.error("a defect", exc_info=error, extra={"request_id": request_id_of(request.scope)})
-        problem = internal()
-    note(request.scope, code=problem.code)
-    return problem.response(request_id_of(request.scope))
-
-
-def _of_framework(request: Request, error: Exception) -> ProblemError | None:
-    """Return the problem of what FastAPI and Starlette refuse by themselves."""
-    if isinstance(error, RequestValidationError):
-        return invalid(faults_of(error.errors()))
-    if isinstance(error, HTTPException):
-        headers = dict(error.headers or {})
-        if error.status_code == 405:
-            headers["Allow"] = ", ".join(_methods_of(request))
-            return ProblemError("method_not_allowed", "this path takes other methods; see Allow", headers=headers)
-        if error.status_code == 404:
-            return ProblemError("not_found", "there is nothing under this path", headers=headers)
-        return ProblemError("invalid_request", "the request is wrong", headers=headers)
-    return None
-
-
-def _methods_of(request: Request) -> list[str]:
-    """Return what the path takes; the framework names the methods of one route only."""
-    every = [getattr(included, "original_router", None) or included for included in request.app.routes]
-    routes = [route for one in every for route in getattr(one, "routes", [one])]
-    matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)
-    methods = {method for route in matching for method in getattr(route, "methods", ())}
-    return sorted(methods | {"HEAD"} if "GET" in methods else methods)
-
-
-async def _nobody(request: Request, error: Exception) -> Response:
-    return Response(status_code=CLIENT_CLOSED_REQUEST)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import logging
+import logging.config
 import os
 import sys
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -20,29 +19,10 @@ USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve -
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def choose_kernel_cache(packages: Path) -> None:
-    """Name a directory for compiled kernels that this user can write, where the packages' own are not.
-
-    Without one Numba refuses to start: "no locator available".
-    """
-    own = packages / "association" / "__pycache__"
-    if "NUMBA_CACHE_DIR" in os.environ or os.access(own if own.exists() else own.parent, os.W_OK):
-        return
-    kept = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "linefix" / "kernels"
-    try:
-        kept.mkdir(mode=0o700, parents=True, exist_ok=True)
-        writable = os.access(kept, os.W_OK)
-    except OSError:
-        writable = False
-    # The last resort is compiled anew at every start. Its name cannot be guessed: what is in it gets executed.
-    os.environ["NUMBA_CACHE_DIR"] = str(kept) if writable else tempfile.mkdtemp(prefix="linefix-kernels-")
-
-
 def serve(arguments: Sequence[str]) -> int:
     """Read the settings and run the service."""
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
-    choose_kernel_cache(Path(__file__).parents[1])
     from .settings import SettingsError, read_settings
 
     try:
@@ -57,32 +37,31 @@ def serve(arguments: Sequence[str]) -> int:
 
 def unknown_settings() -> list[str]:
     """Return what looks like a setting in the environment and is none."""
+    from registration.compiling import DIRECTORY
+
     from .settings import Settings
 
-    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields}
+    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields} | {DIRECTORY}
     return sorted(name for name in os.environ if name.upper().startswith("LINEFIX_") and name.upper() not in known)
 
 
 def run(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
-    from .listening import listen
-    from .logs import configure
+    from .process.listening import listen
+    from .process.server import serve_alone
+    from .telemetry.logs import log_config
 
-    configure(settings.log_level)
+    logging.config.dictConfig(log_config(settings.log_level))
     try:
         listener = listen(settings)
     except OSError as error:
         logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
         return 1
     if settings.workers > 1:
-        # What computes is not loaded into the process that only looks after the others.
-        from .workers import Workers
+        from .process.workers import supervise
 
-        return Workers(settings, listener).run()
-    from .part import WHOLE
-    from .server import answer
-
-    return answer(settings, listener, WHOLE)
+        return supervise(settings, listener)
+    return serve_alone(settings, listener)
 
 
 def main() -> None:

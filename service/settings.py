@@ -13,6 +13,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
 from .database_url import database_url
+from .schemas.limits import Limits
 
 
 def _data_home() -> Path:
@@ -100,16 +101,16 @@ class Settings(BaseSettings):
             return database_url(self.database_url.get_secret_value())
         return URL.create("sqlite", database=str(self.data_dir / "maps.sqlite3"))
 
-    def limits(self) -> dict[str, int]:
-        """Return the limits that arrays are held to, by the names of the validation context."""
-        return {
-            "values": self.max_values,
-            "map_segments": self.max_map_segments,
-            "scan_segments": self.max_scan_segments,
-            "beams": self.max_beams,
-            "pairs": self.max_correspondences,
-            "batch": self.max_batch,
-        }
+    def limits(self) -> Limits:
+        """Return the counts that requests are held to."""
+        return Limits(
+            values=self.max_values,
+            map_segments=self.max_map_segments,
+            scan_segments=self.max_scan_segments,
+            beams=self.max_beams,
+            pairs=self.max_correspondences,
+            batch=self.max_batch,
+        )
 
 
 def is_loopback(host: str) -> bool:

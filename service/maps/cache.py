@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from association import MapIndex
 
-from ..metrics import Metrics
+from ..telemetry.metrics import Metrics
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import Connection
 
-from ..problems import ProblemError
+from .errors import ReadOnlyStoreError
 
 BUSY_SECONDS = 5.0
 # Up to 3.51.2 a WAL that is reset while another connection checkpoints can corrupt the database.
@@ -40,7 +40,7 @@ def make_directory(url: URL) -> None:
 
     Raises
     ------
-    ProblemError
+    ReadOnlyStoreError
         When it cannot be made.
     """
     if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:" or "uri" in url.query:
@@ -52,7 +52,7 @@ def make_directory(url: URL) -> None:
         for made in missing:
             _sync(made.parent)
     except OSError as error:
-        raise ProblemError("read_only", "the directory of the maps cannot be made") from error
+        raise ReadOnlyStoreError("the directory of the maps cannot be made") from error
 
 
 def _sync(folder: Path) -> None:

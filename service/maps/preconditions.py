@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..problems import ProblemError
+from .errors import RevisionConflictError
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,13 @@ class Preconditions:
     none_may_exist: bool = False
 
     def check(self, revision: int | None) -> None:
-        """Raise when the present revision, None for no map, is not as demanded."""
+        """Hold the present revision, None for no map, to the demands.
+
+        Raises
+        ------
+        RevisionConflictError
+            When it is not as demanded.
+        """
         present = revision is not None
         refused = (
             (self.any_match and not present)
@@ -38,9 +44,4 @@ class Preconditions:
             or (self.if_none_match is not None and present and revision in self.if_none_match)
         )
         if refused:
-            now = f"the map's present revision is {revision}" if present else "there is no map under this id"
-            raise ProblemError(
-                "revision_conflict",
-                f"{now}, which is not what was demanded",
-                headers={"ETag": f'"{revision}"'} if present else {},
-            )
+            raise RevisionConflictError(revision)

@@ -11,8 +11,8 @@ from alembic.config import Config
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, inspect, text
 
-from ..problems import ProblemError
-from .failures import failures_as_problems
+from .errors import StoreAwayError
+from .failures import failures_as_store_errors
 from .tables import maps
 
 VERSION_TABLE = "linefix_schema"
@@ -30,13 +30,13 @@ def upgrade(engine: Engine, writer: Engine) -> None:
 
     Raises
     ------
-    ProblemError
+    StoreError
         When the database does not take it, or was made by a newer version of the service.
     """
-    with failures_as_problems(), engine.begin() as connection:
+    with failures_as_store_errors(), engine.begin() as connection:
         if _version(connection) == _head():
             return
-    with _one_at_a_time, failures_as_problems(), writer.begin() as connection:
+    with _one_at_a_time, failures_as_store_errors(), writer.begin() as connection:
         if connection.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _ADVISORY_LOCK})
         version = _version(connection)
@@ -54,7 +54,7 @@ def _version(connection: Connection) -> str | None:
     found = inspect(connection).has_table(VERSION_TABLE)
     version = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar() if found else None
     if version is not None and version not in _known():
-        raise ProblemError("not_ready", "the database was made by a newer version of the service")
+        raise StoreAwayError("the database was made by a newer version of the service")
     return version
 
 

@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, literal, select, update
 from sqlalchemy.exc import IntegrityError
 
-from ..problems import ProblemError
 from .database import make_directory, open_engine
-from .failures import DAMAGED, failures_as_problems
+from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, UnknownMapError
+from .failures import damaged, failures_as_store_errors
 from .preconditions import Preconditions
 from .records import ABSENT, Bounds, MapPage, MapRecord, MapSummary, StoredMap, columns_of, digest, is_sealed
 from .schema import upgrade
@@ -27,7 +27,7 @@ class MapStore:
 
     Raises
     ------
-    ProblemError
+    StoreError
         From every method: when the database is full, read-only, busy, damaged or away.
     """
 
@@ -61,11 +61,8 @@ class MapStore:
         """
         written = self._twice(lambda: self._put(map_id, document, summary, demands))
         # From damaged tables others may read other rows than who wrote them sees: no promise then.
-        try:
+        with suppress(UnknownMapError):  # deleted by another meanwhile
             self.load(map_id)
-        except ProblemError as problem:
-            if problem.code != "unknown_map":  # deleted by another meanwhile
-                raise
         return written
 
     def _put(
@@ -87,7 +84,7 @@ class MapStore:
             # Where the tables themselves are damaged rows may not come back as they were written: no commit then.
             back = _whole(connection, map_id)
             if _trusted(back) != record or not _matches(back, record):
-                raise corrupt_map()
+                raise CorruptMapError
         return record.revision, not exists
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
@@ -99,7 +96,7 @@ class MapStore:
             last, exists = _last(connection, map_id, _locked(connection, map_id))
             demands.check(last if exists else None)
             if not exists:
-                raise unknown_map()
+                raise UnknownMapError
             _update(connection, maps, columns_of(MapRecord(map_id, last, ABSENT), 0, (0.0, 0.0, 0.0, 0.0)))
             connection.execute(delete(documents).where(documents.c.map_id == map_id))
 
@@ -115,7 +112,7 @@ class MapStore:
         record = _trusted(row)
         if not _matches(row, record):
             self._quarantine(record)
-            raise corrupt_map()
+            raise CorruptMapError
         return StoredMap(record, row.document)
 
     def list(self, limit: int, after: str) -> MapPage:
@@ -133,21 +130,21 @@ class MapStore:
         logger.error("map quarantined: it does not match its checksum", extra={"map_id": record.map_id})
         same = (maps.c.map_id == record.map_id, maps.c.revision == record.revision)
         # Where nothing can be written the checksum goes on refusing it.
-        with suppress(ProblemError), self._writing() as connection:
+        with suppress(StoreError), self._writing() as connection:
             connection.execute(update(maps).where(*same).values(quarantined=True))
 
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
         if not self._opened:
             self.open()
-        with failures_as_problems(), self._engine.begin() as connection:
+        with failures_as_store_errors(), self._engine.begin() as connection:
             yield connection
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
         if not self._opened:
             self.open()
-        with failures_as_problems(), self._writer.begin() as connection:
+        with failures_as_store_errors(), self._writer.begin() as connection:
             yield connection
 
     def _twice(self, write: Callable[[], T]) -> T:
@@ -159,23 +156,11 @@ class MapStore:
             try:
                 return write()
             except IntegrityError as error:
-                raise ProblemError(*DAMAGED) from error
-        except ProblemError as problem:
-            if problem.code != "read_only":
-                raise
+                raise damaged() from error
+        except ReadOnlyStoreError:
             # A connection made while nothing could be written stays so when the disk, or the server, is mended.
             self._engine.dispose()
             return write()
-
-
-def unknown_map() -> ProblemError:
-    """Return the problem of an id that nothing is stored under."""
-    return ProblemError("unknown_map", "no map is stored under this id")
-
-
-def corrupt_map() -> ProblemError:
-    """Return the problem of a map that is not as it was put."""
-    return ProblemError("map_corrupt", "the stored map does not match its checksum; put it again")
 
 
 def _whole(connection: Connection, map_id: str) -> Row[Any]:
@@ -197,15 +182,15 @@ def _row(connection: Connection, map_id: str, columns: Select[Any]) -> Row[Any]:
         # Put for the first time between the two looks; or else damage hides the row, which is never deleted.
         row = connection.execute(query).first()
         if row is None:
-            raise corrupt_map()
+            raise CorruptMapError
     if row is None or (row.sha256 == ABSENT and is_sealed(row)):
-        raise unknown_map()
+        raise UnknownMapError
     return row
 
 
 def _trusted(row: Row[Any]) -> MapRecord:
     if row.quarantined or not is_sealed(row):
-        raise corrupt_map()
+        raise CorruptMapError
     return MapRecord(row.map_id, row.revision, row.sha256)
 
 

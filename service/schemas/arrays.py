@@ -1,7 +1,7 @@
 """Long arrays of numbers, checked by the thousand instead of row by row.
 
 pydantic takes some 50 ms for 10,000 rows and makes a megabyte of complaints of them; here a good array costs one pass
-in C, and only a bad one is gone through, for its first `MAX_ERRORS` rows.
+in C, and only a bad one is gone through, for its first `MAX_FAULTS` rows.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from .strict import MAX_MAGNITUDE, TooLargeError
+from .errors import TooManyError
+from .limits import MAX_FAULTS, Limits
+from .strict import MAX_MAGNITUDE
 
 Floats = NDArray[np.float64]
-MAX_ERRORS = 20
 NUMBERS = frozenset((int, float))
 NUMBERS_OR_NULL = frozenset((int, float, type(None)))
 INTEGERS = frozenset((int,))
@@ -28,17 +29,22 @@ def _refuse(faults: Iterable[tuple[int, str]]) -> PydanticCustomError:
     rows: list[tuple[int, str]] = []
     for fault in faults:
         rows.append(fault)
-        if len(rows) == MAX_ERRORS:
+        if len(rows) == MAX_FAULTS:
             break
     return PydanticCustomError("rows", "some rows are wrong", {"rows": rows})
 
 
-def _listed(value: Any, info: ValidationInfo, limit: str, what: str) -> list[Any]:
+def _listed(value: Any, info: ValidationInfo, counted: tuple[str, str]) -> list[Any]:
+    """Return an array that is within its limit; `counted` are the limit's name in `Limits` and what it counts.
+
+    What was stored is read without limits: they may have changed since.
+    """
     if type(value) is not list:
         raise PydanticCustomError("not_an_array", "expected an array")
-    most = info.context.get(limit) if info.context else None
-    if most is not None and len(value) > most:
-        raise TooLargeError("", most, what)
+    name, what = counted
+    limits: Limits | None = info.context
+    if limits is not None and len(value) > getattr(limits, name):
+        raise TooManyError("", getattr(limits, name), what)
     return value
 
 
@@ -79,19 +85,19 @@ def _column(value: list[Any], types: frozenset[type], low: float, high: float) -
 
 
 def _rows_validator(
-    width: int, types: frozenset[type], low: float, high: float, limit: tuple[str, str]
+    width: int, types: frozenset[type], low: float, high: float, counted: tuple[str, str]
 ) -> Callable[[Any, ValidationInfo], Floats]:
     def validate(value: Any, info: ValidationInfo) -> Floats:
-        return _rows(_listed(value, info, *limit), width, types, low, high)
+        return _rows(_listed(value, info, counted), width, types, low, high)
 
     return validate
 
 
 def _column_validator(
-    types: frozenset[type], low: float, high: float, limit: tuple[str, str]
+    types: frozenset[type], low: float, high: float, counted: tuple[str, str]
 ) -> Callable[[Any, ValidationInfo], Floats]:
     def validate(value: Any, info: ValidationInfo) -> Floats:
-        return _column(_listed(value, info, *limit), types, low, high)
+        return _column(_listed(value, info, counted), types, low, high)
 
     return validate
 
@@ -165,8 +171,10 @@ Weights = Annotated[
 ]
 
 
-def _covariance(value: Any, info: ValidationInfo) -> Floats:
-    matrix = _rows(_listed(value, info, "none", "rows"), 3, NUMBERS, -_M, _M)
+def _covariance(value: Any) -> Floats:
+    if type(value) is not list:
+        raise PydanticCustomError("not_an_array", "expected an array")
+    matrix = _rows(value, 3, NUMBERS, -_M, _M)
     if matrix.shape != (3, 3):
         raise PydanticCustomError("covariance", "expected 3 rows of 3 numbers")
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):

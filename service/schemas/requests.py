@@ -8,8 +8,10 @@ from pydantic import Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
 from .arrays import MapSegmentRows, PairRows, PointRows, Weights
+from .errors import TooManyError
+from .limits import Limits
 from .parts import AnyMap, AnyPrior, AnyScan, Laser, MapSigma, MeasuredFields, RaySigma, SearchOptions
-from .strict import FrameId, FreeJson, Pose, Sigma, Strict, TooLargeError
+from .strict import FrameId, FreeJson, Pose, Sigma, Strict
 
 
 class KnownMap(Strict):
@@ -62,9 +64,9 @@ class BatchRequest(Strict):
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
-        most = info.context.get("batch") if info.context else None
-        if most is not None and len(self.scans) > most:
-            raise TooLargeError("/scans", most, "scans")
+        limits: Limits | None = info.context
+        if limits is not None and len(self.scans) > limits.batch:
+            raise TooManyError("/scans", limits.batch, "scans")
         if self.priors is not None and len(self.priors) != len(self.scans):
             raise PydanticCustomError("priors", "expected one prior, or null, per scan")
         return self

@@ -14,21 +14,6 @@ MAX_FREE_BYTES = 16_384
 MAX_FREE_DEPTH = 32
 
 
-class TooLargeError(Exception):
-    """A part of the request is over one of the limits of ``/v1/limits``."""
-
-    def __init__(self, pointer: str, limit: int, what: str) -> None:
-        super().__init__(f"more than {limit} {what}")
-        self.pointer = pointer
-        self.limit = limit
-        self.what = what
-        self.detail = f"at most {limit} {what} are taken"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Say how to pickle it: it crosses processes."""
-        return TooLargeError, (self.pointer, self.limit, self.what)
-
-
 class Strict(BaseModel):
     """Takes numbers for numbers only, and no field that it does not know."""
 

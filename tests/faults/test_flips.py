@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from service.database_url import database_url
+from service.http.problems import ProblemError
 from service.maps import MapStore, Preconditions
-from service.problems import ProblemError
 from service.schemas import examples
 
 BOX = (4, (-1.5, 0.0, 1.0, 1e5))

@@ -12,8 +12,8 @@ import numpy as np
 import orjson
 import pytest
 
+from service.process.warmup import room_ranges
 from service.schemas import examples
-from service.warmup import room_ranges
 from tests.service.test_workers import until
 
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)

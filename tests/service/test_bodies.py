@@ -14,7 +14,7 @@ import httpx
 import orjson
 import pytest
 
-from service.listening import listen
+from service.process.listening import listen
 from service.schemas import examples
 from service.settings import Settings
 from tests.conftest import RunningService, start, stop

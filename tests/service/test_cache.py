@@ -12,13 +12,13 @@ from sqlalchemy import URL
 
 from association import MapIndex
 from registration import Segments
-from service.finite import NotFiniteError, encode
-from service.lookup import MapLookup
 from service.maps import CachedMap, IndexCache, MapStore
-from service.metrics import Metrics
-from service.parser_process import ParserProcess
+from service.maps.lookup import MapLookup
+from service.parsing.parser_process import ParserProcess
 from service.schemas import examples
+from service.schemas.encoding import NotFiniteError, encode
 from service.schemas.parts import InlineMap
+from service.telemetry.metrics import Metrics
 
 INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.problems import CODES
+from service.http.problems import CODES
 
 TEXT = (Path(__file__).parents[2] / "docs" / "http.md").read_text()
 STORED = re.findall(

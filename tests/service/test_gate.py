@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from association import Deadline
-from service.gate import SearchGate
-from service.problems import ProblemError
+from service.admission.gate import SearchGate
+from service.http.problems import ProblemError
 from service.runtime import HangUpError, Runtime
 from service.settings import Settings
 

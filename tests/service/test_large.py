@@ -17,11 +17,11 @@ import numpy as np
 import orjson
 import pytest
 
-from service.channel import Channel
-from service.lookup import LARGE
-from service.parser_process import ParserProcess
-from service.parsing import read_map, read_model
-from service.problems import ProblemError
+from service.http.problems import ProblemError
+from service.maps.lookup import LARGE
+from service.parsing.channel import Channel
+from service.parsing.parser_process import ParserProcess
+from service.parsing.reading import read_map, read_model
 from service.schemas import examples
 from service.schemas.requests import MapDocument
 from service.schemas.strict import TooLargeError

@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.problems import CODES
+from service.http.problems import CODES
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,10 @@ from alembic.migration import MigrationContext
 from sqlalchemy import Column, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
 
 from service.database_url import database_url
+from service.http.problems import ProblemError
 from service.maps import MapStore, Preconditions, schema
 from service.maps.database import open_engine
 from service.maps.tables import metadata
-from service.problems import ProblemError
 
 BOX = (4, (0.0, 0.0, 1.0, 1.0))
 # As `create_all` made it before there were migrations.

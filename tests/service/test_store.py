@@ -12,9 +12,9 @@ import pytest
 from sqlalchemy import text
 
 from service.database_url import database_url
+from service.http.problems import ProblemError
 from service.maps import MapRecord, MapStore, Preconditions
 from service.maps import database as connections
-from service.problems import ProblemError
 
 BOX = (4, (0.0, 0.0, 1.0, 1.0))
 ANY = Preconditions()

@@ -14,10 +14,10 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.metrics import Metrics
-from service.part import Part
+from service.process.part import Part
 from service.schemas import examples
 from service.settings import SettingsError, read_settings
+from service.telemetry.metrics import Metrics
 from tests.conftest import RunningService
 from tests.service.test_fairness import searched_for_a_while
 from tests.service.test_large import children_of, is_running

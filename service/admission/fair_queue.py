@@ -1,0 +1,110 @@
+"""Whose turn is next: the queue is shared fairly between those who hold keys."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, deque
+
+Holder = bytes | None
+"""Who asks: the digest of a key, None where the service has no keys."""
+
+Turn = asyncio.Future[None]
+
+
+class FairQueue:
+    """Waiting turns, one line per holder; the holder that has used the least time is served first.
+
+    A holder counts as active while it has something waiting, running or on its way. One that comes anew starts where
+    the least served of the active ones is: it neither pays for old use nor has credit from the time it was away.
+    """
+
+    def __init__(self) -> None:
+        self._lines: dict[Holder, deque[Turn]] = {}
+        self._running: Counter[Holder] = Counter()
+        self._coming: Counter[Holder] = Counter()
+        self._used: dict[Holder, float] = {}
+        self._fixed: set[Turn] = set()
+        self.waiting = 0
+
+    @property
+    def holders(self) -> int:
+        """How many are active."""
+        return len(self._used)
+
+    def places_of(self, holder: Holder) -> int:
+        """Return how many turns of a holder wait, run, or are on their way."""
+        return len(self._lines.get(holder, ())) + self._running[holder] + self._coming[holder]
+
+    def expect(self, holder: Holder) -> None:
+        """Note that something of a holder is on its way."""
+        self._activate(holder)
+        self._coming[holder] += 1
+
+    def expect_no_longer(self, holder: Holder) -> None:
+        """Note that it has come, or will not."""
+        self._coming[holder] -= 1
+        self._forget_idle(holder)
+
+    def join(self, holder: Holder, *, fixed: bool) -> Turn:
+        """Return a turn at the end of the holder's line; a fixed one is never taken away again."""
+        self._activate(holder)
+        turn: Turn = asyncio.get_running_loop().create_future()
+        self._lines.setdefault(holder, deque()).append(turn)
+        if fixed:
+            self._fixed.add(turn)
+        self.waiting += 1
+        return turn
+
+    def leave(self, holder: Holder, turn: Turn) -> None:
+        """Give up a turn that has not come."""
+        self._lines[holder].remove(turn)
+        self._left(holder, turn)
+
+    def next(self) -> Turn | None:
+        """Take the turn that is next and count it as running; None when nobody waits."""
+        waiting = [holder for holder, line in self._lines.items() if line]
+        if not waiting:
+            return None
+        # Of equals the one that has stood in front for longest: lines are kept in the order in which they began.
+        holder = min(waiting, key=self._used.__getitem__)
+        turn = self._lines[holder].popleft()
+        self.started(holder)
+        self._left(holder, turn)
+        return turn
+
+    def take_from_the_greediest(self, share: float) -> Turn | None:
+        """Take the youngest turn of whoever has the most places, if these are more than a share."""
+        lines = [(self.places_of(holder), holder) for holder, line in self._lines.items() if set(line) - self._fixed]
+        places, greediest = max(lines, key=lambda item: item[0], default=(0, None))
+        if places <= share:
+            return None
+        turn = next(turn for turn in reversed(self._lines[greediest]) if turn not in self._fixed)
+        self.leave(greediest, turn)
+        return turn
+
+    def started(self, holder: Holder) -> None:
+        """Note that something of a holder runs."""
+        self._activate(holder)
+        self._running[holder] += 1
+
+    def finished(self, holder: Holder, seconds: float) -> None:
+        """Note that it ran so long."""
+        self._running[holder] -= 1
+        self._used[holder] += seconds
+        self._forget_idle(holder)
+
+    def _left(self, holder: Holder, turn: Turn) -> None:
+        self._fixed.discard(turn)
+        self.waiting -= 1
+        line = self._lines.pop(holder)
+        if line:
+            self._lines[holder] = line
+        self._forget_idle(holder)
+
+    def _activate(self, holder: Holder) -> None:
+        if holder not in self._used:
+            self._used[holder] = min(self._used.values(), default=0.0)
+
+    def _forget_idle(self, holder: Holder) -> None:
+        if not self.places_of(holder):
+            del self._used[holder], self._running[holder], self._coming[holder]

@@ -1,0 +1,90 @@
+"""Receiving a request's body: bounded in bytes and in time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from starlette.requests import Request
+
+from ..admission.budget import ByteBudget
+from ..schemas.errors import BodyTooLargeError
+from .errors import BodyTooSlowError, EncodingError, MediaTypeError
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body as it arrived."""
+
+    data: bytearray
+    gzipped: bool
+
+
+class BodyReceiver:
+    """Receives bodies.
+
+    Parameters
+    ----------
+    max_bytes : int
+        Of one body, as it arrives.
+    budget : ByteBudget
+        Of all bodies that are being read or parsed.
+    timeout : float
+        Seconds that a request may take to arrive, its head included.
+    """
+
+    def __init__(self, max_bytes: int, budget: ByteBudget, timeout: float) -> None:
+        self._max_bytes = max_bytes
+        self._budget = budget
+        self._timeout = timeout
+
+    @asynccontextmanager
+    async def receiving(self, request: Request, arrived: float) -> AsyncIterator[Body]:
+        """Receive a body whole; its bytes count as held until the block ends.
+
+        Parameters
+        ----------
+        request : Request
+        arrived : float
+            When its first byte came, by the event loop's clock, seconds.
+
+        Raises
+        ------
+        MediaTypeError, EncodingError
+            When it is no JSON by its head.
+        BodyTooLargeError
+            When it is larger than allowed.
+        TooMuchHeldError
+            When too much of all requests is in memory already.
+        BodyTooSlowError
+            When it does not come in time.
+        """
+        gzipped = _is_gzip(request)
+        with self._budget.account() as account:
+            data = bytearray()
+            try:
+                async with asyncio.timeout_at(arrived + self._timeout):
+                    async for piece in request.stream():
+                        if len(data) + len(piece) > self._max_bytes:
+                            raise BodyTooLargeError(self._max_bytes)
+                        account.take(len(piece))
+                        data += piece
+            except TimeoutError:
+                raise BodyTooSlowError(self._timeout) from None
+            yield Body(data, gzipped)
+
+
+def _is_gzip(request: Request) -> bool:
+    """Tell whether a body is gzip; refuse what is not JSON by its head."""
+    media_type = request.headers.get("content-type", "application/json").split(";")[0].strip().lower()
+    if media_type != "application/json" and not (
+        media_type.startswith("application/") and media_type.endswith("+json")
+    ):
+        raise MediaTypeError
+    encodings = [part.strip().lower() for part in request.headers.get("content-encoding", "").split(",")]
+    encodings = [part for part in encodings if part not in ("", "identity")]
+    if encodings not in ([], ["gzip"], ["x-gzip"]):
+        raise EncodingError
+    return bool(encodings)

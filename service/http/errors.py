@@ -1,0 +1,83 @@
+"""What is wrong with a request as HTTP.
+
+::
+
+    HttpError
+    ├── NotHttpError           not HTTP at all
+    ├── NotFoundError          no such path
+    ├── MethodNotAllowedError  the path takes other methods
+    ├── MediaTypeError         the body is no JSON by its head
+    ├── EncodingError          the body is packed in a way that is not taken
+    ├── BodyTooSlowError       the body did not come in time
+    └── RefusedError           anything else that the framework refuses
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class HttpError(Exception):
+    """A request is wrong as HTTP; the message says how."""
+
+
+class NotHttpError(HttpError):
+    """Not HTTP at all."""
+
+    def __init__(self) -> None:
+        super().__init__("this is not HTTP/1.1 as RFC 9112 has it, or no method of HTTP")
+
+
+class NotFoundError(HttpError):
+    """No such path."""
+
+    def __init__(self, message: str = "there is nothing under this path") -> None:
+        super().__init__(message)
+
+
+class MethodNotAllowedError(HttpError):
+    """The path takes other methods.
+
+    Parameters
+    ----------
+    allowed : iterable of str
+        The methods that it takes.
+    """
+
+    def __init__(self, allowed: Iterable[str]) -> None:
+        super().__init__("this path takes other methods; see Allow")
+        self.allowed = tuple(allowed)
+
+
+class MediaTypeError(HttpError):
+    """The body is no JSON by its head."""
+
+    def __init__(self) -> None:
+        super().__init__("the body has to be application/json")
+
+
+class EncodingError(HttpError):
+    """The body is packed in a way that is not taken."""
+
+    def __init__(self) -> None:
+        super().__init__("the only content encoding taken is gzip")
+
+
+class BodyTooSlowError(HttpError):
+    """The body did not come in time.
+
+    Parameters
+    ----------
+    seconds : float
+        That head and body may take together.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(f"the request did not arrive within {seconds:g} seconds")
+
+
+class RefusedError(HttpError):
+    """Anything else that the framework refuses."""
+
+    def __init__(self) -> None:
+        super().__init__("the request is wrong")

@@ -1,0 +1,69 @@
+"""Entity tags of maps: a map's tag is its revision in quotes."""
+
+from __future__ import annotations
+
+import re
+
+from starlette.requests import Request
+
+from ..maps import Preconditions
+from ..schemas.errors import Fault, InvalidRequestError
+
+_TAG = re.compile(r'(W/)?"([^"]*)"')
+_REVISION = re.compile(r"[1-9][0-9]{0,17}")
+
+
+def etag(revision: int) -> str:
+    """Return the strong entity tag of a revision."""
+    return f'"{revision}"'
+
+
+def demands_of(request: Request) -> Preconditions:
+    """Return what ``If-Match`` and ``If-None-Match`` of a writing request demand.
+
+    Raises
+    ------
+    InvalidRequestError
+        When one is not of the form of RFC 9110: taken for no demand it could cost a map.
+    """
+    match, none_match = _joined(request, "if-match"), _joined(request, "if-none-match")
+    wrong = [
+        Fault(f"/header/{name}", 'expected * or tags in quotes, such as "3"')
+        for name, value in (("if-match", match), ("if-none-match", none_match))
+        if value is not None and not _is_well_formed(value)
+    ]
+    if wrong:
+        raise InvalidRequestError(wrong)
+    return Preconditions(
+        # A weak tag never matches strongly: RFC 9110, 8.8.3.2.
+        if_match=None if match in (None, "*") else _revisions(match or "", weak=False),
+        any_match=match == "*",
+        if_none_match=None if none_match in (None, "*") else _revisions(none_match or "", weak=True),
+        none_may_exist=none_match == "*",
+    )
+
+
+def is_conditional(request: Request) -> bool:
+    """Tell whether a reader names what it has."""
+    return "if-none-match" in request.headers
+
+
+def is_unchanged(request: Request, revision: int) -> bool:
+    """Tell whether a reader has this revision already."""
+    none_match = _joined(request, "if-none-match")
+    return none_match is not None and (none_match == "*" or revision in _revisions(none_match, weak=True))
+
+
+def _joined(request: Request, name: str) -> str | None:
+    values = request.headers.getlist(name)
+    return ", ".join(values).strip() if values else None
+
+
+def _is_well_formed(header: str) -> bool:
+    rest, tags = _TAG.subn("", header)
+    return header == "*" or (tags > 0 and not rest.strip(" \t,"))
+
+
+def _revisions(header: str, *, weak: bool) -> frozenset[int]:
+    found = (tag for is_weak, tag in _TAG.findall(header) if weak or not is_weak)
+    return frozenset(int(tag) for tag in found if _REVISION.fullmatch(tag))

@@ -1,0 +1,162 @@
+"""Errors over HTTP: RFC 9457 problems, and the one table that makes them of exceptions.
+
+Nothing here repeats what a caller sent: messages are ours, pointers name places, and both are bounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import orjson
+from starlette.responses import Response
+
+from association import CancelledError
+from registration import InputError
+
+from ..admission import errors as admission
+from ..maps import errors as maps
+from ..parsing import errors as parsing
+from ..schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
+from ..schemas.limits import MAX_FAULTS
+from . import errors as http
+from .etags import etag
+
+MEDIA_TYPE = "application/problem+json"
+MAX_MESSAGE = 200
+MAX_DETAIL = 400
+MAX_POINTER = 120
+CLOSE = {"Connection": "close"}
+"""Of an answer that is given before the body was read: its rest is of no use."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A row of the table.
+
+    Attributes
+    ----------
+    code : str
+        Stable; what a program looks at.
+    status : int
+    title : str
+    raised_as : tuple of exception types
+        What becomes this problem.
+    """
+
+    code: str
+    status: int
+    title: str
+    raised_as: tuple[type[Exception], ...] = ()
+
+
+TABLE = (
+    Kind("invalid_json", 400, "The body is not JSON", (parsing.NotJsonError,)),
+    Kind("invalid_http", 400, "The request is not HTTP", (http.NotHttpError,)),
+    Kind("unauthorized", 401, "A key is needed", (admission.MissingKeyError,)),
+    Kind("forbidden", 403, "The key is not known", (admission.UnknownKeyError,)),
+    Kind("not_found", 404, "There is nothing here", (http.NotFoundError,)),
+    Kind("unknown_map", 404, "There is no such map", (maps.UnknownMapError,)),
+    Kind("method_not_allowed", 405, "The method is not allowed here", (http.MethodNotAllowedError,)),
+    Kind("request_timeout", 408, "The body came too slowly", (http.BodyTooSlowError,)),
+    Kind("map_corrupt", 409, "The stored map is damaged", (maps.CorruptMapError,)),
+    Kind("revision_conflict", 412, "The map is not as demanded", (maps.RevisionConflictError,)),
+    Kind("too_large", 413, "The request is over a limit", (TooManyError, BodyTooLargeError)),
+    Kind("unsupported_media_type", 415, "The media type is not supported", (http.MediaTypeError, http.EncodingError)),
+    Kind("invalid_request", 422, "The request is wrong", (InvalidRequestError, InputError, http.RefusedError)),
+    Kind("rate_limited", 429, "This key has used its share", (admission.ShareUsedError,)),
+    Kind("internal", 500, "A defect of the service"),
+    Kind("not_ready", 503, "The service is not ready", (admission.NotReadyError, maps.StoreAwayError, CancelledError)),
+    Kind(
+        "overloaded",
+        503,
+        "The service is busy",
+        (admission.QueueFullError, admission.TooMuchHeldError, maps.BusyStoreError, parsing.ParserEndedError),
+    ),
+    Kind("read_only", 503, "The store cannot be written", (maps.ReadOnlyStoreError,)),
+    Kind("deadline_exceeded", 504, "The deadline passed before the search started", (admission.DeadlinePassedError,)),
+    Kind("storage_full", 507, "The store is full", (maps.StoreFullError,)),
+)
+KINDS: Mapping[str, Kind] = MappingProxyType({kind.code: kind for kind in TABLE})
+RAISED: Mapping[type[Exception], Kind] = MappingProxyType({error: kind for kind in TABLE for error in kind.raised_as})
+"""Every exception that is an answer; any other is a defect."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """An answer that is an error."""
+
+    kind: Kind
+    detail: str
+    faults: Sequence[Fault] = ()
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+    def as_json(self, request_id: str, move: Callable[[str], str] = str) -> dict[str, object]:
+        """Return the problem document; `move` turns each pointer into the one to be sent."""
+        document: dict[str, object] = {
+            "type": f"urn:linefix:problem:{self.kind.code}",
+            "title": self.kind.title,
+            "status": self.kind.status,
+            "detail": self.detail[:MAX_DETAIL],
+            "code": self.kind.code,
+            "request_id": request_id,
+        }
+        if self.faults:
+            document["errors"] = [
+                {"pointer": move(fault.pointer)[:MAX_POINTER], "message": fault.message[:MAX_MESSAGE]}
+                for fault in self.faults[:MAX_FAULTS]
+            ]
+        return document
+
+    def response(self, request_id: str) -> Response:
+        """Return it as a response."""
+        headers = dict(self.headers)
+        if self.kind.status in (429, 503):
+            headers["Retry-After"] = "1"
+        return Response(orjson.dumps(self.as_json(request_id)), self.kind.status, headers, MEDIA_TYPE)
+
+
+INTERNAL = Problem(KINDS["internal"], "the service failed; the request id names the entry in its log")
+"""What is said of a defect: nothing but that it is one."""
+
+
+def problem_of(error: Exception) -> Problem | None:
+    """Return the problem that an exception stands for, or None for a defect."""
+    kind = next((RAISED[base] for base in type(error).__mro__ if base in RAISED), None)
+    if kind is None:
+        return None
+    match error:
+        case CancelledError():
+            return Problem(kind, "the service is going down")
+        case InputError():
+            return _of_library(kind, error)
+        case InvalidRequestError():
+            return Problem(kind, str(error), error.faults)
+        case TooManyError(pointer=pointer) if pointer:
+            return Problem(kind, str(error), (Fault(pointer, str(error)),))
+    return Problem(kind, str(error), headers=_headers_of(error))
+
+
+def _of_library(kind: Kind, error: InputError) -> Problem:
+    # The libraries name arguments as the contract does, with dots.
+    pointer = "/" + error.argument.replace(".", "/")
+    if error.index is not None:
+        pointer += f"/{error.index}"
+    wrong = InvalidRequestError([Fault(pointer, error.message)])
+    return Problem(kind, str(wrong), wrong.faults)
+
+
+def _headers_of(error: Exception) -> Mapping[str, str]:
+    match error:
+        case admission.MissingKeyError():
+            return {"WWW-Authenticate": 'Bearer realm="linefix"'}
+        case BodyTooLargeError() | admission.TooMuchHeldError() | http.BodyTooSlowError():
+            return CLOSE
+        case maps.RevisionConflictError(revision=int(revision)):
+            return {"ETag": etag(revision)}
+        case http.MethodNotAllowedError(allowed=allowed):
+            return {"Allow": ", ".join(allowed)}
+        case http.EncodingError():
+            return {"Accept-Encoding": "gzip"}
+    return {}

@@ -1,0 +1,68 @@
+"""What the application answers when something is raised."""
+
+from __future__ import annotations
+
+import logging
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
+from starlette.routing import Match
+
+from ..schemas.errors import InvalidRequestError
+from ..schemas.faults import faults_of
+from .errors import MethodNotAllowedError, NotFoundError, RefusedError
+from .exchange import HangUpError
+from .problems import INTERNAL, RAISED, problem_of
+from .state import state_of
+
+logger = logging.getLogger("linefix")
+CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do
+
+
+def handle_errors(app: FastAPI) -> None:
+    """Have an application answer with problems."""
+    for kind in (*RAISED, RequestValidationError, HTTPException):
+        app.add_exception_handler(kind, _refuse)
+    for gone in (HangUpError, ClientDisconnect):
+        app.add_exception_handler(gone, _nobody)
+
+
+async def _refuse(request: Request, error: Exception) -> Response:
+    state = state_of(request.scope)
+    assert state is not None
+    problem = problem_of(_own(request, error))
+    if problem is None:
+        logger.error("a defect", exc_info=error, extra={"request_id": state.request_id})
+        problem = INTERNAL
+    state.noted["code"] = problem.kind.code
+    return problem.response(state.request_id)
+
+
+def _own(request: Request, error: Exception) -> Exception:
+    """Return an exception of ours for what FastAPI and Starlette refuse by themselves."""
+    match error:
+        case RequestValidationError():
+            return InvalidRequestError(faults_of(error.errors()))
+        case HTTPException(status_code=404):
+            return NotFoundError()
+        case HTTPException(status_code=405):
+            return MethodNotAllowedError(_methods_of(request))
+        case HTTPException():
+            return RefusedError()
+    return error
+
+
+def _methods_of(request: Request) -> list[str]:
+    """Return what the path takes; the framework names the methods of one route only."""
+    every = [getattr(included, "original_router", None) or included for included in request.app.routes]
+    routes = [route for one in every for route in getattr(one, "routes", [one])]
+    matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)
+    methods = {method for route in matching for method in getattr(route, "methods", ())}
+    return sorted(methods | {"HEAD"} if "GET" in methods else methods)
+
+
+async def _nobody(request: Request, error: Exception) -> Response:
+    return Response(status_code=CLIENT_CLOSED_REQUEST)

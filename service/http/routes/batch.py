@@ -1,0 +1,91 @@
+"""POST /v1/associate:batch: several scans, one map."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+
+from association import CancelledError
+
+from ...parsing.reading import read_batch
+from ...schemas import examples
+from ...schemas.replies import BatchAnswer
+from ...schemas.requests import BatchItem, BatchRequest
+from ...work.association import batch_done
+from ...work.job import Done, Job
+from ..exchange import Exchange, searching
+from ..problems import INTERNAL, problem_of
+from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+
+logger = logging.getLogger("linefix")
+router = APIRouter(tags=["associate"])
+
+
+@router.post(
+    "/v1/associate:batch",
+    response_model=BatchAnswer,
+    responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES, "unknown_map", "map_corrupt"),
+    openapi_extra=takes(BatchRequest, {"two scans": examples.BATCH}),
+    summary="Find several scans in one map",
+)
+async def post_batch(request: Request) -> Response:
+    """Find several scans in one map; a scan that is wrong is one error item and nothing else."""
+    exchange = searching(request)
+    asked, items = await exchange.read(read_batch)
+    job = exchange.job(asked.options.deadline_ms)
+    return exchange.answer(await exchange.unless_hung_up(_work(exchange, asked, items, job), job.deadline))
+
+
+async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
+    """Index the map in one turn at the gate, and search for each scan in another."""
+    associator = exchange.services.associator
+    target = await exchange.take_turn(partial(associator.target, asked.map, asked.options), job.deadline)
+    job.watch.lap("decode")
+    calls = [partial(associator.find_for_batch, target, item, asked.options, job.deadline) for item in items]
+    results = await _answer_all(exchange, calls, job)
+    job.watch.lap("search")
+    return await exchange.services.parse_threads.run(partial(batch_done, asked, target, results, job))
+
+
+async def _answer_all(
+    exchange: Exchange, calls: Sequence[Callable[[], dict[str, Any]]], job: Job
+) -> list[dict[str, Any]]:
+    """Search for every scan, as many at once as there are cores; others' requests get their turns in between."""
+    results: list[dict[str, Any]] = [{} for _ in calls]
+    todo = iter(enumerate(calls))
+
+    async def take_turns() -> None:
+        for index, call in todo:
+            try:
+                found = await exchange.take_turn(call, job.deadline)
+                results[index] = {"index": index, "status_code": 200, "result": found}
+            except CancelledError:
+                raise
+            except Exception as error:
+                results[index] = _refused(index, error, job.request_id)
+
+    await asyncio.gather(*(take_turns() for _ in range(min(exchange.services.gate.slots, len(results)))))
+    return results
+
+
+def _refused(index: int, error: Exception, request_id: str) -> dict[str, Any]:
+    """Return the item of a scan that has no answer."""
+    problem = problem_of(error)
+    if problem is None:
+        logger.error("a defect", exc_info=error, extra={"request_id": request_id})
+        problem = INTERNAL
+    moved = problem.as_json(request_id, partial(_in_batch, index))
+    return {"index": index, "status_code": problem.kind.status, "problem": moved}
+
+
+def _in_batch(index: int, pointer: str) -> str:
+    """Turn a place in one scan or prior into its place in the batch."""
+    for one, many in (("/scan", f"/scans/{index}"), ("/prior", f"/priors/{index}")):
+        if pointer == one or pointer.startswith(one + "/"):
+            return many + pointer.removeprefix(one)
+    return pointer

@@ -1,0 +1,130 @@
+"""/v1/maps: maps kept by id."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from ...maps.lookup import summary_of
+from ...parsing.reading import read_map
+from ...schemas import examples
+from ...schemas.encoding import encode
+from ...schemas.replies import MapList, MapSummaryAnswer
+from ...schemas.requests import MapDocument
+from ..etags import demands_of, etag, is_conditional, is_unchanged
+from ..exchange import Exchange, json_response
+from .documenting import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
+
+router = APIRouter(tags=["maps"])
+MapIdPath = Annotated[
+    str, Path(pattern="^[A-Za-z0-9._-]+$", min_length=1, max_length=128, examples=["hq-3"], description="the map's id")
+]
+STORE = ("overloaded", "read_only", "not_ready")
+ETAG: dict[str, Any] = {**REQUEST_ID, "ETag": {"description": "the revision in quotes", "schema": {"type": "string"}}}
+
+
+def _conditional(*names: str) -> list[dict[str, Any]]:
+    about = {
+        "If-Match": "revisions, one of which must be the present one; * for any",
+        "If-None-Match": "revisions, none of which may be the present one; * for none at all",
+    }
+    return [
+        {"name": name, "in": "header", "required": False, "description": about[name], "schema": {"type": "string"}}
+        for name in names
+    ]
+
+
+@router.put(
+    "/v1/maps/{map_id}",
+    response_model=MapSummaryAnswer,
+    responses={
+        200: {"description": "A new revision", "headers": ETAG},
+        201: {"description": "A new map", "headers": ETAG, "model": MapSummaryAnswer},
+        **problems(*EVERYWHERE, *READS_BODY, *STORE, "revision_conflict", "storage_full", "map_corrupt"),
+    },
+    openapi_extra={
+        **takes(MapDocument, {"a room": examples.MAP}),
+        "parameters": _conditional("If-Match", "If-None-Match"),
+    },
+    summary="Store a map",
+)
+async def put_map(request: Request, map_id: MapIdPath) -> Response:
+    """Store a map; once answered it survives the loss of process and power."""
+    exchange, demands = Exchange(request), demands_of(request)
+    services = exchange.services
+    asked, document = await exchange.read(read_map)
+    summary = await services.parse_threads.run(partial(summary_of, asked))
+    put = partial(services.store.put, map_id, document, summary, demands)
+    revision, created = await services.store_threads.run(put)
+    services.metrics.map_changes.labels("created" if created else "replaced").inc()
+    exchange.note(map={"map_id": map_id, "revision": revision})
+    count, bounds = summary
+    answer = {"map_id": map_id, "revision": revision, "segments": count, "bounds": bounds}
+    return json_response(encode(answer), 201 if created else 200, {"ETag": etag(revision)})
+
+
+@router.get(
+    "/v1/maps/{map_id}",
+    response_model=MapDocument,
+    responses={
+        200: {"description": "The map as it was stored, to the bit", "headers": ETAG},
+        304: {"description": "The caller has this revision", "headers": ETAG},
+        **problems(*EVERYWHERE, *STORE, "unknown_map", "map_corrupt", "invalid_request"),
+    },
+    openapi_extra={"parameters": _conditional("If-None-Match")},
+    summary="Get a map",
+)
+async def get_map(request: Request, map_id: MapIdPath) -> Response:
+    """Give a map back as it was stored."""
+    services = Exchange(request).services
+    if is_conditional(request):
+        record = await services.store_threads.run(partial(services.store.record, map_id))
+        if is_unchanged(request, record.revision):
+            return Response(status_code=304, headers={"ETag": etag(record.revision)})
+    stored = await services.store_threads.run(partial(services.store.load, map_id))
+    return json_response(stored.document, headers={"ETag": etag(stored.record.revision)})
+
+
+@router.get(
+    "/v1/maps",
+    response_model=MapList,
+    responses=problems(*EVERYWHERE, *STORE, "map_corrupt", "invalid_request"),
+    summary="List the maps",
+)
+async def list_maps(
+    request: Request,
+    limit: Annotated[int, Query(ge=1, le=1000, description="maps on one page")] = 100,
+    cursor: Annotated[
+        str, Query(max_length=128, pattern="^[A-Za-z0-9._-]*$", description="`next` of the page before")
+    ] = "",
+) -> Response:
+    """List what is stored, by id."""
+    services = Exchange(request).services
+    page = await services.store_threads.run(partial(services.store.list, limit, cursor))
+    items = [
+        {"map_id": item.map_id, "revision": item.revision, "segments": item.segments, "bounds": item.bounds}
+        for item in page.maps
+    ]
+    return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
+
+
+@router.delete(
+    "/v1/maps/{map_id}",
+    status_code=204,
+    response_model=None,
+    responses=problems(
+        *EVERYWHERE, *STORE, "unknown_map", "revision_conflict", "invalid_request", "storage_full", "map_corrupt"
+    ),
+    openapi_extra={"parameters": _conditional("If-Match")},
+    summary="Delete a map",
+)
+async def delete_map(request: Request, map_id: MapIdPath) -> Response:
+    """Forget a map."""
+    exchange, demands = Exchange(request), demands_of(request)
+    services = exchange.services
+    await services.store_threads.run(partial(services.store.delete, map_id, demands))
+    services.metrics.map_changes.labels("deleted").inc()
+    exchange.note(map={"map_id": map_id})
+    return Response(status_code=204)

@@ -1,0 +1,74 @@
+"""Probes, counts, limits and version: never shed, never behind a pool of threads that requests can fill."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from ...schemas.encoding import encode
+from ...schemas.replies import Limits, Live, Version
+from ...version import VERSION
+from ..exchange import json_response
+from ..services import services_of
+from .documenting import EVERYWHERE, problems
+
+router = APIRouter(tags=["operations"])
+
+
+@router.get("/livez", response_model=Live, responses=problems("internal"), summary="Is the process alive?")
+async def livez() -> Response:
+    """Answer as long as the event loop turns."""
+    return json_response(b'{"status":"ok"}')
+
+
+@router.get(
+    "/readyz",
+    response_model=Live,
+    responses=problems("internal", "not_ready", "read_only"),
+    summary="Send it requests?",
+)
+async def readyz(request: Request) -> Response:
+    """Answer 200 once the kernels are warm and the store answers, and until the service is told to end."""
+    services = services_of(request.scope)
+    services.readiness.require_all()
+    await services.probe.check()
+    return json_response(b'{"status":"ok"}')
+
+
+@router.get("/version", response_model=Version, responses=problems("internal"), summary="Which version is this?")
+async def version() -> Response:
+    """Name the version of the service and of its contract."""
+    return json_response(encode({"name": "linefix", "version": VERSION, "api": "v1"}))
+
+
+@router.get("/v1/limits", response_model=Limits, responses=problems(*EVERYWHERE), summary="What is too much?")
+async def limits(request: Request) -> Response:
+    """Name the limits beyond which a request is refused with 413, or waits no longer."""
+    settings = services_of(request.scope).settings
+    names = (
+        "max_body_bytes",
+        "max_values",
+        "max_bodies_bytes",
+        "request_timeout",
+        "max_map_segments",
+        "max_scan_segments",
+        "max_beams",
+        "max_correspondences",
+    )
+    more = ("max_batch", "max_deadline_ms", "searches", "queue")
+    fixed = {"max_magnitude": 1e9, "min_segment_length": 1e-6, "max_segment_length": 1e4, "max_map_extent": 1e5}
+    return json_response(encode({name: getattr(settings, name) for name in (*names, *more)} | fixed))
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={
+        200: {"description": "Prometheus text", "content": {"text/plain": {"schema": {"type": "string"}}}},
+        **problems("internal"),
+    },
+    summary="Counts for Prometheus",
+)
+async def metrics(request: Request) -> Response:
+    """Give the counts, over all workers."""
+    text = services_of(request.scope).metrics.exposition()
+    return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")

@@ -1,0 +1,32 @@
+"""POST /v1/register: known correspondences."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fastapi import APIRouter, Request, Response
+
+from ...parsing.reading import read_model
+from ...schemas import examples
+from ...schemas.replies import RegisterAnswer
+from ...schemas.requests import RegisterRequest
+from ...work.registration import answer_registration
+from ..exchange import searching
+from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+
+router = APIRouter(tags=["register"])
+
+
+@router.post(
+    "/v1/register",
+    response_model=RegisterAnswer,
+    responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES),
+    openapi_extra=takes(RegisterRequest, {"a corner": examples.REGISTER}),
+    summary="Find the pose from known correspondences",
+)
+async def post_register(request: Request) -> Response:
+    """Lay scan segments on the map segments that they are known to belong to."""
+    exchange = searching(request)
+    asked = await exchange.read(partial(read_model, RegisterRequest))
+    job = exchange.job()
+    return exchange.answer(await exchange.search(partial(answer_registration, asked, job), job.deadline))

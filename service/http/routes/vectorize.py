@@ -1,0 +1,32 @@
+"""POST /v1/vectorize: ranges or points to segments."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fastapi import APIRouter, Request, Response
+
+from ...parsing.reading import read_model
+from ...schemas import examples
+from ...schemas.replies import VectorizeAnswer
+from ...schemas.requests import VectorizeRequest
+from ...work.vectorization import answer_vectorization
+from ..exchange import searching
+from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+
+router = APIRouter(tags=["vectorize"])
+
+
+@router.post(
+    "/v1/vectorize",
+    response_model=VectorizeAnswer,
+    responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES),
+    openapi_extra=takes(VectorizeRequest, {"a corner": examples.VECTORIZE}),
+    summary="Find the segments in ranges or points",
+)
+async def post_vectorize(request: Request) -> Response:
+    """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
+    exchange = searching(request)
+    asked = await exchange.read(partial(read_model, VectorizeRequest))
+    job = exchange.job()
+    return exchange.answer(await exchange.search(partial(answer_vectorization, asked, job), job.deadline))

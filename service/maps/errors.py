@@ -1,0 +1,76 @@
+"""Why the store of maps does not do what was asked.
+
+::
+
+    StoreError
+    ├── UnknownMapError        nothing is stored under the id
+    ├── CorruptMapError        what is stored is damaged
+    ├── RevisionConflictError  the map is not as the writer demands
+    ├── StoreFullError         the disk is full
+    ├── ReadOnlyStoreError     nothing can be written
+    ├── BusyStoreError         others write for too long
+    └── StoreAwayError         the database does not answer, or cannot be used
+"""
+
+from __future__ import annotations
+
+
+class StoreError(Exception):
+    """The store does not do what was asked; the message says why, for whoever asked."""
+
+
+class UnknownMapError(StoreError):
+    """Nothing is stored under the id."""
+
+    def __init__(self) -> None:
+        super().__init__("no map is stored under this id")
+
+
+class CorruptMapError(StoreError):
+    """What is stored is damaged."""
+
+    def __init__(self, message: str = "the stored map does not match its checksum; put it again") -> None:
+        super().__init__(message)
+
+
+class RevisionConflictError(StoreError):
+    """The map is not as the writer demands.
+
+    Parameters
+    ----------
+    revision : int, or None
+        The present one, None where there is no map.
+    """
+
+    def __init__(self, revision: int | None) -> None:
+        now = "there is no map under this id" if revision is None else f"the map's present revision is {revision}"
+        super().__init__(f"{now}, which is not what was demanded")
+        self.revision = revision
+
+
+class StoreFullError(StoreError):
+    """The disk is full."""
+
+    def __init__(self) -> None:
+        super().__init__("the disk that holds the maps is full")
+
+
+class ReadOnlyStoreError(StoreError):
+    """Nothing can be written."""
+
+    def __init__(self, message: str = "the maps cannot be written") -> None:
+        super().__init__(message)
+
+
+class BusyStoreError(StoreError):
+    """Others write for too long."""
+
+    def __init__(self) -> None:
+        super().__init__("the store is busy with other writes")
+
+
+class StoreAwayError(StoreError):
+    """The database does not answer, or cannot be used."""
+
+    def __init__(self, message: str = "the database does not answer") -> None:
+        super().__init__(message)

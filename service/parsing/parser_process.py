@@ -1,0 +1,134 @@
+"""A process of its own for parsing what is large.
+
+Parsing 15 MB of JSON holds Python's global lock for a fifth of a second in one piece: nothing else of the service would
+answer meanwhile, probes included. What comes back are arrays, which cross as bytes. The memory that a hostile body may
+take is taken there, too.
+"""
+
+from __future__ import annotations
+
+import gc
+import pickle
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+from ..memory import return_large_blocks
+from .channel import receive, send
+from .errors import ParserEndedError
+
+T = TypeVar("T")
+LARGE = 500_000  # bytes; parsing more would hold up everything else for too long
+END_SECONDS = 1.0
+
+
+class ParserProcess:
+    """Runs functions in one other process, one at a time; safe to use from several threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._connection: Connection | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """The process's id, None while there is none."""
+        return None if self._process is None else self._process.pid
+
+    def start(self) -> None:
+        """Start the process, if there is none."""
+        with self._lock:
+            self._started()
+
+    def call(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Return what a function of a module returns there, or raise what it raises.
+
+        Bytes among the arguments, and in a tuple that comes back, are not copied on the way.
+
+        Raises
+        ------
+        ParserEndedError
+            When the process ends meanwhile; the next call has a new one.
+        """
+        with self._lock:
+            connection = self._started()
+            try:
+                send(connection, (function, *map(_wrapped, arguments)))
+                found, error = receive(connection)
+            except (OSError, EOFError):
+                self._end()
+                raise ParserEndedError from None
+        if error is not None:
+            raise error
+        answer: T = found
+        return answer
+
+    def close(self) -> None:
+        """End the process; what it works at is lost."""
+        process = self._process
+        if process is not None:
+            process.kill()
+        with self._lock:
+            self._end()
+
+    def _started(self) -> Connection:
+        if self._process is not None and self._process.poll() is not None:
+            self._end()
+        if self._connection is None:
+            ours, theirs = socket.socketpair()
+            with theirs:
+                # In a group of its own, so that Ctrl-C is for the service, which then ends this.
+                self._process = subprocess.Popen(
+                    [sys.executable, "-m", __name__, str(theirs.fileno())],
+                    pass_fds=[theirs.fileno()],
+                    process_group=0,
+                    stdin=subprocess.DEVNULL,
+                )
+            self._connection = Connection(ours.detach())
+        return self._connection
+
+    def _end(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+        if self._process is not None:
+            self._process.kill()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_SECONDS)
+        self._process = self._connection = None
+
+
+def _wrapped(value: object) -> object:
+    return pickle.PickleBuffer(value) if isinstance(value, bytes | bytearray) else value
+
+
+def work(connection: Connection) -> None:
+    """Answer calls until the other end is gone, which it also is when the service was killed."""
+    return_large_blocks()
+    gc.disable()  # parsed JSON has no cycles, and looking for them takes longer than parsing
+    while True:
+        found: Any = None
+        error: Exception | None = None
+        try:
+            function, *arguments = receive(connection)
+        except (EOFError, OSError):
+            return
+        try:
+            found = function(*arguments)
+        except Exception as raised:
+            error = raised
+        if isinstance(found, tuple):
+            found = tuple(map(_wrapped, found))
+        try:
+            send(connection, (found, error))
+        except OSError:
+            return
+        function = arguments = found = error = None  # nothing large is kept while this waits
+
+
+if __name__ == "__main__":
+    work(Connection(int(sys.argv[1])))

@@ -1,0 +1,98 @@
+"""From JSON to a checked request; light to import, since a process of its own does it for large bodies."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, TypeVar
+
+import orjson
+from pydantic import BaseModel, ValidationError
+
+from ..schemas.encoding import encode
+from ..schemas.errors import InvalidRequestError, RequestError, TooManyError
+from ..schemas.faults import faults_of
+from ..schemas.limits import Limits
+from ..schemas.requests import BatchItem, BatchRequest, MapDocument
+from .errors import NotJsonError
+
+M = TypeVar("M", bound=BaseModel)
+_NO_NUMBER = re.compile(r"-?(NaN|Inf)", re.IGNORECASE)
+
+
+def read_model(model: type[M], data: bytes | bytearray, limits: Limits) -> M:
+    """Return a request from its JSON.
+
+    Raises
+    ------
+    NotJsonError
+        When it is not JSON.
+    InvalidRequestError
+        When it is not what the model takes.
+    TooManyError
+        When an array, or the whole, is longer than `limits` allow.
+    """
+    return validate(model, parse(data, limits), limits)
+
+
+def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, list[BatchItem | RequestError]]:
+    """Return a batch without its scans, and each scan by itself: checked, or why it is none."""
+    asked = read_model(BatchRequest, data, limits)
+    items: list[BatchItem | RequestError] = []
+    for index, scan in enumerate(asked.scans):
+        prior = None if asked.priors is None else asked.priors[index]
+        try:
+            items.append(validate(BatchItem, {"scan": scan, "prior": prior}, limits))
+        except RequestError as error:
+            items.append(error)
+    return asked.model_copy(update={"scans": [], "priors": None}), items
+
+
+def read_map(data: bytes | bytearray, limits: Limits) -> tuple[MapDocument, bytes]:
+    """Return a map that is to be stored, and the document that is kept of it: what was sent and no more."""
+    asked = read_model(MapDocument, data, limits)
+    document = {name: getattr(asked, name) for name in ("segments", "sigma", "frame_id", "meta")}
+    return asked, encode({name: value for name, value in document.items() if name in asked.model_fields_set})
+
+
+def read_stored(document: bytes) -> MapDocument:
+    """Return a map that was stored; what was checked then is not held to limits that may have changed since."""
+    return MapDocument.model_validate(orjson.loads(document))
+
+
+def parse(data: bytes | bytearray, limits: Limits) -> Any:
+    """Parse JSON; NaN, infinities, lone surrogates and nesting beyond 1,024 levels are not JSON here.
+
+    Raises
+    ------
+    NotJsonError
+        When it is not JSON.
+    TooManyError
+        When there are more values than allowed: each takes some hundred bytes of memory, however short it is.
+    """
+    # Every value but the first follows one of these. Commas in strings count, too, which is cheap and on the safe side.
+    if len(data) > limits.values and sum(map(data.count, b",:[{")) > limits.values:
+        raise TooManyError("", limits.values, "values")
+    try:
+        return orjson.loads(data)
+    except orjson.JSONDecodeError as error:
+        # The message of the parser speaks of the kind of error and its place, not of the text.
+        what = f"{error.msg} at line {error.lineno} column {error.colno}"
+        if _NO_NUMBER.match(error.doc, error.pos):
+            what += ": NaN and Infinity are not JSON; a range without a return is null"
+        raise NotJsonError(what) from None
+
+
+def validate(model: type[M], value: Any, limits: Limits) -> M:
+    """Check parsed JSON against a request model.
+
+    Raises
+    ------
+    InvalidRequestError
+        When it is not what the model takes.
+    TooManyError
+        When an array is longer than `limits` allow.
+    """
+    try:
+        return model.model_validate(value, context=limits)
+    except ValidationError as error:
+        raise InvalidRequestError(faults_of(error.errors(include_url=False, include_input=False))) from None

@@ -1,0 +1,48 @@
+"""Unpacking a body that came as gzip, within a limit."""
+
+from __future__ import annotations
+
+import zlib
+
+from ..schemas.errors import BodyTooLargeError
+from .errors import NotJsonError
+
+_PIECE = 1 << 20  # bytes that are unpacked at a time
+_GZIP = zlib.MAX_WBITS | 16
+
+
+def unpack(packed: bytes | bytearray, max_bytes: int) -> bytearray:
+    """Return what one gzip member holds; takes a while for a large one.
+
+    Parameters
+    ----------
+    packed : bytes or bytearray
+    max_bytes : int
+        That it may unpack to; more is never held.
+
+    Raises
+    ------
+    NotJsonError
+        When it is not gzip, is cut short, or something follows it.
+    BodyTooLargeError
+        When it unpacks to more than is allowed.
+    """
+    unpacked = bytearray()
+    stream = zlib.decompressobj(wbits=_GZIP)
+    whole = memoryview(packed)
+    try:
+        for begin in range(0, len(whole), _PIECE):
+            rest: bytes | memoryview = whole[begin : begin + _PIECE]
+            while rest and not stream.eof:
+                unpacked += stream.decompress(rest, max_bytes + 1 - len(unpacked))
+                rest = stream.unconsumed_tail
+                if len(unpacked) > max_bytes:
+                    raise BodyTooLargeError(max_bytes)
+            if stream.eof and (stream.unused_data or begin + _PIECE < len(whole)):
+                raise NotJsonError("something follows the gzip body")
+        unpacked += stream.flush()
+    except zlib.error:
+        raise NotJsonError("the body is not gzip, though Content-Encoding says so") from None
+    if not stream.eof:
+        raise NotJsonError("the gzip body is cut short")
+    return unpacked

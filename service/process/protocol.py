@@ -1,0 +1,71 @@
+"""Admission at the socket: a request is decided upon when its turn on its connection begins.
+
+What is refused there never meets the application: under a flood the answers "no" are what costs.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from starlette.types import Scope
+from uvicorn._types import ASGI3Application
+from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
+
+from ..admission.entrance import is_search
+from ..admission.errors import AdmissionError
+from ..http.problems import RAISED
+from ..http.reception import taken_or_made
+from ..http.state import state_of
+from ..schemas.errors import RequestError
+from .receipt import ReceiptProtocol
+
+UNREAD = 65_536  # bytes; what is left of a refused body up to here is read and dropped, beyond it the connection ends
+OTHER = "unmatched"
+
+
+class AdmittingProtocol(ReceiptProtocol):
+    """Gives each request its ticket, or sends it away."""
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
+        scope = cast("Scope", cycle.scope)
+        state = state_of(scope)
+        assert state is not None
+        try:
+            state.ticket = self._services.entrance.admit(scope["method"], scope["path"], scope["headers"])
+        except (AdmissionError, RequestError) as error:
+            self._refuse(cycle, error)
+            return
+        if not cycle.more_body:
+            state.ticket.announce()
+        super()._start_asgi_task(cycle, app)
+
+    def on_message_complete(self) -> None:
+        """Count a request whose body is there as one that is on its way to the gate."""
+        state = state_of(cast("Scope", self.scope))
+        if state is not None and state.ticket is not None and not self.cycle.response_complete:
+            state.ticket.announce()
+        super().on_message_complete()
+
+    def _refuse(self, cycle: RequestResponseCycle, error: AdmissionError | RequestError) -> None:
+        """Answer in place of the application."""
+        scope = cast("Scope", cycle.scope)
+        close = not (cycle.keep_alive and _is_short(cycle, scope))
+        cycle.response_started = cycle.response_complete = True
+        self.write_refusal(error, taken_or_made(scope["headers"]), close=close)
+        kind, method, path = RAISED[type(error)], scope["method"], scope["path"]
+        self._services.refusals.count(path if is_search(method, path) else OTHER, method, kind.code, kind.status)
+        if close:
+            return
+        if self.pipeline:
+            # Not within each other: there may be thousands.
+            self.loop.call_soon(self.on_response_complete)
+        else:
+            self.on_response_complete()
+
+
+def _is_short(cycle: RequestResponseCycle, scope: Scope) -> bool:
+    """Tell whether what is left of a body can be read and dropped."""
+    if not cycle.more_body:
+        return True
+    sizes = [value for name, value in scope["headers"] if name == b"content-length"]
+    return len(sizes) == 1 and int(sizes[0]) <= UNREAD and not cycle.waiting_for_100_continue

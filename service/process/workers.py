@@ -1,0 +1,131 @@
+"""Several worker processes on one port, under uvicorn's supervisor.
+
+It starts them, replaces those that die or do not answer, and passes signals on. What it does not know is here: which
+share of the service each of them is, that their counts are one, that one stands still though it answers, and that they
+end in time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import faulthandler
+import logging
+import multiprocessing
+import os
+import signal
+import socket
+import tempfile
+import threading
+import time
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from filelock import FileLock, Timeout
+from uvicorn.supervisors import Multiprocess
+
+from ..part import Part
+from ..settings import Settings
+from ..telemetry.metrics import forget_worker, share_counts
+from .server import build, config_of
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
+
+logger = logging.getLogger("linefix")
+ALL_ENDED = 9.8  # s after the signal whoever is left is killed
+LOOK_SECONDS = 1.0  # between looks whether the event loop turns
+
+
+class Supervisor(Multiprocess):
+    """Keeps as many workers as are set."""
+
+    def join_all(self) -> None:
+        """Wait for all to end; kill who has not in time."""
+        last = time.monotonic() + ALL_ENDED
+        for process in self.processes:
+            process.process.join(max(0.0, last - time.monotonic()))
+            if process.exitcode is None:
+                process.process.kill()
+        super().join_all()
+
+    @property
+    def status(self) -> int:
+        """The status to exit with: 0 when all ended as they were told."""
+        return int(any(process.exitcode not in (0, -signal.SIGTERM, -signal.SIGINT) for process in self.processes))
+
+
+def supervise(settings: Settings, listener: socket.socket) -> int:
+    """Run workers until a signal comes; return the status to exit with."""
+    # Counts live in memory where there is a file system for that; nothing else need be writable.
+    shared = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="linefix-workers-", dir=shared) as directory:
+        supervisor = Supervisor(config_of(settings, partial(build_worker, settings, Path(directory))), [listener])
+        supervisor.run()
+        return supervisor.status
+
+
+def build_worker(settings: Settings, directory: Path) -> FastAPI:
+    """Make this process one of several, and return its application; called by uvicorn in its event loop."""
+    part, lock = take_part(directory, settings.workers)
+    forget_worker(str(directory), part.index)  # what a dead one had running; its counts stay
+    share_counts(str(directory), part.index)
+    _follow_parent()
+    app = build(settings, part)
+    app.state.part = lock  # held as long as this process lives
+    _watch(asyncio.get_running_loop(), settings.hang_seconds)
+    return app
+
+
+def take_part(directory: Path, workers: int) -> tuple[Part, FileLock]:
+    """Return the first part that nobody has, and the lock that says so; the system takes it from whoever dies.
+
+    Who takes the part of another stands in for it, as does who comes while nobody has gone yet.
+    """
+    for index in count():
+        path = directory / f"worker-{index}"
+        replaces = path.exists() or index >= workers
+        lock = FileLock(path)
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            continue
+        return Part(index, workers, replaces), lock
+    raise AssertionError
+
+
+def _follow_parent() -> None:
+    """End when the process above has ended, however that came."""
+    above = multiprocessing.parent_process()
+    assert above is not None
+
+    def follow() -> None:
+        above.join()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+def _watch(loop: asyncio.AbstractEventLoop, seconds: float) -> None:
+    """End this process when its event loop stands still; uvicorn only sees whether any of its threads answers.
+
+    Looks are counted, not seconds: when everything was stopped for a while it takes as many again.
+    """
+    turned = threading.Event()
+
+    def watch() -> None:
+        silent = 0.0
+        while silent < seconds:
+            turned.clear()
+            try:
+                loop.call_soon_threadsafe(turned.set)
+            except RuntimeError:  # it has ended
+                return
+            time.sleep(LOOK_SECONDS)
+            silent = 0.0 if turned.is_set() else silent + LOOK_SECONDS
+        logger.error("the event loop hangs")
+        faulthandler.dump_traceback()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,87 @@
+"""Why a request is not what the contract takes.
+
+::
+
+    RequestError
+    ├── InvalidRequestError   places that are wrong
+    ├── TooManyError          more of something than a limit allows
+    └── BodyTooLargeError     more bytes than a limit allows
+
+They cross processes: what they are made of is in their `args`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One wrong place of a request: a JSON pointer, and what is wrong there."""
+
+    pointer: str
+    message: str
+
+
+class RequestError(Exception):
+    """A request is not what the contract takes."""
+
+
+class InvalidRequestError(RequestError):
+    """Places of a request are wrong.
+
+    Parameters
+    ----------
+    faults : sequence of Fault
+        At least one.
+    """
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        super().__init__(tuple(faults))
+        self.faults = tuple(faults)
+
+    def __str__(self) -> str:
+        """Count the places."""
+        count = "one place is" if len(self.faults) == 1 else f"{len(self.faults)} places are"
+        return f"{count} wrong; see errors"
+
+
+class TooManyError(RequestError):
+    """A part of a request is over one of the limits of ``/v1/limits``.
+
+    Parameters
+    ----------
+    pointer : str
+        To the part, empty for the whole.
+    limit : int
+    what : str
+        That there are too many of.
+    """
+
+    def __init__(self, pointer: str, limit: int, what: str) -> None:
+        super().__init__(pointer, limit, what)
+        self.pointer = pointer
+        self.limit = limit
+        self.what = what
+
+    def __str__(self) -> str:
+        """Name the limit."""
+        return f"at most {self.limit} {self.what} are taken"
+
+
+class BodyTooLargeError(RequestError):
+    """A body is too long, as it arrives or unpacked; its rest is of no use.
+
+    Parameters
+    ----------
+    max_bytes : int
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        super().__init__(max_bytes)
+        self.max_bytes = max_bytes
+
+    def __str__(self) -> str:
+        """Name the limit."""
+        return f"a body has at most {self.max_bytes} bytes, unpacked"

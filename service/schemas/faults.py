@@ -1,0 +1,57 @@
+"""What pydantic complains of, in words of the contract: places of the request, and no echo of what was sent."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .errors import Fault
+from .limits import MAX_FAULTS
+from .parts import TAGS
+
+_PLAIN = re.compile(r"^[A-Za-z0-9_.-]{1,40}$")
+# pydantic's own messages for these types repeat what was sent, or speak of Python.
+_MESSAGES: dict[str, str] = {
+    "extra_forbidden": "unknown field",
+    "missing": "missing",
+    "model_type": "expected an object",
+    "model_attributes_type": "expected an object",
+    "union_tag_invalid": "expected an object",
+    "dict_type": "expected an object",
+    "list_type": "expected an array",
+    "float_type": "expected a number",
+    "int_type": "expected an integer",
+    "int_from_float": "expected an integer",
+    "bool_type": "expected true or false",
+    "string_type": "expected a string",
+    "string_pattern_mismatch": "does not match the pattern",
+}
+
+
+def faults_of(items: Iterable[Mapping[str, Any]]) -> list[Fault]:
+    """Return the first places that pydantic complained of."""
+    faults: list[Fault] = []
+    for item in items:
+        place = _pointer(item["loc"])
+        rows = item.get("ctx", {}).get("rows")
+        if rows is None:
+            faults.append(Fault(place, _MESSAGES.get(item["type"], item["msg"])))
+        else:
+            faults.extend(Fault(f"{place}/{index}", message) for index, message in rows)
+        if len(faults) >= MAX_FAULTS:
+            break
+    return faults[:MAX_FAULTS]
+
+
+def _pointer(parts: Sequence[object]) -> str:
+    """Return a JSON pointer; a name that is not plain ends it, since it came from the caller."""
+    pointer = ""
+    for part in parts:
+        if part in TAGS:
+            continue
+        name = str(part)
+        if not _PLAIN.match(name):
+            break
+        pointer += f"/{name}"
+    return pointer

@@ -1,0 +1,33 @@
+"""How much a request may hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MAX_FAULTS = 20  # wrong places that are told of one request
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Counts beyond which a request is refused; the context that requests are validated in.
+
+    Attributes
+    ----------
+    values : int
+        Numbers, strings, arrays and objects in the whole request.
+    map_segments, scan_segments : int
+        Of one map, of one scan.
+    beams : int
+        Ranges or points of one scan.
+    pairs : int
+        Correspondences, or weights, of one registration.
+    batch : int
+        Scans of one batch.
+    """
+
+    values: int
+    map_segments: int
+    scan_segments: int
+    beams: int
+    pairs: int
+    batch: int

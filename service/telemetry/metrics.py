@@ -1,0 +1,106 @@
+"""What Prometheus is told."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest, multiprocess, values
+
+from ..version import VERSION
+
+_SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
+_METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH"))
+_DIRECTORY = "PROMETHEUS_MULTIPROC_DIR"
+REFRESH_SECONDS = 0.5
+
+
+def share_counts(directory: str, index: int) -> None:
+    """Have the counts of this worker kept in files beside those of the others; before any count is made.
+
+    A worker that takes the place of another goes on with its files: counts never go down.
+    """
+    os.environ[_DIRECTORY] = directory
+    values.ValueClass = values.MultiProcessValue(process_identifier=lambda: index)  # type: ignore[no-untyped-call]
+
+
+def forget_worker(directory: str, index: int) -> None:
+    """Take what a dead worker had running and waiting out of the sums; its counts stay."""
+    multiprocess.mark_process_dead(index, directory)  # type: ignore[no-untyped-call]
+
+
+class Metrics:
+    """The counts of one application, in a registry of its own; of all workers together where there are several."""
+
+    def __init__(self) -> None:
+        self.registry = made = CollectorRegistry()
+        self._watched: list[tuple[Gauge, Callable[[], float]]] = []
+        self.requests = Counter(
+            "linefix_http_requests", "Requests answered", ("route", "method", "status"), registry=made
+        )
+        self.request_seconds = Histogram(
+            "linefix_http_request_seconds", "Time to answer", ("route",), buckets=_SECONDS, registry=made
+        )
+        self.verdicts = Counter("linefix_verdicts", "Associations answered", ("status", "usable"), registry=made)
+        self.search_seconds = Histogram("linefix_search_seconds", "Time in the search", buckets=_SECONDS, registry=made)
+        self.hypotheses = Counter("linefix_hypotheses", "Poses that were tried", registry=made)
+        self.cache_hits = Counter("linefix_map_cache_hits", "Maps found indexed", registry=made)
+        self.cache_misses = Counter("linefix_map_cache_misses", "Maps that had to be indexed", registry=made)
+        self.map_changes = Counter(
+            "linefix_map_changes", "Stored maps created, replaced, deleted", ("change",), registry=made
+        )
+        build = Gauge("linefix_build_info", "Version", ("version",), registry=made, multiprocess_mode="livemax")
+        build.labels(VERSION).set(1)
+        self.watch("linefix_resident_bytes", "Memory of the workers", _resident_bytes)
+
+    def watch(self, name: str, what: str, read: Callable[[], float]) -> None:
+        """Report a number that is read now and then, and whenever this worker is asked."""
+        gauge = Gauge(name, what, registry=self.registry, multiprocess_mode="livesum")
+        self._watched.append((gauge, read))
+
+    def refresh(self) -> None:
+        """Read what is watched."""
+        for gauge, read in self._watched:
+            gauge.set(read())
+
+    async def refresh_now_and_then(self) -> None:
+        """Read what is watched for the workers that are asked instead of this one."""
+        while True:
+            self.refresh()
+            await asyncio.sleep(REFRESH_SECONDS)
+
+    def observe_request(self, route: str, method: str, status: int, seconds: float) -> None:
+        """Count one request; status 0 is a client that hung up before it was answered."""
+        # Any string may come as a method: it must not become a time series.
+        name = method if method in _METHODS else "other"
+        self.requests.labels(route, name, str(status)).inc()
+        self.request_seconds.labels(route).observe(seconds)
+
+    def count_refusals(self, route: str, method: str, status: int, count: int) -> None:
+        """Count requests that were refused before the application saw them."""
+        self.requests.labels(route, method, str(status)).inc(count)
+
+    def observe_association(self, status: str, usable: bool, seconds: float, hypotheses: int) -> None:
+        """Count one answered search."""
+        self.verdicts.labels(status, str(usable).lower()).inc()
+        self.search_seconds.observe(seconds)
+        self.hypotheses.inc(hypotheses)
+
+    def exposition(self) -> bytes:
+        """Return the text that Prometheus reads."""
+        self.refresh()
+        directory = os.environ.get(_DIRECTORY)
+        if directory is None:
+            return generate_latest(self.registry)
+        together = CollectorRegistry()
+        multiprocess.MultiProcessCollector(together, directory)  # type: ignore[no-untyped-call]
+        return generate_latest(together)
+
+
+def _resident_bytes() -> float:
+    try:
+        with open("/proc/self/statm") as file:
+            return float(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+    except OSError:
+        return 0.0

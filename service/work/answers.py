@@ -1,0 +1,150 @@
+"""Results of the libraries as the contract's JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association import Alternative, AssociationResult, Correspondence
+from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
+from vectorization import Vectorization
+
+Json = dict[str, Any]
+
+
+def pose_json(pose: RigidTransform | None) -> Json | None:
+    """Return a pose, metres and radians."""
+    return None if pose is None else {"x": pose.x, "y": pose.y, "theta": pose.theta}
+
+
+def matrix_json(matrix: NDArray[np.float64] | None) -> list[list[float]] | None:
+    """Return a matrix by rows."""
+    return None if matrix is None else matrix.tolist()
+
+
+def direction_json(direction: tuple[float, float] | None) -> list[float] | None:
+    """Return a unit vector."""
+    return None if direction is None else [float(direction[0]), float(direction[1])]
+
+
+def ambiguity_json(ambiguity: Ambiguity | None) -> Json | None:
+    """Return the parts of an ambiguity and their sum."""
+    if ambiguity is None:
+        return None
+    return {"translation": ambiguity.translation, "rotation": ambiguity.rotation, "total": ambiguity.total}
+
+
+def diagnostics_json(diagnostics: RegistrationDiagnostics) -> Json:
+    """Return the numbers beside a pose."""
+    return {
+        "ambiguity": ambiguity_json(diagnostics.ambiguity),
+        "ambiguity_before": ambiguity_json(diagnostics.ambiguity_before),
+        "ambiguity_at": ambiguity_json(diagnostics.ambiguity_at),
+        "similarity": diagnostics.similarity,
+        "reliability": diagnostics.reliability,
+        "determinant": diagnostics.determinant,
+        "chi2": diagnostics.chi2,
+        "dof": diagnostics.dof,
+        "rms_offset": diagnostics.rms_offset,
+        "rms_angle": diagnostics.rms_angle,
+        "n": diagnostics.n,
+    }
+
+
+def registration_json(result: RegistrationResult, pairs: NDArray[np.intp]) -> Json:
+    """Return the answer of a registration."""
+    columns = (result.offsets.tolist(), result.angles.tolist(), result.weights.tolist())
+    return {
+        "status": "degenerate" if result.degenerate else "ok",
+        "usable": result.usable,
+        "pose": pose_json(result.pose),
+        "covariance": matrix_json(result.covariance),
+        "unobservable": direction_json(result.unobservable),
+        "residuals": [
+            {"scan": scan, "map": on, "offset": offset, "angle": angle, "weight": weight}
+            for (scan, on), offset, angle, weight in zip(pairs.tolist(), *columns, strict=True)
+        ],
+        "diagnostics": diagnostics_json(result.diagnostics),
+    }
+
+
+def correspondence_json(pair: Correspondence) -> Json:
+    """Return an accepted pair."""
+    return {
+        "scan": pair.scan,
+        "map": pair.map,
+        "overlap": pair.overlap,
+        "offset": pair.offset,
+        "angle": pair.angle,
+        "weight": pair.weight,
+        "alternatives": list(pair.alternatives),
+    }
+
+
+def alternative_json(other: Alternative) -> Json:
+    """Return another pose."""
+    return {
+        "pose": pose_json(other.pose),
+        "covariance": matrix_json(other.covariance),
+        "score": other.score,
+        "reliability": other.reliability,
+        "inlier_fraction": other.inlier_fraction,
+    }
+
+
+def association_json(result: AssociationResult, include: frozenset[str]) -> Json:
+    """Return the answer of a search, without the parts that were not asked for."""
+    diagnostics = result.diagnostics
+    search = result.search
+    answer: Json = {
+        "status": str(result.status),
+        "usable": result.usable,
+        "probability": result.probability,
+        "pose": pose_json(result.pose),
+        "covariance": matrix_json(result.covariance),
+        "unobservable": direction_json(result.unobservable),
+        "unmatched_scan": list(result.unmatched_scan),
+        "diagnostics": None
+        if diagnostics is None
+        else {
+            **diagnostics_json(diagnostics.registration),
+            "inlier_fraction": diagnostics.inlier_fraction,
+            "score": diagnostics.score,
+            "runner_up": diagnostics.runner_up,
+            "margin": diagnostics.margin,
+            "significance": diagnostics.significance,
+        },
+        "search": {
+            "complete": search.complete,
+            "exhaustive": search.exhaustive,
+            "confidence": search.confidence,
+            "bases": search.bases,
+            "hypotheses": search.hypotheses,
+            "verified": search.verified,
+            "seed": search.seed,
+        },
+        "warnings": [{"code": warning.code, "message": warning.message} for warning in result.warnings],
+    }
+    if "correspondences" in include:
+        answer["correspondences"] = [correspondence_json(pair) for pair in result.correspondences]
+    if "alternatives" in include:
+        answer["alternatives"] = [alternative_json(other) for other in result.alternatives]
+    if "missing_map" in include:
+        answer["missing_map"] = list(result.missing_map)
+    return answer
+
+
+def vectorization_json(found: Vectorization) -> Json:
+    """Return the answer of a vectorization."""
+    measured = found.measured
+    return {
+        "segments": measured.segments.endpoints.tolist(),
+        "points": measured.points.astype(int).tolist(),
+        "centroids": measured.centroids.tolist(),
+        "spreads": measured.spreads.tolist(),
+        "sigma": found.sigma,
+        "sigmas": measured.sigma.tolist(),
+        "rms": found.rms.tolist(),
+    }

@@ -1,0 +1,130 @@
+"""Associations: where in a map a scan was taken."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from association import CancelledError, Deadline, associate
+
+from ..admission.errors import DeadlinePassedError
+from ..maps import CachedMap
+from ..maps.lookup import MapLookup
+from ..schemas.encoding import require_finite
+from ..schemas.parts import InlineMap, SearchOptions, StoredMap
+from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
+from ..telemetry.metrics import Metrics
+from .answers import Json, association_json
+from .inputs import association_options_of, prior_of, scanned_of
+from .job import Done, Job
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A map that is ready to be searched.
+
+    Attributes
+    ----------
+    cached : CachedMap
+    reference : dict, or None
+        Id and revision of a stored map, as they are answered.
+    """
+
+    cached: CachedMap
+    reference: Json | None
+
+
+@dataclass(frozen=True, slots=True)
+class Associator:
+    """Finds scans in maps.
+
+    Attributes
+    ----------
+    lookup : MapLookup
+    metrics : Metrics
+        Counts verdicts, and what the searches take.
+    """
+
+    lookup: MapLookup
+    metrics: Metrics
+
+    def answer(self, asked: AssociateRequest, job: Job) -> Done:
+        """Find one scan in one map; raises what `target` and `find` raise."""
+        target = self.target(asked.map, asked.options)
+        job.watch.lap("decode")
+        found = self.find(target, asked, asked.options, job.deadline)
+        job.watch.lap("search")
+        answer = {**found, "map": target.reference, "client_ref": asked.client_ref}
+        return job.done(answer, map=target.reference, verdict=found["status"], usable=found["usable"])
+
+    def target(self, asked: InlineMap | StoredMap, options: SearchOptions) -> Target:
+        """Return the map that is asked for, indexed.
+
+        Raises
+        ------
+        StoreError
+            When it is stored, and cannot be had.
+        ParserEndedError
+            When it is large and could not be read.
+        InputError
+            When it cannot be searched.
+        """
+        cached, revision = self.lookup.indexed(asked, oriented=options.oriented)
+        if isinstance(asked, StoredMap):
+            return Target(cached, {"map_id": asked.map_id, "revision": revision})
+        return Target(cached, None)
+
+    def find(
+        self, target: Target, sought: AssociateRequest | BatchItem, options: SearchOptions, deadline: Deadline
+    ) -> Json:
+        """Find a scan in a map.
+
+        Raises
+        ------
+        InputError, InvalidRequestError
+            When the scan is not what the libraries take.
+        DeadlinePassedError
+            When the deadline has passed before the search starts.
+        CancelledError
+            When the client has gone.
+        """
+        scanned = scanned_of(sought.scan)
+        if deadline.cancelled:
+            raise CancelledError
+        if deadline.passed:
+            raise DeadlinePassedError
+        prior, how = prior_of(sought.prior), association_options_of(options)
+        begun = time.perf_counter()
+        result = associate(target.cached.index, scanned.scan, prior, how, deadline)
+        seconds = time.perf_counter() - begun
+        self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
+        answer = association_json(result, frozenset(options.include))
+        answer["frame_id"] = target.cached.frame_id
+        answer["child_frame_id"] = sought.scan.frame_id
+        answer["stamp"] = sought.scan.stamp
+        if "segments" in options.include:
+            answer["segments"] = None if scanned.segments is None else scanned.segments.tolist()
+        return answer
+
+    def find_for_batch(
+        self, target: Target, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
+    ) -> Json:
+        """Find one scan of a batch; raises also what was wrong with the scan itself.
+
+        What cannot be answered is found out here, where it spoils nothing else.
+        """
+        if isinstance(sought, Exception):
+            raise sought
+        found = self.find(target, sought, options, deadline)
+        require_finite(found)
+        return found
+
+
+def batch_done(asked: BatchRequest, target: Target, results: Sequence[Json], job: Job) -> Done:
+    """Return the answer of a batch, given its items."""
+    verdicts = Counter(item["result"]["status"] if "result" in item else item["status_code"] for item in results)
+    noted = {str(verdict): count for verdict, count in verdicts.items()}
+    answer = {"results": results, "map": target.reference, "client_ref": asked.client_ref}
+    return job.done(answer, map=target.reference, verdicts=noted)

@@ -1,0 +1,32 @@
+"""Vectorizations: ranges or points to segments."""
+
+from __future__ import annotations
+
+from vectorization import VectorizationOptions
+
+from ..schemas.requests import VectorizeRequest
+from .answers import vectorization_json
+from .job import Done, Job
+from .scanning import vectorize_laser, vectorize_points
+
+_PLACES = ("", "/options")  # where scan and options stand in the request
+
+
+def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
+    """Cut a scan into directed segments.
+
+    Raises
+    ------
+    InvalidRequestError
+        When it is not what the library takes.
+    """
+    how = asked.options
+    options = VectorizationOptions(how.sigma, how.min_points, how.min_length, how.max_gap)
+    job.watch.lap("decode")
+    if asked.laser is not None:
+        found = vectorize_laser(asked.laser, options, _PLACES)
+    else:
+        assert asked.points is not None  # the model takes exactly one of the two
+        found = vectorize_points(asked.points, options, (0.0, 0.0), _PLACES)
+    job.watch.lap("search")
+    return job.done(vectorization_json(found))
