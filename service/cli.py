@@ -17,6 +17,7 @@ USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve -
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
 # this when they are loaded, so before anything imports numpy.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+KERNELS = "LINEFIX_KERNELS"  # read by registration.compiling, which is not loaded here for its name
 
 
 def serve(arguments: Sequence[str]) -> int:
@@ -37,11 +38,9 @@ def serve(arguments: Sequence[str]) -> int:
 
 def unknown_settings() -> list[str]:
     """Return what looks like a setting in the environment and is none."""
-    from registration.compiling import DIRECTORY
-
     from .settings import Settings
 
-    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields} | {DIRECTORY}
+    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields} | {KERNELS}
     return sorted(name for name in os.environ if name.upper().startswith("LINEFIX_") and name.upper() not in known)
 
 

@@ -11,8 +11,8 @@ import httpx
 import numpy as np
 import orjson
 import pytest
-
 from service.process.warmup import room_ranges
+
 from service.schemas import examples
 from tests.service.test_workers import until
 

@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 
 import pytest
+from service.runtime import HangUpError, Runtime
 
 from association import Deadline
 from service.admission.gate import SearchGate
 from service.http.problems import ProblemError
-from service.runtime import HangUpError, Runtime
 from service.settings import Settings
 
 

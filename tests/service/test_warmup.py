@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from service.process.warmup import warm_up
+
 from service.schemas import examples
 
 LASER = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-
 from service.process.part import Part
+
 from service.schemas import examples
 from service.settings import SettingsError, read_settings
 from service.telemetry.metrics import Metrics
