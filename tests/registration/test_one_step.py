@@ -170,6 +170,17 @@ def test_an_angle_taken_out_across_the_wrap_is_gone() -> None:
     assert math.degrees(sums.solve("mitsuta")[0].theta) == pytest.approx(176.5, abs=1e-9)
 
 
+def test_a_reference_may_be_moved_across_the_wrap() -> None:
+    pairs = correspondences(directed([175, -175, 178]), MeasuredSegments.from_segments(directed([0, 0, 0])))
+    here, there = RigidTransform(0.0, 0.0, 3.0), RigidTransform(0.0, 0.0, -3.0)
+    sums = OneStepSums.of_set(pairs, np.ones(3), here)
+    fresh = OneStepSums.of_set(pairs, np.ones(3), there)
+    np.testing.assert_allclose(sums.about(there).values, fresh.values, atol=1e-12)
+    rotation: Rotation
+    for rotation in ("wahba", "mitsuta"):
+        assert sums.rotation_cost(there, rotation) == pytest.approx(fresh.rotation_cost(there, rotation))
+
+
 def test_pairs_are_chosen_by_index() -> None:
     map_segments, scan = noisy_pairs(np.random.default_rng(1), 5)
     chosen = Correspondences.of(map_segments, scan, [[3, 3], [1, 1]])
