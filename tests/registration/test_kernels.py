@@ -115,6 +115,32 @@ def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start: float) -> None:
         assert cost < joint.joint_cost(sums, theta, x, y + step)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_joint_solve_goes_down_into_the_valley_that_it_starts_in(seed: int) -> None:
+    _, pairs, weights, measured = drawn(seed)
+    sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
+    angles = np.linspace(-math.pi, math.pi, 721)
+    costs = np.array([reference.least_cost(theta, *measured) for theta in angles[:-1]])
+    for k in range(0, 720, 5):
+        place = k
+        while min(costs[place - 1], costs[(place + 1) % 720]) < costs[place]:
+            place = min(((place - 1) % 720, (place + 1) % 720), key=lambda i: costs[i])
+        theta, *_ = joint.joint_solve(sums, angles[k], False)
+        assert abs(math.remainder(theta - angles[place], math.tau)) < 0.02, angles[k]
+
+
+def test_joint_solve_gives_a_wrapped_angle_and_no_negative_cost() -> None:
+    costs = []
+    for seed in range(20):
+        pose = RigidTransform(1.0, 2.0, -3.1)
+        pairs = correspondences(*noisy_pairs(np.random.default_rng(seed), 7, noise=0.0, pose=pose))
+        sums = joint.joint_sums_compensated(pairs.rows, np.ones(7))[0]
+        theta, *_, cost, _ = joint.joint_solve(sums, 3.1, False)
+        assert theta == pytest.approx(-3.1, abs=1e-9)
+        costs += [cost, joint.joint_cost(sums, theta, 1.0, 2.0)]
+    assert min(costs) == 0.0
+
+
 def test_joint_solve_of_parallel_lines_gives_the_shortest_translation() -> None:
     # Two walls along 0.5 rad that face each other, seen in place but for 2 m across.
     along, across = np.array([math.cos(0.5), math.sin(0.5)]), np.array([-math.sin(0.5), math.cos(0.5)])

@@ -130,6 +130,15 @@ def test_reliability_in_closed_form(degrees: list[float], expected: float) -> No
     assert sums.determinant == pytest.approx((0.5 * expected * len(degrees)) ** 2, abs=1e-12)
 
 
+def test_reliability_never_exceeds_1_by_rounding() -> None:
+    found = []
+    for first in np.linspace(0.0, 90.0, 200):
+        cross = directed([first, first + 90.0])
+        pairs = correspondences(cross, MeasuredSegments.from_segments(cross))
+        found.append(OneStepSums.of_set(pairs, [0.1, 0.1]).reliability)
+    assert max(found) == 1.0
+
+
 def test_sums_of_nothing() -> None:
     pairs = Correspondences.of(directed([0]), MeasuredSegments.from_segments(directed([0])), [])
     sums = OneStepSums.of_set(pairs, [])
