@@ -369,7 +369,8 @@ def test_eigen2_of_what_has_no_one_axis() -> None:
     for a in (0.0, 2.0):
         small, big, x, y = matrices.eigen2(a, 0.0, a)
         np.testing.assert_allclose((small, big, x, y), (a, a, 1.0, 0.0), atol=1e-15)
-    assert matrices.eigen2(1.0, 1.0, 1.0)[0] == 0.0
+    rows = np.random.default_rng(1).normal(size=(200, 2))
+    assert min(matrices.eigen2(x * x, x * y, y * y)[0] for x, y in rows) == 0.0  # and not below, by rounding
 
 
 @given(SEEDS, st.sampled_from([1e-12, 1e-6, 1e-2]))
@@ -395,6 +396,10 @@ def test_is_regular3_of_what_is_not() -> None:
     for gap, regular in ((1e-11, True), (1e-13, False)):
         matrix = np.ones((3, 3)) + 2.0 * gap * np.eye(3)
         assert matrices.is_regular3(symmetric(matrix)[0], 1e-12) is regular
+    # By the determinant, 3 gap^2 to the first order.
+    for gap, regular in ((1e-6, True), (1e-7, False)):
+        matrix = np.ones((3, 3)) + gap * np.eye(3)
+        assert matrices.invert3(symmetric(matrix)[0], np.empty(1, SYMMETRIC3)[0]) is regular
 
 
 @given(SEEDS)
