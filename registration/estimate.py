@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from .correspondences import Correspondences
 from .joint import JointSums
@@ -124,10 +124,8 @@ def fit_one_step(problem: Problem, options: RegistrationOptions) -> Fit:
     sums = JointSums.of_set(problem.centred, problem.weights.used)
     freedom = _freedom(problem, sums, theta)
     fit = Fit(at, at.compose(problem.scan_from_centred), freedom, sums)
-    if observable:
-        # The paper has an answer, so that one is given.
-        return replace(fit, freedom=replace(freedom, slack=0.0))
-    return fit.moved_least(problem)
+    # Where the paper has an answer, that one is given.
+    return fit if observable else fit.moved_least(problem)
 
 
 def _freedom(problem: Problem, sums: JointSums, theta: float) -> Freedom:

@@ -75,5 +75,5 @@ def _slack(sums: JointSums, x: float, y: float) -> float:
 
 
 def _signed(x: float, y: float) -> tuple[float, float]:
-    """Of the two opposite unit vectors return the one that points to the right, or straight up."""
-    return (-x, -y) if x < -1e-12 or (abs(x) <= 1e-12 and y < 0.0) else (x, y)
+    """Of two opposite unit vectors return the one that points to the right, or straight up; x is not below 0."""
+    return (-x, -y) if x <= 1e-12 and y < 0.0 else (x, y)

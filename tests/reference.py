@@ -71,17 +71,25 @@ def joint_cost(
     return total
 
 
-def joint_solve(start: float, *pairs: Iterable[tuple[int, int]]) -> tuple[float, Floats]:
-    """Minimise the cost: at each angle near `start` the best translation by least squares; the best angle by search."""
+def best_translation(theta: float, *pairs: Floats) -> Floats:
+    """Least squares of the distances at an angle."""
     normals, offsets, centroids, _, _, weights = pairs
     root = np.sqrt(weights)
+    gaps = offsets - np.array([n @ rotation(theta) @ m for n, m in zip(normals, centroids, strict=True)])
+    translation: Floats = np.linalg.lstsq(root[:, None] * normals, root * gaps, rcond=1e-9)[0]
+    return translation
 
-    def translation(theta: float) -> Floats:
-        gaps = offsets - np.array([n @ rotation(theta) @ m for n, m in zip(normals, centroids, strict=True)])
-        return np.linalg.lstsq(root[:, None] * normals, root * gaps, rcond=1e-9)[0]
+
+def least_cost(theta: float, *pairs: Floats) -> float:
+    """Cost at an angle with the best translation there."""
+    return joint_cost(theta, best_translation(theta, *pairs), *pairs)
+
+
+def joint_solve(start: float, *pairs: Floats) -> tuple[float, Floats]:
+    """Minimise the cost: at each angle near `start` the best translation by least squares; the best angle by search."""
 
     def cost(theta: float) -> float:
-        return joint_cost(theta, translation(theta), *pairs)
+        return least_cost(theta, *pairs)
 
     grid = start + np.linspace(-0.5, 0.5, 501)
     centre = min(grid, key=cost)
@@ -92,10 +100,10 @@ def joint_solve(start: float, *pairs: Iterable[tuple[int, int]]) -> tuple[float,
         low, high = (low, right) if cost(left) < cost(right) else (left, high)
     theta = 0.5 * (low + high)
     # A golden section stops at the root of the rounding; one Gauss-Newton step from there is exact.
-    jacobian, residuals = _jacobian(theta, translation(theta), *pairs)
+    jacobian, residuals = _jacobian(theta, best_translation(theta, *pairs), *pairs)
     step = np.linalg.lstsq(jacobian, -residuals, rcond=1e-9)[0]
     theta += step[2]
-    return theta, translation(theta)
+    return theta, best_translation(theta, *pairs)
 
 
 def _jacobian(
@@ -117,7 +125,7 @@ def _jacobian(
     return np.array(rows), np.array(residuals)
 
 
-def joint_information(theta: float, *pairs: Iterable[tuple[int, int]]) -> Floats:
+def joint_information(theta: float, *pairs: Floats) -> Floats:
     """J'J of the residuals of the two points of each pair."""
     jacobian, _ = _jacobian(theta, np.zeros(2), *pairs)
     return jacobian.T @ jacobian

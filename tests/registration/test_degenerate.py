@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from registration import MeasuredSegments, RegistrationOptions, RegistrationResult, RigidTransform, Segments, register
@@ -30,6 +30,8 @@ def corridor(theta: float = 0.0, length: float = 8.0) -> Segments:
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 @given(st.floats(-3.0, 3.0), st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
+@example(0.5 * math.pi, 1.0, 2.0)
+@example(-0.5 * math.pi, 1.0, 2.0)
 @settings(max_examples=25, deadline=None)
 def test_a_corridor_leaves_its_own_direction_free(estimator: Estimator, theta: float, x: float, y: float) -> None:
     map_segments = corridor(theta)
@@ -112,6 +114,36 @@ def test_a_translation_less_certain_than_half_a_metre_is_degenerate() -> None:
     assert result.covariance is None
 
 
+@pytest.mark.parametrize(("deviation", "degenerate"), [(0.49, False), (0.51, True)])
+def test_half_a_metre_is_the_limit(deviation: float, degenerate: bool) -> None:
+    """A cross of two walls, each of which alone says where it is across itself."""
+    cross = Segments.from_array([[-50, 0, 50, 0], [0, -50, 0, 50]])
+    scan = MeasuredSegments.from_segments(seen_from(POSE, cross), 4.0 * deviation, points=[16.0, 16.0])
+    result = register(cross, scan, diagonal(2))
+    assert (result.degenerate, result.diagnostics.dof) == (degenerate, 1)
+
+
+def test_what_moves_no_further_than_it_fits_does_so_by_the_noise_and_not_by_the_weights() -> None:
+    map_segments, scan = nearly_parallel(0.45)
+    plain = register(map_segments, scan, diagonal(2))
+    heavy = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions(weights=[1e9, 1e9]))
+    np.testing.assert_allclose(place_of(heavy), place_of(plain), atol=1e-9)
+    # Long walls, whose angle is seen: the same three standard deviations.
+    map_segments, _ = nearly_parallel(0.15, length=40.0)
+    scan = MeasuredSegments.from_segments(seen_from(RigidTransform(30.0, 2.0, 0.4), map_segments), 0.06)
+    result = register(map_segments, scan, diagonal(2))
+    assert result.diagnostics.chi2 == pytest.approx(9.0, rel=1e-3)
+    assert (result.degenerate, result.diagnostics.dof) == (True, 1)
+
+
+def test_parallel_to_rounding_needs_no_noise_to_say_so() -> None:
+    map_segments = corridor(0.7)
+    scan = MeasuredSegments.from_segments(seen_from(POSE, map_segments), 0.0)
+    result = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions(weighting="uniform"))
+    assert (result.degenerate, result.diagnostics.dof) == (True, 2)
+    assert result.unobservable == pytest.approx((math.cos(0.7), math.sin(0.7)))
+
+
 def test_whether_a_set_is_degenerate_is_no_matter_of_how_it_is_weighted() -> None:
     map_segments, scan = nearly_parallel(90.0)
     for options in (
@@ -155,4 +187,5 @@ def test_points_that_fix_no_rotation() -> None:
     result = register(map_segments, scan, diagonal(2), 0.0, RegistrationOptions(weighting="uniform"))
     assert result.degenerate
     assert result.unobservable is None
+    assert result.diagnostics.dof == 1
     np.testing.assert_allclose(place_of(result), 0.0, atol=1e-12)

@@ -83,3 +83,11 @@ def walls(degrees: list[float], sigma: float) -> JointSums:
 )
 def test_parallel_within_three_standard_deviations(degrees: list[float], sigma: float, expected: bool) -> None:
     assert walls(degrees, sigma).parallel is expected
+
+
+def test_fewer_than_two_are_parallel() -> None:
+    """Rounding gives one direction a spread, and none have no weight to divide by."""
+    for seed in range(20):
+        pairs = correspondences(*noisy_pairs(np.random.default_rng(seed), 3))
+        assert JointSums.of_pair(pairs, 0, 1e30).parallel is True
+    assert JointSums.of_set(pairs.take(slice(0, 0)), []).parallel is True

@@ -115,6 +115,32 @@ def test_joint_solve_ends_in_a_minimum_wherever_it_starts(start: float) -> None:
         assert cost < joint.joint_cost(sums, theta, x, y + step)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_joint_solve_goes_down_into_the_valley_that_it_starts_in(seed: int) -> None:
+    _, pairs, weights, measured = drawn(seed)
+    sums = joint.joint_sums_compensated(pairs.rows, weights)[0]
+    angles = np.linspace(-math.pi, math.pi, 721)
+    costs = np.array([reference.least_cost(theta, *measured) for theta in angles[:-1]])
+    for k in range(0, 720, 5):
+        place = k
+        while min(costs[place - 1], costs[(place + 1) % 720]) < costs[place]:
+            place = min(((place - 1) % 720, (place + 1) % 720), key=lambda i: costs[i])
+        theta, *_ = joint.joint_solve(sums, angles[k], False)
+        assert abs(math.remainder(theta - angles[place], math.tau)) < 0.02, angles[k]
+
+
+def test_joint_solve_gives_a_wrapped_angle_and_no_negative_cost() -> None:
+    costs = []
+    for seed in range(20):
+        pose = RigidTransform(1.0, 2.0, -3.1)
+        pairs = correspondences(*noisy_pairs(np.random.default_rng(seed), 7, noise=0.0, pose=pose))
+        sums = joint.joint_sums_compensated(pairs.rows, np.ones(7))[0]
+        theta, *_, cost, _ = joint.joint_solve(sums, 3.1, False)
+        assert theta == pytest.approx(-3.1, abs=1e-9)
+        costs += [cost, joint.joint_cost(sums, theta, 1.0, 2.0)]
+    assert min(costs) == 0.0
+
+
 def test_joint_solve_of_parallel_lines_gives_the_shortest_translation() -> None:
     # Two walls along 0.5 rad that face each other, seen in place but for 2 m across.
     along, across = np.array([math.cos(0.5), math.sin(0.5)]), np.array([-math.sin(0.5), math.cos(0.5)])
@@ -343,7 +369,8 @@ def test_eigen2_of_what_has_no_one_axis() -> None:
     for a in (0.0, 2.0):
         small, big, x, y = matrices.eigen2(a, 0.0, a)
         np.testing.assert_allclose((small, big, x, y), (a, a, 1.0, 0.0), atol=1e-15)
-    assert matrices.eigen2(1.0, 1.0, 1.0)[0] == 0.0
+    rows = np.random.default_rng(1).normal(size=(200, 2))
+    assert min(matrices.eigen2(x * x, x * y, y * y)[0] for x, y in rows) == 0.0  # and not below, by rounding
 
 
 @given(SEEDS, st.sampled_from([1e-12, 1e-6, 1e-2]))
@@ -369,6 +396,10 @@ def test_is_regular3_of_what_is_not() -> None:
     for gap, regular in ((1e-11, True), (1e-13, False)):
         matrix = np.ones((3, 3)) + 2.0 * gap * np.eye(3)
         assert matrices.is_regular3(symmetric(matrix)[0], 1e-12) is regular
+    # By the determinant, 3 gap^2 to the first order.
+    for gap, regular in ((1e-6, True), (1e-7, False)):
+        matrix = np.ones((3, 3)) + gap * np.eye(3)
+        assert matrices.invert3(symmetric(matrix)[0], np.empty(1, SYMMETRIC3)[0]) is regular
 
 
 @given(SEEDS)

@@ -130,6 +130,15 @@ def test_reliability_in_closed_form(degrees: list[float], expected: float) -> No
     assert sums.determinant == pytest.approx((0.5 * expected * len(degrees)) ** 2, abs=1e-12)
 
 
+def test_reliability_never_exceeds_1_by_rounding() -> None:
+    found = []
+    for first in np.linspace(0.0, 90.0, 200):
+        cross = directed([first, first + 90.0])
+        pairs = correspondences(cross, MeasuredSegments.from_segments(cross))
+        found.append(OneStepSums.of_set(pairs, [0.1, 0.1]).reliability)
+    assert max(found) == 1.0
+
+
 def test_sums_of_nothing() -> None:
     pairs = Correspondences.of(directed([0]), MeasuredSegments.from_segments(directed([0])), [])
     sums = OneStepSums.of_set(pairs, [])
@@ -168,6 +177,17 @@ def test_an_angle_taken_out_across_the_wrap_is_gone() -> None:
     pairs = correspondences(directed([175, -175, 178]), MeasuredSegments.from_segments(directed([0, 0, 0])))
     sums = OneStepSums.of_set(pairs, np.ones(3), RigidTransform(0.0, 0.0, math.pi)).remove(pairs, 1, 1.0)
     assert math.degrees(sums.solve("mitsuta")[0].theta) == pytest.approx(176.5, abs=1e-9)
+
+
+def test_a_reference_may_be_moved_across_the_wrap() -> None:
+    pairs = correspondences(directed([175, -175, 178]), MeasuredSegments.from_segments(directed([0, 0, 0])))
+    here, there = RigidTransform(0.0, 0.0, 3.0), RigidTransform(0.0, 0.0, -3.0)
+    sums = OneStepSums.of_set(pairs, np.ones(3), here)
+    fresh = OneStepSums.of_set(pairs, np.ones(3), there)
+    np.testing.assert_allclose(sums.about(there).values, fresh.values, atol=1e-12)
+    rotation: Rotation
+    for rotation in ("wahba", "mitsuta"):
+        assert sums.rotation_cost(there, rotation) == pytest.approx(fresh.rotation_cost(there, rotation))
 
 
 def test_pairs_are_chosen_by_index() -> None:

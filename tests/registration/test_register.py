@@ -253,6 +253,31 @@ def test_without_directions_a_corner_fits_both_ways() -> None:
     assert not register(map_segments, scan, [[0, 0], [1, 1]]).degenerate
 
 
+@pytest.mark.parametrize(("deviations", "unique"), [(2.5, False), (3.5, True)])
+def test_without_directions_the_half_turn_has_to_be_worse_by_three_deviations(deviations: float, unique: bool) -> None:
+    """A cross, which the half turn takes to itself, and a wall that it takes so many standard deviations off."""
+    ends = np.array([[-2, 0, 2, 0], [0, -2, 0, 2], [-1, 0.5 * deviations, 1, 0.5 * deviations]])
+    map_segments = Segments.from_array(ends)
+    scan = MeasuredSegments.from_segments(map_segments, 1.0, points=[1e8, 1e8, 1.0])
+    result = register(map_segments, scan, diagonal(3), 0.0, RegistrationOptions(oriented=False))
+    assert result.degenerate is not unique
+    # It is a question of noise, and not of how a caller weighs.
+    heavy = RegistrationOptions(oriented=False, weights=100.0 * result.weights)
+    assert register(map_segments, scan, diagonal(3), 0.0, heavy).degenerate is not unique
+    exact = MeasuredSegments.from_segments(map_segments, 0.0)
+    options = RegistrationOptions(oriented=False, weighting="uniform")
+    assert not register(map_segments, exact, diagonal(3), 0.0, options).degenerate
+
+
+def test_without_directions_the_rotation_is_that_of_the_pairs_that_count() -> None:
+    map_segments, scan = room()
+    wrong = [[i, j] for i in range(4) for j in range(4) if (i - j) % 2 == 1]  # a quarter turn off
+    weights = [1.0] * 6 + [1e-9] * len(wrong)
+    options = RegistrationOptions(oriented=False, weights=weights)
+    result = register(map_segments, scan, [*diagonal(6).tolist(), *wrong], 0.0, options)
+    np.testing.assert_allclose(difference(pose_of(result), POSE), 0.0, atol=1e-6)
+
+
 def test_a_pair_of_weight_0_has_a_residual_and_no_say() -> None:
     map_segments, scan = room()
     pairs = [*diagonal(6).tolist(), [0, 2]]
@@ -324,6 +349,16 @@ def test_bad_pairs_are_refused(pairs: Any, index: int | None) -> None:
     with pytest.raises(InvalidArgumentError) as caught:
         register(*room(), pairs)
     assert (caught.value.argument, caught.value.index) == ("correspondences", index)
+
+
+def test_each_index_has_the_range_of_its_own_set() -> None:
+    many = Segments.from_array(ROOM)
+    few = many.take(np.arange(2))
+    assert register(many, MeasuredSegments.from_segments(few), [[0, 4], [1, 5]]).diagnostics.n == 2
+    assert register(few, MeasuredSegments.from_segments(many), [[4, 0], [5, 1]]).diagnostics.n == 2
+    for map_segments, scan, pair in ((many, few, [2, 0]), (few, many, [0, 2])):
+        with pytest.raises(InvalidArgumentError, match="from 0 to 1, got 2"):
+            register(map_segments, MeasuredSegments.from_segments(scan), [pair])
 
 
 @pytest.mark.parametrize(
