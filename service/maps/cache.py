@@ -7,10 +7,12 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from dataclasses import dataclass
-
-from association import MapIndex
+from typing import TYPE_CHECKING
 
 from ..telemetry.metrics import Metrics
+
+if TYPE_CHECKING:  # the store comes without what computes
+    from association import MapIndex
 
 
 @dataclass(frozen=True, slots=True)

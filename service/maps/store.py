@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
-from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, literal, select, update
+from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from .database import make_directory, open_engine
@@ -46,11 +46,6 @@ class MapStore:
     def close(self) -> None:
         """Close all connections."""
         self._engine.dispose()
-
-    def ping(self) -> None:
-        """Return when the store answers."""
-        with self._reading() as connection:
-            connection.execute(select(literal(1)).select_from(maps).limit(1)).first()
 
     def put(
         self, map_id: str, document: bytes, summary: tuple[int, Bounds], demands: Preconditions

@@ -74,7 +74,7 @@ def build_worker(settings: Settings, directory: Path) -> FastAPI:
     _follow_parent()
     app = build(settings, part)
     app.state.part = lock  # held as long as this process lives
-    _watch(asyncio.get_running_loop(), settings.hang_seconds)
+    watch_loop(asyncio.get_running_loop(), settings.hang_seconds)
     return app
 
 
@@ -107,7 +107,7 @@ def _follow_parent() -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
-def _watch(loop: asyncio.AbstractEventLoop, seconds: float) -> None:
+def watch_loop(loop: asyncio.AbstractEventLoop, seconds: float) -> None:
     """End this process when its event loop stands still; uvicorn only sees whether any of its threads answers.
 
     Looks are counted, not seconds: when everything was stopped for a while it takes as many again.

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from service.database_url import database_url
-from service.http.problems import ProblemError
 from service.maps import MapStore, Preconditions
+from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.schemas import examples
 
 BOX = (4, (-1.5, 0.0, 1.0, 1e5))
@@ -29,11 +29,11 @@ def put_all(store: MapStore) -> None:
 
 
 def attempt(call: Callable[[], Any]) -> Any:
-    """Return what a call returns, or the code of its problem; anything else is a defect."""
+    """Return what a call returns, or the kind of error that the store raises; anything else is a defect."""
     try:
         return call()
-    except ProblemError as problem:
-        return problem.code
+    except StoreError as error:
+        return type(error)
 
 
 def look(store: MapStore) -> Counter[str]:
@@ -41,16 +41,16 @@ def look(store: MapStore) -> Counter[str]:
     seen: Counter[str] = Counter()
     for name, document in DOCUMENTS.items():
         found = attempt(lambda name=name: store.load(name))
-        if isinstance(found, str):
-            assert found == "map_corrupt", (name, found)
+        if isinstance(found, type):
+            assert found is CorruptMapError, (name, found)
             seen["named"] += 1
         else:
             assert (found.document, found.record.revision) == (document, 2), name
             seen["whole"] += 1
-    assert attempt(lambda: store.load("gone")) in ("unknown_map", "map_corrupt")
+    assert attempt(lambda: store.load("gone")) in (UnknownMapError, CorruptMapError)
     page = attempt(lambda: store.list(100, ""))
-    if isinstance(page, str):
-        assert page == "map_corrupt"
+    if isinstance(page, type):
+        assert page is CorruptMapError
     else:
         for item in page.maps:
             assert (item.revision, item.segments, item.bounds) == (2, *BOX), item
@@ -61,11 +61,11 @@ def heal(store: MapStore) -> Counter[str]:
     """Put every map that is damaged again, and see whether that helped."""
     seen: Counter[str] = Counter()
     for name, document in DOCUMENTS.items():
-        if attempt(lambda name=name: store.load(name)) != "map_corrupt":
+        if attempt(lambda name=name: store.load(name)) is not CorruptMapError:
             continue
         put = attempt(lambda name=name, document=document: store.put(name, document, BOX, Preconditions()))
-        if isinstance(put, str):
-            assert put == "map_corrupt"
+        if isinstance(put, type):
+            assert put is CorruptMapError
             seen["not healed"] += 1
         else:
             assert put[0] > 2

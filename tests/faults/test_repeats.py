@@ -11,10 +11,10 @@ import httpx
 import numpy as np
 import orjson
 import pytest
-from service.process.warmup import room_ranges
 
 from service.schemas import examples
-from tests.service.test_workers import until
+from service.work.warmup import room_ranges
+from tests.running import until
 
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 LASER = {"angle_min": -np.pi, "angle_increment": np.pi / 180.0, "range_max": 30.0, "ranges": room_ranges(TURN).tolist()}

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from schemathesis import GenerationMode, checks
 
 from service.schemas import examples
-from tests.conftest import RunningService, start, stop
+from tests.running import RunningService, running
 
 CASES = int(os.environ.get("FUZZ_CASES", "2000"))
 PATHS = ["/v1/register", "/v1/associate", "/v1/associate:batch", "/v1/vectorize"]
@@ -47,17 +47,14 @@ def fuzz(share: float) -> settings:
 @pytest.fixture(scope="module")
 def fuzzed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     """A service that keeps next to no maps, so that its memory shows what requests leave behind."""
-    running = start(tmp_path_factory.mktemp("fuzzed"), drain_seconds=0, cache_bytes=1_000_000)
-    try:
-        yield running
-        assert running.process.poll() is None
-        assert "Traceback" not in running.log()
-    finally:
-        stop(running)
+    with running(tmp_path_factory.mktemp("fuzzed"), cache_bytes=1_000_000) as service:
+        yield service
+        assert service.process.poll() is None
+        assert "Traceback" not in service.log()
 
 
-def resident(running: RunningService) -> int:
-    return int(Path(f"/proc/{running.process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+def resident(service: RunningService) -> int:
+    return int(Path(f"/proc/{service.process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.fixture(scope="module")

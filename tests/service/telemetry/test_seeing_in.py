@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import re
-import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import httpx
 
 from service.schemas import examples
+from tests.running import RunningService, until
 
-DASHBOARD = json.loads((Path(__file__).parents[2] / "deploy" / "grafana.json").read_text())
+DASHBOARD = json.loads((Path(__file__).parents[3] / "deploy" / "grafana.json").read_text())
 
 
 def asked_for() -> dict[str, str]:
@@ -53,7 +52,7 @@ def test_the_dashboard_shows_all_that_is_counted(client: httpx.Client) -> None:
     assert not forgotten
 
 
-def test_the_log_names_request_map_and_verdict(start_service: Callable[..., Any]) -> None:
+def test_the_log_names_request_map_and_verdict(start_service: Callable[..., RunningService]) -> None:
     running = start_service()
     stored = {**examples.ASSOCIATE, "map": {"map_id": "hq-3"}}
     running.client.put("/v1/maps/hq-3", json=examples.MAP)
@@ -62,10 +61,7 @@ def test_the_log_names_request_map_and_verdict(start_service: Callable[..., Any]
     batch = {**examples.BATCH, "map": {"map_id": "hq-3"}, "scans": [{"segments": examples.SEEN}, {}], "priors": None}
     running.client.post("/v1/associate:batch", json=batch, headers={"x-request-id": "batch"})
     running.client.post("/v1/associate", json={}, headers={"x-request-id": "wrong"})
-    give_up = time.monotonic() + 30
-    # A line is written after its answer is sent.
-    while '"request_id":"wrong"' not in running.log() and time.monotonic() < give_up:
-        time.sleep(0.01)
+    until(lambda: '"request_id":"wrong"' in running.log())  # a line is written after its answer is sent
     lines = [json.loads(line) for line in running.log().splitlines()]
     by_id = {line["request_id"]: line for line in lines if line["message"] == "request"}
     for line in by_id.values():

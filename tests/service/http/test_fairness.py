@@ -5,25 +5,14 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 import httpx
-import numpy as np
-import orjson
+
+from tests.running import RunningService
+from tests.service.searches import searched_for_a_while
 
 
-def searched_for_a_while() -> bytes:
-    """A request that takes some ten milliseconds: nothing in the scan is on the map."""
-    rng = np.random.default_rng(1)
-    begins = rng.uniform(0.0, 50.0, (800, 2))
-    angles = rng.uniform(0.0, np.pi, 800)
-    segments = np.hstack([begins, begins + 2.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
-    seen = rng.uniform(-5.0, 5.0, (30, 4))
-    body = {"map": {"segments": segments}, "scan": {"segments": seen}, "options": {"exhaustive": True}}
-    return orjson.dumps(body, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Any]) -> None:
+def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., RunningService]) -> None:
     running = start_service(keys="flood,robot", searches=1, queue=8)
     body = searched_for_a_while()
     answers: Counter[tuple[str, int]] = Counter()
@@ -60,7 +49,7 @@ def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Any]
     assert answers["robot", 429] + answers["robot", 503] == 0, answers
 
 
-def test_a_key_alone_has_all_of_the_service(start_service: Callable[..., Any]) -> None:
+def test_a_key_alone_has_all_of_the_service(start_service: Callable[..., RunningService]) -> None:
     running = start_service(keys="one,other", searches=2, queue=8)
     body = searched_for_a_while()
     answers: list[int] = []

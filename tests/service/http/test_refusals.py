@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import http.client
-import socket
 import time
 from contextlib import suppress
 from typing import Any
@@ -12,7 +11,7 @@ import httpx
 import orjson
 import pytest
 
-from tests.conftest import RunningService
+from tests.running import RunningService
 
 ROOM = [[-4.0, -3.0, 4.0, -3.0], [4.0, -3.0, 4.0, 3.0], [4.0, 3.0, -4.0, 3.0], [-4.0, 3.0, -4.0, -3.0]]
 
@@ -239,14 +238,14 @@ def test_a_wish_for_another_protocol_is_ignored(service: RunningService, apart: 
     head = b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nConnection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"
     head += b"HTTP2-Settings: AAMAAABkAARAAAAAAAIAAAAA\r\nContent-Length: %d\r\n\r\n" % len(body)
     pieces = [head[:split], head[split:], body] if apart else [head[:split], head[split:] + body]
-    with socket.create_connection(("127.0.0.1", service.port), timeout=3) as connection:
+    answer = b""
+    with service.connection() as connection, suppress(TimeoutError):
         for piece in pieces:
             connection.sendall(piece)
             time.sleep(0.1)
-        answer = b""
-        with suppress(TimeoutError):
-            while piece := connection.recv(65_536):
-                answer += piece
+        while piece := connection.recv(65_536):
+            answer += piece
+            connection.settimeout(0.5)  # for a second answer, which there should not be
     assert answer.count(b"HTTP/1.1 ") == 1
     assert b"max_body_bytes" not in answer
     if split == 0:  # where the head comes in pieces it may also be refused

@@ -8,9 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from service.process.warmup import warm_up
-
 from service.schemas import examples
+from service.work.warmup import warm_up
 
 LASER = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}
 SEGMENTS = examples.ASSOCIATE["scan"]["segments"]
@@ -92,7 +91,7 @@ def signatures() -> dict[str, int]:
 
 
 def test_no_request_compiles_anything_after_the_warm_up(tmp_path: Path) -> None:
-    script = "from tests.service.test_warmup import compiled_by_requests; print(compiled_by_requests())"
+    script = "from tests.service.work.test_warmup import compiled_by_requests; print(compiled_by_requests())"
     run = subprocess.run([sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True, timeout=300)
     assert run.returncode == 0, run.stderr
     assert run.stdout.strip() == "[]"

@@ -8,9 +8,9 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from service.process.warmup import ROOM, room_ranges
 
 from service.schemas import examples
+from service.work.warmup import ROOM, room_ranges
 
 TURN = [-math.pi + math.tau * i / 720 for i in range(720)]
 

@@ -8,7 +8,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.http.problems import CODES
+from service.http.problems import KINDS
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_every_error_is_a_problem_of_a_known_code(document: dict[str, Any]) -> N
             assert (media_type, more) == ("application/problem+json", []), (method, path, status)
             assert content["schema"] == {"$ref": "#/components/schemas/Problem"}
             for code, example in content["examples"].items():
-                assert CODES[code] == int(status) == example["value"]["status"]
+                assert KINDS[code].status == int(status) == example["value"]["status"]
         if path.startswith("/v1/"):
             assert {"401", "403", "500"} <= operation["responses"].keys()
 

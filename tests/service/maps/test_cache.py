@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
-import numpy as np
 import pytest
-from sqlalchemy import URL
 
 from association import MapIndex
 from registration import Segments
-from service.maps import CachedMap, IndexCache, MapStore
-from service.maps.lookup import MapLookup
-from service.parsing.parser_process import ParserProcess
-from service.schemas import examples
-from service.schemas.encoding import NotFiniteError, encode
-from service.schemas.parts import InlineMap
+from service.maps import CachedMap, IndexCache
 from service.telemetry.metrics import Metrics
 
 INDEX = MapIndex.build(Segments.from_array([[0.0, 0.0, 1.0, 0.0]]), 0.0)
@@ -35,8 +28,13 @@ def test_the_least_recently_used_goes_first() -> None:
     cache.get("d", lambda: a_map(30))
     assert (len(cache), cache.bytes) == (3, 90)
     cache.get("a", lambda: pytest.fail("is there"))
-    built = []
-    cache.get("b", lambda: built.append("b") or a_map(30))
+    built: list[str] = []
+
+    def build() -> CachedMap:
+        built.append("b")
+        return a_map(30)
+
+    cache.get("b", build)
     assert built == ["b"]
 
 
@@ -68,32 +66,56 @@ def test_callers_at_the_same_time_share_one_build() -> None:
 
     with ThreadPoolExecutor(4) as threads:
         asked = [threads.submit(cache.get, "a", build) for _ in range(4)]
+        time.sleep(0.05)
         release.set()
         answers = [one.result(10) for one in asked]
     assert len(builds) == 1
     assert all(answer is answers[0] for answer in answers)
 
 
-def test_a_failed_build_is_not_remembered() -> None:
+def test_who_waits_for_a_build_that_fails_is_told_so() -> None:
     cache = IndexCache(100, Metrics())
-    with pytest.raises(ZeroDivisionError):
-        cache.get("a", lambda: 1 // 0)  # type: ignore[arg-type, return-value]
+    release = threading.Event()
+
+    def fail() -> CachedMap:
+        release.wait(10)
+        raise ZeroDivisionError
+
+    with ThreadPoolExecutor(2) as threads:
+        asked = [threads.submit(cache.get, "a", fail) for _ in range(2)]
+        time.sleep(0.05)
+        release.set()
+        for one in asked:
+            with pytest.raises(ZeroDivisionError):
+                one.result(10)
     assert cache.get("a", lambda: a_map(1)).bytes == 1
 
 
-def test_a_map_without_directions_is_another_one_in_the_cache(tmp_path: Path) -> None:
-    cache = IndexCache(10_000_000, Metrics())
-    lookup = MapLookup(cache, MapStore(URL.create("sqlite", database=str(tmp_path / "maps"))), ParserProcess())
-    asked = InlineMap.model_validate({"segments": examples.WALLS}, context={"map_segments": 10})
-    one, other, again = (lookup.indexed(asked, oriented=oriented)[0] for oriented in (True, False, True))
-    assert len(other.index.segments) == 2 * len(one.index.segments)
-    assert again is one
-    assert cache.bytes == one.index.nbytes + other.index.nbytes
-    assert other.index.undirected is other.index
+def test_what_fits_exactly_is_kept() -> None:
+    cache = IndexCache(60, Metrics())
+    for name in "ab":
+        cache.get(name, lambda: a_map(30))
+    assert (len(cache), cache.bytes) == (2, 60)
+    cache.make_room(0)
+    assert len(cache) == 2
+    cache.get("c", lambda: a_map(60))
+    assert (len(cache), cache.bytes) == (1, 60)
+    cache.get("d", lambda: a_map(61))
+    cache.get("c", lambda: pytest.fail("is there"))
 
 
-@pytest.mark.parametrize("answer", [np.nan, {"a": [1.0, {"b": np.inf}]}, {"a": np.array([[1.0, -np.inf]])}, (np.nan,)])
-def test_nothing_that_is_not_finite_leaves(answer: object) -> None:
-    with pytest.raises(NotFiniteError):
-        encode(answer)
-    assert encode({"a": np.array([1.0]), "b": None}) == b'{"a":[1.0],"b":null}'
+def test_hits_and_misses_are_counted() -> None:
+    metrics = Metrics()
+    cache = IndexCache(100, metrics)
+    for name in "aab":
+        cache.get(name, lambda: a_map(1))
+    text = metrics.exposition().decode()
+    assert "linefix_map_cache_hits_total 1.0" in text
+    assert "linefix_map_cache_misses_total 2.0" in text
+
+
+def test_a_failed_build_is_not_remembered() -> None:
+    cache = IndexCache(100, Metrics())
+    with pytest.raises(ZeroDivisionError):
+        cache.get("a", lambda: a_map(1 // 0))
+    assert cache.get("a", lambda: a_map(1)).bytes == 1

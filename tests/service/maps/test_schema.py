@@ -10,12 +10,12 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import Column, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
+from sqlalchemy import Column, Engine, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
 
 from service.database_url import database_url
-from service.http.problems import ProblemError
 from service.maps import MapStore, Preconditions, schema
 from service.maps.database import open_engine
+from service.maps.errors import CorruptMapError, StoreAwayError, UnknownMapError
 from service.maps.tables import metadata
 
 BOX = (4, (0.0, 0.0, 1.0, 1.0))
@@ -54,17 +54,26 @@ def check_migrated(store: MapStore) -> None:
     kept = store.load("kept")
     assert (kept.record.revision, kept.document) == (3, b"document")
     assert [item.bounds for item in store.list(10, "").maps if item.map_id == "kept"] == [(-0.5, 1 / 3, 1e5, 2.0)]
-    for name, code in (("damaged", "map_corrupt"), ("deleted", "unknown_map")):
-        with pytest.raises(ProblemError) as caught:
+    for name, error in (("damaged", CorruptMapError), ("deleted", UnknownMapError)):
+        with pytest.raises(error):
             store.load(name)
-        assert caught.value.code == code
     assert store.put("deleted", b"new", BOX, Preconditions()) == (6, True)
 
 
-def test_the_migrations_make_the_tables_that_are_used(store: MapStore) -> None:
-    with store._engine.connect() as connection:
-        options = {"version_table": schema.VERSION_TABLE, "compare_type": True}
-        assert compare_metadata(MigrationContext.configure(connection, opts=options), metadata) == []
+def differences(database: str) -> list[object]:
+    """Return in what the tables differ from those that the store uses."""
+    options = {"version_table": schema.VERSION_TABLE, "compare_type": True}
+    engine = open_engine(database_url(database))
+    try:
+        with engine.connect() as connection:
+            return list(compare_metadata(MigrationContext.configure(connection, opts=options), metadata))
+    finally:
+        engine.dispose()
+
+
+@pytest.mark.usefixtures("store")
+def test_the_migrations_make_the_tables_that_are_used(database: str) -> None:
+    assert differences(database) == []
 
 
 def test_a_database_from_before_migrations(database: str) -> None:
@@ -72,10 +81,8 @@ def test_a_database_from_before_migrations(database: str) -> None:
     store = MapStore(database_url(database))
     store.open()
     check_migrated(store)
-    with store._engine.connect() as connection:
-        options = {"version_table": schema.VERSION_TABLE, "compare_type": True}
-        assert compare_metadata(MigrationContext.configure(connection, opts=options), metadata) == []
     store.close()
+    assert differences(database) == []
 
 
 @pytest.mark.parametrize("old", [False, True], ids=["empty", "old"])
@@ -84,7 +91,7 @@ def test_workers_that_start_together(database: str, old: bool) -> None:
         make_old(database)
     program = (
         "import sys; from service.database_url import database_url; from service.maps import MapStore; "
-        "store = MapStore(database_url(sys.argv[1])); sys.stdin.read(1); store.open(); store.ping(); store.close()"
+        "store = MapStore(database_url(sys.argv[1])); sys.stdin.read(1); store.open(); store.close()"
     )
     workers = [
         subprocess.Popen([sys.executable, "-c", program, database], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -108,24 +115,28 @@ def test_a_migration_that_fails_leaves_what_was_there(database: str, monkeypatch
         raise RuntimeError("the power is gone")
 
     with monkeypatch.context() as broken:
-        broken.setattr("service.maps.records._seal", fail)
+        broken.setattr("service.maps.records.columns_of", fail)
         with pytest.raises(RuntimeError):
             store.open()
-    with store._engine.connect() as connection:
+    engine = open_engine(database_url(database))
+    with engine.connect() as connection:
         assert set(inspect(connection).get_table_names()) == {"maps"}
         assert connection.execute(text("SELECT document FROM maps WHERE map_id = 'kept'")).scalar() == b"document"
+    engine.dispose()
     store.open()
     check_migrated(store)
     store.close()
 
 
-def test_a_newer_database_is_refused_and_left_alone(store: MapStore, database: str) -> None:
-    with store._writer.begin() as connection:
+@pytest.mark.usefixtures("store")
+def test_a_newer_database_is_refused_and_left_alone(database: str) -> None:
+    engine = open_engine(database_url(database))
+    with engine.begin() as connection:
         connection.execute(text(f"UPDATE {schema.VERSION_TABLE} SET version_num = '9999'"))
+    engine.dispose()
     other = MapStore(database_url(database))
-    with pytest.raises(ProblemError) as caught:
+    with pytest.raises(StoreAwayError, match="newer"):
         other.open()
-    assert (caught.value.code, "newer" in caught.value.detail) == ("not_ready", True)
     other.close()
 
 
@@ -135,8 +146,11 @@ def test_an_up_to_date_database_is_only_read(store: MapStore) -> None:
     def remember(connection: object, cursor: object, statement: str, *_: object) -> None:
         statements.append(statement)
 
-    event.listen(store._engine, "before_cursor_execute", remember)
-    store.open()
+    event.listen(Engine, "before_cursor_execute", remember)
+    try:
+        store.open()
+    finally:
+        event.remove(Engine, "before_cursor_execute", remember)
     assert statements
     assert all(statement.startswith(("SELECT", "BEGIN", "PRAGMA")) for statement in statements)
     assert "BEGIN IMMEDIATE" not in statements

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -12,20 +13,39 @@ import httpx
 import pytest
 
 from service.schemas import examples
+from tests.running import RunningService, running
+from tests.service.conftest import KINDS, empty_database
 
 WRITERS = 8
 
 
+class Pair:
+    """Two services on one database."""
+
+    def __init__(self, services: list[RunningService]) -> None:
+        self.services = services
+        self.clients = [each.client for each in services]
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
+    folder = tmp_path_factory.mktemp("pair")
+    with ExitStack() as stack:
+        url = stack.enter_context(empty_database(request.param, folder))
+        services = []
+        for name in ("one", "two"):
+            (folder / name).mkdir()
+            services.append(stack.enter_context(running(folder / name, database_url=url)))
+        yield Pair(services)
+        for each in services:
+            assert "a defect" not in each.log()
+            assert "postgres@" not in each.log()
+
+
 @pytest.fixture
-def pair(database: str, tmp_path: Any, start_service: Callable[..., Any]) -> Iterator[list[httpx.Client]]:
-    folders = [tmp_path / name for name in ("one", "two")]
-    for folder in folders:
-        folder.mkdir()
-    running = [start_service(folder, database_url=database) for folder in folders]
-    yield [each.client for each in running]
-    for each in running:
-        assert "a defect" not in each.log()
-        assert "postgres@" not in each.log()
+def url(request: pytest.FixtureRequest) -> str:
+    """A map of each test's own."""
+    return f"/v1/maps/{request.function.__name__}"
 
 
 def at_once(calls: list[Callable[[], httpx.Response]]) -> list[httpx.Response]:
@@ -43,14 +63,14 @@ def a_map(number: int) -> dict[str, Any]:
     return {"segments": examples.WALLS, "meta": number}
 
 
-def put(client: httpx.Client, number: int, **headers: str) -> Callable[[], httpx.Response]:
+def put(client: httpx.Client, url: str, number: int, **headers: str) -> Callable[[], httpx.Response]:
     sent = {name.replace("_", "-"): value for name, value in headers.items()}
-    return lambda: client.put("/v1/maps/m", json=a_map(number), headers=sent)
+    return lambda: client.put(url, json=a_map(number), headers=sent)
 
 
-def test_one_writer_wins(pair: list[httpx.Client]) -> None:
+def test_one_writer_wins(pair: Pair, url: str) -> None:
     def writers(**headers: str) -> list[Callable[[], httpx.Response]]:
-        return [put(pair[i % 2], i, **headers) for i in range(WRITERS)]
+        return [put(pair.clients[i % 2], url, i, **headers) for i in range(WRITERS)]
 
     revision = 0
     for _ in range(5):
@@ -60,59 +80,59 @@ def test_one_writer_wins(pair: list[httpx.Client]) -> None:
             winner = next(i for i, answer in enumerate(answers) if answer.is_success)
             revision += 1
             assert answers[winner].headers["etag"] == f'"{revision}"'
-            for client in pair:
-                got = client.get("/v1/maps/m")
+            for client in pair.clients:
+                got = client.get(url)
                 assert (got.json(), got.headers["etag"]) == (a_map(winner), f'"{revision}"')
             answers = at_once(writers(if_match=f'"{revision}"'))
             assert sorted(answer.status_code for answer in answers) == [200] + [412] * (WRITERS - 1)
         revision += 1
         # One deletes or one writes, and whoever comes second is told.
         tag = f'"{revision}"'
-        gone = [partial(client.delete, "/v1/maps/m", headers={"if-match": tag}) for client in pair]
+        gone = [partial(client.delete, url, headers={"if-match": tag}) for client in pair.clients]
         codes = sorted(answer.status_code for answer in at_once([*gone, *writers(if_match=tag)[:2]]))
         assert codes in ([204, 412, 412, 412], [200, 412, 412, 412])
         if codes[0] == 200:
             revision += 1
-            assert pair[0].delete("/v1/maps/m").status_code == 204
+            assert pair.clients[0].delete(url).status_code == 204
 
 
-def test_every_unconditional_write_is_a_revision(pair: list[httpx.Client]) -> None:
-    answers = at_once([put(pair[i % 2], i) for i in range(WRITERS)])
+def test_every_unconditional_write_is_a_revision(pair: Pair, url: str) -> None:
+    answers = at_once([put(pair.clients[i % 2], url, i) for i in range(WRITERS)])
     assert sorted(answer.json()["revision"] for answer in answers) == list(range(1, WRITERS + 1))
     assert [answer.status_code for answer in answers].count(201) == 1
     last = max(range(WRITERS), key=lambda i: answers[i].json()["revision"])
-    assert pair[0].get("/v1/maps/m").json() == a_map(last)
+    assert pair.clients[0].get(url).json() == a_map(last)
 
 
-def test_a_change_by_another_process_is_noticed_at_once(pair: list[httpx.Client]) -> None:
-    one, two = pair
-    body = {"map": {"map_id": "m"}, "scan": {"segments": examples.SEEN}}
+def test_a_change_by_another_process_is_noticed_at_once(pair: Pair, url: str) -> None:
+    one, two = pair.clients
+    body = {"map": {"map_id": url.rsplit("/", 1)[1]}, "scan": {"segments": examples.SEEN}}
     for revision in range(1, 11):
         writer, reader = (one, two) if revision % 2 else (two, one)
-        assert writer.put("/v1/maps/m", json=a_map(0) | {"frame_id": f"f{revision}"}).json()["revision"] == revision
+        assert writer.put(url, json=a_map(0) | {"frame_id": f"f{revision}"}).json()["revision"] == revision
         for client in (reader, writer):
             answer = client.post("/v1/associate", json=body).json()
             assert (answer["map"]["revision"], answer["frame_id"]) == (revision, f"f{revision}")
-    assert one.delete("/v1/maps/m").status_code == 204
+    assert one.delete(url).status_code == 204
     assert two.post("/v1/associate", json=body).json()["code"] == "unknown_map"
 
 
-def test_readers_see_whole_revisions_while_others_write(pair: list[httpx.Client]) -> None:
-    one, two = pair
-    assert put(one, 1)().status_code == 201
+def test_readers_see_whole_revisions_while_others_write(pair: Pair, url: str) -> None:
+    one, two = pair.clients
+    assert put(one, url, 1)().status_code == 201
     stop = threading.Event()
 
     def write() -> None:
         number = 1
         while not stop.is_set():
             number += 1
-            assert put(one, number)().json()["revision"] == number
+            assert put(one, url, number)().json()["revision"] == number
 
     with ThreadPoolExecutor(1) as threads:
         writing = threads.submit(write)
         try:
             for _ in range(100):
-                got = two.get("/v1/maps/m")
+                got = two.get(url)
                 assert got.status_code == 200, got.text
                 assert got.headers["etag"] == f'"{got.json()["meta"]}"'
         finally:

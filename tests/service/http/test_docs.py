@@ -8,9 +8,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.http.problems import CODES
+from service.http.problems import TABLE
 
-TEXT = (Path(__file__).parents[2] / "docs" / "http.md").read_text()
+TEXT = (Path(__file__).parents[3] / "docs" / "http.md").read_text()
 STORED = re.findall(
     r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT
 )
@@ -38,8 +38,8 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
 
 
 def test_every_code_is_described() -> None:
-    for code, status in CODES.items():
-        assert re.search(rf"\| [^|]*{status}[^|]*\| [^|]*`{code}`", TEXT), code
+    for kind in TABLE:
+        assert re.search(rf"\| [^|]*{kind.status}[^|]*\| [^|]*`{kind.code}`", TEXT), kind.code
 
 
 def test_the_named_settings_exist() -> None:

@@ -1,0 +1,115 @@
+"""A service in a process of its own, for the tests that talk to one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+
+START_SECONDS = 150.0  # the first start may have to compile every kernel
+STOP_SECONDS = 15.0
+PATIENCE = 60.0  # s for what has to come about
+
+
+@dataclass(frozen=True)
+class RunningService:
+    """A service in a process of its own, on a loopback port."""
+
+    url: str
+    port: int
+    data_dir: Path
+    process: subprocess.Popen[bytes]
+    client: httpx.Client
+
+    def log(self) -> str:
+        return (self.data_dir / "log").read_text()
+
+    def count(self, line: str) -> float:
+        """Return one of the service's own counts, 0 where it has none."""
+        found = [row for row in self.client.get("/metrics").text.splitlines() if row.startswith(line + " ")]
+        return float(found[0].rsplit(" ", 1)[1]) if found else 0.0
+
+    @contextmanager
+    def connection(self, timeout: float = 20.0) -> Iterator[socket.socket]:
+        """Talk to the service below HTTP."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=timeout) as connection:
+            yield connection
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def start(data_dir: Path, *, probe: str = "/readyz", **settings: object) -> RunningService:
+    port = free_port()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    environment |= {f"LINEFIX_{name.upper()}": str(value) for name, value in settings.items()}
+    command = [sys.executable, "-m", "service", "--port", str(port), "--data-dir", str(data_dir)]
+    with (data_dir / "log").open("ab") as log:
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+    url = f"http://127.0.0.1:{port}"
+    service = RunningService(url, port, data_dir, process, httpx.Client(base_url=url, timeout=30.0))
+    give_up = time.monotonic() + START_SECONDS
+    while time.monotonic() < give_up:
+        if process.poll() is not None:
+            raise RuntimeError(f"the service ended with {process.returncode}: {service.log()}")
+        try:
+            if service.client.get(probe).status_code == 200:
+                return service
+        except httpx.TransportError:
+            pass
+        time.sleep(0.02)
+    stop(service)
+    raise RuntimeError(f"the service did not become ready: {service.log()}")
+
+
+def stop(service: RunningService) -> None:
+    service.client.close()
+    if service.process.poll() is None:
+        service.process.send_signal(signal.SIGTERM)
+        try:
+            service.process.wait(STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            service.process.kill()
+            service.process.wait()
+            raise
+
+
+@contextmanager
+def running(data_dir: Path, **settings: object) -> Iterator[RunningService]:
+    """Start a service that ends with the block."""
+    service = start(data_dir, **{"drain_seconds": 0, **settings})
+    try:
+        yield service
+    finally:
+        stop(service)
+
+
+def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
+    give_up = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < give_up, "did not come about"
+        time.sleep(0.01)
+
+
+def children_of(pid: int) -> set[int]:
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    return {int(child) for task in tasks for child in (task / "children").read_text().split()}
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False

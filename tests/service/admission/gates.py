@@ -1,0 +1,76 @@
+"""Gates to test with, which give their threads back whatever becomes of the test."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any, TypeVar
+
+from association import Deadline
+from service.admission.fair_queue import Holder
+from service.admission.gate import SearchGate
+from service.admission.ticket import Ticket
+
+T = TypeVar("T")
+
+
+def soon() -> Deadline:
+    return Deadline(at=time.monotonic() + 30.0)
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    for _ in range(2000):
+        if condition():
+            return
+        await asyncio.sleep(0.001)
+    raise AssertionError("did not come about")
+
+
+class BlockedGate(SearchGate):
+    """A gate, and a search that runs until it is released."""
+
+    def __init__(self, slots: int, queue: int) -> None:
+        super().__init__(slots, queue)
+        self.release = threading.Event()
+        self.asked: list[asyncio.Future[Any]] = []
+
+    def ask(
+        self, function: Callable[[], T], holder: Holder = None, deadline: Deadline | None = None
+    ) -> asyncio.Future[T]:
+        """Ask for a turn, as a request does that has not had any."""
+        return self.ask_with(Ticket(holder), function, deadline)
+
+    def ask_with(
+        self, ticket: Ticket, function: Callable[[], T], deadline: Deadline | None = None
+    ) -> asyncio.Future[T]:
+        asked = asyncio.ensure_future(self.run(function, deadline or soon(), ticket))
+        self.asked.append(asked)
+        return asked
+
+    async def block(self, holder: Holder = None, deadline: Deadline | None = None) -> asyncio.Future[bool]:
+        """Have a slot taken until `release` is set."""
+        before = self.running
+        blocking = self.ask(self.release.wait, holder, deadline)
+        await until(lambda: self.running > before)
+        return blocking
+
+
+@asynccontextmanager
+async def gate_of(slots: int, queue: int) -> AsyncIterator[BlockedGate]:
+    gate = BlockedGate(slots, queue)
+    try:
+        yield gate
+    finally:
+        gate.release.set()
+        for asked in gate.asked:
+            asked.cancel()
+        await asyncio.gather(*gate.asked, return_exceptions=True)
+        gate.close()
+
+
+def in_loop(scenario: Callable[[], Any]) -> None:
+    """Run a scenario in an event loop of its own."""
+    asyncio.run(asyncio.wait_for(scenario(), 60.0))

@@ -1,0 +1,356 @@
+"""Who may search: slots, queue, deadlines, and those who leave."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import pytest
+
+from association import CancelledError, Deadline
+from service.admission.errors import DeadlinePassedError, QueueFullError, ShareUsedError
+from service.admission.gate import HEARING_SECONDS, SearchGate
+from service.admission.ticket import Ticket
+
+from .gates import gate_of, in_loop, soon, until
+
+
+def test_never_more_at_once_than_slots_and_the_rest_in_order() -> None:
+    async def scenario() -> None:
+        async with gate_of(2, 8) as gate:
+            running, most, order = 0, 0, []
+            lock = threading.Lock()
+
+            def work(number: int) -> int:
+                nonlocal running, most
+                with lock:
+                    running += 1
+                    most = max(most, running)
+                    order.append(number)
+                time.sleep(0.01)
+                with lock:
+                    running -= 1
+                return number
+
+            answers = await asyncio.gather(*(gate.ask(lambda n=n: work(n)) for n in range(10)))  # type: ignore[misc]
+            assert answers == list(range(10))
+            assert most == 2
+            assert order[2:] == sorted(order[2:])
+            assert (gate.running, gate.waiting) == (0, 0)
+
+    in_loop(scenario)
+
+
+def test_beyond_the_queue_it_is_full() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 2) as gate:
+            assert not gate.full
+            first = await gate.block()
+            second = gate.ask(lambda: 2)
+            await until(lambda: gate.waiting == 1)
+            assert not gate.full
+            gate.require_place()
+            third = gate.ask(lambda: 3)
+            await until(lambda: gate.waiting == 2)
+            assert gate.full
+            with pytest.raises(QueueFullError):
+                gate.require_place()
+            with pytest.raises(QueueFullError):
+                await gate.ask(lambda: 4)
+            assert gate.waiting == 2
+            gate.release.set()
+            assert [await first, await second, await third] == [True, 2, 3]
+            assert not gate.full
+
+    in_loop(scenario)
+
+
+def test_a_further_turn_waits_however_long_the_queue_is() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            ticket = Ticket()
+            assert not ticket.admitted
+            assert await gate.ask_with(ticket, lambda: 1) == 1
+            assert ticket.admitted
+            await gate.block()
+            gate.ask(lambda: 2)
+            await until(lambda: gate.waiting == 1)
+            further = gate.ask_with(ticket, lambda: 3)
+            await until(lambda: gate.waiting == 2)
+            gate.release.set()
+            assert await further == 3
+
+    in_loop(scenario)
+
+
+def test_a_deadline_passes_in_the_queue() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            first = await gate.block()
+            begun = time.monotonic()
+            with pytest.raises(DeadlinePassedError):
+                await gate.ask(lambda: 2, deadline=Deadline(at=begun + 0.05))
+            assert time.monotonic() - begun >= 0.05
+            assert gate.waiting == 0
+            gate.release.set()
+            await first
+            assert gate.running == 0
+            # One that has passed already is not even looked at, though there is room.
+            with pytest.raises(DeadlinePassedError):
+                await gate.ask(lambda: pytest.fail("searched"), deadline=Deadline(at=time.monotonic()))
+            assert gate.running == 0
+
+    in_loop(scenario)
+
+
+def test_without_a_deadline_a_turn_is_waited_for() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            await gate.block()
+            waiting = gate.ask(lambda: 2, deadline=Deadline())
+            await until(lambda: gate.waiting == 1)
+            gate.release.set()
+            assert await waiting == 2
+
+    in_loop(scenario)
+
+
+def test_who_leaves_the_queue_frees_the_place_and_who_runs_keeps_the_slot() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            first = await gate.block()
+            second = gate.ask(lambda: 2)
+            await until(lambda: gate.waiting == 1)
+            second.cancel()
+            await until(lambda: gate.waiting == 0)
+            first.cancel()
+            await asyncio.wait({first})
+            assert gate.running == 1
+            gate.release.set()
+            await until(lambda: gate.running == 0)
+            assert await gate.ask(lambda: 3) == 3
+
+    in_loop(scenario)
+
+
+def test_a_failure_gives_the_slot_back() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 0) as gate:
+            with pytest.raises(ZeroDivisionError):
+                await gate.ask(lambda: 1 // 0)
+            assert await gate.ask(lambda: 3) == 3
+
+    in_loop(scenario)
+
+
+def test_what_cannot_be_started_gives_the_slot_back() -> None:
+    async def scenario() -> None:
+        gate = SearchGate(1, 0)
+        gate.close()
+        for _ in range(2):
+            with pytest.raises(RuntimeError, match="shutdown"):
+                await gate.run(lambda: 1, soon(), Ticket())
+        assert gate.running == 0
+
+    in_loop(scenario)
+
+
+def test_everything_that_runs_is_told_to_give_up() -> None:
+    async def scenario() -> None:
+        async with gate_of(2, 0) as gate:
+            deadlines = soon(), soon()
+            works = [await gate.block(deadline=deadline) for deadline in deadlines]
+            gate.cancel_all()
+            assert [deadline.cancelled for deadline in deadlines] == [True, True]
+            gate.release.set()
+            assert await asyncio.gather(*works) == [True, True]
+
+    in_loop(scenario)
+
+
+def test_what_does_not_hear_is_not_waited_for() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 0) as gate:
+            deaf = await gate.block()
+            begun = time.monotonic()
+            gate.cancel_all()
+            with pytest.raises(CancelledError):
+                await asyncio.wait_for(deaf, 20.0)
+            assert time.monotonic() - begun >= HEARING_SECONDS - 0.01
+            assert gate.running == 1  # the thread is still at it
+
+    in_loop(scenario)
+
+
+def test_told_to_give_up_twice_it_ends_once() -> None:
+    async def scenario() -> None:
+        failures: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: failures.append(context))
+        async with gate_of(1, 0) as gate:
+            gate.cancel_all()  # nothing has run yet
+            deaf = await gate.block()
+            gate.cancel_all()
+            gate.cancel_all()
+            await asyncio.wait({deaf})
+            await asyncio.sleep(0.05)
+        assert failures == []
+
+    in_loop(scenario)
+
+
+def test_a_full_queue_is_shared_between_keys() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 3) as gate:
+            greedy = [await gate.block(b"greedy")]
+            greedy += [gate.ask(lambda: True, b"greedy") for _ in range(3)]
+            await until(lambda: gate.waiting == 3)
+            # Alone it may have everything, and beyond that the service is busy.
+            with pytest.raises(QueueFullError):
+                gate.require_place(b"greedy")
+            gate.require_place(b"modest")
+            modest = [gate.ask(lambda: "modest", b"modest") for _ in range(2)]
+            # The youngest have to go.
+            for given_up in (greedy[3], greedy[2]):
+                with pytest.raises(ShareUsedError):
+                    await given_up
+            # Now each has its half: neither gets more, and both are told so.
+            for holder in (b"greedy", b"modest"):
+                with pytest.raises(ShareUsedError):
+                    gate.require_place(holder)
+                with pytest.raises(ShareUsedError):
+                    await gate.ask(lambda: None, holder)
+            # A third has a share of one and a third, so one place is its own.
+            third = gate.ask(lambda: "third", b"third")
+            await until(lambda: sum(asked.done() for asked in gate.asked) == 5)
+            gate.release.set()
+            assert await third == "third"
+            await asyncio.gather(*gate.asked, return_exceptions=True)
+            assert [asked.exception() is None for asked in (*greedy[:2], *modest)].count(True) == 3
+            assert (gate.running, gate.waiting) == (0, 0)
+
+    in_loop(scenario)
+
+
+def test_more_keys_than_places_are_told_that_it_is_full() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            await gate.block(b"a")
+            gate.ask(lambda: 1, b"b")
+            await until(lambda: gate.waiting == 1)
+            with pytest.raises(QueueFullError):
+                gate.require_place(b"c")
+            with pytest.raises(QueueFullError):
+                await gate.ask(lambda: 1, b"c")
+
+    in_loop(scenario)
+
+
+def test_turns_go_to_the_key_that_has_used_the_least_time() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 100) as gate:
+            order: list[str] = []
+
+            def work(name: str, seconds: float) -> None:
+                order.append(name)
+                time.sleep(seconds)
+
+            await gate.block(b"long")
+            calls = [gate.ask(lambda: work("long", 0.03), b"long") for _ in range(4)]
+            calls += [gate.ask(lambda: work("short", 0.001), b"short") for _ in range(8)]
+            await until(lambda: gate.waiting == 12)
+            gate.release.set()
+            await asyncio.gather(*calls)
+            # Turn by turn the short ones would be done after 16; by time they are done before the second long one.
+            assert order[:2].count("long") <= 1
+            assert [name for name in order[:10] if name == "short"] == ["short"] * 8
+
+    in_loop(scenario)
+
+
+def test_parts_of_what_was_let_in_are_never_taken_away() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 2) as gate:
+            batch = Ticket(b"batch")
+            await gate.ask_with(batch, lambda: 0)
+            first = await gate.block(b"batch")
+            parts = [gate.ask_with(batch, lambda: 1) for _ in range(4)]
+            await until(lambda: gate.waiting == 4)
+            with pytest.raises(QueueFullError):
+                await gate.ask(lambda: 2, b"other")
+            gate.release.set()
+            assert await asyncio.gather(first, *parts) == [True, 1, 1, 1, 1]
+
+    in_loop(scenario)
+
+
+def test_a_turn_that_comes_while_its_caller_leaves_goes_on_to_the_next() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 5) as gate:
+            first = await gate.block()
+            second, third = gate.ask(lambda: 2), gate.ask(lambda: 3)
+            await until(lambda: gate.waiting == 2)
+            gate.release.set()
+            # As soon as the first has ended, and before the second can take its turn.
+            await asyncio.wait({first})
+            second.cancel()
+            assert await third == 3
+            assert (gate.running, gate.waiting) == (0, 0)
+
+    in_loop(scenario)
+
+
+def test_who_is_expected_has_a_place_until_it_comes() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            coming = [Ticket(gate=gate) for _ in range(2)]
+            for ticket in coming:
+                gate.require_place()
+                ticket.announce()
+                ticket.announce()
+            assert gate.full
+            with pytest.raises(QueueFullError):
+                gate.require_place()
+            for ticket in coming:
+                # Who was let in is not sent away at the gate, though another is still on the way.
+                assert await gate.ask_with(ticket, lambda: 1) == 1
+            assert not gate.full
+
+    in_loop(scenario)
+
+
+def test_who_never_comes_gives_the_place_back() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 0) as gate:
+            ticket = Ticket(gate=gate)
+            ticket.arrive()
+            ticket.announce()  # too late: it has gone
+            assert not gate.full
+            other = Ticket(gate=gate)
+            other.announce()
+            assert gate.full
+            other.arrive()
+            other.arrive()
+            assert not gate.full
+
+    in_loop(scenario)
+
+
+def test_who_is_on_the_way_counts_for_the_key_it_comes_with() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 3) as gate:
+            tickets = [Ticket(b"flood", gate) for _ in range(4)]
+            for ticket in tickets:
+                ticket.announce()
+            with pytest.raises(QueueFullError):
+                gate.require_place(b"flood")
+            gate.require_place(b"robot")
+            robot = Ticket(b"robot", gate)
+            robot.announce()
+            with pytest.raises(ShareUsedError):
+                gate.require_place(b"flood")
+            for ticket in (*tickets, robot):
+                ticket.arrive()
+            gate.require_place(b"flood")
+
+    in_loop(scenario)

@@ -1,0 +1,58 @@
+"""Keys over HTTP: what asks for one, and what is said to whom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx
+import pytest
+
+from service.schemas import examples
+from tests.running import RunningService, running
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    with running(tmp_path_factory.mktemp("guarded"), keys="sesame,open") as service:
+        yield service
+        assert "sesame" not in service.log()
+
+
+def test_probes_and_pages_ask_for_no_key(guarded: RunningService) -> None:
+    for path in ("/livez", "/readyz", "/metrics", "/version", "/docs", "/openapi.json", "/"):
+        assert guarded.client.get(path).status_code == 200, path
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/v1/limits"),
+        ("POST", "/v1/associate"),
+        ("PUT", "/v1/maps/m"),
+        ("POST", "/v1/nothing"),
+        ("GET", "/%76%31/limits"),  # the same path in other letters
+        ("HEAD", "/v1/maps"),
+    ],
+)
+def test_everything_under_v1_asks_for_one(guarded: RunningService, method: str, path: str) -> None:
+    body = {} if method in ("GET", "HEAD") else {"content": b"x" * 100_000}
+    none = guarded.client.request(method, path, **body)  # type: ignore[arg-type]
+    assert none.status_code == 401
+    assert none.headers["www-authenticate"] == 'Bearer realm="linefix"'
+    wrong = guarded.client.request(method, path, headers={"authorization": "Bearer sesam"}, **body)  # type: ignore[arg-type]
+    assert (wrong.status_code, "www-authenticate" in wrong.headers) == (403, False)
+    if method != "HEAD":
+        assert (none.json()["code"], wrong.json()["code"]) == ("unauthorized", "forbidden")
+
+
+def test_each_key_opens(guarded: RunningService) -> None:
+    for key in ("sesame", "open"):
+        headers = {"authorization": f"Bearer {key}"}
+        assert guarded.client.get("/v1/limits", headers=headers).status_code == 200
+        assert guarded.client.post("/v1/associate", json=examples.ASSOCIATE, headers=headers).status_code == 200
+        assert guarded.client.get("/v1/nothing", headers=headers).status_code == 404
+
+
+def test_two_keys_are_none(guarded: RunningService) -> None:
+    twice = httpx.Headers([("authorization", "Bearer wrong"), ("authorization", "Bearer sesame")])
+    assert guarded.client.get("/v1/limits", headers=twice).json()["code"] == "unauthorized"

@@ -1,0 +1,126 @@
+"""Probes, counts, pages; and what a service does that has no place left."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import httpx
+import orjson
+import pytest
+
+from service.schemas import examples
+from tests.running import RunningService, until
+from tests.service.searches import heavy_body
+
+
+def test_probes_and_version(client: httpx.Client) -> None:
+    assert client.get("/livez").json() == {"status": "ok"}
+    assert client.get("/readyz").json() == {"status": "ok"}
+    assert client.get("/version").json()["name"] == "linefix"
+    assert client.get("/v1/limits").json()["max_batch"] == 256
+
+
+def test_pages_need_no_internet(client: httpx.Client) -> None:
+    assert "/docs" in client.get("/").text
+    page = client.get("/docs").text
+    assert "http://" not in page
+    assert "https://" not in page
+    for name in ("swagger-ui-bundle.js", "swagger-ui.css", "favicon.png"):
+        assert f"/docs/assets/{name}" in page
+        assert client.get(f"/docs/assets/{name}").status_code == 200
+    assert client.get("/docs/assets/..%2f..%2fcore.py").status_code == 404
+
+
+def test_metrics_count(client: httpx.Client) -> None:
+    client.post("/v1/associate", json=examples.ASSOCIATE)
+    client.get("/nothing/at/all")
+    text = client.get("/metrics").text
+    assert 'linefix_http_requests_total{method="POST",route="/v1/associate",status="200"}' in text
+    assert 'route="unmatched"' in text
+    assert "/nothing/at/all" not in text
+    assert "linefix_verdicts_total" in text
+    assert "linefix_searches_running 0.0" in text
+
+
+RUNNING, WAITING = "linefix_searches_running", "linefix_searches_waiting"
+
+
+def ask(running: RunningService, body: bytes) -> httpx.Response:
+    return httpx.post(running.url + "/v1/associate", content=body, timeout=60)
+
+
+def refused(running: RunningService) -> bytes:
+    """Return what a request is told whose body has not come."""
+    answer = b""
+    with running.connection() as connection:
+        connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n")
+        connection.settimeout(0.2)
+        with suppress(TimeoutError):
+            while part := connection.recv(4096):
+                answer += part
+    return answer
+
+
+def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable[..., RunningService]) -> None:
+    running = start_service(searches=1, queue=0)
+    busy = threading.Thread(target=ask, args=(running, heavy_body(190_000)))
+    busy.start()
+    try:
+        # Between parsing and searching there is a place for a moment.
+        until(lambda: refused(running).startswith(b"HTTP/1.1 503") or not busy.is_alive())
+        answer = refused(running)
+        assert answer.startswith(b"HTTP/1.1 503")
+        assert b"retry-after: 1\r\n" in answer
+        assert b'"code":"overloaded"' in answer
+        # What needs no search is answered all the same, also on a connection that was refused before.
+        with running.connection() as connection:
+            connection.sendall(b"POST /v1/register HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\n{}" * 3)
+            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+            answers = b""
+            while not answers.endswith(b'{"status":"ok"}'):
+                part = connection.recv(65_536)
+                assert part, answers
+                answers += part
+            assert answers.count(b"HTTP/1.1 503") == 3
+        assert running.client.get("/readyz").status_code == 200
+        assert running.client.put("/v1/maps/m", json=examples.MAP).status_code == 201
+    finally:
+        busy.join()
+    assert running.client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
+    counted = 'linefix_http_requests_total{method="POST",route="/v1/register",status="503"}'
+    until(lambda: running.count(counted) == 3.0)
+    assert '"message":"refused","route":"/v1/register","code":"overloaded","count":3' in running.log()
+
+
+def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., RunningService]) -> None:
+    running = start_service(searches=1, queue=1)
+    busy = threading.Thread(target=ask, args=(running, heavy_body(190_000)))
+    busy.start()
+    until(lambda: running.count(RUNNING) == 1.0)
+    body = orjson.dumps(examples.ASSOCIATE)
+    head = f"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", running.port), timeout=20) as connection:
+        connection.sendall(head.encode() + body)
+        until(lambda: running.count(WAITING) == 1.0 or not busy.is_alive())
+    until(lambda: running.count(WAITING) == 0.0)
+    # The one before it still runs: the place came free because its client left.
+    assert busy.is_alive()
+    busy.join()
+    assert "a defect" not in running.log()
+
+
+def test_before_the_kernels_are_there_nothing_is_searched(
+    start_service: Callable[..., RunningService], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    running = start_service(probe="/livez")
+    for path, body in (("/v1/associate", orjson.dumps(examples.ASSOCIATE)), ("/v1/register", b"not even read")):
+        answer = running.client.post(path, content=body)
+        assert (answer.status_code, answer.json()["code"]) == (503, "not_ready")
+    assert running.client.get("/readyz").json()["detail"] == "the kernels are being compiled"
+    assert running.client.put("/v1/maps/m", json=examples.MAP).status_code == 201
+    assert running.client.get("/v1/maps/m").json() == examples.MAP

@@ -1,0 +1,143 @@
+"""From the map of a request to its index."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+import pytest
+
+from association import InvalidMapError
+from registration import InputError
+from service.database_url import database_url
+from service.maps import IndexCache, MapStore, Preconditions
+from service.maps.errors import UnknownMapError
+from service.maps.lookup import MapLookup, summary_of
+from service.parsing.parser_process import LARGE, ParserProcess
+from service.schemas import examples
+from service.schemas.parts import InlineMap, StoredMap
+from service.schemas.requests import MapDocument
+from service.telemetry.metrics import Metrics
+
+
+class Lookup(MapLookup):
+    """A lookup with what it looks in."""
+
+    def __init__(self, folder: Path) -> None:
+        self.cache = IndexCache(10_000_000, Metrics())
+        self.store = MapStore(database_url(f"sqlite:///{folder / 'maps.sqlite3'}"))
+        self.parser = ParserProcess()
+        super().__init__(self.cache, self.store, self.parser)
+
+    def put(self, map_id: str, **parts: Any) -> None:
+        self.store.put(map_id, orjson.dumps(parts), (6, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+
+
+@pytest.fixture
+def lookup(tmp_path: Path) -> Iterator[Lookup]:
+    made = Lookup(tmp_path)
+    yield made
+    made.parser.close()
+    made.store.close()
+
+
+def inline(**parts: Any) -> InlineMap:
+    return InlineMap.model_validate({"segments": examples.WALLS, **parts})
+
+
+def test_a_map_that_is_sent_again_is_not_indexed_again(lookup: Lookup) -> None:
+    first, revision = lookup.indexed(inline(), oriented=True)
+    assert revision is None
+    assert lookup.indexed(inline(), oriented=True)[0] is first
+
+
+@pytest.mark.parametrize(
+    "parts", [{"sigma": 0.05}, {"frame_id": "other"}, {"segments": [*examples.WALLS[:-1], [-4.0, 3.0, -4.0, -3.001]]}]
+)
+def test_everything_that_an_answer_rests_on_names_the_index(lookup: Lookup, parts: dict[str, Any]) -> None:
+    plain, _ = lookup.indexed(inline(), oriented=True)
+    other, _ = lookup.indexed(inline(**parts), oriented=True)
+    assert other is not plain
+    assert other.frame_id == parts.get("frame_id", "map")
+    assert other.index.sigma == parts.get("sigma", 0.0)
+    assert lookup.indexed(inline(), oriented=True)[0] is plain
+
+
+def test_a_map_without_directions_is_another_one_in_the_cache(lookup: Lookup) -> None:
+    one, other, again = (lookup.indexed(inline(), oriented=oriented)[0] for oriented in (True, False, True))
+    assert len(other.index.segments) == 2 * len(one.index.segments)
+    assert again is one
+    assert lookup.cache.bytes == one.index.nbytes + other.index.nbytes
+    assert other.index.undirected is other.index
+
+
+def test_a_stored_map_is_the_one_that_is_stored_now(lookup: Lookup) -> None:
+    asked = StoredMap(map_id="m")
+    with pytest.raises(UnknownMapError):
+        lookup.indexed(asked, oriented=True)
+    lookup.put("m", segments=examples.WALLS)
+    first, revision = lookup.indexed(asked, oriented=True)
+    assert (revision, first.frame_id) == (1, "map")
+    assert lookup.indexed(asked, oriented=True)[0] is first
+    assert lookup.indexed(asked, oriented=False)[0] is not first
+    lookup.put("m", segments=examples.WALLS, frame_id="new", sigma=0.1)
+    second, revision = lookup.indexed(asked, oriented=True)
+    assert (revision, second.frame_id, second.index.sigma) == (2, "new", 0.1)
+
+
+def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup) -> None:
+    lookup.put("m", segments=examples.WALLS)
+    load, changes = lookup.store.load, [1, 2]
+
+    def changing(map_id: str) -> Any:
+        if changes:
+            lookup.put("m", segments=examples.WALLS, frame_id=f"change {changes.pop()}")
+        return load(map_id)
+
+    lookup.store.load = changing  # type: ignore[method-assign]
+    found, revision = lookup.indexed(StoredMap(map_id="m"), oriented=True)
+    assert (found.frame_id, revision) == ("change 1", 3)
+
+
+def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:
+    begins = np.random.default_rng(0).uniform(1e3, 2e3, (12_000, 2))
+    rows = np.hstack([begins, begins + np.array([1.0, 0.1])]).tolist()
+    lookup.put("small", segments=examples.WALLS)
+    lookup.put("large", segments=rows)
+    assert len(lookup.store.load("large").document) > LARGE
+    lookup.indexed(StoredMap(map_id="small"), oriented=True)
+    assert lookup.parser.pid is None
+    assert lookup.indexed(StoredMap(map_id="large"), oriented=True)[0].index.nbytes > 0
+    assert lookup.parser.pid is not None
+
+
+def document(rows: object) -> MapDocument:
+    return MapDocument.model_validate({"segments": rows})
+
+
+def test_what_is_stored_has_a_count_and_bounds() -> None:
+    count, bounds = summary_of(document([[-1.0, 2.0, 3.0, -0.0], [0.0, 0.0, 1.0, 5.0]]))
+    assert (count, bounds) == (2, (-1.0, 0.0, 3.0, 5.0))
+    assert str(bounds[1]) == "0.0"  # not -0.0, which not every database keeps
+
+
+@pytest.mark.parametrize("width", [1e5, 1e5 + 0.001])
+def test_a_map_is_at_most_100_km_wide(width: float) -> None:
+    for rows in (
+        [[0.0, 0.0, 1.0, 0.0], [width - 1.0, 0.0, width, 0.0]],
+        [[0.0, 0.0, 0.0, 1.0], [0.0, width - 1.0, 0.0, width]],
+    ):
+        if width == 1e5:
+            assert summary_of(document(rows))[0] == 2
+        else:
+            with pytest.raises(InvalidMapError, match="extent"):
+                summary_of(document(rows))
+
+
+def test_what_could_not_be_searched_is_not_stored() -> None:
+    for rows, message in (([], "at least one"), ([[0.0, 0.0, 0.0, 0.0]], "shorter")):
+        with pytest.raises(InputError, match=message):
+            summary_of(document(rows))

@@ -1,0 +1,108 @@
+"""Another process parses as this one would, and can be lost."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Iterator
+from multiprocessing import Pipe
+
+import numpy as np
+import pytest
+
+from service.parsing.channel import receive, send
+from service.parsing.errors import NotJsonError, ParserEndedError
+from service.parsing.parser_process import ParserProcess
+from service.parsing.reading import read_map, read_model
+from service.schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
+from service.schemas.requests import MapDocument
+
+from .bodies import LIMITS, large_map
+
+
+@pytest.fixture(scope="module")
+def parser() -> Iterator[ParserProcess]:
+    made = ParserProcess()
+    yield made
+    made.close()
+    assert made.pid is None
+
+
+def test_the_other_process_reads_as_this_one_does(parser: ParserProcess) -> None:
+    body = large_map()
+    for data in (body, bytearray(body)):
+        there, here = parser.call(read_map, data, LIMITS), read_map(body, LIMITS)
+        assert parser.pid not in (None, os.getpid())
+        assert np.array_equal(there[0].segments, here[0].segments)
+        assert there[1] == here[1]
+
+
+def _raise(error: Exception) -> None:
+    raise error
+
+
+def test_what_is_wrong_crosses_whole(parser: ParserProcess) -> None:
+    with pytest.raises(InvalidRequestError) as invalid:
+        parser.call(read_model, MapDocument, b'{"segments": [[0, 0, 1]]}', LIMITS)
+    assert invalid.value.faults == (Fault("/segments/0", "expected 4 numbers, got 3"),)
+    for error in (TooManyError("/scans", 2, "scans"), BodyTooLargeError(7), NotJsonError("not"), ParserEndedError()):
+        with pytest.raises(type(error)) as caught:
+            parser.call(_raise, error)
+        assert (str(caught.value), vars(caught.value)) == (str(error), vars(error))
+    assert parser.call(len, b"after that it works on") == 22
+
+
+def test_objects_cross_a_channel_without_a_copy_and_its_end_is_told() -> None:
+    one, other = Pipe()
+    sent = (pickle.PickleBuffer(b"x" * 3_000_000), np.arange(400_000.0).reshape(-1, 4), {"a": b"z"}, b"")
+    thread = threading.Thread(target=send, args=(one, sent))
+    thread.start()
+    come = receive(other)
+    thread.join()
+    assert np.array_equal(come[1], sent[1])  # type: ignore[arg-type]
+    assert (come[0], *come[2:]) == (b"x" * 3_000_000, {"a": b"z"}, b"")
+    one.close()
+    with pytest.raises(EOFError):
+        receive(other)
+    with pytest.raises(BrokenPipeError):
+        send(other, (1,))
+    other.close()
+
+
+def test_an_end_of_the_process_is_one_refusal(parser: ParserProcess) -> None:
+    before = parser.call(os.getpid)
+    with pytest.raises(ParserEndedError):
+        parser.call(os._exit, 1)
+    after = parser.call(os.getpid)
+    assert after != before
+    os.kill(after, signal.SIGKILL)
+    # Found dead before the next call, or in it: then that is the one refusal.
+    try:
+        assert parser.call(os.getpid) != after
+    except ParserEndedError:
+        assert parser.call(os.getpid) != after
+
+
+def test_closing_ends_what_it_works_at() -> None:
+    made = ParserProcess()
+    made.start()
+    pid = made.pid
+    made.start()
+    assert made.pid == pid is not None
+    ended: list[BaseException] = []
+
+    def call() -> None:
+        try:
+            made.call(signal.pause)
+        except ParserEndedError as error:
+            ended.append(error)
+
+    waiting = threading.Thread(target=call)
+    waiting.start()
+    made.close()
+    waiting.join(10)
+    made.close()  # whether or not the call came before: nothing is left
+    assert not waiting.is_alive()
+    assert made.pid is None

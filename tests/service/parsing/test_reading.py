@@ -1,0 +1,118 @@
+"""From JSON to a checked request."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import orjson
+import pytest
+
+from service.parsing.errors import NotJsonError
+from service.parsing.reading import parse, read_batch, read_map, read_model, read_stored
+from service.schemas import examples
+from service.schemas.errors import InvalidRequestError, TooManyError
+from service.schemas.requests import AssociateRequest, BatchItem, MapDocument, RegisterRequest, VectorizeRequest
+
+from .bodies import LIMITS
+
+FEW = replace(LIMITS, values=10)
+
+
+@pytest.mark.parametrize(
+    ("body", "values"),
+    [
+        # Where there is a value there is a comma, a colon or a bracket before it, but for the first.
+        (b"[" + b"1," * 9 + b"1]", 10),
+        (b"{" + b'"a":1,' * 4 + b'"a":1}', 10),
+        (b"[" + b"[]," * 4 + b"[]]", 10),
+        (b"[" + b"{}," * 4 + b"{}]", 10),
+    ],
+)
+def test_values_are_counted_before_they_take_memory(body: bytes, values: int) -> None:
+    assert parse(body, replace(LIMITS, values=values)) is not None
+    with pytest.raises(TooManyError) as caught:
+        parse(body, replace(LIMITS, values=values - 1))
+    assert (caught.value.limit, str(caught.value)) == (values - 1, f"at most {values - 1} values are taken")
+
+
+def test_a_body_of_few_bytes_cannot_hold_too_many_values() -> None:
+    assert parse(b"[1,2,3,4]", FEW) == [1, 2, 3, 4]
+    with pytest.raises(TooManyError):
+        parse(b"[" * 11, FEW)
+    with pytest.raises(NotJsonError):
+        parse(b"[" * 10, FEW)
+
+
+@pytest.mark.parametrize("body", [b"", b"{", b"[1,]", b"\x00", b'"\xff"', b'{"a": "\\ud800"}', b"[1e400]", b"[" * 2000])
+def test_what_is_not_json(body: bytes) -> None:
+    with pytest.raises(NotJsonError) as caught:
+        parse(body, LIMITS)
+    assert "null" not in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [b"NaN", b"Infinity", b"-Infinity", b"-inf"])
+def test_nan_is_told_what_to_send_instead(number: bytes) -> None:
+    with pytest.raises(NotJsonError, match="a range without a return is null"):
+        parse(b"[1.0, " + number + b"]", LIMITS)
+
+
+ROW = [0.0, 0.0, 1.0, 0.0]
+COUNTED = [
+    ("map_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "map": {"segments": [ROW] * n}}),
+    ("map_segments", MapDocument, lambda n: {"segments": [ROW] * n}),
+    ("map_segments", RegisterRequest, lambda n: {**examples.REGISTER, "map": {"segments": [ROW] * n}}),
+    ("scan_segments", AssociateRequest, lambda n: {**examples.ASSOCIATE, "scan": {"segments": [ROW] * n}}),
+    ("scan_segments", RegisterRequest, lambda n: {**examples.REGISTER, "scan": {"segments": [ROW] * n}}),
+    ("beams", VectorizeRequest, lambda n: {"points": [[0.0, 1.0]] * n}),
+    (
+        "beams",
+        VectorizeRequest,
+        lambda n: {"laser": {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0] * n}},
+    ),
+    ("pairs", RegisterRequest, lambda n: {**examples.REGISTER, "correspondences": [[0, 0]] * n}),
+    ("pairs", RegisterRequest, lambda n: {**examples.REGISTER, "weights": [1.0] * n}),
+]
+
+
+@pytest.mark.parametrize(("name", "model", "body"), COUNTED)
+def test_every_count_has_its_limit(name: str, model: type, body: object) -> None:
+    assert callable(body)
+    data = orjson.dumps(body(12))
+    read_model(model, data, replace(LIMITS, **{name: 12}))
+    with pytest.raises(TooManyError) as caught:
+        read_model(model, data, replace(LIMITS, **{name: 11}))
+    assert caught.value.limit == 11
+
+
+@pytest.mark.parametrize("name", ["points", "sigma", "spreads"])
+def test_what_comes_with_each_segment_has_the_limit_of_the_segments(name: str) -> None:
+    scan = {"segments": [ROW], "centroids": [[0.0, 0.0]], "spreads": [1.0], name: [1.0] * 12}
+    data = orjson.dumps({**examples.ASSOCIATE, "scan": scan})
+    read_model(AssociateRequest, data, replace(LIMITS, scan_segments=12))
+    with pytest.raises(TooManyError):
+        read_model(AssociateRequest, data, replace(LIMITS, scan_segments=11))
+
+
+def test_a_batch_is_read_scan_by_scan() -> None:
+    scans: list[object] = [{"segments": [ROW]}, {"segments": [[1, 2, 3]]}, {"segments": [ROW] * 3}, 5]
+    priors = [None, None, None, {"x": 1, "y": 1, "theta": 0, "radius": "far", "angle": 1}]
+    body = orjson.dumps({"map": {"segments": examples.WALLS}, "scans": scans, "priors": priors})
+    limits = replace(LIMITS, scan_segments=2, batch=4)
+    asked, items = read_batch(body, limits)
+    assert (asked.scans, asked.priors) == ([], None)
+    assert [type(item) for item in items] == [BatchItem, InvalidRequestError, TooManyError, InvalidRequestError]
+    with pytest.raises(TooManyError) as caught:
+        read_batch(body, replace(limits, batch=3))
+    assert (caught.value.pointer, caught.value.limit) == ("/scans", 3)
+
+
+def test_of_a_map_what_was_sent_is_kept_and_no_more() -> None:
+    asked, document = read_map(orjson.dumps({"segments": [ROW], "meta": [1]}), LIMITS)
+    assert orjson.loads(document) == {"segments": [ROW], "meta": [1]}
+    assert (asked.sigma, asked.frame_id) == (0.0, "map")
+    full = {"segments": [ROW], "sigma": 0.1, "frame_id": "f", "meta": None}
+    assert orjson.loads(read_map(orjson.dumps(full), LIMITS)[1]) == full
+
+
+def test_what_was_stored_is_held_to_no_limit() -> None:
+    assert len(read_stored(orjson.dumps({"segments": [ROW] * 300_000})).segments) == 300_000

@@ -1,0 +1,71 @@
+"""Gzip within a limit."""
+
+from __future__ import annotations
+
+import gzip
+import tracemalloc
+
+import pytest
+
+from service.parsing.errors import NotJsonError
+from service.parsing.unpacking import unpack
+from service.schemas.errors import BodyTooLargeError
+
+MEGABYTE = 1 << 20
+
+
+@pytest.mark.parametrize("size", [0, 1, 1000, 3 * MEGABYTE])
+def test_what_was_packed_comes_back(size: int) -> None:
+    data = bytes(i * i % 251 for i in range(1000)) * (size // 1000) + b"x" * (size % 1000)
+    assert unpack(gzip.compress(data), size) == data
+
+
+def test_the_limit_is_that_of_what_comes_out() -> None:
+    packed = gzip.compress(b" " * 1000)
+    assert len(unpack(packed, 1000)) == 1000
+    with pytest.raises(BodyTooLargeError) as caught:
+        unpack(packed, 999)
+    assert caught.value.max_bytes == 999
+
+
+@pytest.mark.parametrize("size", [2 * MEGABYTE, 64 * MEGABYTE])
+def test_more_than_is_allowed_is_never_held(size: int) -> None:
+    packed = gzip.compress(bytes(size), compresslevel=9)
+    tracemalloc.start()
+    try:
+        with pytest.raises(BodyTooLargeError):
+            unpack(packed, MEGABYTE)
+        assert tracemalloc.get_traced_memory()[1] < 4 * MEGABYTE
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_body_in_many_pieces() -> None:
+    import random
+
+    data = random.Random(0).randbytes(3 * MEGABYTE)  # does not get smaller
+    packed = gzip.compress(data, compresslevel=1)
+    assert len(packed) > 3 * MEGABYTE
+    assert unpack(packed, len(data)) == data
+    with pytest.raises(BodyTooLargeError):
+        unpack(packed, len(data) - 1)
+    for end in (b"x", packed):
+        with pytest.raises(NotJsonError, match="follows"):
+            unpack(packed + end, 2 * len(data))
+    with pytest.raises(NotJsonError, match="cut short"):
+        unpack(packed[: 2 * MEGABYTE], len(data))
+
+
+@pytest.mark.parametrize(
+    ("packed", "message"),
+    [
+        (b"not gzip", "is not gzip"),
+        (gzip.compress(b"{}")[:-4], "cut short"),
+        (gzip.compress(b"{}") + b"more", "follows"),
+        (gzip.compress(b"{}") * 2, "follows"),
+        (b"", "cut short"),
+    ],
+)
+def test_what_is_not_gzip(packed: bytes, message: str) -> None:
+    with pytest.raises(NotJsonError, match=message):
+        unpack(packed, 1000)

@@ -1,0 +1,123 @@
+"""What the server does with requests that come slowly, wrongly or not at all."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+
+import orjson
+import pytest
+
+from service.process.listening import listen
+from service.settings import Settings
+from tests.running import RunningService, running
+
+
+@pytest.fixture(scope="module")
+def impatient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    folder = tmp_path_factory.mktemp("impatient")
+    with running(folder, request_timeout=1.0, max_body_bytes=20_000_000) as service:
+        yield service
+
+
+def trickle(service: RunningService, pieces: list[bytes]) -> tuple[bytes, float]:
+    """Send a piece every 0.1 s until the service ends the connection; return its answer and how long it took."""
+    begun = time.monotonic()
+    answer = b""
+    with service.connection(timeout=0.1) as connection:
+        for piece in pieces:
+            with suppress(ConnectionError):
+                connection.sendall(piece)
+            with suppress(TimeoutError, ConnectionError):
+                while part := connection.recv(4096):
+                    answer += part
+                break
+    return answer, time.monotonic() - begun
+
+
+HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n"
+SLOW: dict[str, tuple[list[bytes], bytes]] = {
+    "nothing": ([b""] * 100, b""),
+    "empty lines": ([b"\r\n"] * 100, b""),
+    "a head": ([HEAD] + [b"X-A: a\r\n"] * 100, b""),
+    "a body": ([HEAD + b"\r\n"] + [b" "] * 100, b"408"),
+    # One limit for both.
+    "a head, then a body": ([HEAD] + [b"X-A: a\r\n"] * 7 + [b"\r\n"] + [b" "] * 100, b"408"),
+    "a body that nobody wants": (
+        [HEAD.replace(b"/v1/associate", b"/nothing") + b"\r\n"] + [b" "] * 100,
+        b"404",
+    ),
+    "a second request": ([b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n", b"G", *[b""] * 100], b"200"),
+}
+
+
+def test_slow_clients_are_closed(impatient: RunningService) -> None:
+    with ThreadPoolExecutor(len(SLOW)) as threads:
+        found = {name: threads.submit(trickle, impatient, pieces) for name, (pieces, _) in SLOW.items()}
+        for name, (_, status) in SLOW.items():
+            answer, seconds = found[name].result()
+            assert answer[9:12] == status, name
+            # The limit is a second; with all the pieces it would be ten.
+            assert 0.9 < seconds < 6.0, name
+
+
+def test_who_does_not_read_the_answer_is_closed(impatient: RunningService) -> None:
+    segments = [[float(i % 1000), 0.125, float(i % 1000) + 0.1234567890123, 0.1234567890123] for i in range(150_000)]
+    assert impatient.client.put("/v1/maps/large", json={"segments": segments}).status_code == 201
+    with socket.socket() as connection:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        connection.connect(("127.0.0.1", impatient.port))
+        connection.sendall(b"GET /v1/maps/large HTTP/1.1\r\nHost: x\r\n\r\n")
+        connection.settimeout(20)
+        time.sleep(3.0)
+        received = 0
+        with suppress(ConnectionError):
+            while part := connection.recv(1 << 20):
+                received += len(part)
+    # What was on the way arrives, the rest was dropped with the connection.
+    assert 0 < received < 5_000_000
+
+
+NOT_HTTP = [
+    b"RUBBISH\r\n\r\n",
+    b"GET /\xff HTTP/1.1\r\nHost: x\r\n\r\n",
+    b"CONNECT example.org:443 HTTP/1.1\r\nHost: x\r\n\r\n",
+    b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
+    b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: -1\r\n\r\n",
+    b"POST /v1/associate HTTP/1.1\r\nContent-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n{}",
+    b"GET / HTTP/1.1\r\nHost: x\r\nA: " + b"a" * 300_000,
+    b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+    b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc",
+]
+
+
+@pytest.mark.parametrize("sent", NOT_HTTP, ids=range(len(NOT_HTTP)))
+def test_what_is_not_http_gets_a_problem(service: RunningService, sent: bytes) -> None:
+    with service.connection() as connection:
+        connection.sendall(sent)
+        answer = b"".join(iter(lambda: connection.recv(4096), b""))
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 400 ")
+    assert b"application/problem+json" in head
+    assert b"connection: close" in head
+    assert orjson.loads(body)["code"] == "invalid_http"
+    assert "Traceback" not in service.log()
+
+
+def test_a_broken_chunk_ends_the_connection_and_nothing_else(service: RunningService) -> None:
+    with service.connection() as connection:
+        connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n")
+        assert connection.recv(4096)[:12] in (b"HTTP/1.1 400", b"")
+    assert service.client.get("/livez").status_code == 200
+
+
+def test_no_part_of_an_answer_is_held_back(tmp_path: Path) -> None:
+    with listen(Settings(port=0, data_dir=tmp_path)) as listener, socket.create_connection(listener.getsockname()):
+        accepted, _ = listener.accept()
+        with accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 9000

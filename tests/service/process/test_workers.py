@@ -1,0 +1,208 @@
+"""Several workers: one port, one set of counts, one limit; the dead are replaced, and all end together."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service.part import Part
+from service.process.workers import take_part
+from service.schemas import examples
+from tests.running import RunningService, children_of, is_running, running, until
+from tests.service.searches import heavy_body, searched_for_a_while
+
+POSTS = 'linefix_http_requests_total{method="POST",route="/v1/associate",status="200"}'
+
+
+def workers_of(service: RunningService) -> set[int]:
+    return {
+        pid
+        for pid in children_of(service.process.pid)
+        if is_running(pid) and b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    }
+
+
+def ready(service: RunningService) -> int:
+    return service.log().count('"ready"')
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    """Two workers; tests may kill them, since they are replaced."""
+    folder = tmp_path_factory.mktemp("pair")
+    with running(folder, workers=2, searches=2, queue=4, hang_seconds=8) as service:
+        until(lambda: ready(service) == 2)
+        yield service
+        assert "a defect" not in service.log()
+
+
+def test_shares_add_up() -> None:
+    for whole in (0, 1, 7, 16, 128_000_000):
+        for of in (1, 2, 3, 5):
+            shares = [Part(index, of).share(whole) for index in range(of)]
+            assert sum(shares) == whole
+            assert max(shares) - min(shares) <= 1
+            # One too many, while another is about to go, has no more than the least.
+            assert Part(of, of).share(whole) == min(shares)
+
+
+def test_a_part_is_one_process_s_as_long_as_it_lives(tmp_path: Path) -> None:
+    (first, one), (second, other) = (take_part(tmp_path, 2) for _ in range(2))
+    assert [(part.index, part.of, part.replaces) for part in (first, second)] == [(0, 2, False), (1, 2, False)]
+    third, more = take_part(tmp_path, 2)
+    assert (third.index, third.replaces) == (2, True)
+    one.release()
+    again, _ = take_part(tmp_path, 2)
+    assert (again.index, again.replaces) == (0, True)
+    other.release()
+    more.release()
+
+
+def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> None:
+    before = pair.count(POSTS)
+    for _ in range(40):
+        # A new connection each time: any worker may take it.
+        assert httpx.post(pair.url + "/v1/associate", json=examples.ASSOCIATE).status_code == 200
+    texts = [httpx.get(pair.url + "/metrics").text for _ in range(10)]
+    assert all(f"{POSTS} {before + 40}" in text for text in texts)
+    # A worker that is killed takes none of its counts with it, but all that it had running.
+    started = ready(pair)
+    for pid in workers_of(pair):
+        os.kill(pid, signal.SIGKILL)
+    until(lambda: ready(pair) == started + 2)
+    assert pair.count(POSTS) == before + 40
+    until(lambda: pair.count("linefix_workers_ready") == 2.0)
+
+
+def test_a_worker_that_dies_is_replaced_and_the_other_answers_meanwhile(pair: RunningService) -> None:
+    before, started = workers_of(pair), ready(pair)
+    assert len(before) == 2
+    os.kill(min(before), signal.SIGKILL)
+    statuses: list[int] = []
+
+    def replaced() -> bool:
+        with suppress(httpx.TransportError):
+            statuses.append(httpx.get(pair.url + "/readyz").status_code)
+        return ready(pair) == started + 1
+
+    until(replaced)
+    assert (set(statuses), len(statuses) > 5) == ({200}, True)
+    after = workers_of(pair)
+    assert len(after) == 2
+    assert len(after & before) == 1
+
+
+def test_a_worker_that_does_not_answer_is_replaced(pair: RunningService) -> None:
+    before, started = workers_of(pair), ready(pair)
+    os.kill(min(before), signal.SIGSTOP)
+    until(lambda: ready(pair) == started + 1)
+    assert workers_of(pair) & before == {max(before)}
+    assert len(workers_of(pair)) == 2
+
+
+def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
+    body, enough = searched_for_a_while(), threading.Event()
+    statuses: list[int] = []
+
+    def ask() -> None:
+        while not enough.is_set():
+            statuses.append(httpx.post(pair.url + "/v1/associate", content=body, timeout=60).status_code)
+
+    threads = [threading.Thread(target=ask) for _ in range(16)]
+    for thread in threads:
+        thread.start()
+    try:
+        until(lambda: {200, 503} <= set(statuses))
+        found = [(pair.count("linefix_searches_running"), pair.count("linefix_searches_waiting")) for _ in range(30)]
+    finally:
+        enough.set()
+        for thread in threads:
+            thread.join()
+    assert max(running for running, _ in found) <= 2.0
+    assert max(waiting for _, waiting in found) <= 4.0
+    assert set(statuses) == {200, 503}
+
+
+def test_all_are_exchanged_one_after_another_and_all_drain_and_end(
+    start_service: Callable[..., RunningService],
+) -> None:
+    service = start_service(workers=2, searches=2)
+    until(lambda: ready(service) == 2)
+    before = workers_of(service)
+    service.process.send_signal(signal.SIGHUP)
+    statuses: list[int] = []
+
+    def exchanged() -> bool:
+        statuses.append(httpx.post(service.url + "/v1/associate", json=examples.ASSOCIATE).status_code)
+        return ready(service) == 4 and not workers_of(service) & before
+
+    until(exchanged)
+    assert set(statuses) == {200}
+    assert len(workers_of(service)) == 2
+
+    answers: list[int] = []
+    body = heavy_body()
+
+    def ask() -> None:
+        answers.append(httpx.post(service.url + "/v1/associate", content=body, timeout=60).status_code)
+
+    busy = threading.Thread(target=ask)
+    busy.start()
+    until(lambda: service.count("linefix_searches_running") == 1.0)
+    pids = workers_of(service)
+    service.process.send_signal(signal.SIGTERM)
+    assert service.process.wait(15) == 0
+    busy.join()
+    assert answers == [200]
+    assert not any(is_running(pid) for pid in pids)
+    assert "Traceback" not in service.log()
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(service.url + "/livez")
+
+
+def test_workers_end_with_the_process_above_them(start_service: Callable[..., RunningService]) -> None:
+    service = start_service(workers=2, searches=2)
+    until(lambda: len(workers_of(service)) == 2 and ready(service) >= 1)
+    pids = workers_of(service)
+    service.process.kill()
+    service.process.wait()
+    until(lambda: not any(is_running(pid) for pid in pids))
+
+
+HANGING = """
+import asyncio, sys, time
+from service.process.workers import watch_loop
+
+async def main():
+    watch_loop(asyncio.get_running_loop(), 2.0)
+    await asyncio.sleep(float(sys.argv[1]))
+    time.sleep(float(sys.argv[2]))
+    await asyncio.sleep(1.5)
+    print("went on")
+
+asyncio.run(main())
+"""
+
+
+def test_a_process_whose_loop_stands_still_ends_itself() -> None:
+    def run(turns: float, stands: float) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", HANGING, str(turns), str(stands)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+    began = time.monotonic()
+    hanging = run(0.0, 30.0)
+    assert (hanging.returncode, hanging.stdout) == (1, "")
+    assert time.monotonic() - began < 20.0
+    assert "in main" in hanging.stderr  # where it stands
+    busy = run(3.0, 0.5)
+    assert (busy.returncode, busy.stdout) == (0, "went on\n")

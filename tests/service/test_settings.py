@@ -1,0 +1,89 @@
+"""Settings: from where, which are refused, and where kernels are kept."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.cli import choose_kernel_cache, unknown_settings
+from service.settings import SettingsError, read_settings
+
+
+@pytest.fixture(autouse=True)
+def _no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in os.environ if name.startswith("LINEFIX_")]:
+        monkeypatch.delenv(name)
+
+
+def test_the_command_line_beats_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINEFIX_PORT", "81")
+    monkeypatch.setenv("LINEFIX_QUEUE", "3")
+    settings = read_settings(["--port", "82"])
+    assert (settings.host, settings.port, settings.queue) == ("127.0.0.1", 82, 3)
+
+
+def test_without_keys_only_loopback(monkeypatch: pytest.MonkeyPatch) -> None:
+    for host in ("0.0.0.0", "::", "192.168.1.4", "example.org"):
+        with pytest.raises(SettingsError, match="LINEFIX_KEYS"):
+            read_settings(["--host", host])
+    for host in ("127.0.0.1", "::1", "localhost"):
+        read_settings(["--host", host])
+    monkeypatch.setenv("LINEFIX_ALLOW_ANONYMOUS", "1")
+    read_settings(["--host", "0.0.0.0"])
+    monkeypatch.delenv("LINEFIX_ALLOW_ANONYMOUS")
+    monkeypatch.setenv("LINEFIX_KEYS", " sesame, two ,")
+    settings = read_settings(["--host", "0.0.0.0"])
+    assert [key.get_secret_value() for key in settings.keys] == ["sesame", "two"]
+    assert "sesame" not in repr(settings)
+
+
+def test_a_wrong_setting_is_named_and_ends_the_start() -> None:
+    with pytest.raises(SettingsError, match="queue"):
+        read_settings(["--queue", "-1"])
+    command = [sys.executable, "-m", "service", "--host", "0.0.0.0"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    assert "LINEFIX_ALLOW_ANONYMOUS" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_misspelt_setting_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINEFIX_PROT", "81")
+    monkeypatch.setenv("LINEFIX_PORT", "81")
+    assert unknown_settings() == ["LINEFIX_PROT"]
+
+
+def test_kernels_are_kept_where_this_user_may_write(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def chosen() -> str | None:
+        choose_kernel_cache(tmp_path)
+        return os.environ.pop("NUMBA_CACHE_DIR", None)
+
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "association").mkdir()
+    assert chosen() is None
+    (tmp_path / "association").rmdir()
+    assert chosen() == str(tmp_path / "cache" / "linefix" / "kernels")
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    last_resort = chosen()
+    assert last_resort is not None
+    assert os.access(last_resort, os.W_OK)
+    os.rmdir(last_resort)
+
+
+def test_limits_are_the_settings_of_the_same_kind() -> None:
+    said = "--max-values 1001 --max-map-segments 2 --max-scan-segments 3 --max-beams 4 --max-correspondences 5"
+    limits = read_settings([*said.split(), "--max-batch", "6"]).limits()
+    assert (limits.values, limits.map_segments, limits.scan_segments) == (1001, 2, 3)
+    assert (limits.beams, limits.pairs, limits.batch) == (4, 5, 6)
+
+
+def test_no_more_workers_than_searches() -> None:
+    assert read_settings(["--workers", "2", "--searches", "2"]).workers == 2
+    with pytest.raises(SettingsError, match="workers"):
+        read_settings(["--workers", "3", "--searches", "2"])
