@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from service.cli import choose_kernel_cache, unknown_settings
+from service.cli import unknown_settings
 from service.settings import SettingsError, read_settings
 
 
@@ -55,25 +54,6 @@ def test_a_misspelt_setting_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LINEFIX_PROT", "81")
     monkeypatch.setenv("LINEFIX_PORT", "81")
     assert unknown_settings() == ["LINEFIX_PROT"]
-
-
-def test_kernels_are_kept_where_this_user_may_write(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def chosen() -> str | None:
-        choose_kernel_cache(tmp_path)
-        return os.environ.pop("NUMBA_CACHE_DIR", None)
-
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    (tmp_path / "association").mkdir()
-    assert chosen() is None
-    (tmp_path / "association").rmdir()
-    assert chosen() == str(tmp_path / "cache" / "linefix" / "kernels")
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    last_resort = chosen()
-    assert last_resort is not None
-    assert os.access(last_resort, os.W_OK)
-    os.rmdir(last_resort)
 
 
 def test_limits_are_the_settings_of_the_same_kind() -> None:
