@@ -6,7 +6,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve faults bench experiments peers overload endings fuzz lock clean
+.PHONY: help demo test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -21,7 +21,7 @@ $(VENV)/.ready: pyproject.toml requirements/dev.txt
 demo: $(VENV)/.ready  ## start the service, ask it where a robot is, draw the answer
 	$(BIN)/python -m examples.demo
 
-test: lint types layers unit  ## lint, types, import layers and tests
+test: lint types layers unit  ## lint, types, import layers and tests, these in two processes or as JOBS= says
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
@@ -33,8 +33,12 @@ types: $(VENV)/.ready
 layers: $(VENV)/.ready
 	$(BIN)/lint-imports
 
+JOBS ?= 2
+
+# Kernels first: the processes would compile the same ones side by side.
 unit: $(VENV)/.ready
-	$(BIN)/python -m pytest -m "not long"
+	$(BIN)/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
+	$(BIN)/python -m pytest -m "not long" -n $(JOBS) --dist loadfile
 
 serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000, or as ARGS="--port 8001" says
 	$(BIN)/python -m service $(ARGS)
@@ -50,6 +54,12 @@ overload: $(VENV)/.ready  ## print what ten times too much load does, and what l
 
 endings: $(VENV)/.ready  ## print how soon hang-ups, slow clients, killed workers and drains end (5 min)
 	$(BIN)/python -m benchmarks.endings
+
+mutants: $(VENV)/.ready  ## put 500 mistakes into the code, one at a time, and see which the tests notice (hours; takes up where it was stopped)
+	nice -n 19 $(BIN)/python -m benchmarks.mutants $(ARGS)
+
+siege: $(VENV)/.ready  ## print what each of many attacks takes from an honest client (25 min)
+	$(BIN)/python -m benchmarks.siege
 
 fuzz: $(VENV)/.ready  ## send 100,000 strange requests
 	FUZZ_CASES=100000 $(BIN)/python -m pytest -s tests/service/test_fuzz.py
@@ -70,6 +80,8 @@ lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group peers -o requirements/peers.txt
 
+# Where LINEFIX_KERNELS or NUMBA_CACHE_DIR name a directory, whoever named it removes it: it may hold other things.
 clean:  ## remove what the other targets made, compiled kernels too
 	rm -rf $(VENV) $(VENV)-peers out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf "$${XDG_CACHE_HOME:-$${HOME:-/nonexistent}/.cache}/linefix/kernels"

@@ -13,11 +13,12 @@ from registration import RegistrationOptions, RegistrationResult, register
 
 from .context import SearchContext
 from .kernels.acceptance import accept_matches
-from .layout import ENDS, as_records
+from .layout import ENDS, Lines, as_records
 from .map_index import MapIndex
 from .options import Estimator, Rotation
 from .ranking import Ranked
 from .result import Correspondence
+from .settling import Settled
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -54,17 +55,22 @@ class Accepted:
 def accept(context: SearchContext, best: Ranked) -> Accepted:
     """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
     index, ends = context.index, as_records(ENDS, context.scan.measured.segments.endpoints)
-    found = accept_matches(best.matches, context.segments.order, ends, best.estimate, index.walls.rows, index.pieces)
+    lines = Lines(context.lines.rows, context.lines.row_of, float(context.gates["least_overlap"][0]))
+    found = accept_matches(best.matches, lines, ends, best.estimate, index.walls.rows, index.pieces)
     return Accepted(*found)
 
 
-def register_accepted(context: SearchContext, accepted: Accepted) -> RegistrationResult | None:
-    """Fit the pose to a consensus set, as `/v1/register` would; None without pairs."""
+def register_accepted(context: SearchContext, accepted: Accepted, settled: Settled) -> RegistrationResult | None:
+    """Evaluate the settled pose on the pairs, walls off as they are there; None without pairs.
+
+    The paper's estimator fits a pose of its own to the same pairs.
+    """
     if not len(accepted.pairs):
         return None
     index, options = context.index, context.options
     how = _how(options.estimator, options.rotation)
-    return register(index.segments, context.scan.measured, accepted.pairs, index.sigma, how)
+    at = context.in_map(settled.pose) if options.estimator == "joint" else None
+    return register(index.segments, context.scan.measured, accepted.pairs, settled.wall_sigma, how, at)
 
 
 @lru_cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,7 +15,7 @@ from .context import SearchContext
 from .kernels.planning import BUDGET, EXHAUSTED, PROVEN, advance, plan_bases
 from .kernels.proposing import search_slides
 from .layout import FOUND, PROGRESS, RULES, Plan, record
-from .options import CancelledError
+from .options import AssociationOptions, CancelledError
 from .result import SearchReport
 from .tuning import (
     BASE_SEGMENTS,
@@ -27,6 +28,7 @@ from .tuning import (
     KEPT_SHARE_FOR_BEAMS,
     KEPT_SLIDES,
     PARALLEL_SINE,
+    REUSE,
     RIVAL_SHARE,
     SAMPLE_SEED,
     SAMPLE_WORDS,
@@ -52,20 +54,51 @@ class Candidates:
     report: SearchReport
 
 
-def find_candidates(context: SearchContext) -> Candidates:
-    """Go through bases until nothing better can have been missed, the bases are used up or the deadline passes.
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much is looked for.
 
-    Poses are kept more freely when raw beams are to decide between them.
+    Attributes
+    ----------
+    kept : int
+        Poses at most.
+    kept_share : float
+        Of the best value, below which a pose is not kept.
+    rival_share : float
+        Of the best value, above which no pose may have been missed.
+    known : float
+        A value that is known to be reached, nats: what stays below these shares of it is not looked for.
+    enough : float
+        A value that ends the search, nats.
+    """
+
+    kept: int
+    kept_share: float
+    rival_share: float
+    known: float = 0.0
+    enough: float = math.inf
+
+    @classmethod
+    def of(cls, context: SearchContext) -> Effort:
+        """Keep poses more freely where raw beams are to decide between them."""
+        if context.with_beams:
+            return cls(KEPT_FOR_BEAMS, KEPT_SHARE_FOR_BEAMS, RIVAL_SHARE)
+        return cls(KEPT, KEPT_SHARE, RIVAL_SHARE)
+
+
+def find_candidates(context: SearchContext, effort: Effort | None = None) -> Candidates:
+    """Go through bases until nothing better can have been missed, the bases are used up or the deadline passes.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
+    effort = effort or Effort.of(context)
     if context.window is None:
-        return _search(context)
+        return _search(context, effort)
     # A window is searched by itself; the whole map shows whether a clearly better pose lies outside.
-    within, everywhere = _search(context), _search(context.anywhere())
+    within, everywhere = _search(context, effort), _search(context.anywhere(), effort)
     one, other = within.report, everywhere.report
     report = SearchReport(
         complete=one.complete and other.complete,
@@ -75,24 +108,24 @@ def find_candidates(context: SearchContext) -> Candidates:
         hypotheses=one.hypotheses + other.hypotheses,
         verified=one.verified + other.verified,
         seed=one.seed,
+        sampling=one.sampling,
+        rivals_above=max(one.rivals_above, other.rivals_above),
     )
     return Candidates(np.concatenate([within.poses, everywhere.poses]), report)
 
 
-def _search(context: SearchContext) -> Candidates:
+def _search(context: SearchContext, effort: Effort) -> Candidates:
     """Search the map, or the window of a hard prior."""
-    scan, index = context.segments.rows, context.index
-    beams = context.with_beams
-    kept, share = (KEPT_FOR_BEAMS, KEPT_SHARE_FOR_BEAMS) if beams else (KEPT, KEPT_SHARE)
+    scan, index, kept = context.lines.rows, context.index, effort.kept
     found = np.zeros(kept + KEPT_SLIDES, FOUND)
-    progress = record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
-    rules = _rules(share, DISTINCT_DISTANCE)
+    progress = record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0, best_value=effort.known)
+    rules = _rules(effort, DISTINCT_DISTANCE)
     # A test of a pose takes longer the more walls lie where it is.
     chunk = int(CHUNK / max(1.0, index.crowd / USUAL_CROWD))
     stopped = _go_through_bases(context, rules, found[:kept], progress, chunk)
     places = list(range(int(progress["count"][0])))
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
-    slid = _slide(context, rules, found[kept:], progress, chunk)
+    slid = _slide(context, effort, found[kept:], progress, chunk)
     places += range(kept, kept + int(progress["count"][0]))
     if context.deadline.cancelled:
         raise CancelledError
@@ -105,18 +138,21 @@ def _search(context: SearchContext) -> Candidates:
         hypotheses=int(progress["hypotheses"][0]),
         verified=int(progress["verified"][0]),
         seed=context.options.seed,
+        sampling=context.options.sampling,
+        rivals_above=effort.rival_share,
     )
     return Candidates(found[np.array(places, dtype=np.intp)[order]], report)
 
 
 @lru_cache
-def _rules(kept_share: float, distinct_distance: float) -> Records:
+def _rules(effort: Effort, distinct_distance: float) -> Records:
     return record(
         RULES,
-        kept_share=kept_share,
+        kept_share=effort.kept_share,
         distinct_distance=distinct_distance,
         distinct_angle=DISTINCT_ANGLE,
-        rival_share=RIVAL_SHARE,
+        rival_share=effort.rival_share,
+        enough=effort.enough,
     )
 
 
@@ -132,16 +168,30 @@ def _go_through_bases(context: SearchContext, rules: Records, found: Records, pr
 
 
 def _plan(context: SearchContext) -> Plan:
-    scan, index = context.segments.rows, context.index
+    scan, index = context.lines.rows, context.index
     n = min(len(scan), BASE_SEGMENTS)
     return Plan(
-        bases=plan_bases(scan, n, index.runs, index.area),
+        bases=_drawn(plan_bases(scan, n, index.runs, index.area), context.options),
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
+        freest=np.argsort(-scan["freedom"], kind="stable"),
         inliers=_sampled_inliers(n),
         missing=np.full((n, SAMPLE_WORDS), ~np.uint64(0)),
+        fade=0.0 if context.options.sampling == "random" else math.log(REUSE),
+        random=context.options.sampling == "random",
     )
+
+
+def _drawn(bases: Records, options: AssociationOptions) -> Records:
+    """Put bases in a random order where the options want it.
+
+    Those with the greatest sums of the logarithm of their merit and a Gumbel variate are draws without replacement with
+    a probability by merit.
+    """
+    if options.sampling == "random":
+        bases["merit"] += np.random.default_rng(options.seed).gumbel(size=len(bases))
+    return bases
 
 
 @lru_cache(maxsize=BASE_SEGMENTS + 1)
@@ -156,17 +206,16 @@ def _sampled_inliers(n: int) -> NDArray[np.uint64]:
     return np.ascontiguousarray(bits).view(np.uint64)
 
 
-def _slide(context: SearchContext, rules: Records, found: Records, progress: Records, chunk: int) -> bool:
+def _slide(context: SearchContext, effort: Effort, found: Records, progress: Records, chunk: int) -> bool:
     """Lay the longest of parallel segments on every run, and fill `found`; return whether that was completed."""
     spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
     if context.window is not None:
         spacing = min(spacing, context.window.radius)
-    kept_share = float(rules["kept_share"][0])
-    question = context.question(_rules(kept_share, SLIDE_DISTINCT_SHARE * spacing))
-    tables, share = context.index.tables, kept_share if context.with_beams else RIVAL_SHARE
+    question = context.question(_rules(effort, SLIDE_DISTINCT_SHARE * spacing))
+    tables, share = context.index.tables, effort.kept_share if context.with_beams else effort.rival_share
     progress["count"] = 0
     slid = True
-    for sliding in _sliding_segments(context.segments.rows, share * float(progress["best_value"][0])):
+    for sliding in _sliding_segments(context.lines.rows, share * float(progress["best_value"][0])):
         progress["anchor"] = progress["step"] = 0
         slid = False
         while not slid and not context.deadline.passed:

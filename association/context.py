@@ -13,7 +13,7 @@ from registration.layout import Records
 from .layout import HARD_PRIOR, NO_PRIOR, PRIOR, RULES, SOFT_PRIOR, TERMS, VIEW, Question, Workspace, record
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, Scan, SoftPrior
-from .scan_segments import ScanSegments, gates
+from .scan_lines import ScanLines, gates
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 ANY = record(RULES)  # for kernels that keep no poses
@@ -37,7 +37,7 @@ class SearchContext:
         In the map frame.
     options : AssociationOptions
     deadline : Deadline
-    segments : ScanSegments
+    lines : ScanLines
     gates : (1,) of `GATES`
     """
 
@@ -46,7 +46,7 @@ class SearchContext:
     prior: Prior | None
     options: AssociationOptions
     deadline: Deadline
-    segments: ScanSegments
+    lines: ScanLines
     gates: Records
 
     @classmethod
@@ -55,8 +55,8 @@ class SearchContext:
     ) -> SearchContext:
         """Prepare a search."""
         place = index if options.oriented else index.undirected
-        segments = ScanSegments.of(scan, place.sigma, options)
-        return cls(place, scan, prior, options, deadline, segments, gates(options))
+        lines = ScanLines.of(scan, place.sigma, options)
+        return cls(place, scan, prior, options, deadline, lines, gates(options))
 
     @property
     def with_beams(self) -> bool:
@@ -77,13 +77,14 @@ class SearchContext:
     @cached_property
     def workspace(self) -> Workspace:
         """What the kernels write to while they look at poses."""
-        return Workspace.of(len(self.segments.rows))
+        return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
 
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""
         terms = np.zeros(1, TERMS)
         terms["gates"], terms["rules"], terms["prior"] = self.gates, rules, self.prior_record
-        return Question(self.segments.rows, terms)
+        terms["model"] = self.lines.model
+        return Question(self.lines.rows, terms)
 
     def anywhere(self) -> SearchContext:
         """Return the same search without its prior."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from registration import RegistrationResult
 
 from .acceptance import Accepted, accept, register_accepted
-from .candidates import find_candidates
+from .candidates import Effort, find_candidates
 from .context import SearchContext
 from .ranking import Ranked, rank_candidates
 from .result import SearchReport
+from .settling import Settled, settle
 from .sight import agreement
 from .significance import significance
 
@@ -24,8 +25,10 @@ class Answer:
     best : Ranked
     accepted : Accepted
         Its consensus set in the map's own segments.
+    settled : Settled
+        Its pose, and what that hinges on.
     registered : RegistrationResult
-        The pose of that set.
+        That pose on the map's own segments.
     agreement : float
         Share of directions in which the scan shows what the map does, 0 to 1.
     significance : float
@@ -34,6 +37,7 @@ class Answer:
 
     best: Ranked
     accepted: Accepted
+    settled: Settled
     registered: RegistrationResult
     agreement: float
     significance: float
@@ -59,7 +63,7 @@ class Explanations:
     @property
     def rivals(self) -> tuple[Ranked, ...]:
         """The other explanations within the window, best first."""
-        return tuple(one for one in self.ranked if one.inside)[1:]
+        return tuple(one for one in self.others if one.inside)
 
     @property
     def others(self) -> tuple[Ranked, ...]:
@@ -67,24 +71,27 @@ class Explanations:
         return self.ranked if self.answer is None else tuple(r for r in self.ranked if r is not self.answer.best)
 
 
-def explain(context: SearchContext) -> Explanations:
-    """Search, rank what was found, and work out the best of it.
+def explain(context: SearchContext, effort: Effort | None = None) -> Explanations:
+    """Search, rank what was found, and work out the best of it; by default with the effort that the context wants.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    candidates = find_candidates(context)
+    candidates = find_candidates(context, effort)
     ranked = rank_candidates(context, candidates)
+    # What the deadline left unranked may have been better.
+    search = replace(candidates.report, complete=False) if context.deadline.passed else candidates.report
     best = next((one for one in ranked if one.inside), None)
-    return Explanations(tuple(ranked), None if best is None else _answer(context, best), candidates.report)
+    return Explanations(tuple(ranked), None if best is None else _answer(context, best), search)
 
 
 def _answer(context: SearchContext, best: Ranked) -> Answer | None:
     accepted = accept(context, best)
-    registered = register_accepted(context, accepted)
+    settled = settle(context, best)
+    registered = register_accepted(context, accepted, settled)
     if registered is None:
         return None
     chance = significance(context, float(best.matches["worth"].sum()))
-    return Answer(best, accepted, registered, agreement(context, best), chance)
+    return Answer(best, accepted, settled, registered, agreement(context, best), chance)

@@ -2,43 +2,37 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from registration import RegistrationResult, RigidTransform
+from registration import RigidTransform
+from registration.observability import MAX_DEVIATION
 
 from .context import SearchContext
 from .explain import Answer
 from .ranking import Ranked
-from .tuning import MAX_DEVIATION
+from .settling import Settled
+from .tuning import FEW_WALLS
 
 
-def is_degenerate(registered: RegistrationResult) -> bool:
-    """Tell whether a direction of the position is not fixed: parallel pairs, or a deviation beyond 0.5 m."""
-    if registered.degenerate or registered.covariance is None:
-        return registered.degenerate
-    (xx, xy), (_, yy) = registered.covariance[:2, :2].tolist()
-    return bool(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy) > MAX_DEVIATION**2)
+def is_degenerate(settled: Settled) -> bool:
+    """Tell whether a direction of the position is not fixed: parallel walls, or a deviation beyond 0.5 m."""
+    return settled.parallel or settled.weakest > MAX_DEVIATION
 
 
-def free_direction(registered: RegistrationResult) -> tuple[float, float] | None:
-    """Return the direction that is not fixed, of the two opposite ones that with a positive first component."""
-    if registered.unobservable is not None or registered.covariance is None:
-        return registered.unobservable
-    axis = np.linalg.eigh(registered.covariance[:2, :2])[1][:, 1]
-    axis = axis if axis[0] > 0.0 or (axis[0] == 0.0 and axis[1] > 0.0) else -axis
-    return float(axis[0]), float(axis[1])
+def is_thin(settled: Settled) -> bool:
+    """Tell whether so few walls fix the pose that one alone decides: any building has such a corner."""
+    free = bool((settled.hinges["deviation"] > MAX_DEVIATION).any())
+    return free and len(settled.hinges) <= FEW_WALLS
 
 
 def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | None:
-    """Choose among poses that differ along the free direction only.
+    """Choose among poses that differ along the free direction only; a pose that is fixed, if weakly, is that.
 
     The nearest to the prior, else to where the raw beams fit best, else the one that centres what was seen on the walls
     that it matched.
     """
-    pose, direction = answer.registered.pose, answer.registered.unobservable
-    if pose is None or direction is None:
+    pose, direction = answer.registered.pose, answer.settled.direction
+    if pose is None or not answer.settled.free:
         return pose
     anchor = _anchor(context, answer.best)
     u = np.array(direction)
@@ -67,7 +61,7 @@ def _centring_shift(
     spans = np.stack([walls["begin"], walls["end"]], axis=1)
     ends = d[:, None] * spans[:, :, None]
     ends = ends + normals[:, None] * walls["offset"][:, None, None] + context.index.origin
-    seen = context.segments.rows[matched]
+    seen = context.lines.rows[matched]
     middles, towards = np.stack([seen["x"], seen["y"]], axis=1), np.stack([seen["dx"], seen["dy"]], axis=1)
     half = 0.5 * seen["length"][:, None] * towards
     points = pose.apply(np.stack([middles - half, middles + half], axis=1))

@@ -8,19 +8,27 @@ from typing import NamedTuple
 
 from .context import SearchContext
 from .explain import Answer
+from .null import Null
 from .ranking import Ranked
 from .tuning import (
     CROWD_TEMPERATURE,
+    LEAST_CHANCE_FEATURE,
     LEAST_CROWD,
     LEAST_MISFIT,
     LONGEST_UNMATCHED,
     MANY,
+    MAX_GAP,
     MAX_LEAD,
+    MODEL_OFFSET,
     MOST_DEVIATION,
     MOST_MISFIT,
+    MOST_NULL,
     MOST_UNMATCHED,
     NEARLY_ALL,
+    NULL_SHARE,
+    SYMMETRIC,
     TWIN_TEMPERATURE,
+    UNLIKE_SYMMETRY,
 )
 
 
@@ -40,6 +48,17 @@ class Features(NamedTuple):
     inverse_count : one over the number of matched segments
     longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`
     agreement : share of directions in which the scan shows what the map does
+    read, passed : shares of the beams that read the wall they should, and that passed through one; 0 without beams
+    hinge_moves : by how much the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
+    hinge_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
+    chance : log10 of the significance, from `LEAST_CHANCE_FEATURE`
+    null : score of the mirrored scan over the answer's, from `NULL_SHARE` to `MOST_NULL`; as good as none where the map
+        is symmetric about the place
+    null_gap : root of what the answer's score has over the mirrored scan's, in nats, up to that of `MAX_GAP`; likewise
+    null_better : by how much the mirrored scan's share of the score is over 1, symmetric or not, up to `MOST_NULL`
+    root_score : root of the score by segments, nats
+    blocked : root of what lines of sight speak against the answer, nats
+    walls : root of the number of walls that hold a match
     misfit_of_many : misfit times the number of matched segments over `MANY`
     beyond_nearly_all : share of the length beyond `NEARLY_ALL`
     root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`
@@ -57,6 +76,17 @@ class Features(NamedTuple):
     inverse_count: float
     longest_unmatched: float
     agreement: float
+    read: float
+    passed: float
+    hinge_moves: float
+    hinge_deviation: float
+    chance: float
+    null: float
+    null_gap: float
+    null_better: float
+    root_score: float
+    blocked: float
+    walls: float
     misfit_of_many: float
     beyond_nearly_all: float
     root_unmatched: float
@@ -64,12 +94,12 @@ class Features(NamedTuple):
 
 
 def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]) -> Features:
-    """Return the features of an answer beside its rivals, best first."""
-    best = answer.best
-    lead = best.value - rivals[0].value if rivals else best.value
-    crowd = math.log(_evidence(best, rivals, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
+    """Return the features of an answer beside its rivals, best first; with the least null there is."""
+    best, hinges, gaps = answer.best, answer.settled.hinges, gaps_of(answer, rivals)
+    lead = -max(gaps) if rivals else best.value
+    crowd = math.log(_evidence(gaps, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
     count = int(best.matched.sum())
-    unmatched = context.segments.rows["length"][~best.matched]
+    unmatched = context.lines.rows["length"][~best.matched]
     misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
     return Features(
         constant=1.0,
@@ -78,11 +108,22 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
         share=best.share,
         root_count=math.sqrt(count),
         root_length=math.sqrt(best.length),
-        deviation=min(best.deviation, MOST_DEVIATION),
+        deviation=min(answer.settled.weakest, MOST_DEVIATION),
         misfit=misfit,
         inverse_count=1.0 / max(1, count),
         longest_unmatched=min(float(unmatched.max(initial=0.0)), LONGEST_UNMATCHED),
         agreement=answer.agreement,
+        read=best.read,
+        passed=best.passed,
+        hinge_moves=min(float(hinges["moves"].max(initial=0.0)), MOST_DEVIATION),
+        hinge_deviation=min(float(hinges["deviation"].max(initial=0.0)), MOST_DEVIATION),
+        chance=max(LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
+        null=NULL_SHARE,
+        null_gap=_root_gap((1.0 - NULL_SHARE) * best.score),
+        null_better=0.0,
+        root_score=math.sqrt(max(0.0, best.by_segments)),
+        blocked=math.sqrt(best.blocked),
+        walls=math.sqrt(len(hinges)),
         misfit_of_many=misfit * min(count, MANY) / MANY,
         beyond_nearly_all=max(0.0, best.share - NEARLY_ALL),
         root_unmatched=math.sqrt(min(float(unmatched.sum()), MOST_UNMATCHED)),
@@ -90,10 +131,39 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
     )
 
 
-def twin_share(best: Ranked, rivals: Sequence[Ranked]) -> float:
+def with_null(features: Features, best: Ranked, null: Null) -> Features:
+    """Return the features with what the mirrored scan comes to."""
+    share = min(MOST_NULL, null.score / best.score) if best.score > 0.0 else MOST_NULL
+    symmetric = min(1.0, max(0.0, (null.symmetry - UNLIKE_SYMMETRY) / (SYMMETRIC - UNLIKE_SYMMETRY)))
+    excess = max(0.0, share - NULL_SHARE) * (1.0 - symmetric)
+    gap = (1.0 - NULL_SHARE - excess) * best.score
+    better = max(0.0, share - 1.0)
+    return features._replace(null=NULL_SHARE + excess, null_gap=_root_gap(gap), null_better=better)
+
+
+def _root_gap(gap: float) -> float:
+    return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
+
+
+def gaps_of(answer: Answer, rivals: Sequence[Ranked]) -> list[float]:
+    """Return by how much each rival is worth more than the best, nats, with the walls as far off as they turned out.
+
+    Where the answer's walls are off by more than the score supposes, by centimetres, the centimetres that tell rivals
+    apart count that much less: a cost is what it is by the variance that it was weighed with.
+    """
+    supposed = MODEL_OFFSET**2
+    share = min(1.0, supposed / answer.settled.wall_sigma**2)
+
+    def worth(one: Ranked) -> float:
+        return one.value + 0.5 * (1.0 - share) * one.cost
+
+    return [worth(rival) - worth(answer.best) for rival in rivals]
+
+
+def twin_share(answer: Answer, rivals: Sequence[Ranked]) -> float:
     """Return the chance of the best explanation among those that are about as good, above 0 and up to 1."""
-    return 1.0 / (1.0 + _evidence(best, rivals, TWIN_TEMPERATURE))
+    return 1.0 / (1.0 + _evidence(gaps_of(answer, rivals), TWIN_TEMPERATURE))
 
 
-def _evidence(best: Ranked, rivals: Sequence[Ranked], temperature: float) -> float:
-    return sum(math.exp(min(0.0, other.value - best.value) / temperature) for other in rivals)
+def _evidence(gaps: Sequence[float], temperature: float) -> float:
+    return sum(math.exp(min(0.0, gap) / temperature) for gap in gaps)

@@ -35,28 +35,44 @@ ENDS = _fields((_F, "x1 y1 x2 y2"))
 # the direction; angle of the direction; the walls before and after it on its run, or -1. One cache line.
 WALL = _fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
 
-# A segment of the scan, the most telling first: unit direction; midpoint; length; angle of the direction; mean of the
-# points and their second moment along the segment (m^2); variances of offset (m^2) and angle (rad^2) with the model's
-# slack; weight in the sums (1/m^2); what it is worth on a wall; the sum of that over all later segments; variance of
-# the offset by the sigmas alone (m^2).
-SCAN_SEGMENT = _fields(
+# A line of the scan, one segment or several that continue or repeat one another, the most telling first: unit
+# direction; midpoint; length; angle of the direction; mean of the points and their second moment along the line (m^2);
+# variances of offset (m^2) and angle (rad^2) with the model's slack, for the gates; weight in the sums (1/m^2), without
+# what is common to a wall; what it is worth on a wall; the sum of that over all later lines; variance of the offset by
+# the sigmas alone (m^2); the freedom that it takes from a pose by itself, nats.
+SCAN_LINE = _fields(
     (
         _F,
         "dx dy x y length angle centroid_x centroid_y spread offset_variance angle_variance weight gain later_gain "
-        "plain_variance",
+        "plain_variance freedom",
     ),
 )
 
-# Where a scan segment lies: the wall or -1; offset from it; sine of the angle to it; share of the length on walls;
+# What segments of a scan show together that continue or repeat one another: unit direction; midpoint; length from end
+# to end, and of what they cover; mean of the points and their second moment along the line (m^2); how many
+# they are; variance of its offset (m^2).
+LINE_PARTS = _fields((_F, "dx dy x y length covered centroid_x centroid_y spread points variance"))
+
+# Where a scan line lies: the wall or -1; offset from it; sine of the angle to it; share of the length on walls;
 # worth of the match.
 MATCH = _fields((_I, "wall"), (_F, "offset sine overlap worth"))
 
 # A pose with its covariance, of additive x, y, theta.
 ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 
-# What an estimate is worth: its score; the length of the matched segments; its share of the scan's; the paper's
-# reliability, Eq. (28); the mean squared offset over what the sigmas alone expect.
-MERIT = _fields((_F, "score length share reliability misfit"))
+# What a consensus set is worth, nats: the gains of its pairs; its joint cost, walls' own errors out; the logarithm of
+# the freedom that it takes from the pose. The score is gain - cost / 2 - freedom.
+VALUE = _fields((_F, "gain cost freedom"))
+
+# What an estimate is worth: its score; the joint cost in it; what the same sums cost at the paper's estimate; length of
+# the matched segments; its share of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
+# sigmas alone expect; what lines of sight speak against it, nats; the shares of the beams that read the wall they
+# should, and that passed through one, 0 without beams.
+MERIT = _fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed"))
+
+# What one wall has in the sums: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of
+# its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs.
+WALL_SHARE = _fields((_F, "c s x y one weight count"))
 
 # A pose among the best: score and prior together; the score alone.
 FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
@@ -68,29 +84,42 @@ GRID_SHAPE = _fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 # come to; the least share of the length on walls.
 GATES = _fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
 
+# What a consensus set is judged by: variance of a wall's own error, m^2; how far a pose is free before it is fixed, as
+# standard deviations of position (m) and heading (rad).
+MODEL = _fields((_F, "wall_variance free_distance free_angle"))
+
 # Which poses are kept: share of the best value that is needed; distance and angle of distinct poses; share of the best
-# value that makes a rival, up to which the search goes on.
-RULES = _fields((_F, "kept_share distinct_distance distinct_angle rival_share"))
+# value that makes a rival, up to which the search goes on; the value that ends it.
+RULES = _fields((_F, "kept_share distinct_distance distinct_angle rival_share enough"))
 
 # What is known before: kind; the pose; radius and angle of a window; information of a Gaussian.
 PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYMMETRIC3.descr])
 NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 
 # All of these together.
-TERMS = np.dtype([("gates", GATES), ("rules", RULES), ("prior", PRIOR)])
+TERMS = np.dtype([("gates", GATES), ("rules", RULES), ("prior", PRIOR), ("model", MODEL)])
 
 # Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs.
 BASE = _fields((_I, "sliding crossing"), (_F, "merit"))
 
 # How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
-# through, poses proposed, poses scored to the end; where to go on: the base or -1, the anchor, the step along it, and
-# the slide or -inf; bound on the score of a pose that contains no base so far; chance of having missed a better
-# consensus set.
+# through, poses proposed, poses scored to the end; where to go on: the base or -1, the anchor, the step along it or the
+# item of a cell, and the slide or -inf; bound on the gain of a pose that contains no base so far; chance of having
+# missed a better consensus set; the freedom that any set takes at least whose score would be kept.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
     (_I, "count bases hypotheses verified base anchor step"),
-    (_F, "slide bound missed"),
+    (_F, "slide bound missed least_freedom"),
 )
+
+# A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
+# m^2; if walls were off by centimetres, the position's deviation along its weakest direction, m, and that unit
+# direction; how far the directions of the walls are from parallel, as a chi-square of their angles.
+SETTLED = np.dtype([("pose", ESTIMATE), *_fields((_F, "wall_variance weakest dx dy unlike")).descr])
+
+# What a pose would be without one wall: the wall; by how much it would move, m; the position's deviation along its
+# weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed.
+HINGE = np.dtype([("wall", _I), *_fields((_F, "moves deviation dx dy")).descr])
 
 # What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
 # together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
@@ -126,14 +155,15 @@ class Walls(NamedTuple):
     summed: Floats
 
 
-# What kernels write to while they look at one pose: the pose; the information of its consensus set, and its sums; the
-# end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would outlive the
-# array, whose last use ends it: hence these come from outside.
+# What kernels write to while they look at one pose: the pose; the information of its consensus set, its sums, and what
+# it is worth; the end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would
+# outlive the array, whose last use ends it: hence these come from outside.
 SCRATCH = np.dtype(
     [
         ("estimate", ESTIMATE),
         ("information", SYMMETRIC3),
         ("sums", JOINT_SUMS),
+        ("value", VALUE),
         ("point", SEEN),
         ("ray", RAY),
         ("evidence", BEAM_EVIDENCE),
@@ -225,6 +255,22 @@ class Measured(NamedTuple):
     points: Floats
 
 
+class Lines(NamedTuple):
+    """The lines of a scan, and the segments that they are made of.
+
+    Attributes
+    ----------
+    rows : (n,) of `SCAN_LINE`
+    row_of : (segments,) which row each segment is part of
+    least_overlap : float
+        Share of a segment's length that has to lie on a wall.
+    """
+
+    rows: Records
+    row_of: Indices
+    least_overlap: float
+
+
 class Rays(NamedTuple):
     """Single beams of which something is known.
 
@@ -246,7 +292,7 @@ class Question(NamedTuple):
 
     Attributes
     ----------
-    scan : (n,) of `SCAN_SEGMENT`
+    scan : (n,) of `SCAN_LINE`
     terms : (1,) of `TERMS`
     """
 
@@ -276,16 +322,24 @@ class Plan(NamedTuple):
     uses : (n,) how often each of the first n scan segments was part of a base so far
     residual : (all scan segments,) what is left of each gain in the bound, nats
     best_gains : (n,) the gains of the first n, the largest first, nats
+    freest : (all scan lines,) those that take most freedom by themselves first
     inliers : (n, n, words) ``[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1
     missing : (n, words) which of these samples have missed all bases so far
+    fade : float
+        What the logarithm of a base's merit loses for each earlier use of one of its segments.
+    random : bool
+        Whether the bases are drawn at random.
     """
 
     bases: Records
     uses: Floats
     residual: Floats
     best_gains: Floats
+    freest: Integers
     inliers: Words
     missing: Words
+    fade: float
+    random: bool
 
 
 class Workspace(NamedTuple):
@@ -295,19 +349,22 @@ class Workspace(NamedTuple):
     ----------
     matches : (n,) of `MATCH`
     spreads : (n,) angle gates in sectors
-    held : (n,) which wall of each scan segment is in the sums, or -1
+    held : (n,) which wall of each scan line is in the sums, or -1
+    shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
     """
 
     matches: Records
     spreads: Floats
     held: Integers
+    shares: Records
     scratch: Records
 
     @classmethod
-    def of(cls, count: int) -> Workspace:
-        """Return one for a scan of `count` segments."""
-        return cls(np.zeros(count, MATCH), np.zeros(count), np.zeros(count, np.int64), np.zeros(1, SCRATCH))
+    def of(cls, count: int, walls: int) -> Workspace:
+        """Return one for a scan of `count` lines and a map of that many walls."""
+        held = np.full(count, -1, np.int64)
+        return cls(np.zeros(count, MATCH), np.zeros(count), held, np.zeros(walls, WALL_SHARE), np.zeros(1, SCRATCH))
 
 
 def record(dtype: np.dtype[Any], /, **values: float) -> Records:

@@ -30,8 +30,8 @@ class MapIndex:
     ----------
     segments : Segments
         As sent, in the map frame.
-    sigma : float
-        Standard deviation of the map's lines normal to themselves, metres.
+    sigma : float or None
+        Standard deviation of the map's lines normal to themselves, metres; None: estimated for each answer.
     origin : (2,)
         Centre of the map, metres in the map frame; the index works relative to it, so that maps far out lose nothing.
     directed : int
@@ -52,7 +52,7 @@ class MapIndex:
     """
 
     segments: Segments
-    sigma: float
+    sigma: float | None
     origin: Floats
     directed: int
     wall_of_piece: Integers
@@ -64,15 +64,16 @@ class MapIndex:
     raster: Raster
 
     @classmethod
-    def build(cls, segments: Segments, sigma: float = 0.0, *, oriented: bool = True) -> MapIndex:
+    def build(cls, segments: Segments, sigma: float | None = None, *, oriented: bool = True) -> MapIndex:
         """Index a map; some 10 microseconds a segment.
 
         Parameters
         ----------
         segments : Segments
             At least one, within an extent of 100 km.
-        sigma : float
-            Standard deviation of the map's lines normal to themselves, metres, 0 to 10.
+        sigma : float or None
+            Standard deviation of the map's lines normal to themselves, metres, 0 to 10; None: it is not known, and
+            each answer estimates it from what its walls leave.
         oriented : bool
             False lists every segment in both directions, for scans whose directions mean nothing.
 
@@ -83,7 +84,7 @@ class MapIndex:
         """
         if len(segments) == 0:
             raise InvalidMapError("a map has at least one segment", argument="map.segments")
-        if not 0.0 <= sigma <= MAX_MAP_SIGMA:
+        if sigma is not None and not 0.0 <= sigma <= MAX_MAP_SIGMA:
             raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument="map.sigma")
         corners = segments.endpoints.reshape(-1, 2)
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -93,10 +94,10 @@ class MapIndex:
         return cls._of(segments if oriented else both_ways(segments), sigma, origin, len(segments))
 
     @classmethod
-    def _of(cls, segments: Segments, sigma: float, origin: Floats, directed: int) -> MapIndex:
+    def _of(cls, segments: Segments, sigma: float | None, origin: Floats, directed: int) -> MapIndex:
         local = segments.shifted(-origin)
         walls, wall_of_piece = merge(local, MERGE_GAP)
-        runs, run_of_wall = merge(Segments.from_array(ends_of(walls)), RUN_GAP)
+        runs, run_of_wall = merge(Segments.derived(ends_of(walls)), RUN_GAP)
         link(walls, run_of_wall)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
@@ -137,6 +138,11 @@ class MapIndex:
         """Of the map's bounding box with a margin, m^2."""
         cell, columns, rows = self.grid.shape[["cell", "columns", "rows"]][0]
         return float(cell**2 * columns * rows)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Of the box around the map, metres."""
+        return float(np.hypot(*np.ptp(self.segments.endpoints.reshape(-1, 2), axis=0)))
 
     @cached_property
     def tables(self) -> MapTables:

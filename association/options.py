@@ -17,6 +17,7 @@ from .tuning import GREATEST_ANGLE_GATE, REACH
 
 Estimator = Literal["joint", "one_step"]
 Rotation = Literal["wahba", "mitsuta"]
+Sampling = Literal["ordered", "random"]
 
 MAX_ALTERNATIVES = 50
 
@@ -122,8 +123,12 @@ class AssociationOptions:
         The chance wanted of not having missed a better consensus set, below 1.
     exhaustive : bool
         Go through all bases whatever the confidence.
+    sampling : "ordered" or "random"
+        How bases are drawn: the cheap and telling ones first, or by `seed` with a probability by that merit. Ordered
+        bases stop when their own choice shows that nothing was missed, random ones when as many draws would have hit
+        the inliers of a better consensus set.
     seed : int
-        Of the choice among equally good bases.
+        Of random bases; ordered ones are the same whatever the seed.
     oriented : bool
         Whether directions mean anything.
     offset_tolerance : float or None
@@ -132,8 +137,10 @@ class AssociationOptions:
         Radians; gate on the angle between them. None: from the sigmas.
     min_overlap : float
         Share of a scan segment's length that must lie on the map, 0 to 1.
+    causes : bool
+        Whether to look for a mistake of the caller's where the answer is not usable, for twice the time at most.
     estimator, rotation : str
-        Of the final pose, as in `registration.RegistrationOptions`.
+        Of the final pose, as in `registration.RegistrationOptions`; the estimator also of the scores that are told.
 
     Raises
     ------
@@ -145,10 +152,12 @@ class AssociationOptions:
     confidence: float = 0.9999
     exhaustive: bool = False
     seed: int = 0
+    sampling: Sampling = "ordered"
     oriented: bool = True
     offset_tolerance: float | None = None
     angle_tolerance: float | None = None
     min_overlap: float = 0.5
+    causes: bool = False
     estimator: Estimator = "joint"
     rotation: Rotation = "wahba"
 
@@ -182,6 +191,13 @@ class Deadline:
 
     at: float | None = None
     _cancelled: bool = field(default=False, init=False)
+    _outer: Deadline | None = field(default=None, init=False)
+
+    def within(self, at: float) -> Deadline:
+        """Return an end that comes no later than a time, and is cancelled with this one."""
+        inner = Deadline(at if self.at is None else min(at, self.at))
+        inner._outer = self
+        return inner
 
     def cancel(self) -> None:
         """Make the search give up soon; safe from any thread."""
@@ -190,9 +206,9 @@ class Deadline:
     @property
     def cancelled(self) -> bool:
         """Whether `cancel` was called."""
-        return self._cancelled
+        return self._cancelled or (self._outer is not None and self._outer.cancelled)
 
     @property
     def passed(self) -> bool:
         """Whether the search has to end."""
-        return self._cancelled or (self.at is not None and time.monotonic() >= self.at)
+        return self.cancelled or (self.at is not None and time.monotonic() >= self.at)

@@ -17,16 +17,19 @@ from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
 from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Rays
+from .options import CancelledError, Estimator
 from .tuning import (
     BEAM_FINALISTS,
     BEAMS_PASSED,
     BEAMS_READ,
+    CONTRADICTION,
     DISTINCT_ANGLE,
     DISTINCT_DISTANCE,
     FEW_BEAMS,
     INSIDE,
     LEAST_DISTINCT,
     MOST_BEAMS,
+    RANKED_AT_ONCE,
     SAME_FAMILY,
 )
 
@@ -47,6 +50,10 @@ class Ranked:
         Score and prior together.
     inside : bool
         Whether it lies within a hard prior's window; True without one.
+    cost : float
+        The joint cost in the score, which takes half of it: a chi-square.
+    one_step_cost : float
+        What the same sums cost at the paper's estimate, Wahba's rotation first.
     length : float
         Of the matched segments together, metres.
     share : float
@@ -55,6 +62,10 @@ class Ranked:
         Eq. (28).
     misfit : float
         Mean squared offset over what the sigmas alone expect.
+    blocked : float
+        What lines of sight speak against it, nats, in the score.
+    read, passed : float
+        Shares of the beams that read the wall they should, and that passed through one; 0 without beams.
     matches : (n,) of `MATCH`
         By row of the scan.
     """
@@ -63,10 +74,15 @@ class Ranked:
     score: float
     value: float
     inside: bool
+    cost: float
+    one_step_cost: float
     length: float
     share: float
     reliability: float
     misfit: float
+    blocked: float
+    read: float
+    passed: float
     matches: Records
 
     @property
@@ -74,6 +90,15 @@ class Ranked:
         """Index frame from scan frame."""
         theta, x, y, *_ = self.estimate[0].item()
         return RigidTransform(x, y, theta)
+
+    @property
+    def by_segments(self) -> float:
+        """The score without the beams' part."""
+        return self.score - BEAMS_READ * self.read + BEAMS_PASSED * self.passed
+
+    def score_by(self, estimator: Estimator) -> float:
+        """Return the score by the sums at an estimator's pose; that of the joint one orders and judges."""
+        return self.score if estimator == "joint" else self.score + 0.5 * (self.cost - self.one_step_cost)
 
     @property
     def covariance(self) -> Floats:
@@ -111,7 +136,7 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     scores = scored.merits["score"]
     values = scores if context.prior is None else scores + _prior_values(context, scored.estimates)
     most = max(LEAST_DISTINCT, context.options.max_alternatives + 1)
-    order = _distinct(scored.estimates, np.where(scores > 0.0, values, -np.inf), most)
+    order = _distinct(scored, np.where(scores > 0.0, values, -np.inf), most)
     windowed = context.window is not None
     return [
         _explanation(scored, place, merit, value, windowed=windowed)
@@ -120,43 +145,82 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
 
 
 def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, windowed: bool) -> Ranked:
-    score, length, share, reliability, misfit = merit
+    score, cost, one_step_cost, length, share, reliability, misfit, blocked, read, passed = merit
     within = value >= INSIDE / 2
     estimate, matches = scored.estimates[place : place + 1], scored.matches[place]
     value, inside = score if within else value, within or not windowed
-    return Ranked(estimate, score, value, inside, length, share, reliability, misfit, matches)
+    return Ranked(
+        estimate,
+        score,
+        value,
+        inside,
+        cost,
+        one_step_cost,
+        length,
+        share,
+        reliability,
+        misfit,
+        blocked,
+        read,
+        passed,
+        matches,
+    )
 
 
-def _distinct(estimates: Records, values: Floats, most: int) -> list[int]:
+def _distinct(scored: _Scored, values: Floats, most: int) -> list[int]:
     """Order the best `most` by value, ties by index, without those that a better one stands for."""
     order = np.argsort(-values, kind="stable")
     order = order[: int(np.isfinite(values).sum())]
-    kept: list[int] = distinct(estimates, order, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY).tolist()
-    return kept
+    scores = np.ascontiguousarray(scored.merits["score"])
+    kept = distinct(
+        scored.estimates, scores, order, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
+    )
+    places: list[int] = kept.tolist()
+    return places
 
 
 def _score(context: SearchContext, poses: Records) -> _Scored:
-    """Refine the poses on their consensus sets and score those, with lines of sight unless there are beams."""
+    """Refine the poses on their consensus sets and score those, with lines of sight unless there are beams.
+
+    The first are scored also when the deadline has passed, so that there is an answer; what it leaves unscored is worth
+    nothing.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
     k, place = len(poses), context.index.tables.place
-    scored = _Scored(np.zeros(k, ESTIMATE), np.zeros(k, MERIT), np.zeros((k, len(context.segments.rows)), MATCH))
+    scored = _Scored(np.zeros(k, ESTIMATE), np.zeros(k, MERIT), np.zeros((k, len(context.lines.rows)), MATCH))
     for name in ("theta", "x", "y"):
         scored.estimates[name] = poses[name]
-    rank(context.question(ANY), place, context.view, scored.estimates, scored.merits, scored.matches, context.workspace)
+    # Between some poses the clock is looked at: of the best first there are usually few enough for one go.
+    step = max(1, int(RANKED_AT_ONCE / (max(1, len(context.lines.rows)) * max(1.0, context.index.crowd))))
+    for begin in range(0, k, step):
+        if context.deadline.cancelled or (begin > 0 and context.deadline.passed):
+            break
+        some = slice(begin, begin + step)
+        parts = scored.estimates[some], scored.merits[some], scored.matches[some]
+        rank(context.question(ANY), place, context.view, *parts, context.workspace)
+    if context.deadline.cancelled:
+        raise CancelledError
     return scored
 
 
 def _weigh_beams(context: SearchContext, scored: _Scored) -> _Scored:
     """Add what the raw beams say to the scores, and move the best poses to where the beams fit."""
-    by_few = scored.merits["score"] + _beam_scores(context, scored.estimates, FEW_BEAMS, 0)
+    by_few = scored.merits["score"] + _nats(_beam_evidence(context, scored.estimates, FEW_BEAMS, 0))
     best = np.argsort(-by_few, kind="stable")[:BEAM_FINALISTS]
     if context.window is not None:
         # What lies within the window is looked at, however good the poses outside are.
         within = np.argsort(-(by_few + _prior_values(context, scored.estimates)), kind="stable")[:BEAM_FINALISTS]
         best = np.concatenate([within, best[~np.isin(best, within)]])
     poses = scored.estimates[best]
-    evidence = _beam_scores(context, poses, MOST_BEAMS, len(poses))
+    evidence = _beam_evidence(context, poses, MOST_BEAMS, len(poses))
     final = _score(context, poses)
-    final.merits["score"] = np.where(final.merits["score"] > 0.0, final.merits["score"] + evidence, 0.0)
+    for name in ("read", "passed"):
+        final.merits[name] = evidence[name]
+    final.merits["score"] = np.where(final.merits["score"] > 0.0, final.merits["score"] + _nats(evidence), 0.0)
     return final
 
 
@@ -166,8 +230,13 @@ def _prior_values(context: SearchContext, poses: Records) -> Floats:
     return values
 
 
-def _beam_scores(context: SearchContext, poses: Records, most: int, refined: int) -> Floats:
-    """Return what at most `most` of the beams say of each pose, nats over a pose where none reads what it should.
+def _nats(evidence: Records) -> Floats:
+    """Return what beams say of each pose, over one where none reads what it should."""
+    return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])
+
+
+def _beam_evidence(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
+    """Return what at most `most` of the beams say of each pose, (k,) of `BEAM_EVIDENCE`.
 
     Moves the first `refined` of the poses.
     """
@@ -175,7 +244,7 @@ def _beam_scores(context: SearchContext, poses: Records, most: int, refined: int
     weigh_beams(
         _rays(context, most), context.view, poses, context.index.tables.place, refined, context.workspace, evidence
     )
-    return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])
+    return evidence
 
 
 def _rays(context: SearchContext, most: int) -> Rays:

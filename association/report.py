@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from registration import RegistrationResult
-from registration.layout import Floats
+from registration import Ambiguity, Correspondences, OneStepSums
 
 from .acceptance import correspondences
+from .causes import Cause
 from .context import SearchContext
 from .explain import Answer, Explanations
-from .families import free_direction
+from .families import is_degenerate
+from .kernels.settling import pairs_of
 from .ranking import Ranked
 from .result import (
     Alternative,
     AssociationDiagnostics,
     AssociationResult,
-    AssociationWarning,
-    SearchReport,
+    Hinge,
     Status,
 )
+from .settling import settle
 from .sight import missing_segments
-from .tuning import FACING
+from .tuning import HINGES
 from .verdict import Verdict
+from .warnings import warnings_of
 
 
-def report(context: SearchContext, explanations: Explanations, verdict: Verdict) -> AssociationResult:
+def report(
+    context: SearchContext, explanations: Explanations, verdict: Verdict, causes: Sequence[Cause] = ()
+) -> AssociationResult:
     """Put an answer together."""
     answer = explanations.answer
     if answer is None or verdict.status is Status.NO_MATCH:
-        return _no_match(context, explanations, verdict)
+        return _no_match(context, explanations, verdict, causes)
     degenerate = verdict.status is Status.DEGENERATE
     matched, on_map = set(answer.accepted.scan_indices), set(answer.accepted.map_indices(context.index))
     return AssociationResult(
@@ -37,19 +43,22 @@ def report(context: SearchContext, explanations: Explanations, verdict: Verdict)
         usable=verdict.usable,
         probability=verdict.probability,
         pose=verdict.pose,
-        covariance=None if degenerate else _covariance(answer.registered),
-        unobservable=free_direction(answer.registered) if degenerate else None,
+        covariance=None if degenerate or context.options.estimator == "one_step" else answer.settled.covariance,
+        unobservable=answer.settled.direction if degenerate else None,
         correspondences=correspondences(context.index, answer.accepted, answer.registered),
         unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
         missing_map=tuple(i for i in missing_segments(context, answer.best) if i not in on_map),
-        diagnostics=_diagnostics(answer, verdict),
+        diagnostics=_diagnostics(context, answer, verdict),
+        reasons=verdict.reasons,
         alternatives=_alternatives(context, explanations.others),
         search=explanations.search,
-        warnings=_warnings(context, explanations.search, verdict),
+        warnings=warnings_of(context, explanations.search, verdict, causes),
     )
 
 
-def _no_match(context: SearchContext, explanations: Explanations, verdict: Verdict) -> AssociationResult:
+def _no_match(
+    context: SearchContext, explanations: Explanations, verdict: Verdict, causes: Sequence[Cause]
+) -> AssociationResult:
     return AssociationResult(
         status=Status.NO_MATCH,
         usable=False,
@@ -61,77 +70,52 @@ def _no_match(context: SearchContext, explanations: Explanations, verdict: Verdi
         unmatched_scan=tuple(range(len(context.scan.measured))),
         missing_map=(),
         diagnostics=None,
+        reasons=verdict.reasons,
         alternatives=_alternatives(context, explanations.ranked),
         search=explanations.search,
-        warnings=_warnings(context, explanations.search, verdict),
+        warnings=warnings_of(context, explanations.search, verdict, causes),
     )
 
 
-def _diagnostics(answer: Answer, verdict: Verdict) -> AssociationDiagnostics:
+def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> AssociationDiagnostics:
     return AssociationDiagnostics(
         registration=answer.registered.diagnostics,
         inlier_fraction=answer.best.share,
-        score=answer.best.score,
+        score=answer.best.score_by(context.options.estimator),
         runner_up=verdict.runner_up,
         margin=verdict.margin,
         significance=answer.significance,
+        hinges_on=_hinge(context, answer),
     )
 
 
-def _covariance(registered: RegistrationResult) -> Floats | None:
-    """Return the covariance, widened by chi2 / dof where the residuals are larger than the sigmas can explain.
-
-    A map that is a centimetre off, with sigma 0, would otherwise claim half a millimetre.
-    """
-    if registered.covariance is None or registered.usable:
-        return registered.covariance
-    diagnostics = registered.diagnostics
-    return np.asarray(registered.covariance * max(1.0, diagnostics.chi2 / max(1, diagnostics.dof)))
+def _hinge(context: SearchContext, answer: Answer) -> Hinge | None:
+    """Return the wall without which the pose would move most or be free; None where it would hardly move."""
+    hinges = answer.settled.hinges
+    moves = np.maximum(hinges["moves"], hinges["deviation"])
+    if not len(hinges) or moves.max() < HINGES:
+        return None
+    one = hinges[int(moves.argmax())]
+    on_it = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]] == one["wall"]
+    scan = answer.accepted.pairs[on_it, 0].tolist()
+    on_map = sorted({i for i, there in zip(answer.accepted.map_indices(context.index), on_it, strict=True) if there})
+    return Hinge(tuple(scan), tuple(on_map), (float(one["dx"]), float(one["dy"])), float(moves.max()))
 
 
 def _alternatives(context: SearchContext, others: tuple[Ranked, ...]) -> tuple[Alternative, ...]:
-    return tuple(
-        Alternative(
-            pose=context.in_map(other.pose),
-            covariance=other.covariance,
-            score=other.score,
-            reliability=other.reliability,
-            inlier_fraction=other.share,
-        )
-        for other in others[: context.options.max_alternatives]
+    return tuple(_alternative(context, other) for other in others[: context.options.max_alternatives])
+
+
+def _alternative(context: SearchContext, other: Ranked) -> Alternative:
+    settled = settle(context, other, hinges=False)
+    pairs = Correspondences(pairs_of(context.lines.rows, other.matches, context.index.walls.rows))
+    sums = OneStepSums.of_set(pairs, 1.0 / (pairs.rows["scan"]["variance"] + settled.wall_sigma**2), settled.pose)
+    translation, rotation = sums.costs(settled.pose, context.options.rotation)
+    return Alternative(
+        pose=context.in_map(settled.pose),
+        covariance=None if is_degenerate(settled) else settled.covariance,
+        score=other.score_by(context.options.estimator),
+        ambiguity=Ambiguity(translation, rotation),
+        reliability=sums.reliability,
+        inlier_fraction=other.share,
     )
-
-
-def _warnings(context: SearchContext, search: SearchReport, verdict: Verdict) -> tuple[AssociationWarning, ...]:
-    found, count = [], len(context.scan.measured)
-    if count == 0:
-        found.append(AssociationWarning("no_segments", "The scan has no segments, so that nothing could be searched."))
-    away = _facing_away(context) if context.options.oriented else 0
-    if away:
-        found.append(
-            AssociationWarning(
-                "faces_away",
-                f"{away} of {count} segments show their back to the viewpoint, from where nobody can see them: are "
-                "begin and end exchanged, or is this not the sensor's frame?",
-            )
-        )
-    if verdict.contradicted:
-        found.append(
-            AssociationWarning("prior_contradicted", "A clearly better pose lies where the prior says it should not.")
-        )
-    if not search.complete:
-        found.append(
-            AssociationWarning(
-                "search_incomplete", "The deadline ended the search; a better pose may have been missed."
-            )
-        )
-    return tuple(found)
-
-
-def _facing_away(context: SearchContext) -> int:
-    """Count the segments whose left, where free space is, is not where the sensor stood."""
-    if context.scan.viewpoint is None:
-        return 0
-    segments = context.scan.measured.segments
-    fronts = np.einsum("ij,ij->i", segments.normals, np.asarray(context.scan.viewpoint) - segments.midpoints)
-    return int((fronts < -FACING).sum())

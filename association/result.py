@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RegistrationDiagnostics, RigidTransform
+from registration import Ambiguity, RegistrationDiagnostics, RigidTransform
 
 Floats = NDArray[np.float64]
 
@@ -52,6 +52,34 @@ class Correspondence:
 
 
 @dataclass(frozen=True, slots=True)
+class Hinge:
+    """The wall that the pose hinges on: without it the pose would move most, or not be fixed.
+
+    Attributes
+    ----------
+    scan, map : tuple of int
+        Indices of the segments seen on it and of the map segments that they lie on, as sent.
+    direction : (float, float)
+        Unit vector in the map frame along which the pose would move, or be free.
+    moves : float
+        Metres; by how much, or the standard deviation along that direction where that is more.
+    """
+
+    scan: tuple[int, ...]
+    map: tuple[int, ...]
+    direction: tuple[float, float]
+    moves: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why an answer is not usable: a stable code and a plain sentence."""
+
+    code: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
 class AssociationDiagnostics:
     """Numbers beside the pose.
 
@@ -62,13 +90,16 @@ class AssociationDiagnostics:
     inlier_fraction : float
         Share of the scan's length that is matched.
     score : float
-        Log-likelihood over that of a scan that is all clutter, nats.
+        Log-likelihood over that of a scan that is all clutter, nats, by the sums at the estimator's pose. What judges
+        and orders is that of the joint estimator, from which `runner_up` and `margin` come.
     runner_up : float or None
-        Score of the best other pose over `score`, never below 0; None when there is no other.
+        Score of the best other pose over that of the best, never below 0; None when there is no other.
     margin : float or None
-        `score` minus that of the best other pose, nats.
+        Score of the best less that of the best other pose, nats.
     significance : float
         Probability that chance scores as high; small is good.
+    hinges_on : Hinge or None
+        None where the pose stays within `HINGES` metres without any one wall.
     """
 
     registration: RegistrationDiagnostics
@@ -77,15 +108,17 @@ class AssociationDiagnostics:
     runner_up: float | None
     margin: float | None
     significance: float
+    hinges_on: Hinge | None
 
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """Another pose that explains part of the scan."""
+    """Another pose that explains part of the scan; ambiguity and reliability as of the best, with the same sigmas."""
 
     pose: RigidTransform
     covariance: Floats | None
     score: float
+    ambiguity: Ambiguity
     reliability: float
     inlier_fraction: float
 
@@ -105,6 +138,9 @@ class SearchReport:
     bases, hypotheses, verified : int
         Bases drawn, poses they gave, poses that were scored to the end.
     seed : int
+    sampling : "ordered" or "random"
+    rivals_above : float
+        Share of the best score, by segments, above which no other pose was missed, with that confidence.
     """
 
     complete: bool
@@ -114,6 +150,8 @@ class SearchReport:
     hypotheses: int
     verified: int
     seed: int
+    sampling: str
+    rivals_above: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +186,8 @@ class AssociationResult:
         Map segments that rays to matched segments pass through.
     diagnostics : AssociationDiagnostics or None
         None when nothing was matched.
+    reasons : tuple of Reason
+        Why it is not usable, the weightiest first; empty when it is.
     alternatives : tuple of Alternative
         Distinct from the pose and from each other, best first.
     search : SearchReport
@@ -164,6 +204,7 @@ class AssociationResult:
     unmatched_scan: tuple[int, ...]
     missing_map: tuple[int, ...]
     diagnostics: AssociationDiagnostics | None
+    reasons: tuple[Reason, ...]
     alternatives: tuple[Alternative, ...]
     search: SearchReport
     warnings: tuple[AssociationWarning, ...]

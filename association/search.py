@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+
+from .causes import find_causes
 from .context import SearchContext
 from .explain import explain
 from .map_index import MapIndex
@@ -44,7 +47,9 @@ def associate(
     CancelledError
         When the deadline was cancelled.
     """
+    began = time.monotonic()
     context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
     explanations = explain(context)
     verdict = judge(context, explanations)
-    return report(context, explanations, verdict)
+    causes = find_causes(context, explanations, verdict, began)
+    return report(context, explanations, verdict, causes)

@@ -15,7 +15,7 @@ def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
         return ()
     index = context.index
     pieces = missing_pieces(
-        context.segments.rows, best.matches, context.view, best.estimate, index.tables.place, index.pieces,
+        context.lines.rows, best.matches, context.view, best.estimate, index.tables.place, index.pieces,
         context.workspace,
     )  # fmt: skip
     return tuple(sorted(set((pieces % index.directed).tolist())))
@@ -26,4 +26,4 @@ def agreement(context: SearchContext, best: Ranked) -> float:
     if context.scan.viewpoint is None:
         return NEUTRAL
     pose, place = best.estimate, context.index.tables.place
-    return float(agreement_at(context.segments.rows, context.view, pose, place, context.workspace))
+    return float(agreement_at(context.lines.rows, context.view, pose, place, context.workspace))

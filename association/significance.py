@@ -31,7 +31,7 @@ def significance(context: SearchContext, score: float) -> float:
     float
         0 to 1; small is good.
     """
-    index, scan, gates = context.index, context.segments.rows, context.gates
+    index, scan, gates = context.index, context.lines.rows, context.gates
     lengths, beyond = index.sorted_lengths
     chances = chance_matches(scan, lengths, beyond, index.agreeing_share, index.area, gates)
     exponent = float(log_tail(scan, chances, score, EXPONENTS))

@@ -15,7 +15,9 @@ MERGE_GAP = 0.3  # m, geometry: a doorway is wider, the joint between two pieces
 RUN_GAP = 1.5  # m, geometry: a scan segment may bridge a doorway
 MERGE_LATERAL = 0.03  # m, tables
 MERGE_ANGLE = math.radians(2.0)  # tables
-MOST_LOOKS = 400  # pieces that begin in one cell and are compared; geometry: no building has more
+BEGIN_CELL = 1.0  # m, by which begins of pieces are found, at least; measured: little changes near it
+MOST_STEPS = 100  # places along one piece around which others are looked for; geometry: 190 m of wall
+MOST_LOOKS = 600  # begins that one piece is compared with; measured: no fewer walls are found on 443 maps of buildings
 DIRECTION_BINS = 90  # tables
 SECTOR_BITS = 4
 SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degrees is the middle of one; tables
@@ -31,8 +33,16 @@ CELL_GROWTH = 1.25  # by which cells grow until their lists fit
 
 # --- Scan: what a segment is worth and how far it is to be trusted ----------------------------------------------------
 
+# Segments of a scan that continue or repeat one another are one line, and one witness; first those that were one
+# segment and cut, or that come twice, so that nothing else depends on it.
+CUT_LATERAL = 1e-4  # m, rounding
+CUT_COSINE = 1.0 - 1e-7  # rounding: some 0.03 degrees
+LINE_LATERAL = 0.04  # m, tables; how far the middle of one may lie beside the line of another,
+LINE_COSINE = math.cos(math.radians(2.5))  # tables; of the angle between them,
+LINE_GAP = 0.3  # m, geometry: as for walls; and along it
 # What no sigma that is sent accounts for: maps drawn or built with some slack, walls that are not quite straight.
-MODEL_OFFSET = 0.02  # m, tables
+MODEL_OFFSET = 0.02  # m, tables; of a wall as a whole,
+ROUGHNESS = 0.01  # m, tables; of which that much differs along it
 MODEL_ANGLE = math.radians(0.6)  # tables
 # Roughness of a wall and bias of the ranges shift neighbouring points together: no number of points averages it out. It
 # decides the angle of short segments, which come with raw ranges.
@@ -60,6 +70,9 @@ ROUNDS = 3  # tables; of matching and solving
 MAX_STEP = 1.0  # m, tables; a consensus set that moves its pose farther than that, or
 MAX_TURN = 0.2  # rad, tables; is not the one that the pose was proposed for
 SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
+# How far a pose is free before anything fixes it: what a set is charged for fixing it more sharply. Tables.
+FREE_DISTANCE = 0.3  # m
+FREE_ANGLE = 0.1  # rad
 START_VARIANCE = 1e-4  # m^2, tables; of a pose that comes without a covariance
 START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
 
@@ -106,6 +119,10 @@ TESTS_REJECTED = 10
 TESTS_HYPOTHESIS = 50
 TESTS_REFINED = 800
 
+# Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
+# of a place. More than all poses of a usual search, and some seconds where thousands of walls lie in one place.
+RANKED_AT_ONCE = 200_000
+
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 
 KEPT = 64  # poses, tables
@@ -113,11 +130,24 @@ KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no rivals
 # Where raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
 KEPT_SHARE_FOR_BEAMS = 0.5
-RIVAL_SHARE = 0.95  # of the best value, tables; a pose above it must not have been missed
+RIVAL_SHARE = 0.75  # of the best value, tables; a pose above it must not have been missed, for the verdict weighs it
 DISTINCT_DISTANCE = 0.3  # m, tables
 DISTINCT_ANGLE = 0.1  # rad, tables
 SOFT_FLOOR = -20.0  # nats, tables; the most that a soft prior speaks against a pose
 INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those outside
+
+# --- Settling: the answer worked out, with the error of the map's walls estimated -------------------------------------
+
+# What the walls' own error is taken for before any is seen, and how many walls that counts as. Fitted.
+USUAL_WALL_ERROR = 0.02  # m
+USUAL_WALLS = 2.0
+UNSEEN_ERROR = 1.7  # fitted; variance of walls' errors over that of those which the gates let pass
+LEAST_KNOWN_VARIANCE = 1e-10  # m^2, rounding; of walls whose error the caller knows
+LEAST_WALL_ERROR = 0.003  # m, tables
+ROUGH_SHARE = 0.1  # of a wall's variance, tables; what differs along it
+SETTLING_ROUNDS = 4  # tables
+FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
+COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 
 # --- Ranking ----------------------------------------------------------------------------------------------------------
 
@@ -135,6 +165,14 @@ BLOCKED_CLUTTER = 2.0  # nats a metre, tables; likewise for rays to clutter
 BLOCKING_LENGTH = 3.0  # m, tables; beyond it a wall speaks no more
 BLOCKING_RAYS = 4.0  # that count fully, tables
 FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of sight
+
+# --- Null: what the mirrored scan scores ------------------------------------------------------------------------------
+
+SHORTEST_SHOWN = 0.2  # m, tables; less of a wall tells nothing of its symmetry
+NULL_KEPT = 24  # poses, tables
+NULL_SHARE = 0.7  # of the answer's score, tables; a null below it says no more
+NULL_ENOUGH = 1.1  # likewise; a null above it
+NULL_CONFIDENCE = 0.99  # tables; it is one feature among others
 
 # --- Beams ------------------------------------------------------------------------------------------------------------
 
@@ -172,9 +210,36 @@ LEAST_SIGNIFICANCE = 1e-300  # rounding
 
 # --- Reporting --------------------------------------------------------------------------------------------------------
 
+HINGES = 0.1  # m, geometry: the finest pose that a robot docks by; a pose that moves less does not hinge on one wall
 FACING = 0.05  # m, geometry; a wall seen along itself may pass the sensor on either side
+# Of the ranges that came back at least that many, and that share, at one value to the digit. In the logs, which give
+# centimetres, it is 18 % at most.
+LEAST_STUCK = 10
+STUCK_SHARE = 0.5  # measured
+EXTENT_ANGLES = 18  # directions in which a scan's extent is looked for, geometry
+OUTERMOST_SHARE = 0.05  # of a scan's length, measured; at either end it may lie outside of the map
+EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
 MAX_RIVALS = 8  # map segments named beside the one that a scan segment lies on most
 MIN_EXTENT = 1e-9  # m, rounding; what a segment along a wall counts as at least
+
+# --- Causes: a caller's mistakes --------------------------------------------------------------------------------------
+
+TIMES_FOR_CAUSES = 2.0  # of the answer's own time; the contract
+LEAST_TIME_FOR_CAUSES = 0.02  # s, measured; where nothing fits an answer takes no time, and twice that is none
+CAUSE_CONFIDENCE = 0.99  # tables
+CAUSE_KEPT = 24  # poses, tables
+# Where a changed scan would not be usable either, it still fits much better with so much more score and share.
+# Measured: of 127 scans in their map that were not usable none did so.
+CAUSE_GAP = 30.0  # nats
+CAUSE_RATIO = 1.5
+CAUSE_SHARE = 0.7  # of the length
+USUAL_EXTENT = 12.0  # m, tables; of a scan
+LEAST_STRETCH, GREATEST_STRETCH = 0.004, 0.12  # tables; how far a factor near one may be from it
+SCALE_LENGTH = 0.5  # of the scan's length, tables; that has to match where the gates are wide
+SCALE_KEPT = 8  # poses, tables
+SCALE_SHARE = 0.75  # of the best value, tables
+SCALE_FITS = 3  # tables
+SCALE_OUTLIER = 3.0  # times the median, tables
 
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 
@@ -186,17 +251,20 @@ MAX_LEAD = 40.0  # nats, tables
 MOST_DEVIATION = 1.0  # m, tables
 CROWD_TEMPERATURE = 4.0  # nats, tables
 LEAST_CROWD = -12.0
+MAX_GAP = 60.0  # nats, tables
+LEAST_CHANCE_FEATURE = -30.0  # log10, tables; less likely chance says no more
+MOST_NULL = 1.2  # tables; a null above it says no more
+UNLIKE_SYMMETRY, SYMMETRIC = 0.7, 0.95  # tables; between which a map comes to count as symmetric about a place
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 TWIN_TEMPERATURE = 1.5  # nats, fitted; how far apart two explanations score that are as likely as one to e
 USABLE_PROBABILITY = 0.94  # cross-validated
-USABLE_CAUTIOUS = 0.92  # cross-validated; of the same, where other buildings are reckoned with
-USABLE_BY_CHANCE = 0.98  # cross-validated; likewise, where chance alone scores as high with that probability:
-LIKELY_BY_CHANCE = 0.3  # tables
-FEWEST = 3  # matched segments, tables; or else
-MOSTLY = 0.7  # of the scan's length, tables
-NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a twin of it
-CHANCE = 1e-3  # tables; where chance scores as high more often, other buildings are reckoned with in that too
+USABLE_CAUTIOUS = 0.885  # cross-validated; of the same, where other buildings are reckoned with,
+USABLE_CAUTIOUS_WITH_BEAMS = 0.885  # cross-validated; and where raw beams speak too
+FEW_WALLS = 3  # geometry: a corner, or three sides of a room; as many are never enough if one of them alone decides
+TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not told
+NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a twin of it, other buildings reckoned with
+ELSEWHERE_PROBABILITY = 0.24  # cross-validated; likewise, below it 2 % of scans of the map and most of others are
 CONTRADICTION = 6.0  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
 CONTRADICTED = 0.5  # the most that an answer can then be probable
 FAR_FROM_PRIOR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
-MAX_DEVIATION = 0.5  # m; beyond it the weakest direction counts as not fixed; the contract
+ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls

@@ -1,4 +1,4 @@
-"""From the explanations to one verdict, and the chance that the best one is right."""
+"""From the explanations to one verdict: how likely the best one is right, whether a robot may go by it, and why not."""
 
 from __future__ import annotations
 
@@ -9,22 +9,21 @@ from registration import RigidTransform
 
 from .context import SearchContext
 from .explain import Answer, Explanations
-from .families import is_degenerate, place_on_family
-from .features import features_of, twin_share
-from .models import CAUTIOUS, PROBABILITY, WITH_BEAMS
+from .families import is_degenerate, is_thin, place_on_family
+from .features import Features, features_of, twin_share, with_null
+from .models import MODELS, USUAL, Model
+from .null import null_of
 from .ranking import Ranked
-from .result import Status
+from .reasons import Standing, reasons_of
+from .result import Reason, Status
 from .tuning import (
-    CHANCE,
     CONTRADICTED,
     CONTRADICTION,
+    ELSEWHERE_PROBABILITY,
     FAR_FROM_PRIOR,
-    FEWEST,
-    LIKELY_BY_CHANCE,
-    MOSTLY,
     NO_MATCH_PROBABILITY,
-    USABLE_BY_CHANCE,
     USABLE_CAUTIOUS,
+    USABLE_CAUTIOUS_WITH_BEAMS,
     USABLE_PROBABILITY,
 )
 
@@ -47,6 +46,8 @@ class Verdict:
         Value of the next over that of the best, never below 0.
     contradicted : bool
         Whether the prior says that the robot is elsewhere.
+    reasons : tuple of Reason
+        Why it is not usable, the weightiest first.
     """
 
     status: Status
@@ -56,30 +57,38 @@ class Verdict:
     margin: float | None
     runner_up: float | None
     contradicted: bool
+    reasons: tuple[Reason, ...]
 
 
 def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     """Weigh the best explanation against the others and against none being right."""
-    answer, rivals = explanations.answer, explanations.rivals
+    answer, rivals, complete = explanations.answer, explanations.rivals, explanations.search.complete
     if answer is None:
-        return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked))
+        why = reasons_of(
+            Standing(Status.NO_MATCH, complete, bool(explanations.ranked), elsewhere=True, thin=False), None, None
+        )
+        return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked), why)
     best = answer.best
     better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
-    chances = _Chances.of(context, answer, rivals)
-    status = _status(answer, chances, with_beams=context.with_beams, capped=better_elsewhere)
+    chances = _Chances.of(context, answer, rivals, capped=better_elsewhere)
+    status = _status(answer, chances, _bar(context), capped=better_elsewhere)
     pose = place_on_family(context, answer) if status is Status.DEGENERATE else answer.registered.pose
     if context.window is not None and pose is not None and not context.window.contains(pose):
         # It was inside before it was registered: the window is narrower than what the scan says.
         contradicted = contradicted or status is not Status.NO_MATCH
+    usable = status is Status.OK and complete and not contradicted
+    elsewhere, thin = chances.explained < ELSEWHERE_PROBABILITY, is_thin(answer.settled)
+    standing = Standing(status, complete, contradicted, elsewhere=elsewhere, thin=thin)
     return Verdict(
         status=status,
         probability=min(chances.right, CONTRADICTED) if contradicted else chances.right,
-        usable=status is Status.OK and explanations.search.complete and not contradicted,
+        usable=usable,
         pose=pose,
         margin=best.value - rivals[0].value if rivals else None,
         runner_up=max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,
         contradicted=contradicted,
+        reasons=() if usable else reasons_of(standing, chances.features, chances.cautious),
     )
 
 
@@ -94,48 +103,51 @@ class _Chances:
     careful : float
         The same where other buildings are reckoned with.
     explained : float
-        That this or a twin of it is right, wherever along a free direction.
+        That this or a twin of it is right, wherever along a free direction, other buildings reckoned with.
+    features : Features
+        What these come from, with the null where it was needed.
+    cautious : Model
+        By which the careful one does.
     """
 
     right: float
     careful: float
     explained: float
+    features: Features
+    cautious: Model
 
     @classmethod
-    def of(cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...]) -> _Chances:
-        features = features_of(context, answer, rivals)
-        share = twin_share(answer.best, rivals)
-        usual, cautious = (WITH_BEAMS, WITH_BEAMS) if context.with_beams else (PROBABILITY, CAUTIOUS)
+    def of(cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool) -> _Chances:
+        form = "_with_beams" if context.with_beams else ""
+        usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
+        features, share = features_of(context, answer, rivals), twin_share(answer, rivals)
         right, careful = usual.logit(features), cautious.logit(features)
-        # Whether anything explains the scan is another question than whether it fixes the position.
-        explained = _logistic(right - usual.coefficient("deviation") * features.deviation)
-        if answer.significance > CHANCE:
-            explained = min(explained, _logistic(careful - cautious.coefficient("deviation") * features.deviation))
-        return cls(_logistic(right) * share, _logistic(careful) * share, explained)
+        # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
+        explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))
+        likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
+        decidable = not is_degenerate(answer.settled) and not is_thin(answer.settled)
+        if likely and decidable and _logistic(careful) * share >= _bar(context):
+            # Only what would be usable has to stand up to the mirrored scan, which costs another search.
+            features = with_null(features, answer.best, null_of(context, answer.best))
+            careful = cautious.logit(features)
+        return cls(_logistic(right) * share, _logistic(careful) * share, explained, features, cautious)
 
 
 def _logistic(logit: float) -> float:
-    return 1.0 / (1.0 + math.exp(-logit))
+    return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
 
 
-def _status(answer: Answer, chances: _Chances, *, with_beams: bool, capped: bool) -> Status:
+def _bar(context: SearchContext) -> float:
+    """Return what the cautious probability has to reach."""
+    return USABLE_CAUTIOUS_WITH_BEAMS if context.with_beams else USABLE_CAUTIOUS
+
+
+def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool) -> Status:
     """Decide in order of precedence; a `capped` probability is never enough."""
     if chances.explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
-    if is_degenerate(answer.registered):
+    if is_degenerate(answer.settled):
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= _bar(answer.significance, with_beams=with_beams)
-    return Status.OK if likely and sure and not _is_thin(answer.best) else Status.AMBIGUOUS
-
-
-def _bar(significance: float, *, with_beams: bool) -> float:
-    """Return what the cautious probability has to reach."""
-    if significance > LIKELY_BY_CHANCE:
-        return USABLE_BY_CHANCE
-    return USABLE_PROBABILITY if with_beams else USABLE_CAUTIOUS
-
-
-def _is_thin(best: Ranked) -> bool:
-    """Tell whether a corner is all that fits, and most of the scan does not: any building has one."""
-    return int(best.matched.sum()) < FEWEST and best.share < MOSTLY
+    sure = chances.careful >= bar and not is_thin(answer.settled)
+    return Status.OK if likely and sure else Status.AMBIGUOUS

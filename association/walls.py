@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 def both_ways(segments: Segments) -> Segments:
     """Return the segments, and behind them the same with begin and end exchanged."""
-    return Segments.from_array(np.concatenate([segments.endpoints, segments.endpoints[:, [2, 3, 0, 1]]]))
+    return Segments.derived(np.concatenate([segments.endpoints, segments.endpoints[:, [2, 3, 0, 1]]]))
 
 
 def merge(local: Segments, gap: float) -> tuple[Walls, Integers]:

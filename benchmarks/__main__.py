@@ -11,6 +11,8 @@ from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
 from .localization import localization
 from .lookalikes import lookalikes
+from .mistakes import mistakes
+from .parts import parts
 from .peers import peers, versions
 from .queries import DATA, data_found
 from .ranges import ranges
@@ -58,6 +60,17 @@ def _ranges(quick: int) -> list[Row]:
     return rows
 
 
+def _mistakes(quick: int) -> list[Row]:
+    rows = mistakes(quick)
+    print_rows("Time for causes", rows)
+    return rows
+
+
+def _parts(quick: int) -> list[Row]:
+    parts(quick)
+    return []
+
+
 def _peers(quick: int) -> list[Row]:
     print(f"\nPeers: {versions()}")
     return peers(quick)
@@ -77,6 +90,8 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "growth": _growth,
     "vectorization": _vectorization,
     "ranges": _ranges,
+    "parts": _parts,
+    "mistakes": _mistakes,
     "peers": _peers,
     "sums": _sums,
     "worlds": worlds,

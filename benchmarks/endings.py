@@ -28,7 +28,7 @@ from .table import Row, at_most, machine, print_rows
 
 HANG_UP_MS, SLOW_S, REPLACED_S, DRAINED_S = 250.0, 10.0, 3.0, 10.0
 TRIES = 10
-HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: 5000\r\n"
+HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 5000\r\n"
 
 
 def heavy(count: int = 199_000, seed: int = 0) -> bytes:
@@ -45,7 +45,7 @@ def ask(port: int, body: bytes) -> int:
     """Return the status of an association, 0 when the connection broke."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
-        connection.request("POST", "/v1/associate", body)
+        connection.request("POST", "/v1/associate", body, {"Content-Type": "application/json"})
         return connection.getresponse().status
     except (OSError, http.client.HTTPException):
         return 0

@@ -11,16 +11,27 @@ from association import Beams, Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.explain import explain
 from association.families import is_degenerate
-from association.features import Features, features_of
+from association.features import Features, features_of, gaps_of, with_null
+from association.null import null_of
+from registration import RigidTransform
+from simulation import CONDITIONS, FAMILIES
+from simulation import Case as DrawnCase
 from vectorization import vectorize
 
 from .collection import Collection, MapKey, Query, fold
-from .outcomes import OPTIONS, is_right, other_map, progress
+from .outcomes import OPTIONS, offset, other_map, progress
 from .queries import floor_plans, logs
 from .ranges import Log
+from .worlds.cases import in_map, kept_for_report, questions
+from .worlds.outcomes import share_read
+from .worlds.tables import TOLD
 
 SEGMENTS, RANGES = "segments", "ranges"
-STRANGERS = "strangers"
+STRANGERS, DRAWN, DRAWN_STRANGERS = "strangers", "drawn", "drawn strangers"
+# Of each drawn world and condition, of those worlds that are fitted on.
+HERE, AWAY = 16, 64
+DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
+LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,32 +44,60 @@ class Example:
         `SEGMENTS` or `RANGES`: how the scan was sent.
     group : str
         What kind of scan it is; `STRANGERS` for one that was searched in the map of another building.
-    fold : int
+    condition : str
+        Of a drawn world; the log or level of another.
+    fold : str
         It is reported on by a fit without that one.
     features : Features
     gaps : (n,) how much less than the best the rivals are worth, nats, 0 or less
     right, degenerate : bool
+    told : bool
+        Whether the scan shows that the answer is not where it was taken, where the answer is wrong.
     """
 
     form: str
     group: str
-    fold: int
+    condition: str
+    fold: str
     features: Features
     gaps: np.ndarray
     right: bool
     degenerate: bool
+    told: bool
+
+    @property
+    def stranger(self) -> bool:
+        """Whether no answer is right."""
+        return self.group in (STRANGERS, DRAWN_STRANGERS)
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A scan to be searched in a map, its own or that of another building."""
+    """A scan to be searched in a map.
 
-    collection: Collection
-    query: Query
+    Attributes
+    ----------
+    scan : Scan
+    index : MapIndex
+    truth : RigidTransform or None
+        map_from_scan; None in the map of another building.
+    distance, angle : float
+        Metres and degrees that an answer may be off.
+    group, condition, fold : str
+        As of `Example`.
+    told : callable or None
+        Whether a pose is one that the scan speaks against; by default any wrong one is.
+    """
+
     scan: Scan
     index: MapIndex
+    truth: RigidTransform | None
+    distance: float
+    angle: float
     group: str
-    own: bool
+    condition: str
+    fold: str
+    told: Callable[[RigidTransform], bool] | None = None
 
     def example(self) -> Example | None:
         """Search up to where the verdict is due; None where there is no explanation."""
@@ -66,16 +105,28 @@ class Case:
         found = explain(context)
         if found.answer is None:
             return None
-        best, rivals = found.answer.best, found.rivals
+        best, rivals, pose = found.answer.best, found.rivals, found.answer.registered.pose
+        right = False
+        if self.truth is not None and pose is not None:
+            distance, angle = offset(pose, self.truth)
+            right = distance < self.distance and angle < self.angle
         return Example(
             form=RANGES if context.with_beams else SEGMENTS,
-            group=self.group if self.own else STRANGERS,
-            fold=fold(self.query.map),
-            features=features_of(context, found.answer, rivals),
-            gaps=np.minimum(0.0, [rival.value - best.value for rival in rivals]),
-            right=self.own and is_right(found.answer.registered.pose, self.query.pose, self.collection),
-            degenerate=is_degenerate(found.answer.registered),
+            group=self.group,
+            condition=self.condition,
+            fold=self.fold,
+            features=with_null(features_of(context, found.answer, rivals), best, null_of(context, best)),
+            gaps=np.minimum(0.0, gaps_of(found.answer, rivals)),
+            right=right,
+            degenerate=is_degenerate(found.answer.settled),
+            told=not right and (self.told is None or pose is None or self.told(pose)),
         )
+
+
+def cases(form: str, stride: int) -> Iterator[Case]:
+    """Yield all cases of a form, one in `stride`."""
+    yield from (segment_cases if form == SEGMENTS else range_cases)(stride)
+    yield from world_cases(form, stride)
 
 
 def segment_cases(stride: int) -> Iterator[Case]:
@@ -83,8 +134,8 @@ def segment_cases(stride: int) -> Iterator[Case]:
     plans = floor_plans(stride)
     away = other_map(plans)
     for k, query in enumerate(plans.queries):
-        yield Case(plans, query, query.scan, plans.index(query.map), query.level, True)
-        yield Case(plans, query, query.scan, plans.index(away[k]), query.level, False)
+        yield _case(plans, query, query.scan, plans.index(query.map), query.level, own=True)
+        yield _case(plans, query, query.scan, plans.index(away[k]), query.level, own=False)
         progress(plans.name, k + 1, len(plans.queries))
     yield from _log_cases(stride, lambda _, query: query.scan)
 
@@ -105,16 +156,44 @@ def range_cases(stride: int) -> Iterator[Case]:
 def _log_cases(stride: int, scan_of: Callable[[Collection, Query], Scan]) -> Iterator[Case]:
     of_logs = logs(stride)
     for k, log in enumerate(of_logs):
-        other = of_logs[(k + 1) % len(of_logs)]
-        key: MapKey = next(iter(other.maps))
         for n, query in enumerate(log.queries):
             scan = scan_of(log, query)
-            yield Case(log, query, scan, log.index(query.map), "logs", True)
+            yield _case(log, query, scan, log.index(query.map), "logs", own=True)
             if n % 4 == 0:
-                yield Case(log, query, scan, other.index(key), "logs", False)
+                other = of_logs[(k + 1 + n // 4 % (len(of_logs) - 1)) % len(of_logs)]
+                key: MapKey = next(iter(other.maps))
+                yield _case(log, query, scan, other.index(key), "logs", own=False)
         progress(log.name, len(log.queries), len(log.queries))
 
 
-def collect(cases: Iterator[Case]) -> list[Example]:
+def _case(collection: Collection, query: Query, scan: Scan, index: MapIndex, group: str, *, own: bool) -> Case:
+    return Case(
+        scan, index, query.pose if own else None, collection.distance, collection.angle, group if own else STRANGERS,
+        collection.name if group == "logs" else query.level, f"{query.family}{fold(query.map)}",
+    )  # fmt: skip
+
+
+def world_cases(form: str, stride: int) -> Iterator[Case]:
+    """Yield scans of those drawn worlds that may be fitted on, in all conditions."""
+    worlds = [name for name in FAMILIES if not kept_for_report(name)]
+    conditions = [name for name in CONDITIONS if name not in LEFT_OUT]
+    for n, world in enumerate(worlds):
+        for condition in conditions:
+            own = in_map(condition)
+            numbers = range(0, HERE if own else AWAY, stride)
+            for question in questions([world], [condition], numbers):
+                yield Case(
+                    question.scans[form], question.index, question.case.truth, DRAWN_DISTANCE, DRAWN_ANGLE,
+                    DRAWN if own else DRAWN_STRANGERS, condition, world, _told_by(question.case),
+                )  # fmt: skip
+        progress(f"worlds, {form}", n + 1, len(worlds))
+
+
+def _told_by(case: DrawnCase) -> Callable[[RigidTransform], bool]:
+    """Return the test of whether a scan speaks against a pose: some beams do not read what the map shows there."""
+    return lambda pose: share_read(case, pose) < TOLD
+
+
+def collect(found: Iterator[Case]) -> list[Example]:
     """Search everything."""
-    return [example for example in (case.example() for case in cases) if example is not None]
+    return [example for example in (case.example() for case in found) if example is not None]

@@ -31,6 +31,7 @@ def request_of(path: str, body: bytes | None = None, key: str | None = None) -> 
     """Return a request as it goes over the wire."""
     head = f"{'GET' if body is None else 'POST'} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n"
     head += f"Authorization: Bearer {key}\r\n" if key else ""
+    head += "" if body is None else "Content-Type: application/json\r\n"
     return (head + f"Content-Length: {len(body or b'')}\r\n\r\n").encode() + (body or b"")
 
 

@@ -63,7 +63,7 @@ class Service:
         """Send one request with the robot's key; return the status."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         data = body if isinstance(body, bytes) else orjson.dumps(body)
-        connection.request(method, path, data, {"Authorization": "Bearer robot"})
+        connection.request(method, path, data, {"Authorization": "Bearer robot", "Content-Type": "application/json"})
         status = connection.getresponse().status
         connection.close()
         return status

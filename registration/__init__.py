@@ -10,6 +10,7 @@ from .result import Ambiguity, RegistrationDiagnostics, RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .solve import register
 from .transform import RigidTransform, wrap_angle
+from .wall_error import register_estimating
 
 __all__ = [
     "Ambiguity",
@@ -29,5 +30,6 @@ __all__ = [
     "Segments",
     "find_freedom",
     "register",
+    "register_estimating",
     "wrap_angle",
 ]

@@ -33,6 +33,8 @@ import numba
 import numpy as np
 from numba import njit
 
+from .interpreting import interpreted
+
 UNKNOWN_NUMBA = (
     f"Numba {numba.__version__} keeps compiled functions in a way that is not known here; "
     "install one of the versions that linefix names"
@@ -80,16 +82,18 @@ def kernel(function: Function) -> Function:
     if function.__closure__:
         raise TypeError(f"kernel {function.__qualname__}: expected no variables of an enclosing function")
     compiled = njit(nogil=True)(function)
-    if isinstance(compiled, Dispatcher):  # not so where NUMBA_DISABLE_JIT is set
-        if not hasattr(compiled, "_cache"):
-            raise ImportError(UNKNOWN_NUMBA)
-        compiled._cache = KernelCache(function)
+    if not isinstance(compiled, Dispatcher):  # NUMBA_DISABLE_JIT is set
+        return interpreted(function)
+    if not hasattr(compiled, "_cache"):
+        raise ImportError(UNKNOWN_NUMBA)
+    compiled._cache = KernelCache(function)
     return cast(Function, compiled)
 
 
 def inlined(function: Function) -> Function:
     """Compile a small function into each kernel that calls it."""
-    return cast(Function, njit(inline="always")(function))
+    compiled = njit(inline="always")(function)
+    return cast(Function, compiled) if isinstance(compiled, Dispatcher) else interpreted(function)
 
 
 def cache_directory(package: str) -> Path:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError
 from .kernels import pairs as kernels
-from .layout import Floats, Records, X, Y
+from .layout import LEAST_POINTS, Floats, Records, X, Y
 from .segments import MeasuredSegments, Segments
 
 Indices = NDArray[np.intp]
@@ -53,6 +53,9 @@ class Correspondences:
         kernels.fill_in_map(rows, chosen, m.directions, m.midpoints, m.lengths)
         kernels.fill_in_scan(rows, chosen, s.directions, s.midpoints, s.lengths)
         kernels.fill_in_points(rows, chosen, scan.centroids, scan.spreads, scan.sigma, scan.points)
+        if not scan.counted and scan.points.min(initial=np.inf) < LEAST_POINTS:
+            together = np.bincount(chosen[:, 1], scan.points[chosen[:, 0]])[chosen[:, 1]]
+            rows["scan"]["variance"] *= np.minimum(1.0, together / LEAST_POINTS)
         return cls(rows)
 
     def __len__(self) -> int:

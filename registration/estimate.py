@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from .correspondences import Correspondences
 from .joint import JointSums
 from .kernels.pairs import middles
-from .observability import Freedom, find_freedom
+from .observability import Freedom, are_parallel, find_freedom
 from .one_step import OneStepSums
 from .options import RegistrationOptions, Rotation
 from .orientation import choose_rotation
@@ -128,8 +128,18 @@ def fit_one_step(problem: Problem, options: RegistrationOptions) -> Fit:
     return fit if observable else fit.moved_least(problem)
 
 
+def fit_at(problem: Problem, pose: RigidTransform) -> Fit:
+    """Take a transform, map_from_scan, for the answer."""
+    local_from_scan = problem.map_from_local.inverse().compose(pose)
+    sums = JointSums.of_set(problem.centred, problem.weights.used)
+    freedom = _freedom(problem, sums, pose.theta)
+    return Fit(local_from_scan, local_from_scan.compose(problem.scan_from_centred), freedom, sums)
+
+
 def _freedom(problem: Problem, sums: JointSums, theta: float) -> Freedom:
     noise = problem.weights.noise
+    parallel = noise is not None and are_parallel(problem.centred, noise)
     if noise is problem.weights.used:
-        return find_freedom(sums, sums, theta)
-    return find_freedom(sums, None if noise is None else JointSums.of_set(problem.centred, noise), theta)
+        return find_freedom(sums, sums, theta, parallel=parallel)
+    of_noise = None if noise is None else JointSums.of_set(problem.centred, noise)
+    return find_freedom(sums, of_noise, theta, parallel=parallel)

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
-from .kernels import eigen2, of_arrays
+from .kernels import of_arrays
 from .kernels.compensated import compensated_sum
 from .kernels.joint import joint_sums_compensated
 from .layout import Floats, Records
-
-THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,22 +83,6 @@ class JointSums:
         The information of a translation when the rotation is known.
         """
         return of_arrays.normal_moments(self.compensated)
-
-    @property
-    def parallel(self) -> bool:
-        """Whether all directions are parallel within three standard deviations.
-
-        For two lines that is what it says; for more, whether their spread is one that the noise gives parallel lines in
-        99.73 % of cases. The mean squared sine between the map lines and their common direction is the smaller
-        eigenvalue of ``sum w n n'`` over its trace; the information that the pairs have of angles is the sum of
-        ``w s``, which the length of Wahba's resultant stands for. Weights must be 1 / variance.
-        """
-        if self.count < 2:
-            return True
-        xx, xy, yy = self.normal_moments
-        small, *_ = eigen2(xx, xy, yy)
-        resultant = math.hypot(*of_arrays.wahba_resultant(self.compensated))
-        return bool(small * resultant / (xx + yy) <= chi_square_quantile(self.count - 1, THREE_SIGMA_TAIL))
 
     def solve(self, start: float) -> tuple[float, Floats, bool]:
         """Minimise the cost.

@@ -17,6 +17,8 @@ Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]  # an array of one of the types below
 Record: TypeAlias = Any  # an element of one; type checkers cannot see its fields
 
+LEAST_POINTS = 2.0  # behind all that is seen of one wall, where nobody counted them
+
 X, Y = 0, 1  # columns of an (n, 2) array of points or directions
 
 # The ends of a segment.

@@ -5,9 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .chi_square import chi_square_quantile
+from .correspondences import Correspondences
 from .joint import JointSums
 from .kernels import eigen2
 from .kernels.matrices import PARALLEL_RATIO
+from .kernels.pairs import angle_chi_square
+from .layout import Floats
+
+THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
 MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
 SLACK = 3.0  # standard deviations that a fit may move and still be one
@@ -36,7 +42,24 @@ class Freedom:
     slack: float = 0.0
 
 
-def find_freedom(used: JointSums, noise: JointSums | None, theta: float) -> Freedom:
+def are_parallel(pairs: Correspondences, inverse_variances: Floats) -> bool:
+    """Tell whether all lines are parallel within three standard deviations of what is known of their angles.
+
+    For two lines that is what it says; for more, whether their directions differ as those of parallel lines do by
+    noise in 99.73 % of cases. A pair knows its angle with the information w s of its weight and spread, and of the
+    common direction ``sum w s sin^2`` is least: a chi-square.
+
+    Parameters
+    ----------
+    pairs : Correspondences
+    inverse_variances : (n,) 1/m^2
+        Of the offsets; those of 0 do not count.
+    """
+    unlike, count = angle_chi_square(pairs.rows, inverse_variances)
+    return count < 2 or bool(unlike <= chi_square_quantile(count - 1, THREE_SIGMA_TAIL))
+
+
+def find_freedom(used: JointSums, noise: JointSums | None, theta: float, *, parallel: bool) -> Freedom:
     """Tell whether the lines fix the transform, and what they leave free.
 
     Degenerate are lines that are parallel to rounding; or to three standard deviations of their angles; or that leave
@@ -51,11 +74,13 @@ def find_freedom(used: JointSums, noise: JointSums | None, theta: float) -> Free
         The same with weights 1 / variance; None when there is no noise.
     theta : float
         The rotation, radians.
+    parallel : bool
+        Whether the lines are parallel within the noise.
     """
     small, big, *axis = eigen2(*used.normal_moments)
     if small <= PARALLEL_RATIO * big:
         return Freedom(True, True, _signed(*axis), math.inf)
-    if noise is not None and noise.parallel:
+    if noise is not None and parallel:
         _, _, *axis = eigen2(*noise.normal_moments)
         return Freedom(True, True, _signed(*axis), _slack(noise, *axis))
     if not used.is_regular(theta, PARALLEL_RATIO):

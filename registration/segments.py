@@ -83,6 +83,23 @@ class Segments:
         lengths = np.hypot(span[:, 0], span[:, 1])
         _refuse(lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
         _refuse(lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
+        return cls._lines(e)
+
+    @classmethod
+    def derived(cls, endpoints: Floats) -> Segments:
+        """Return segments that were made of validated ones: merged they may be longer than what is taken from outside.
+
+        Parameters
+        ----------
+        endpoints : (n, 4)
+            Finite, metres; each of some length.
+        """
+        return cls._lines(np.array(endpoints, dtype=np.float64, order="C"))
+
+    @classmethod
+    def _lines(cls, e: Floats) -> Segments:
+        span = e[:, 2:] - e[:, :2]
+        lengths = np.hypot(span[:, 0], span[:, 1])
         d = span / lengths[:, None]
         n = np.stack([-d[:, 1], d[:, 0]], axis=1)
         middles = e[:, :2] + 0.5 * span
@@ -101,12 +118,12 @@ class Segments:
 
     def reversed(self) -> Segments:
         """Return the same segments with begin and end exchanged."""
-        return Segments.from_array(self.endpoints[:, [2, 3, 0, 1]])
+        return Segments.derived(self.endpoints[:, [2, 3, 0, 1]])
 
     def shifted(self, by: ArrayLike) -> Segments:
         """Return the segments moved by a vector of 2 metres, to work near the origin."""
         offset = np.asarray(by, dtype=np.float64)
-        return Segments.from_array(self.endpoints + np.tile(offset, 2))
+        return Segments.derived(self.endpoints + np.tile(offset, 2))
 
 
 def _refuse(bad: NDArray[np.bool_] | np.bool_, what: str, argument: str) -> None:
@@ -122,9 +139,11 @@ class MeasuredSegments:
     ----------
     segments : Segments
     sigma : (n,) standard deviation of single points normal to the wall, metres
-    points : (n,) number of points behind each segment
+    points : (n,) number of points behind each segment; below 1 where nobody counted them and it is short
     centroids : (n, 2) mean of those points, metres
     spreads : (n,) their second moment along the segment, m^2
+    counted : bool
+        Whether the points were counted; if not, what one wall shows together has 2 at least.
     """
 
     segments: Segments
@@ -132,6 +151,7 @@ class MeasuredSegments:
     points: Floats
     centroids: Floats = field(repr=False)
     spreads: Floats = field(repr=False)
+    counted: bool = True
 
     @classmethod
     def from_segments(
@@ -151,7 +171,8 @@ class MeasuredSegments:
         sigma : float or (n,)
             Standard deviation of single points normal to the wall, metres, 0 to 1e3.
         points : (n,), optional
-            Number of points behind each segment, at least 1; default ``max(2, length / 0.05)``.
+            Number of points behind each segment, at least 1; default ``length / 0.05``, and 2 at least behind all that
+            is seen of one wall.
         moments : ((n, 2) centroids, (n,) spreads), optional
             Mean of the points and their second moment along the segment; default midpoint and ``length^2 / 12``, that
             of points spread evenly.
@@ -164,17 +185,19 @@ class MeasuredSegments:
             When a number is out of range or an array has another length than `segments`.
         """
         n = len(segments)
-        default_points = np.maximum(2.0, segments.lengths / DEFAULT_POINT_SPACING)
+        counted = points is not None
         centroids, spreads = moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
         ranges: list[tuple[str, Any, tuple[int, ...], float, float]] = [
             ("sigma", np.broadcast_to(np.asarray(sigma, dtype=np.float64), (n,)) if np.ndim(sigma) == 0 else sigma,
              (n,), 0.0, MAX_SIGMA),
-            ("points", default_points if points is None else points, (n,), 1.0, MAX_POINTS),
+            ("points", points if counted else segments.lengths / DEFAULT_POINT_SPACING,
+             (n,), 1.0 if counted else 0.0, MAX_POINTS),
             ("centroids", centroids, (n, 2), -MAX_COORDINATE, MAX_COORDINATE),
             ("spreads", spreads, (n,), 0.0, MAX_LENGTH**2),
         ]  # fmt: skip
         arrays = [_checked(values, shape, low, high, f"{argument}.{name}") for name, values, shape, low, high in ranges]
-        return cls(segments, *arrays)
+        sigmas, counts, means, moments_along = arrays
+        return cls(segments, sigmas, counts, means, moments_along, counted)
 
     def __len__(self) -> int:
         return len(self.segments)

@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
 from .diagnostics import Residuals, covariance_of, diagnose, no_answer
-from .estimate import Problem, fit_joint, fit_one_step
+from .estimate import Problem, fit_at, fit_joint, fit_one_step
 from .options import RegistrationOptions
 from .result import RegistrationResult
 from .segments import MeasuredSegments, Segments
+from .transform import RigidTransform
 from .weights import weigh
 
 TAIL = 0.001  # chance that chi2 of right pairs is larger; an answer beyond it is not usable
@@ -24,6 +25,7 @@ def register(
     pairs: ArrayLike,
     map_sigma: float = 0.0,
     options: RegistrationOptions = DEFAULT_OPTIONS,
+    at: RigidTransform | None = None,
 ) -> RegistrationResult:
     """Find the rigid transform that lays scan segments on their map lines.
 
@@ -38,6 +40,8 @@ def register(
     map_sigma : float
         Standard deviation of the offset of a map line, metres, 0 to 1e3.
     options : RegistrationOptions
+    at : RigidTransform or None
+        Evaluate this transform, map_from_scan, in place of fitting one.
 
     Returns
     -------
@@ -57,7 +61,10 @@ def register(
         return no_answer(options)
 
     problem = Problem.of(given, weights, oriented=options.oriented)
-    fit = (fit_joint if options.estimator == "joint" else fit_one_step)(problem, options)
+    if at is not None:
+        fit = fit_at(problem, at)
+    else:
+        fit = (fit_joint if options.estimator == "joint" else fit_one_step)(problem, options)
     degenerate = fit.freedom.degenerate or not problem.unique
 
     residuals = Residuals.of(problem, fit)

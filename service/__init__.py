@@ -1,1 +1,17 @@
-"""The service: registration and association over HTTP."""
+"""The service: registration and association over HTTP.
+
+Each room imports only from those below it; import-linter holds them to that (`pyproject.toml`).
+
+::
+
+    cli                    the subcommands
+    process/               the process that serves: server, workers, protocol at the socket, how it ends
+    app                    puts the parts of one application together
+    http/                  routes, problems, bodies, the log of requests
+    work/                  one request's work in a thread: models to the libraries, results to JSON
+    settings               command line and environment
+    admission/, maps/      who is let in; stored maps and their indices
+    parsing/               from the bytes of a body to a checked request, large ones in another process
+    schemas/, telemetry/   models of requests and answers, their limits; counts and the log
+    database_url, memory, part, threads, version
+"""

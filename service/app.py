@@ -8,17 +8,18 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from functools import partial
-from typing import Any
 
 from fastapi import FastAPI
 
 from .admission.budget import ByteBudget
+from .admission.connections import ConnectionLimit, most_connections
 from .admission.entrance import Entrance
 from .admission.gate import SearchGate
 from .admission.keys import Keyring
+from .admission.origins import Origins
 from .admission.readiness import Readiness
 from .http.bodies import BodyReceiver
-from .http.openapi import describe
+from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
@@ -55,24 +56,18 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     app = FastAPI(
         title="Linefix",
         version=VERSION,
+        openapi_url=None,  # the pages give it, rendered once
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services
+    app.state.contract = Contract(partial(describe, app), services.parse_threads)
     for module in (register, associate, batch, vectorize, maps, operations, pages):
         app.include_router(module.router)
     handle_errors(app)
     app.add_middleware(Reception, services=services)
-    document: dict[str, Any] = {}
-
-    def openapi() -> dict[str, Any]:
-        if not document:
-            document.update(describe(app))
-        return document
-
-    app.openapi = openapi  # type: ignore[method-assign]
     return app
 
 
@@ -80,14 +75,18 @@ def _services(settings: Settings, part: Part) -> Services:
     """Put the parts together; of several processes each has its share."""
     metrics = Metrics()
     gate = SearchGate(part.share(settings.searches), part.share(settings.queue))
-    budget = ByteBudget(max(settings.max_body_bytes, part.share(settings.max_bodies_bytes)))
-    store = MapStore(settings.url)
+    budget = _budget(settings, part, settings.max_bodies_bytes)
+    store = MapStore(settings.url, may_make=not part.replaces)
     cache = IndexCache(part.share(settings.cache_bytes), metrics)
     parser = ParserProcess()
+    lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
+    connections = ConnectionLimit(most_connections(part.share(settings.max_connections)))
+    origins = Origins(settings.hosts, guarded=bool(settings.keys))
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
     metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)
+    metrics.watch("linefix_connections", "Connections open", lambda: len(connections))
     metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: budget.held)
     metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes)
     metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(cache))
@@ -96,16 +95,25 @@ def _services(settings: Settings, part: Part) -> Services:
         metrics=metrics,
         refusals=RefusalTally(metrics),
         readiness=readiness,
-        entrance=Entrance(gate, Keyring(settings.keys), settings.max_body_bytes),
+        entrance=Entrance(gate, Keyring(settings.keys), origins, settings.max_body_bytes),
         gate=gate,
-        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout),
+        connections=connections,
+        answers=_budget(settings, part, settings.max_answers_bytes),
+        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout, guarded=bool(settings.keys)),
         parser=parser,
         store=store,
         probe=StoreProbe(store),
-        associator=Associator(MapLookup(cache, store, parser), metrics),
+        lookup=lookup,
+        documents=_budget(settings, part, settings.max_answers_bytes),
+        associator=Associator(lookup, metrics),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
     )
+
+
+def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
+    """Return what one of several processes may hold; the largest body always fits."""
+    return ByteBudget(max(settings.max_body_bytes, part.share(most)), least_share=settings.max_body_bytes)
 
 
 @asynccontextmanager
@@ -137,7 +145,7 @@ async def _get_ready(services: Services) -> None:
             await threads.run(partial(parser.call, compile_kernels))
         parser.close()
     await asyncio.gather(threads.run(warm_up), threads.run(parser.start))
-    # What is there now stays: no need to look through it for garbage ever again.
+    # What was made until now lives as long as the process: the garbage collector need not look through it again.
     gc.collect()
     gc.freeze()
     services.readiness.warm = True

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, SecretStr, ValidationError, field_validator
+from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
 from .database_url import database_url
 from .schemas.limits import Limits
+
+Finite = Annotated[float, AllowInfNan(False)]
+_PRINTABLE = re.compile(r"[!-~]+")
 
 
 def _data_home() -> Path:
@@ -56,6 +60,9 @@ class Settings(BaseSettings):
         description="postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory",
     )
     keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys, comma separated")
+    hosts: Annotated[tuple[str, ...], NoDecode] = Field(
+        (), description="without keys: names under which the service is asked for, comma separated"
+    )
     allow_anonymous: bool = Field(False, description="without keys, listen on other addresses than loopback")
 
     workers: int = Field(1, ge=1, le=256, description="processes that share the port, the searches and the queue")
@@ -63,29 +70,55 @@ class Settings(BaseSettings):
     queue: int = Field(16, ge=0, le=10_000, description="requests that may wait for a search")
     max_body_bytes: int = Field(32_000_000, ge=1_000, le=1_000_000_000, description="of a request, unpacked")
     max_values: int = Field(2_000_000, ge=1_000, description="numbers, strings, arrays and objects in a request")
-    max_bodies_bytes: int = Field(256_000_000, ge=1_000, description="of all requests being read at once")
+    max_bodies_bytes: int = Field(
+        96_000_000, ge=1_000, description="of all requests being read at once, unpacked; of one key half of that"
+    )
+    max_answers_bytes: int = Field(
+        64_000_000, ge=1_000, description="of large answers that wait to be read; of one key half of that"
+    )
+    max_connections: int = Field(
+        512, ge=8, le=100_000, description="open at once, of one address half of that; fewer where descriptors are few"
+    )
     max_map_segments: int = Field(200_000, ge=1, description="of one map")
     max_scan_segments: int = Field(2_000, ge=1, description="of one scan")
     max_beams: int = Field(20_000, ge=1, description="ranges or points of one scan")
     max_correspondences: int = Field(200_000, ge=1, description="of one registration")
     max_batch: int = Field(256, ge=1, description="scans of one batch")
-    max_deadline_ms: float = Field(30_000.0, gt=0.0, description="and the deadline where none is asked for")
+    max_deadline_ms: Finite = Field(30_000.0, gt=0.0, le=3.6e6, description="and the deadline where none is asked for")
     cache_bytes: int = Field(112_000_000, ge=0, description="of indexed maps kept in memory")
-    request_timeout: float = Field(9.0, gt=0.0, description="seconds that a request may take to arrive, head and body")
-    drain_seconds: float = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
-    hang_seconds: float = Field(
-        30.0, ge=2.0, le=3600.0, description="without a sign of life after which one of several workers is replaced"
+    request_timeout: Finite = Field(
+        9.0,
+        gt=0.0,
+        le=3600.0,
+        allow_inf_nan=False,
+        description="seconds that a request may take to arrive, head and body",
+    )
+    drain_seconds: Finite = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
+    hang_seconds: Finite = Field(
+        30.0,
+        ge=2.0,
+        le=3600.0,
+        allow_inf_nan=False,
+        description="without a sign of life after which one of several workers is replaced",
     )
     log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
 
-    @field_validator("keys", mode="before")
+    @field_validator("keys", "hosts", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         items = value.split(",") if isinstance(value, str) else value
-        if isinstance(items, list | tuple):
-            parts = [part for item in items for part in (item.split(",") if isinstance(item, str) else [item])]
-            return tuple(part.strip() if isinstance(part, str) else part for part in parts if part not in ("", " "))
-        return items
+        if value == "":  # set, but to nothing, as compose files do
+            return ()
+        if not isinstance(items, list | tuple):
+            return items
+        parts = [part for item in items for part in (item.split(",") if isinstance(item, str) else [item])]
+        stripped = (part.strip() if isinstance(part, str) else part for part in parts)
+        found = tuple(part for part in stripped if part != "")
+        if parts and not found:
+            raise ValueError("nothing but blanks; leave it empty for none")
+        if any(isinstance(part, str) and not _PRINTABLE.fullmatch(part) for part in found):
+            raise ValueError("one of them holds a space, or a letter that no header can")
+        return found
 
     @field_validator("database_url")
     @classmethod
@@ -131,6 +164,7 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     SettingsError
         When a value is wrong, or the service would listen to the world without keys.
     """
+    _require_text(arguments)
     try:
         settings = Settings(_cli_parse_args=list(arguments))
     except ValidationError as error:
@@ -144,3 +178,11 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     if settings.workers > settings.searches:
         raise SettingsError(f"workers: at most as many as searches, of which there are {settings.searches}")
     return settings
+
+
+def _require_text(arguments: Sequence[str]) -> None:
+    """Refuse what is not UTF-8: nothing later could name it in a message, or compare it with what is sent."""
+    named = [(name, name + value) for name, value in os.environ.items() if name.upper().startswith("LINEFIX_")]
+    for name, text in [*named, *((f"argument {index + 1}", text) for index, text in enumerate(arguments))]:
+        if any("\ud800" <= letter <= "\udfff" for letter in text):
+            raise SettingsError(f"{ascii(name)[1:-1]}: not UTF-8")

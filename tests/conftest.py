@@ -20,8 +20,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Python waits for threads that do not end, as one that a failed test left waiting: not for ever here."""
-    faulthandler.dump_traceback_later(EXIT_SECONDS, exit=True)
+    """Python waits for threads that do not end, as one that a failed test left waiting: not for ever here.
+
+    Of several processes the first ends the others; one that is through early waits for the rest.
+    """
+    if not hasattr(config, "workerinput"):
+        faulthandler.dump_traceback_later(EXIT_SECONDS, exit=True)
 
 
 @pytest.fixture(scope="session")
@@ -29,6 +33,14 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService
     """One service for all tests that leave it as it was."""
     with running(tmp_path_factory.mktemp("service")) as started:
         yield started
+
+
+@pytest.fixture(scope="session")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    """One that asks for a key, `sesame` or `open`."""
+    with running(tmp_path_factory.mktemp("guarded"), keys="sesame,open") as started:
+        yield started
+        assert "sesame" not in started.log()
 
 
 @pytest.fixture

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration import MeasuredSegments, Segments
 from registration.layout import PAIR, Floats, Records
@@ -20,7 +21,9 @@ def rotation(theta: float) -> Floats:
     return np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
 
 
-def pair_rows(map_segments: Segments, scan: MeasuredSegments, pairs: Iterable[tuple[int, int]]) -> Records:
+def pair_rows(
+    map_segments: Segments, scan: MeasuredSegments, pairs: Sequence[tuple[int, int]] | NDArray[np.intp]
+) -> Records:
     """What is known of each pair, as `registration.layout.PAIR` has it."""
     rows = np.zeros(len(pairs), PAIR)
     for row, (i, j) in zip(rows, pairs, strict=True):
@@ -151,12 +154,15 @@ def one_step_translation(lines: Sequence[Line], weights: Floats) -> Floats:
     """Minimise sum w (|T - P|^2 - ((T - P) . v)^2) as least squares of the distances along the normals."""
     a = np.array([math.sqrt(w) * (TURN @ v) for (_, v, _), w in zip(lines, weights, strict=True)])
     b = np.array([math.sqrt(w) * (TURN @ v) @ p for (p, v, _), w in zip(lines, weights, strict=True)])
-    return np.linalg.lstsq(a, b, rcond=1e-9)[0]
+    solution: Floats = np.linalg.lstsq(a, b, rcond=1e-9)[0]
+    return solution
 
 
 def translation_ambiguity(at: Floats, lines: Sequence[Line], weights: Floats) -> float:
     """Eq. (2) squared and summed: distances of a translation from the lines."""
-    return sum(w * ((at - p)[0] * v[1] - (at - p)[1] * v[0]) ** 2 for (p, v, _), w in zip(lines, weights, strict=True))
+    return sum(
+        float(w * ((at - p)[0] * v[1] - (at - p)[1] * v[0]) ** 2) for (p, v, _), w in zip(lines, weights, strict=True)
+    )
 
 
 def mitsuta(angles: Sequence[float], weights: Floats) -> tuple[float, float]:
@@ -178,7 +184,7 @@ def mitsuta(angles: Sequence[float], weights: Floats) -> tuple[float, float]:
 def wahba_error(theta: float, map_directions: Floats, directions: Floats, weights: Floats) -> float:
     """Eq. (11)."""
     return sum(
-        w * float(np.sum((s - rotation(theta) @ d) ** 2))
+        float(w) * float(np.sum((s - rotation(theta) @ d) ** 2))
         for s, d, w in zip(map_directions, directions, weights, strict=True)
     )
 

@@ -17,6 +17,7 @@ import httpx
 
 START_SECONDS = 150.0  # the first start may have to compile every kernel
 STOP_SECONDS = 15.0
+JSON = {"content-type": "application/json"}
 PATIENCE = 60.0  # s for what has to come about
 
 
@@ -37,6 +38,18 @@ class RunningService:
         """Return one of the service's own counts, 0 where it has none."""
         found = [row for row in self.client.get("/metrics").text.splitlines() if row.startswith(line + " ")]
         return float(found[0].rsplit(" ", 1)[1]) if found else 0.0
+
+    def memory_mb(self) -> float:
+        """Return what the service and its processes hold now, MB."""
+        return sum(_status(pid, "VmRSS") for pid in family_of(self.process.pid))
+
+    @contextmanager
+    def peak_mb(self) -> Iterator[Callable[[], float]]:
+        """Watch from here on what each of its processes has held at most; what is given returns their sum, MB."""
+        pids = family_of(self.process.pid)
+        for pid in pids:
+            Path(f"/proc/{pid}/clear_refs").write_text("5")
+        yield lambda: sum(_status(pid, "VmHWM") for pid in pids)
 
     @contextmanager
     def connection(self, timeout: float = 20.0) -> Iterator[socket.socket]:
@@ -59,7 +72,7 @@ def start(data_dir: Path, *, probe: str = "/readyz", **settings: object) -> Runn
     with (data_dir / "log").open("ab") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
     url = f"http://127.0.0.1:{port}"
-    service = RunningService(url, port, data_dir, process, httpx.Client(base_url=url, timeout=30.0))
+    service = RunningService(url, port, data_dir, process, httpx.Client(base_url=url, timeout=30.0, headers=JSON))
     give_up = time.monotonic() + START_SECONDS
     while time.monotonic() < give_up:
         if process.poll() is not None:
@@ -106,6 +119,18 @@ def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
 def children_of(pid: int) -> set[int]:
     tasks = Path(f"/proc/{pid}/task").iterdir()
     return {int(child) for task in tasks for child in (task / "children").read_text().split()}
+
+
+def family_of(pid: int) -> list[int]:
+    return [pid, *(one for child in children_of(pid) for one in family_of(child))]
+
+
+def _status(pid: int, name: str) -> float:
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+    return next((int(line.split()[1]) / 1e3 for line in lines if line.startswith(f"{name}:")), 0.0)
 
 
 def is_running(pid: int) -> bool:

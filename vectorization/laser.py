@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from registration.layout import Floats
-from registration.limits import MAX_ANGLE, MAX_BEAMS, MAX_LENGTH
+from registration.limits import MAX_ANGLE, MAX_BEAMS, MAX_LENGTH, MIN_LENGTH
 
 from .errors import InvalidScanError
 from .kernels.rays import clean
+
+MIN_INCREMENT = 1e-6  # rad; neighbouring beams closer than that are one
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -24,7 +26,8 @@ class LaserScan:
     angle_min : float
         Of the first beam, radians, counter-clockwise from the scan frame's x axis.
     angle_increment : float
-        From beam to beam, radians, not 0; negative for a scanner that turns clockwise. All beams make at most a turn.
+        From beam to beam, radians, at least 1e-6; negative for a scanner that turns clockwise. All beams make at most a
+        turn.
     ranges : (m,) metres
         inf where nothing came back; nan, or None in a list, where nothing is known; -inf where something was too near.
     range_min, range_max : float
@@ -56,9 +59,10 @@ class LaserScan:
         if not abs(angle_min) <= MAX_ANGLE:
             raise InvalidScanError(f"expected at most {MAX_ANGLE:g} rad, got {angle_min!r}", argument="angle_min")
         turn = abs(angle_increment) * max(1, m - 1)
-        if not (angle_increment != 0.0 and turn <= math.tau * (1.0 + 1e-3)):
+        if not (abs(angle_increment) >= MIN_INCREMENT and turn <= math.tau * (1.0 + 1e-3)):
             raise InvalidScanError(
-                f"expected radians, not 0, that make at most one turn over {m} beams; got {angle_increment!r}",
+                f"expected radians, at least {MIN_INCREMENT:g} and at most one turn over {m} beams; "
+                f"got {angle_increment!r}",
                 argument="angle_increment",
             )
         if not 0.0 <= range_min < math.inf:
@@ -78,8 +82,11 @@ class LaserScan:
 
     @property
     def cleaned(self) -> Floats:
-        """The ranges with every beam without return at inf and every beam of which nothing is known at nan."""
-        return clean(self.ranges, self.range_min, min(self.range_max, MAX_LENGTH))
+        """The ranges with every beam without return at inf and every beam of which nothing is known at nan.
+
+        Nothing is known, too, of what is said to be nearer than a segment is long.
+        """
+        return clean(self.ranges, max(self.range_min, MIN_LENGTH), min(self.range_max, MAX_LENGTH))
 
     def points(self) -> Floats:
         """Return the measured points in the scan frame, ``(k, 2)`` metres, beams without a range left out."""

@@ -223,5 +223,5 @@ def _trace(points: Records, increment: float, closed: bool, sigma: float, option
 def _measured(lines: Records, origin: tuple[float, float]) -> tuple[MeasuredSegments, Floats]:
     endpoints, sigmas, centroids, rms = describe(lines, origin[0], origin[1])
     moments = centroids, lines["spread"]
-    measured = MeasuredSegments.from_segments(Segments.from_array(endpoints), sigmas, lines["count"], moments)
+    measured = MeasuredSegments.from_segments(Segments.derived(endpoints), sigmas, lines["count"], moments)
     return measured, rms

@@ -7,7 +7,7 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
-from ..layout import BLOCKER, Blockers, Indices, Integers, Pieces, Place, Workspace
+from ..layout import BLOCKER, Blockers, Indices, Lines, Pieces, Place, Workspace
 from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT
 from .sight import count_blockers
 
@@ -37,29 +37,31 @@ def first_wall(walls: Records, w: int, bridging: bool) -> int:
 
 @kernel
 def accept_matches(
-    matches: Records, order: Integers, scan_ends: Records, pose: Records, walls: Records, pieces: Pieces
+    matches: Records, lines: Lines, scan_ends: Records, pose: Records, walls: Records, pieces: Pieces
 ) -> tuple[Indices, Floats, Indices, Indices]:
     """Pick for every matched scan segment the piece of its wall that it lies on most, of equal ones the first.
 
-    `order` (n,) is the scan index of each match; `pose` (1,). Returns, by scan index, pairs (k, 2) of scan index and
-    piece; the share of each segment that lies on pieces of its wall, or of its run where it may bridge doorways (k,);
-    and the other pieces that it lies on: of pair i ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
+    `pose` (1,). Of a line of several segments those count of which enough lies on the wall. Returns, by scan index,
+    pairs (k, 2) of scan index and piece; the share of each segment that lies on pieces of its wall, or of its run where
+    it may bridge doorways (k,); and the other pieces that it lies on: of pair i
+    ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
     """
     items = pieces.items
     piece_starts = pieces.starts
     ends = pieces.ends
     at = pose[0]
-    n = len(order)
+    row_of = lines.row_of
+    n = len(row_of)
+    members = np.zeros(len(matches), dtype=np.int64)
     wall_of = np.full(n, -1)
     bridging = np.zeros(n, dtype=np.bool_)
     most_pieces = 0
     found = 0
-    for row in range(n):
-        w = matches[row].wall
+    for i in range(n):
+        members[row_of[i]] += 1
+        w = matches[row_of[i]].wall
         if w >= 0:
-            i = order[row]
-            length = math.hypot(scan_ends[i].x2 - scan_ends[i].x1, scan_ends[i].y2 - scan_ends[i].y1)
-            bridging[i] = length > BRIDGING
+            bridging[i] = lines.rows[row_of[i]].length > BRIDGING
             w = first_wall(walls, w, bridging[i])
             wall_of[i] = w
             under = 0
@@ -109,9 +111,14 @@ def accept_matches(
                     covering[count] = p
                     count += 1
             w = walls[w].after if bridging[i] else -1
+        overlap = 0.0
+        if count > 0:
+            overlap = min(1.0, union_length(lows, highs, count) / max(high - low, MIN_EXTENT))
+        if overlap < lines.least_overlap and members[row_of[i]] > 1:
+            continue
         pairs[pair, 0] = i
         pairs[pair, 1] = most
-        overlaps[pair] = min(1.0, union_length(lows, highs, count) / max(high - low, MIN_EXTENT))
+        overlaps[pair] = overlap
         stop_at = rival_starts[pair]
         for k in range(count):
             if covering[k] != most and stop_at < rival_starts[pair] + MAX_RIVALS:
@@ -119,7 +126,7 @@ def accept_matches(
                 stop_at += 1
         rival_starts[pair + 1] = stop_at
         pair += 1
-    return pairs, overlaps, rivals[: rival_starts[found]], rival_starts
+    return pairs[:pair], overlaps[:pair], rivals[: rival_starts[pair]], rival_starts[: pair + 1]
 
 
 @kernel

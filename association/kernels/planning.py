@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from registration.compiling import kernel
+from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
-from ..layout import BASE, MapTables, Plan, Question, Walls, Words, Workspace
+from ..layout import BASE, Integers, MapTables, Plan, Question, Walls, Words, Workspace
 from ..tuning import (
     COST_ANCHOR,
     COST_BASE,
@@ -16,7 +16,6 @@ from ..tuning import (
     GAIN_POWER,
     HYPOTHESIS_SCALE,
     MIN_CROSSING_BASE,
-    REUSE,
     SHORT_LENGTH,
     SHORT_POWER,
     SINE_POWER,
@@ -125,14 +124,15 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
 
 
 @kernel
-def next_base(bases: Records, uses: Floats) -> int:
+def next_base(bases: Records, uses: Floats, fade: float) -> int:
     """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
+
+    Each use adds `fade` to the logarithm of its merit.
 
     Ties go to the pair that comes first, that of the longest segments.
     """
     best = -1
     best_merit = -math.inf
-    fade = math.log(REUSE)
     for k in range(len(bases)):
         if bases[k].merit == -math.inf:
             continue
@@ -195,6 +195,29 @@ def fewest_segments(best_gains: Floats, beyond: float, needed: float) -> int:
     return max(len(best_gains), 2)
 
 
+@inlined
+def drawn_chance(fewest: int, count: int) -> float:
+    """Return the chance that both segments of a base drawn among `count` are among `fewest` inliers."""
+    return min(1.0, fewest * (fewest - 1) / max(1, count * (count - 1)))
+
+
+@kernel
+def least_freedom(scan: Records, freest: Integers, needed: float) -> float:
+    """Return what freedom a consensus set takes at least whose gains come to `needed`, nats.
+
+    It has one of the lines at least without which the others do not come to that; `freest` (n,) are the lines, those
+    that take most by themselves first.
+    """
+    rest = 0.0
+    for i in range(len(scan)):
+        rest += scan[i].gain
+    for i in freest:
+        rest -= scan[i].gain
+        if rest < needed:
+            return scan[i].freedom
+    return 0.0
+
+
 # Why `advance` came back.
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
@@ -225,7 +248,7 @@ def advance(
     spent = 0
     while True:
         if state.base < 0:
-            state.base = next_base(bases, plan.uses)
+            state.base = next_base(bases, plan.uses, plan.fade)
             if state.base < 0:
                 return EXHAUSTED
         base = bases[state.base]
@@ -233,13 +256,20 @@ def advance(
         if state.anchor > 0 or state.slide > -math.inf:
             return BUDGET
         state.base = -1
+        state.least_freedom = least_freedom(scan, plan.freest, rules.kept_share * state.best_value)
         needed = rules.rival_share * state.best_value
+        needed += least_freedom(scan, plan.freest, needed)
         a = base.sliding
         b = base.crossing
         if is_telling(scan, a, b):
             state.bound -= cover(plan.residual, a, b)
             fewest = fewest_segments(plan.best_gains, beyond, needed)
-            state.missed = strike(plan.missing, plan.inliers, a, b, fewest)
+            if plan.random:
+                state.missed *= 1.0 - drawn_chance(fewest, len(plan.best_gains))
+            else:
+                state.missed = strike(plan.missing, plan.inliers, a, b, fewest)
+        if state.best_value >= rules.enough:
+            return CONFIDENT
         if allowed >= 0.0:
             if state.bound < needed:
                 return PROVEN

@@ -96,9 +96,10 @@ def try_pose(
     Returns what it cost, in tests of a wall.
     """
     scan = question.scan
-    gates = question.terms[0].gates
-    rules = question.terms[0].rules
-    prior = question.terms[0].prior
+    terms = question.terms[0]
+    gates = terms.gates
+    rules = terms.rules
+    prior = terms.prior
     pose = work.scratch[0].estimate
     progress.hypotheses += 1
     bonus = prior_value(prior, pose)
@@ -109,13 +110,13 @@ def try_pose(
             or abs(wrap(pose.theta - prior.theta)) > prior.angle + WINDOW_TURN
         ):
             return TESTS_REJECTED
-    floor = floor_of(rules, progress, bonus)
+    floor = floor_of(rules, progress, bonus) + progress.least_freedom
     if gates.least_overlap >= WHOLE_OVERLAP and not may_score(scan, pose, work.spreads, raster, floor):
         return TESTS_REJECTED
     if match_scan(scan, pose, place, gates, floor, work.matches) < 0.0:
         return TESTS_HYPOTHESIS
     progress.verified += 1
-    score = refine(scan, pose, place, gates, work.matches, work, ROUNDS)
+    score = refine(scan, pose, place, terms, work.matches, work, ROUNDS)
     offer(found, progress, rules, prior, pose, score)
     return TESTS_REFINED
 
@@ -128,9 +129,9 @@ def search_base(
 
     A run under a fixes the rotation and leaves one slide; the grid is walked along what the midpoint of b then sweeps.
     The final angle splits the misfit of both, so that b turns about a by up to `swing` metres: the ends are tested
-    loosely until then. Goes on from the anchor where `progress` stands, at its slide unless that is -inf, and stops
-    when `budget` tests are used up. Returns the tests that it took; the anchor is back at 0, and the slide at -inf,
-    when the base is done.
+    loosely until then. Goes on from the anchor where `progress` stands, at its slide unless that is -inf and there at
+    the item of its step, and stops when `budget` tests are used up, within a cell, too. Returns the tests that it took;
+    the anchor is back at 0, and the slide at -inf, when the base is done.
 
     The walk stands here whole, and reads arrays only by element: see `match_scan`.
     """
@@ -190,7 +191,9 @@ def search_base(
         dy = wa.dy
         at = max(wa.begin + half_a, progress.slide)
         high = wa.end - half_a
+        first = progress.step
         progress.slide = -math.inf
+        progress.step = 0
         entered = at
         if windowed:
             away = dx * nearest_y - dy * nearest_x - wa.offset
@@ -225,7 +228,10 @@ def search_base(
             until = min(next_x, next_y)
             if 0 <= column < columns and 0 <= row < rows:
                 here = row * columns + column
-                for k in range(starts[here], starts[here + 1]):
+                begin = starts[here]
+                if begin < first <= starts[here + 1]:
+                    begin = first  # those before it were looked at the last time
+                for k in range(begin, starts[here + 1]):
                     if (items[k] - first_sector) & (SECTORS - 1) > more_sectors:
                         continue
                     wb = items[k] >> SECTOR_BITS
@@ -245,6 +251,11 @@ def search_base(
                     if base_pose(a, b, wa, runs[wb], pose):
                         turning(theta_var, c * pin_x - s * pin_y, s * pin_x + c * pin_y, pose)
                         spent += try_pose(question, place, raster, found, progress, work)
+                        if spent > budget:
+                            progress.anchor -= 1
+                            progress.slide = at
+                            progress.step = k + 1
+                            return spent
             at = until
             if next_x < next_y:
                 column += step_x

@@ -6,11 +6,11 @@ import numpy as np
 
 from registration.compiling import kernel
 from registration.kernels import invert3, keep_alive
-from registration.layout import SYMMETRIC3, Records
+from registration.layout import SYMMETRIC3, Floats, Records
 
 from ..layout import BLOCKER, Blockers, Integers, Place, Question, Workspace
 from ..tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
-from .consensus import refine
+from .consensus import one_step_cost, refine
 from .matching import wrap
 from .sight import count_blockers, sight_penalty
 
@@ -30,7 +30,7 @@ def rank(
     The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). `view` (1,).
     """
     scan = question.scan
-    gates = question.terms[0].gates
+    terms = question.terms[0]
     sums = work.scratch[0].sums
     sighted = view[0].sighted
     blockers = Blockers(np.zeros(len(place.walls), dtype=BLOCKER), np.empty(len(place.walls), dtype=np.int64))
@@ -47,12 +47,15 @@ def rank(
         one.yy = START_VARIANCE
         one.yt = 0.0
         one.tt = START_ANGLE_VARIANCE
-        merit.score = refine(scan, one, place, gates, matches[k], work, ROUNDS)
+        merit.score = refine(scan, one, place, terms, matches[k], work, ROUNDS)
+        merit.cost = work.scratch[0].value.cost if merit.score > 0.0 else 0.0
+        merit.one_step_cost = one_step_cost(sums, one) if merit.score > 0.0 else 0.0
         det = sums.xx * sums.yy - sums.xy * sums.xy
         weight = sums.xx + sums.yy
         merit.reliability = min(1.0, 2.0 * math.sqrt(max(det, 0.0)) / weight) if weight > 0.0 else 0.0
         merit.length = 0.0
         merit.misfit = 0.0
+        merit.blocked = 0.0
         count = 0
         for i in range(len(scan)):
             if matches[k, i].wall >= 0:
@@ -64,17 +67,29 @@ def rank(
         # The candidates come best first: what is far behind is no rival, its score may stay too good.
         if sighted and merit.score > best - FAR_BEHIND:
             count = count_blockers(scan, matches[k], view[0], one, place, blockers, work.scratch[0].ray)
-            merit.score -= sight_penalty(blockers, count, place.walls)
+            merit.blocked = sight_penalty(blockers, count, place.walls)
+            merit.score -= merit.blocked
             best = max(best, merit.score)
 
 
 @kernel
-def distinct(poses: Records, order: Integers, most: int, distance: float, angle: float, same_family: float) -> Integers:
+def distinct(
+    poses: Records,
+    scores: Floats,
+    order: Integers,
+    most: int,
+    distance: float,
+    angle: float,
+    same_family: float,
+    much_better: float,
+) -> Integers:
     """Pick from `order`, the best first, at most `most` poses without those that a better one stands for.
 
     A pose stands for those that are near, within `distance` metres and `angle` radians, and for those that its own
     covariance does not tell from it, at less than `same_family` squared deviations: a family along a corridor is one
-    explanation. `poses` (k,) of `ESTIMATE`. Returns the places in them.
+    explanation. It does not stand for one of its family with a score that is better by more than `much_better` nats: a
+    prior may put that one behind it, and is contradicted by it. `poses` (k,) of `ESTIMATE`, `scores` (k,) without the
+    prior. Returns the places in them.
     """
     kept = np.empty(min(most, len(order)), dtype=np.int64)
     informations = np.empty(len(kept), dtype=SYMMETRIC3)
@@ -95,7 +110,7 @@ def distinct(poses: Records, order: Integers, most: int, distance: float, angle:
             f = informations[k]
             square = f.xx * x * x + f.yy * y * y + f.tt * turn * turn
             square += 2.0 * (f.xy * x * y + f.xt * x * turn + f.yt * y * turn)
-            if known[k] and square < same_family:
+            if known[k] and square < same_family and scores[i] <= scores[kept[k]] + much_better:
                 stands = True
                 break
         if not stands:

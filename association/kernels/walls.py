@@ -8,7 +8,7 @@ from registration.compiling import kernel
 from registration.layout import Records
 
 from ..layout import Integers
-from ..tuning import MOST_LOOKS
+from ..tuning import BEGIN_CELL, MOST_LOOKS, MOST_STEPS
 
 
 @kernel
@@ -23,16 +23,19 @@ def _find(parent: Integers, i: int) -> int:
 def collinear_groups(
     ends: Records, directions: Records, max_gap: float, max_lateral: float, min_cos: float
 ) -> Integers:
-    """Label pieces that continue one another: the end of one within `max_gap` of the begin of the other.
+    """Label pieces that continue or repeat one another: one begins along the other, or within `max_gap` of its end.
 
-    Where more than `MOST_LOOKS` begin in one cell, as on no map of a building, some are not merged. `ends` (n,) of
+    What begins along another one has to end beside its line, too. Where more than `MOST_LOOKS` begin about one piece,
+    and beyond `MOST_STEPS` places before its end, as on no map of a building, some are not merged. `ends` (n,) of
     `ENDS`, `directions` (n,) of `POINT`. Returns (n,) labels, the lowest index of each group.
     """
     n = len(ends)
     parent = np.arange(n)
     if n == 0:
         return parent
-    cell = max(4.0 * max_gap, 0.5)
+    # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
+    cell = max(BEGIN_CELL, 1.01 * math.hypot(max_gap, max_lateral))
+    spacing = 1.98 * (cell - max_lateral)
     # Begins sorted by a hash of their cell, so that memory does not grow with the extent.
     buckets = 1
     while buckets < 2 * n:
@@ -48,29 +51,39 @@ def collinear_groups(
         y = ends[i].y2
         dx = directions[i].x
         dy = directions[i].y
-        column = math.floor(x / cell)
-        row = math.floor(y / cell)
-        for a in range(-1, 2):
-            for b in range(-1, 2):
-                j = heads[_cell_hash(column + a, row + b, buckets)]
-                looks = 0
-                while j >= 0 and looks < MOST_LOOKS:
-                    looks += 1
-                    gx = ends[j].x1 - x
-                    gy = ends[j].y1 - y
-                    if (
-                        j != i
-                        and abs(gx * dx + gy * dy) <= max_gap
-                        and abs(gy * dx - gx * dy) <= max_lateral
-                        and directions[j].x * dx + directions[j].y * dy >= min_cos
-                    ):
-                        one = _find(parent, i)
-                        other = _find(parent, j)
-                        if one < other:
-                            parent[other] = one
-                        else:
-                            parent[one] = other
-                    j = following[j]
+        length = math.hypot(x - ends[i].x1, y - ends[i].y1)
+        looks = 0
+        # At places from the end backwards, evenly spread, the last of them the begin.
+        steps = math.ceil(length / spacing)
+        for step in range(min(steps, MOST_STEPS) + 1):
+            back = step * length / steps if step < MOST_STEPS else length
+            column = math.floor((x - back * dx) / cell)
+            row = math.floor((y - back * dy) / cell)
+            for a in range(-1, 2):
+                for b in range(-1, 2):
+                    j = heads[_cell_hash(column + a, row + b, buckets)]
+                    while j >= 0 and looks < MOST_LOOKS:
+                        looks += 1
+                        gx = ends[j].x1 - x
+                        gy = ends[j].y1 - y
+                        along = gx * dx + gy * dy
+                        if (
+                            j != i
+                            and -length - max_gap <= along <= max_gap
+                            and abs(gy * dx - gx * dy) <= max_lateral
+                            and directions[j].x * dx + directions[j].y * dy >= min_cos
+                            and (
+                                abs(along) <= max_gap
+                                or abs((ends[j].y2 - y) * dx - (ends[j].x2 - x) * dy) <= max_lateral
+                            )
+                        ):
+                            one = _find(parent, i)
+                            other = _find(parent, j)
+                            if one < other:
+                                parent[other] = one
+                            else:
+                                parent[one] = other
+                        j = following[j]
     for i in range(n):
         parent[i] = _find(parent, i)
     return parent

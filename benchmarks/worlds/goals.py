@@ -8,12 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from association import Status
-
 from ..table import Row, at_least, at_most, mean, within
 from .cases import FORMS, HALVES
 from .outcomes import WorldOutcome
-from .tables import MAP_ERRORS, could_be_told, held, judged, of_form, quantile_bins, worst_gap
+from .tables import MAP_ERRORS, WALL_ERRORS, could_be_told, held, judged, of_form, quantile_bins, worst_gap
 
 # Usable and right at commit 563ffea, percent of the scans, ranges and segments, by half of the worlds.
 BEFORE = {
@@ -49,7 +47,7 @@ HELD = (90.0, 98.0)  # percent of the truths within the ellipsoid of 95 %
 NEES = (2.5, 4.0)  # from this many walls on:
 MANY_WALLS = 6
 FEW = 20  # answers below which a covariance is not judged
-ELSEWHERE, ELSEWHERE_HERE = 90.0, 2.0  # percent no_match: of other buildings, and of scans in their map
+ELSEWHERE, ELSEWHERE_HERE = 90.0, 2.0  # percent no_match or elsewhere: of other buildings, and in the map
 
 
 def rows(outcomes: Sequence[WorldOutcome], half: str) -> list[Row]:
@@ -65,18 +63,13 @@ def rows(outcomes: Sequence[WorldOutcome], half: str) -> list[Row]:
         bins = [b for b in quantile_bins(here, BIN) if b[0] >= BIN]
         found.append(at_most(f"{form}: probability, points off in bins of {BIN}", worst_gap(bins), *CALIBRATION, ".1f"))
         away = [o for o in answers if o.condition in ("other_type", "sister")]
+        shares = [100.0 * mean(o.said_elsewhere for o in group) for group in (away, here)]
         found.append(
-            at_least(f"{form}: in another building: no_match, %", _share(away, Status.NO_MATCH), None, ELSEWHERE, ".1f")
+            at_least(f"{form}: in another building: told to be elsewhere, %", shares[0], None, ELSEWHERE, ".1f")
         )
-        found.append(
-            at_most(f"{form}: in the map: no_match, %", _share(here, Status.NO_MATCH), None, ELSEWHERE_HERE, ".1f")
-        )
+        found.append(at_most(f"{form}: in the map: told to be elsewhere, %", shares[1], None, ELSEWHERE_HERE, ".1f"))
     turning = [o.usable for o in of_form(outcomes, "segments") if o.condition == "turning"]
     return [*found, at_least("segments: turning: usable, %", 100.0 * mean(turning), None, TURNING, ".1f")]
-
-
-def _share(answers: Sequence[WorldOutcome], status: Status) -> float:
-    return 100.0 * mean(o.status == status for o in answers)
 
 
 def _kept(answers: Sequence[WorldOutcome], form: str, before: dict[str, float]) -> list[Row]:
@@ -125,8 +118,11 @@ def _wrong_row(what: str, answers: Sequence[WorldOutcome], goal: float, aim: flo
 
 
 def _covariance(answers: Sequence[WorldOutcome], form: str) -> list[Row]:
-    """Judge the covariances over all map errors: the share held by number of walls, and the mean NEES of many."""
-    right = [o for o in answers if o.condition in MAP_ERRORS and judged(o)]
+    """Judge the covariances over all errors of single walls: the share held by number of walls, the mean NEES of many.
+
+    Beside that the mean NEES with a map that is out of scale, too.
+    """
+    right = [o for o in answers if o.condition in WALL_ERRORS and judged(o)]
     found = []
     for told, group in (
         (f"fewer than {MANY_WALLS} walls", [o for o in right if o.walls < MANY_WALLS]),
@@ -137,4 +133,8 @@ def _covariance(answers: Sequence[WorldOutcome], form: str) -> list[Row]:
     many = [o.nees for o in right if o.walls >= MANY_WALLS and o.nees is not None]
     if len(many) >= FEW:
         found.append(within(f"{form}: {MANY_WALLS} walls and more: mean NEES", mean(many), *NEES, ".2f"))
+    scaled = [o.nees for o in answers if o.condition in MAP_ERRORS and judged(o) and o.walls >= MANY_WALLS]
+    if len(scaled) > len(many) >= FEW:
+        told = f"{mean(nees for nees in scaled if nees is not None):.2f}"
+        found.append(Row(f"{form}:   and with maps scaled by 1 %", told))
     return found

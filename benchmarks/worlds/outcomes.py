@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from association import AssociationResult, associate
+from association import AssociationResult, Status, associate
 from registration import RigidTransform, wrap_angle
 from simulation import Case, Scanner, scan, wall_of_segment
 
@@ -45,6 +45,8 @@ class WorldOutcome:
         No truth for a stranger, no pose for `no_match`.
     status : str
     usable : bool
+    reasons : list of str
+        Their codes.
     probability : float
     distance, angle : float or None
         How far the pose is off, metres and degrees.
@@ -75,6 +77,7 @@ class WorldOutcome:
     pose: list[float] | None
     status: str
     usable: bool
+    reasons: list[str]
     probability: float
     distance: float | None
     angle: float | None
@@ -118,6 +121,11 @@ class WorldOutcome:
         """Whether a robot would go by a pose that is not right."""
         return self.usable and not self.right
 
+    @property
+    def said_elsewhere(self) -> bool:
+        """Whether the answer says that the robot is somewhere that is not on the map."""
+        return self.status == Status.NO_MATCH or "elsewhere" in self.reasons
+
     def _within(self, distance: float, angle: float) -> bool:
         off = self.distance, self.angle
         return off[0] is not None and off[0] < distance and off[1] is not None and off[1] < angle
@@ -142,6 +150,7 @@ def answer(question: Question, form: str) -> WorldOutcome:
         pose=_listed(result.pose),
         status=str(result.status),
         usable=result.usable,
+        reasons=[reason.code for reason in result.reasons],
         probability=result.probability,
         distance=distance,
         angle=angle,

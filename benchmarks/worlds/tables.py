@@ -17,7 +17,8 @@ from .cases import FORMS, in_map, kept_for_report
 from .outcomes import WorldOutcome
 
 TOLD = 0.98  # of the beams; where as many read what the map shows, no scan could tell the answer from the truth
-MAP_ERRORS = ("clean", "walls_5mm", "walls_2cm", "walls_5cm", "cut", "bias", "noisier", "scaled_1")
+WALL_ERRORS = ("clean", "walls_5mm", "walls_2cm", "walls_5cm", "cut", "bias", "noisier")
+MAP_ERRORS = (*WALL_ERRORS, "scaled_1")  # a scale moves all walls together, of which a residual shows next to nothing
 MANY = 1000
 WALLS = ((1, 2), (3, 3), (4, 5), (6, 8), (9, MANY))
 BINS = 10
@@ -56,7 +57,7 @@ def print_in_map(outcomes: Outcomes) -> None:
     """Print right, usable and wrong of the scans whose truth is in their map, by condition and by world."""
     here = [o for o in outcomes if not o.stranger]
     head = ("", "scans", "right first %", "within 0.1 m %", "usable and right %", "usable but wrong", "of usable",
-            "no_match %")  # fmt: skip
+            "told to be elsewhere %")  # fmt: skip
 
     def cells(name: str, group: Outcomes) -> tuple[str, ...]:
         return (
@@ -67,7 +68,7 @@ def print_in_map(outcomes: Outcomes) -> None:
             _both(group, lambda g: _percent(o.usable and o.right for o in g)),
             _both(group, _wrong),
             _both(group, lambda g: str(sum(o.usable for o in g))),
-            _both(group, lambda g: _percent((o.status == Status.NO_MATCH for o in g), 1)),
+            _both(group, lambda g: _percent((o.said_elsewhere for o in g), 1)),
         )
 
     _by(here, "In the map, ranges / segments", head, cells)
@@ -76,7 +77,8 @@ def print_in_map(outcomes: Outcomes) -> None:
 def print_strangers(outcomes: Outcomes) -> None:
     """Print how often a scan that has no place in its map gets a usable answer, by condition and by world."""
     away = [o for o in outcomes if o.stranger]
-    head = ("", "scans", "usable %", "usable", "could be told, %", *(f"{s} %" for s in Status if s is not Status.OK))
+    head = ("", "scans", "usable %", "usable", "could be told, %", "told to be elsewhere %",
+            *(f"{s} %" for s in Status if s is not Status.OK))  # fmt: skip
 
     def cells(name: str, group: Outcomes) -> tuple[str, ...]:
         return (
@@ -85,6 +87,7 @@ def print_strangers(outcomes: Outcomes) -> None:
             _both(group, lambda g: _percent((o.usable for o in g), 1)),
             _both(group, _wrong),
             _both(group, lambda g: _percent((o.wrong and could_be_told(o) for o in g), 2)),
+            _both(group, lambda g: _percent((o.said_elsewhere for o in g), 1)),
             *(
                 _both(group, lambda g, s=s: _percent(o.status == s for o in g))  # type: ignore[misc]
                 for s in Status

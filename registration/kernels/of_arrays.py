@@ -107,12 +107,6 @@ def normal_moments(sums: Records) -> tuple[float, float, float]:
 
 
 @kernel
-def wahba_resultant(sums: Records) -> tuple[float, float]:
-    """Return the two sums of Wahba's angle."""
-    return sums[0].wahba_cos, sums[0].wahba_sin
-
-
-@kernel
 def direction_moments(sums: Records) -> tuple[float, float, float, float]:
     """Return the paper's ``S_w``, ``S_x2``, ``S_y2`` and ``S_xy``."""
     return sums[0].w, sums[0].x2, sums[0].y2, sums[0].xy

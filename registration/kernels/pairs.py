@@ -100,6 +100,27 @@ def inverse_variances(pairs: Records, map_variance: float) -> tuple[Floats, bool
 
 
 @kernel
+def angle_chi_square(pairs: Records, weights: Floats) -> tuple[float, int]:
+    """Return the smaller eigenvalue of ``sum w s d d'`` over the map lines' directions d, and how many pairs count.
+
+    That is ``sum w s sin^2`` of the angles to the direction from which it is least, s being the spread.
+    """
+    xx = 0.0
+    xy = 0.0
+    yy = 0.0
+    count = 0
+    for i in range(len(pairs)):
+        if weights[i] > 0.0:
+            line = pairs[i].map
+            angle = weights[i] * pairs[i].scan.spread
+            xx += angle * line.dx * line.dx
+            xy += angle * line.dx * line.dy
+            yy += angle * line.dy * line.dy
+            count += 1
+    return max(0.0, 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)), count
+
+
+@kernel
 def middles(pairs: Records, weights: Floats) -> tuple[float, float, float, float, int]:
     """Return the means of the map midpoints and of the points' means, ``(map_x, map_y, scan_x, scan_y)``, and n."""
     map_x = 0.0

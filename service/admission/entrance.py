@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from ..schemas.errors import BodyTooLargeError
-from .errors import MissingKeyError, UnknownKeyError
 from .gate import SearchGate
 from .keys import Keyring
+from .origins import Origins
 from .ticket import Ticket
 
 SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize"))
 """Paths whose POST needs a turn at the gate."""
+GUARDED = "/v1/"
+"""What asks for a key begins so; probes and pages stay open."""
 
+Head = Mapping[str, Any]
+"""What ASGI calls a scope: method, path, headers, client."""
 Headers = Sequence[tuple[bytes, bytes]]
 
 
@@ -22,45 +27,46 @@ def is_search(method: str, path: str) -> bool:
 
 
 class Entrance:
-    """Gives tickets, and sends away what would have to search while the queue is full.
+    """Gives tickets, and sends away who may not come in, and what would have to search while the queue is full.
 
     Parameters
     ----------
     gate : SearchGate
     keyring : Keyring
+    origins : Origins
     max_body_bytes : int
     """
 
-    def __init__(self, gate: SearchGate, keyring: Keyring, max_body_bytes: int) -> None:
+    def __init__(self, gate: SearchGate, keyring: Keyring, origins: Origins, max_body_bytes: int) -> None:
         self._gate = gate
         self._keyring = keyring
+        self._origins = origins
         self._max_body_bytes = max_body_bytes
 
-    def admit(self, method: str, path: str, headers: Headers) -> Ticket:
+    def admit(self, head: Head) -> Ticket:
         """Return the ticket of a request.
-
-        What is wrong with a key is in the ticket: not every path asks for one.
 
         Parameters
         ----------
-        method, path : str
-            The path without its query, its escapes undone.
-        headers : sequence of (bytes, bytes)
-            Names in lower case.
+        head : Head
+            The path without its query, its escapes undone; names of headers in lower case.
 
         Raises
         ------
+        ForeignHostError, ForeignOriginError
+            When it may come from a web page that somebody looks at, and the service has no keys.
+        MissingKeyError, UnknownKeyError
+            When the path asks for a key.
         BodyTooLargeError
             When the body is too long by what the head says of it.
         QueueFullError, ShareUsedError
             When there is no place for a search.
         """
+        method, path, headers = head["method"], head["path"], head["headers"]
+        self._origins.require(headers)
+        holder = self._keyring.holder(headers, head.get("client")) if path.startswith(GUARDED) else None
         if method in ("POST", "PUT"):
             self._check_length(headers)
-        try:
-            holder = self._keyring.holder(headers)
-        except (MissingKeyError, UnknownKeyError) as error:
-            return Ticket(key_error=type(error))
         if not is_search(method, path):
             return Ticket(holder)
         self._gate.require_place(holder)

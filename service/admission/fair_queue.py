@@ -6,7 +6,7 @@ import asyncio
 from collections import Counter, deque
 
 Holder = bytes | None
-"""Who asks: the digest of a key, None where the service has no keys."""
+"""Who asks: the digest of a key, or an address where the service has no keys; None where that is not known."""
 
 Turn = asyncio.Future[None]
 

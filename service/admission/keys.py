@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import ipaddress
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 from pydantic import SecretStr
 
 from .errors import MissingKeyError, UnknownKeyError
 from .fair_queue import Holder
+
+Client = tuple[str, int] | None
 
 
 class Keyring:
@@ -24,13 +28,15 @@ class Keyring:
     def __init__(self, keys: Sequence[SecretStr]) -> None:
         self._digests = [_digest(key.get_secret_value().encode()) for key in keys]
 
-    def holder(self, headers: Iterable[tuple[bytes, bytes]]) -> Holder:
-        """Return whose key a request carries; None where the service has no keys.
+    def holder(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Holder:
+        """Return whose key a request carries; where the service has no keys, from which address it comes.
 
         Parameters
         ----------
         headers : iterable of (bytes, bytes)
             Names in lower case, as ASGI has them.
+        client : (str, int) or None
+            Address and port of the other end, where they are known.
 
         Raises
         ------
@@ -40,7 +46,7 @@ class Keyring:
             When it carries one that is not known.
         """
         if not self._digests:
-            return None
+            return address_of(client)
         sent = [value for name, value in headers if name == b"authorization"]
         if len(sent) != 1:
             raise MissingKeyError
@@ -56,3 +62,17 @@ class Keyring:
 
 def _digest(key: bytes) -> bytes:
     return hashlib.sha256(key).digest()
+
+
+@lru_cache(maxsize=256)
+def address_of(client: Client) -> Holder:
+    """Return who a client is by its address: of IPv6 the network, since one client has all of its addresses."""
+    if client is None:
+        return None
+    try:
+        address = ipaddress.ip_address(client[0].partition("%")[0])
+    except ValueError:
+        return client[0].encode()
+    if address.version == 4:
+        return address.packed
+    return address.ipv4_mapped.packed if address.ipv4_mapped is not None else address.packed[:8]

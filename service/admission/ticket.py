@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from .errors import AdmissionError
 from .fair_queue import Holder
 
 
@@ -21,18 +20,15 @@ class Expecting(Protocol):
 class Ticket:
     """One request's admission; made by `Entrance.admit`, taken by `SearchGate.run`.
 
-    Between the end of its body and the gate a request that is to search has a place that counts: without it all that
-    come together would find room.
+    From the end of its body until it reaches the gate, a request that is to search counts as taking a place. Without
+    that, requests that arrive together would all see the same free place.
 
     Parameters
     ----------
     holder : Holder
-        Whose key it came with.
+        Whose key it came with, or from which address.
     gate : Expecting, or None
         Where it is on its way to; None for what does not search.
-    key_error : type of AdmissionError, or None
-        What is wrong with its key, for routes that ask for one. The type alone: an exception that was raised would keep
-        everything that led to it.
 
     Attributes
     ----------
@@ -40,21 +36,13 @@ class Ticket:
         Whether it has had a turn: what was let in once is not sent away later.
     """
 
-    __slots__ = ("_announced", "_gate", "admitted", "holder", "key_error")
+    __slots__ = ("_announced", "_gate", "admitted", "holder")
 
-    def __init__(
-        self, holder: Holder = None, gate: Expecting | None = None, key_error: type[AdmissionError] | None = None
-    ) -> None:
+    def __init__(self, holder: Holder = None, gate: Expecting | None = None) -> None:
         self.holder = holder
-        self.key_error = key_error
         self.admitted = False
         self._gate = gate
         self._announced = False
-
-    def require_key(self) -> None:
-        """Raise what is wrong with the key, if anything is."""
-        if self.key_error is not None:
-            raise self.key_error
 
     def announce(self) -> None:
         """Say that the body is there and the request on its way to the gate."""

@@ -9,17 +9,27 @@ from dataclasses import dataclass
 
 from starlette.requests import Request
 
-from ..admission.budget import ByteBudget
+from ..admission.budget import ByteAccount, ByteBudget
+from ..admission.fair_queue import Holder
 from ..schemas.errors import BodyTooLargeError
 from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A body as it arrived."""
+    """A body as it arrived.
+
+    Attributes
+    ----------
+    data : bytearray
+    gzipped : bool
+    account : ByteAccount
+        Where its bytes are counted, and those that it unpacks to have to be.
+    """
 
     data: bytearray
     gzipped: bool
+    account: ByteAccount
 
 
 class BodyReceiver:
@@ -33,15 +43,19 @@ class BodyReceiver:
         Of all bodies that are being read or parsed.
     timeout : float
         Seconds that a request may take to arrive, its head included.
+    guarded : bool
+        Whether the service has keys. Without them a POST has to name its media type: one that a browser sends for the
+        page of another site cannot name JSON without asking first.
     """
 
-    def __init__(self, max_bytes: int, budget: ByteBudget, timeout: float) -> None:
+    def __init__(self, max_bytes: int, budget: ByteBudget, timeout: float, *, guarded: bool = True) -> None:
         self._max_bytes = max_bytes
         self._budget = budget
         self._timeout = timeout
+        self._guarded = guarded
 
     @asynccontextmanager
-    async def receiving(self, request: Request, arrived: float) -> AsyncIterator[Body]:
+    async def receiving(self, request: Request, arrived: float, holder: Holder = None) -> AsyncIterator[Body]:
         """Receive a body whole; its bytes count as held until the block ends.
 
         Parameters
@@ -49,6 +63,8 @@ class BodyReceiver:
         request : Request
         arrived : float
             When its first byte came, by the event loop's clock, seconds.
+        holder : Holder
+            Who sends it.
 
         Raises
         ------
@@ -56,13 +72,15 @@ class BodyReceiver:
             When it is no JSON by its head.
         BodyTooLargeError
             When it is larger than allowed.
-        TooMuchHeldError
-            When too much of all requests is in memory already.
+        TooMuchHeldError, ShareHeldError
+            When too much of all requests, or of this holder's, is in memory already.
         BodyTooSlowError
             When it does not come in time.
         """
+        if not self._guarded and request.method == "POST" and "content-type" not in request.headers:
+            raise MediaTypeError
         gzipped = _is_gzip(request)
-        with self._budget.account() as account:
+        with self._budget.account(holder) as account:
             data = bytearray()
             try:
                 async with asyncio.timeout_at(arrived + self._timeout):
@@ -73,7 +91,7 @@ class BodyReceiver:
                         data += piece
             except TimeoutError:
                 raise BodyTooSlowError(self._timeout) from None
-            yield Body(data, gzipped)
+            yield Body(data, gzipped, account)
 
 
 def _is_gzip(request: Request) -> bool:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+import time
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, TypeVar
 
@@ -12,10 +14,15 @@ from starlette.responses import Response
 
 from association import Deadline
 
+from ..admission.errors import DeadlinePassedError
+from ..maps.errors import StoreAwayError
+from ..maps.lookup import FoundMap
 from ..parsing.parser_process import LARGE
 from ..parsing.unpacking import unpack
 from ..schemas.limits import Limits
+from ..schemas.parts import InlineMap, SearchOptions, StoredMap
 from ..work.job import Done, Job, Stopwatch
+from .sending import json_response
 from .services import Services, services_of
 from .state import RequestState, state_of
 
@@ -23,7 +30,7 @@ T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]
 """From JSON to what was asked for; a function of a module, so that another process can call it."""
 
-JSON = "application/json"
+STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others for some seconds
 SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
 
 
@@ -66,11 +73,14 @@ class Exchange:
         """
         services = self.services
         limits, max_bytes = services.settings.limits(), services.settings.max_body_bytes
-        async with services.bodies.receiving(self._request, self._state.arrived) as body:
+        async with services.bodies.receiving(self._request, self._state.arrived, self._ticket.holder) as body:
             self._watch = Stopwatch()
             data = body.data
             if body.gzipped:
-                data = await services.parse_threads.run(partial(unpack, data, max_bytes))
+                packed = len(data)
+                data = await services.parse_threads.run(partial(unpack, data, max_bytes, body.account.take))
+                body.data.clear()
+                body.account.give_back(packed)
             if len(data) <= SMALL:
                 return reader(data, limits)
             if len(data) <= LARGE:
@@ -82,6 +92,37 @@ class Exchange:
         """Return what is to be done for this request; without a deadline of its own it has the service's."""
         deadline = self._watch.deadline(deadline_ms, self.services.settings.max_deadline_ms)
         return Job(self._state.request_id, self._watch, deadline)
+
+    @asynccontextmanager
+    async def looking_up(
+        self, asked: InlineMap | StoredMap, options: SearchOptions, deadline: Deadline
+    ) -> AsyncIterator[InlineMap | FoundMap]:
+        """Look a stored map up before its turn at the gate: a database that hangs holds up nobody else.
+
+        Its document counts as held until the block ends.
+
+        Raises
+        ------
+        StoreError
+            When it cannot be had.
+        TooMuchHeldError, ShareHeldError
+            When too much is held already.
+        DeadlinePassedError
+            When the deadline passes first.
+        """
+        if isinstance(asked, InlineMap):
+            yield asked
+            return
+        left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
+        find = partial(self.services.lookup.find, asked.map_id, oriented=options.oriented)
+        try:
+            async with asyncio.timeout(left):
+                found = await ask_store(self.services, find)
+        except TimeoutError:
+            raise DeadlinePassedError from None
+        with self.services.documents.account(self._ticket.holder) as account:
+            account.take(len(found.document or b""))
+            yield found
 
     async def search(self, call: Callable[[], T], deadline: Deadline) -> T:
         """Run a search when its turn comes; give up when the client does."""
@@ -118,9 +159,20 @@ class Exchange:
         return json_response(done.body)
 
 
-def json_response(data: bytes, status: int = 200, headers: dict[str, str] | None = None) -> Response:
-    """Return JSON that is encoded already."""
-    return Response(data, status, headers, JSON)
+async def ask_store(services: Services, call: Callable[[], T]) -> T:
+    """Return what the store says, in one of its threads.
+
+    Raises
+    ------
+    StoreError
+        When it cannot do what is asked, or does not answer in `STORE_SECONDS`. What was to be written may have been
+        written all the same.
+    """
+    try:
+        async with asyncio.timeout(STORE_SECONDS):
+            return await services.store_threads.run(call)
+    except TimeoutError:
+        raise StoreAwayError from None
 
 
 def searching(request: Request) -> Exchange:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from fastapi import FastAPI
@@ -9,6 +11,8 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from ..schemas import replies, requests
+from ..schemas.encoding import encode
+from ..threads import Threads
 
 DESCRIPTION = """
 Lays the line segments of a scan on those of a map and says where the scan was taken, how sure that is, and when it
@@ -44,3 +48,27 @@ def describe(app: FastAPI) -> dict[str, Any]:
     # A service without keys asks for none.
     document["security"] = [{"key": []}, {}]
     return document
+
+
+class Contract:
+    """The document as it is sent, one copy for all who read it; belongs to one event loop.
+
+    It takes some tenths of a second to make: in a thread, when it is asked for first, and never again.
+
+    Parameters
+    ----------
+    describe : callable
+        Returns the document.
+    threads : Threads
+    """
+
+    def __init__(self, describe: Callable[[], dict[str, Any]], threads: Threads) -> None:
+        self._describe = describe
+        self._threads = threads
+        self._making: asyncio.Future[bytes] | None = None
+
+    async def body(self) -> bytes:
+        """Return it as JSON; those who ask while it is made wait for the same."""
+        if self._making is None:
+            self._making = asyncio.ensure_future(self._threads.run(lambda: encode(self._describe())))
+        return await asyncio.shield(self._making)

@@ -55,7 +55,12 @@ TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (parsing.NotJsonError,)),
     Kind("invalid_http", 400, "The request is not HTTP", (http.NotHttpError,)),
     Kind("unauthorized", 401, "A key is needed", (admission.MissingKeyError,)),
-    Kind("forbidden", 403, "The key is not known", (admission.UnknownKeyError,)),
+    Kind(
+        "forbidden",
+        403,
+        "This may not be asked",
+        (admission.UnknownKeyError, admission.ForeignHostError, admission.ForeignOriginError),
+    ),
     Kind("not_found", 404, "There is nothing here", (http.NotFoundError,)),
     Kind("unknown_map", 404, "There is no such map", (maps.UnknownMapError,)),
     Kind("method_not_allowed", 405, "The method is not allowed here", (http.MethodNotAllowedError,)),
@@ -65,14 +70,20 @@ TABLE = (
     Kind("too_large", 413, "The request is over a limit", (TooManyError, BodyTooLargeError)),
     Kind("unsupported_media_type", 415, "The media type is not supported", (http.MediaTypeError, http.EncodingError)),
     Kind("invalid_request", 422, "The request is wrong", (InvalidRequestError, InputError, http.RefusedError)),
-    Kind("rate_limited", 429, "This key has used its share", (admission.ShareUsedError,)),
+    Kind("rate_limited", 429, "This key has used its share", (admission.ShareUsedError, admission.ShareHeldError)),
     Kind("internal", 500, "A defect of the service"),
     Kind("not_ready", 503, "The service is not ready", (admission.NotReadyError, maps.StoreAwayError, CancelledError)),
     Kind(
         "overloaded",
         503,
         "The service is busy",
-        (admission.QueueFullError, admission.TooMuchHeldError, maps.BusyStoreError, parsing.ParserEndedError),
+        (
+            admission.QueueFullError,
+            admission.TooManyConnectionsError,
+            admission.TooMuchHeldError,
+            maps.BusyStoreError,
+            parsing.ParserEndedError,
+        ),
     ),
     Kind("read_only", 503, "The store cannot be written", (maps.ReadOnlyStoreError,)),
     Kind("deadline_exceeded", 504, "The deadline passed before the search started", (admission.DeadlinePassedError,)),
@@ -135,7 +146,7 @@ def problem_of(error: Exception) -> Problem | None:
             return Problem(kind, str(error), error.faults)
         case TooManyError(pointer=pointer) if pointer:
             return Problem(kind, str(error), (Fault(pointer, str(error)),))
-    return Problem(kind, str(error), headers=_headers_of(error))
+    return Problem(kind, str(error), headers=headers_of(error))
 
 
 def _of_library(kind: Kind, error: InputError) -> Problem:
@@ -147,11 +158,12 @@ def _of_library(kind: Kind, error: InputError) -> Problem:
     return Problem(kind, str(wrong), wrong.faults)
 
 
-def _headers_of(error: Exception) -> Mapping[str, str]:
+def headers_of(error: Exception) -> Mapping[str, str]:
+    """Return the headers that say more of an error."""
     match error:
         case admission.MissingKeyError():
             return {"WWW-Authenticate": 'Bearer realm="linefix"'}
-        case BodyTooLargeError() | admission.TooMuchHeldError() | http.BodyTooSlowError():
+        case BodyTooLargeError() | admission.TooMuchHeldError() | admission.ShareHeldError() | http.BodyTooSlowError():
             return CLOSE
         case maps.RevisionConflictError(revision=int(revision)):
             return {"ETag": etag(revision)}

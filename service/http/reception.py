@@ -15,8 +15,6 @@ from .services import Services
 from .state import RequestState, attach, state_of
 
 logger = logging.getLogger("linefix")
-GUARDED = "/v1/"
-"""What asks for a key begins so; probes and pages stay open."""
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
 
 
@@ -29,7 +27,7 @@ def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
 
 
 class Reception:
-    """Pure ASGI: what wraps responses instead would hide a client that hung up.
+    """Written as plain ASGI: Starlette's `BaseHTTPMiddleware` would hide that a client hung up.
 
     A request comes with its ticket where the server has admitted it; otherwise it is admitted here.
     """
@@ -55,11 +53,13 @@ class Reception:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 identity = (b"x-request-id", state.request_id.encode("ascii"))
-                message["headers"] = [*message.get("headers", ()), identity]
+                closing = ((b"connection", b"close"),) if state.is_unread() else ()
+                message["headers"] = [*message.get("headers", ()), identity, *closing]
             await send(message)
 
         try:
-            self._admit(scope, state)
+            if state.ticket is None:
+                state.ticket = self._services.entrance.admit(scope)
             await self._app(inner, receive, send_with_id)
         except Exception as error:
             problem = problem_of(error)
@@ -72,12 +72,6 @@ class Reception:
             if state.ticket is not None:
                 state.ticket.arrive()
             self._tell(inner, scope["method"], status, time.perf_counter() - started)
-
-    def _admit(self, scope: Scope, state: RequestState) -> None:
-        if state.ticket is None:
-            state.ticket = self._services.entrance.admit(scope["method"], scope["path"], scope["headers"])
-        if scope["path"].startswith(GUARDED):
-            state.ticket.require_key()
 
     def _tell(self, scope: Scope, method: str, status: int, seconds: float) -> None:
         """Count and log a request; status 0 is a client that was gone before it was answered."""

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 from starlette.types import Scope
 
+from ..admission.budget import ByteBudget
+from ..admission.connections import ConnectionLimit
 from ..admission.entrance import Entrance
 from ..admission.gate import SearchGate
 from ..admission.readiness import Readiness
 from ..maps import MapStore
+from ..maps.lookup import MapLookup
 from ..parsing.parser_process import ParserProcess
 from ..settings import Settings
 from ..telemetry.metrics import Metrics
@@ -35,11 +38,17 @@ class Services:
     readiness : Readiness
     entrance : Entrance
     gate : SearchGate
+    connections : ConnectionLimit
     bodies : BodyReceiver
+    answers : ByteBudget
+        Bytes of large answers that are being read.
     parser : ParserProcess
         For large bodies.
     store : MapStore
     probe : StoreProbe
+    lookup : MapLookup
+    documents : ByteBudget
+        Bytes of stored maps that wait to be indexed.
     associator : Associator
     parse_threads, store_threads : Threads
     """
@@ -50,10 +59,14 @@ class Services:
     readiness: Readiness
     entrance: Entrance
     gate: SearchGate
+    connections: ConnectionLimit
     bodies: BodyReceiver
+    answers: ByteBudget
     parser: ParserProcess
     store: MapStore
     probe: StoreProbe
+    lookup: MapLookup
+    documents: ByteBudget
     associator: Associator
     parse_threads: Threads
     store_threads: Threads

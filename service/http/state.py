@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -26,12 +27,15 @@ class RequestState:
         Empty as long as it has none.
     noted : dict
         What the log is to say of it beside the usual.
+    is_unread : callable
+        Tells whether more of the body is left than can be read and dropped: then the answer ends the connection.
     """
 
     arrived: float
     ticket: Ticket | None = None
     request_id: str = ""
     noted: dict[str, object] = field(default_factory=dict)
+    is_unread: Callable[[], bool] = bool
 
 
 def attach(scope: Scope, state: RequestState) -> None:

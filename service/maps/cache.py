@@ -41,6 +41,11 @@ class IndexCache:
     def __len__(self) -> int:
         return len(self._ready)
 
+    def has(self, key: Hashable) -> bool:
+        """Tell whether a map is there."""
+        with self._lock:
+            return key in self._ready
+
     def get(self, key: Hashable, build: Callable[[], CachedMap]) -> CachedMap:
         """Return the map of a key, built by this caller or by the one that asked first."""
         with self._lock:

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import Connection
 
-from .errors import ReadOnlyStoreError
+from .errors import ReadOnlyStoreError, StoreAwayError
 
 BUSY_SECONDS = 5.0
 # Up to 3.51.2 a WAL that is reset while another connection checkpoints can corrupt the database.
@@ -18,11 +18,17 @@ SAFE_WAL = (3, 51, 3)
 
 
 def open_engine(url: URL) -> Engine:
-    """Return an engine; nothing is opened yet."""
+    """Return an engine; nothing is opened yet.
+
+    A file of SQLite's is opened where there is one, and never made: see `DatabaseFile`.
+    """
     if url.get_backend_name() == "sqlite":
         # No bound on connections: each is used by one thread, whose number is bounded elsewhere.
         # A statement that is kept keeps what it was last given, a document of 15 MB for each and every connection.
         waits = {"timeout": BUSY_SECONDS, "cached_statements": 0}
+        path = file_of(url)
+        if path is not None:
+            url = url.set(database=path.as_uri()).update_query_dict({"mode": "rw", "uri": "true"})
         engine = create_engine(url, connect_args=waits, max_overflow=-1)
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
@@ -35,24 +41,68 @@ def open_engine(url: URL) -> Engine:
     return engine
 
 
-def make_directory(url: URL) -> None:
-    """Make the directory of a database file, and sync the one that it appears in.
-
-    Raises
-    ------
-    ReadOnlyStoreError
-        When it cannot be made.
-    """
+def file_of(url: URL) -> Path | None:
+    """Return the file that a database is kept in; None where it is in no file of its own, or the URL says how."""
     if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:" or "uri" in url.query:
-        return
-    folder = Path(url.database).absolute().parent
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for made in missing:
-            _sync(made.parent)
-    except OSError as error:
-        raise ReadOnlyStoreError("the directory of the maps cannot be made") from error
+        return None
+    return Path(url.database).absolute()
+
+
+class DatabaseFile:
+    """The file of a database: made once, for its owner alone, and missed when it is gone.
+
+    Parameters
+    ----------
+    path : Path
+    may_make : bool
+        Whether it is made where there is none: not by who stands in for a process that had it.
+    """
+
+    def __init__(self, path: Path, *, may_make: bool) -> None:
+        self._path = path
+        self._may_make = may_make
+        self._known: tuple[int, int] | None = None
+
+    def require(self) -> None:
+        """Make the file where there never was one, and its directory.
+
+        Raises
+        ------
+        ReadOnlyStoreError
+            When it cannot be made.
+        StoreAwayError
+            When it was there, and is no longer: a new one in its place would hide that.
+        """
+        if self._known is None and self._may_make and not self._path.exists():
+            self._make()
+        try:
+            found = os.stat(self._path)
+        except OSError as error:
+            raise StoreAwayError("the file of the maps is gone") from error
+        self._known = (found.st_dev, found.st_ino)
+        self._may_make = False
+
+    @property
+    def is_the_same(self) -> bool:
+        """Whether the file is the one that was found last."""
+        try:
+            found = os.stat(self._path)
+        except OSError:
+            return False
+        return self._known == (found.st_dev, found.st_ino)
+
+    def _make(self) -> None:
+        folder = self._path.parent
+        missing = [one for one in (folder, *folder.parents) if not one.exists()]
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            for made in missing:
+                _sync(made.parent)
+            # What SQLite puts beside it later has the same permissions.
+            os.close(os.open(self._path, os.O_RDWR | os.O_CREAT, 0o600))
+            _sync(folder)
+        except OSError as error:
+            raise ReadOnlyStoreError("the file of the maps, or its directory, cannot be made") from error
 
 
 def _sync(folder: Path) -> None:

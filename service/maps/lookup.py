@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -12,14 +13,31 @@ from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
-from ..schemas.parts import InlineMap, StoredMap
+from ..schemas.parts import InlineMap
 from ..schemas.requests import MapDocument
 from .cache import CachedMap, IndexCache
+from .errors import BusyStoreError
 from .records import Bounds, MapRecord
 from .store import MapStore
 
 MAX_EXTENT = 1e5  # m
+OVERHEAD = 24_000  # bytes that an index takes beside its arrays, however small these are
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
+
+
+@dataclass(frozen=True, slots=True)
+class FoundMap:
+    """A stored map that is to be searched.
+
+    Attributes
+    ----------
+    record : MapRecord
+    document : bytes, or None
+        What is to be indexed; None where it was in the cache.
+    """
+
+    record: MapRecord
+    document: bytes | None
 
 
 class MapLookup:
@@ -38,8 +56,24 @@ class MapLookup:
         self._store = store
         self._parser = parser
 
-    def indexed(self, asked: InlineMap | StoredMap, *, oriented: bool) -> tuple[CachedMap, int | None]:
-        """Return a map ready to be searched, and its revision where it is a stored one.
+    def find(self, map_id: str, *, oriented: bool) -> FoundMap:
+        """Look a stored map up, with its document where it is not indexed yet; runs in a thread that may wait.
+
+        Looked up before every use, so that a change by another worker is never missed.
+
+        Raises
+        ------
+        StoreError
+            When no such map is stored, or it is damaged, or the store does not answer.
+        """
+        record = self._store.record(map_id)
+        if self._cache.has((record, oriented)):
+            return FoundMap(record, None)
+        stored = self._store.load(map_id)
+        return FoundMap(stored.record, stored.document)
+
+    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool) -> CachedMap:
+        """Return a map ready to be searched.
 
         Whether its directions count makes it another index, with a place of its own in the cache.
 
@@ -48,39 +82,36 @@ class MapLookup:
         Raises
         ------
         StoreError
-            When no such map is stored, or it is damaged, or the store does not answer.
+            When a stored map has left the cache since it was found, and cannot be had again.
         ParserEndedError
             When the process that parses a large one ends meanwhile.
         InvalidSegmentsError, InvalidMapError
             When the map of the request cannot be searched.
         """
-        if isinstance(asked, InlineMap):
-            # Robots send the same map with every scan: what is in it names it.
-            digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
-            key = digest, asked.sigma, asked.frame_id, oriented
-            return self._cache.get(key, lambda: self._index(asked, oriented)), None
-        while True:
-            # Looked up before every use, so that a change by another worker is never missed.
-            record = self._store.record(asked.map_id)
-            try:
-                return self._cache.get((record, oriented), partial(self._load, record, oriented)), record.revision
-            except _ChangedError:
-                continue
+        if isinstance(asked, FoundMap):
+            return self._cache.get((asked.record, oriented), partial(self._read, asked, oriented))
+        # Robots send the same map with every scan: what is in it names it.
+        digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
+        key = digest, asked.sigma, asked.frame_id, oriented
+        return self._cache.get(key, lambda: self._index(asked, oriented))
 
-    def _load(self, record: MapRecord, oriented: bool) -> CachedMap:
-        stored = self._store.load(record.map_id)
-        if stored.record != record:
-            raise _ChangedError
-        if len(stored.document) > LARGE:
-            return self._index(self._parser.call(read_stored, stored.document), oriented)
-        return self._index(read_stored(stored.document), oriented)
+    def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
+        document = found.document
+        if document is None:
+            stored = self._store.load(found.record.map_id)
+            if stored.record != found.record:
+                raise BusyStoreError  # changed since, and out of the cache meanwhile
+            document = stored.document
+        if len(document) > LARGE:
+            return self._index(self._parser.call(read_stored, document), oriented)
+        return self._index(read_stored(document), oriented)
 
     def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
         # The old goes before the new comes: two of the largest at once would take too much.
         self._cache.make_room(INDEXED_BYTES * len(asked.segments) * (1 if oriented else 2))
         segments = Segments.from_array(asked.segments, argument="map.segments")
         index = MapIndex.build(segments, asked.sigma, oriented=oriented)
-        return CachedMap(index, asked.frame_id, index.nbytes)
+        return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
 
 
 def summary_of(document: MapDocument) -> tuple[int, Bounds]:
@@ -100,7 +131,3 @@ def summary_of(document: MapDocument) -> tuple[int, Bounds]:
     # No negative zeros: not every database keeps them.
     low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
     return len(segments), (low[0], low[1], high[0], high[1])
-
-
-class _ChangedError(Exception):
-    """The map was changed between the look at its revision and its loading."""

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from .database import make_directory, open_engine
+from .database import DatabaseFile, file_of, open_engine
 from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, UnknownMapError
 from .failures import damaged, failures_as_store_errors
 from .preconditions import Preconditions
@@ -25,21 +25,32 @@ logger = logging.getLogger("linefix")
 class MapStore:
     """Keeps maps in a database; safe to use from several threads and processes.
 
+    Parameters
+    ----------
+    url : URL
+    may_make : bool
+        Whether the file of a database of SQLite's is made where there is none.
+
     Raises
     ------
     StoreError
         From every method: when the database is full, read-only, busy, damaged or away.
     """
 
-    def __init__(self, url: URL) -> None:
-        self._url = url
+    def __init__(self, url: URL, *, may_make: bool = True) -> None:
+        path = file_of(url)
+        self._file = None if path is None else DatabaseFile(path, may_make=may_make)
         self._engine: Engine = open_engine(url)
         self._writer = self._engine.execution_options(writes=True)
         self._opened = False
 
     def open(self) -> None:
         """Make sure that the tables exist and are of this version; the other methods do it where nobody has."""
-        make_directory(self._url)
+        if self._file is not None:
+            if self._opened and not self._file.is_the_same:
+                # Connections to a file that was moved away go on with it: what they write nobody would find again.
+                self._engine.dispose()
+            self._file.require()
         upgrade(self._engine, self._writer)
         self._opened = True
 
@@ -55,7 +66,7 @@ class MapStore:
         The transaction is on the disk when this returns, and was read back. A damaged map is replaced as any other.
         """
         written = self._twice(lambda: self._put(map_id, document, summary, demands))
-        # From damaged tables others may read other rows than who wrote them sees: no promise then.
+        # In damaged tables another connection may read other rows than the one that wrote: look before promising.
         with suppress(UnknownMapError):  # deleted by another meanwhile
             self.load(map_id)
         return written
@@ -128,17 +139,19 @@ class MapStore:
         with suppress(StoreError), self._writing() as connection:
             connection.execute(update(maps).where(*same).values(quarantined=True))
 
+    def _require_open(self) -> None:
+        if not self._opened or (self._file is not None and not self._file.is_the_same):
+            self.open()
+
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
-        if not self._opened:
-            self.open()
+        self._require_open()
         with failures_as_store_errors(), self._engine.begin() as connection:
             yield connection
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
-        if not self._opened:
-            self.open()
+        self._require_open()
         with failures_as_store_errors(), self._writer.begin() as connection:
             yield connection
 

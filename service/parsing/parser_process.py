@@ -56,8 +56,8 @@ class ParserProcess:
             When the process ends meanwhile; the next call has a new one.
         """
         with self._lock:
-            connection = self._started()
             try:
+                connection = self._started()
                 send(connection, (function, *map(_wrapped, arguments)))
                 found, error = receive(connection)
             except (OSError, EOFError):
@@ -83,12 +83,16 @@ class ParserProcess:
             ours, theirs = socket.socketpair()
             with theirs:
                 # In a group of its own, so that Ctrl-C is for the service, which then ends this.
-                self._process = subprocess.Popen(
-                    [sys.executable, "-m", __name__, str(theirs.fileno())],
-                    pass_fds=[theirs.fileno()],
-                    process_group=0,
-                    stdin=subprocess.DEVNULL,
-                )
+                try:
+                    self._process = subprocess.Popen(
+                        [sys.executable, "-m", __name__, str(theirs.fileno())],
+                        pass_fds=[theirs.fileno()],
+                        process_group=0,
+                        stdin=subprocess.DEVNULL,
+                    )
+                except OSError:  # no memory, or no descriptors
+                    ours.close()
+                    raise
             self._connection = Connection(ours.detach())
         return self._connection
 

@@ -75,7 +75,7 @@ def parse(data: bytes | bytearray, limits: Limits) -> Any:
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as error:
-        # The message of the parser speaks of the kind of error and its place, not of the text.
+        # The parser's message names the kind of error and its place, and repeats nothing of the text.
         what = f"{error.msg} at line {error.lineno} column {error.colno}"
         if _NO_NUMBER.match(error.doc, error.pos):
             what += ": NaN and Infinity are not JSON; a range without a return is null"

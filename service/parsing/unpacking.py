@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 
 from ..schemas.errors import BodyTooLargeError
 from .errors import NotJsonError
@@ -11,7 +12,7 @@ _PIECE = 1 << 20  # bytes that are unpacked at a time
 _GZIP = zlib.MAX_WBITS | 16
 
 
-def unpack(packed: bytes | bytearray, max_bytes: int) -> bytearray:
+def unpack(packed: bytes | bytearray, max_bytes: int, take: Callable[[int], None]) -> bytearray:
     """Return what one gzip member holds; takes a while for a large one.
 
     Parameters
@@ -19,6 +20,8 @@ def unpack(packed: bytes | bytearray, max_bytes: int) -> bytearray:
     packed : bytes or bytearray
     max_bytes : int
         That it may unpack to; more is never held.
+    take : callable
+        Told how many bytes more there are, piece by piece; what it raises ends this.
 
     Raises
     ------
@@ -34,7 +37,9 @@ def unpack(packed: bytes | bytearray, max_bytes: int) -> bytearray:
         for begin in range(0, len(whole), _PIECE):
             rest: bytes | memoryview = whole[begin : begin + _PIECE]
             while rest and not stream.eof:
-                unpacked += stream.decompress(rest, max_bytes + 1 - len(unpacked))
+                piece = stream.decompress(rest, min(_PIECE, max_bytes + 1 - len(unpacked)))
+                take(len(piece))
+                unpacked += piece
                 rest = stream.unconsumed_tail
                 if len(unpacked) > max_bytes:
                     raise BodyTooLargeError(max_bytes)

@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 import threading
+from collections.abc import Callable
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -50,3 +51,10 @@ def drain_on_signals(services: Services, loop: asyncio.AbstractEventLoop) -> Non
 
     for number in HANDLED_SIGNALS:
         signal.signal(number, handle)
+    drain_on_hang_up(lambda: handle(signal.SIGTERM, None))
+
+
+def drain_on_hang_up(drain: Callable[[], None]) -> None:
+    """Have SIGHUP end the process as SIGTERM does, unless it was started so as to outlive its terminal."""
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda *_: drain())

@@ -9,6 +9,7 @@ from ..settings import Settings
 
 logger = logging.getLogger("linefix")
 BACKLOG = 512
+BUFFER = 262_144  # bytes; enough for some megabytes a second across a continent
 
 
 def listen(settings: Settings) -> socket.socket:
@@ -21,16 +22,12 @@ def listen(settings: Settings) -> socket.socket:
     """
     family, _, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
     listener = socket.create_server(address[:2], family=family, backlog=BACKLOG)
-    _prepare(listener, settings.request_timeout)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        # Accepted connections inherit it: an end when a client acknowledges nothing of an answer for so long.
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1e3 * settings.request_timeout))
+    # By itself the system lets each connection have several megabytes of what nobody takes, in both directions.
+    for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+        listener.setsockopt(socket.SOL_SOCKET, option, BUFFER)
     host, port = listener.getsockname()[:2]
     logger.info("listening", extra={"host": host, "port": port})
     return listener
-
-
-def _prepare(listener: socket.socket, seconds: float) -> None:
-    """Set what accepted connections inherit: no delay, and an end when a client takes nothing of an answer for long."""
-    # asyncio does this for sockets whose protocol number is given, which that of an accepted one is not. Without it the
-    # second part of an answer waits 40 ms for the client to acknowledge the first.
-    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):
-        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1e3 * seconds))

@@ -64,6 +64,7 @@ def config_of(settings: Settings, factory: Callable[[], FastAPI]) -> uvicorn.Con
         access_log=False,
         proxy_headers=False,
         server_header=False,
+        headers=[("X-Content-Type-Options", "nosniff")],
         workers=settings.workers,
         timeout_keep_alive=IDLE_SECONDS,
         timeout_graceful_shutdown=GRACE + 1,
@@ -74,7 +75,7 @@ def config_of(settings: Settings, factory: Callable[[], FastAPI]) -> uvicorn.Con
 
 def build(settings: Settings, part: Part) -> FastAPI:
     """Prepare this process, and return the application; called by uvicorn in its event loop."""
-    # What computes is not loaded into a process that only looks after others.
+    # Imported here: the supervisor imports this module, and needs neither Numba nor SciPy.
     from ..app import create_app
 
     return_large_blocks()

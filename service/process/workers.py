@@ -50,6 +50,10 @@ class Supervisor(Multiprocess):
                 process.process.kill()
         super().join_all()
 
+    def handle_hup(self) -> None:
+        """End as at SIGTERM; by itself it would start all workers anew, each of which has had the signal, too."""
+        self.handle_term()
+
     @property
     def status(self) -> int:
         """The status to exit with: 0 when all ended as they were told."""
@@ -81,7 +85,8 @@ def build_worker(settings: Settings, directory: Path) -> FastAPI:
 def take_part(directory: Path, workers: int) -> tuple[Part, FileLock]:
     """Return the first part that nobody has, and the lock that says so; the system takes it from whoever dies.
 
-    Who takes the part of another stands in for it, as does who comes while nobody has gone yet.
+    A worker replaces another when it takes a part that was in use before, and when it comes while all parts are taken:
+    workers that are exchanged start before the old ones end.
     """
     for index in count():
         path = directory / f"worker-{index}"
@@ -110,7 +115,7 @@ def _follow_parent() -> None:
 def watch_loop(loop: asyncio.AbstractEventLoop, seconds: float) -> None:
     """End this process when its event loop stands still; uvicorn only sees whether any of its threads answers.
 
-    Looks are counted, not seconds: when everything was stopped for a while it takes as many again.
+    Looks are counted, not seconds: a process that was suspended for a while is not taken for one that hangs.
     """
     turned = threading.Event()
 

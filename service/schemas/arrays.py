@@ -174,8 +174,9 @@ Weights = Annotated[
 def _covariance(value: Any) -> Floats:
     if type(value) is not list:
         raise PydanticCustomError("not_an_array", "expected an array")
-    matrix = _rows(value, 3, NUMBERS, -_M, _M)
-    if matrix.shape != (3, 3):
+    # A few more than are right are looked at, for what is wrong with them.
+    matrix = _rows(value[:MAX_FAULTS], 3, NUMBERS, -_M, _M)
+    if len(value) != 3 or matrix.shape != (3, 3):
         raise PydanticCustomError("covariance", "expected 3 rows of 3 numbers")
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
         raise PydanticCustomError("covariance", "expected a symmetric matrix")

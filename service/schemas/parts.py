@@ -21,8 +21,8 @@ from .arrays import (
 from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
-RaySigma = Annotated[float, Field(gt=0.0, le=10.0)]
-IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map"]
+RaySigma = Annotated[float, Field(ge=1e-6, le=10.0)]
+IncludeName = Literal["correspondences", "alternatives", "segments", "missing_map", "causes"]
 EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segments", "missing_map")
 
 # Union tags; in brackets, so that no field of a request is ever taken for one.
@@ -38,7 +38,9 @@ class InlineMap(Strict):
     """A map in the request itself."""
 
     segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
-    sigma: MapSigma = Field(0.0, description="standard deviation of the map's lines normal to themselves, metres")
+    sigma: MapSigma | None = Field(
+        None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
+    )
     frame_id: FrameId = "map"
 
 
@@ -81,7 +83,9 @@ class MeasuredFields(Strict):
     sigma: SigmaOrSigmas = Field(
         0.02, description="standard deviation of single points normal to the wall, metres; of all or of each segment"
     )
-    points: PointCounts | None = Field(None, description="points behind each segment; default max(2, length / 0.05)")
+    points: PointCounts | None = Field(
+        None, description="points behind each segment; default length / 0.05, and 2 behind all of one wall"
+    )
     centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
     spreads: Spreads | None = Field(None, description="their second moment along the segment, m^2; with `centroids`")
 
@@ -194,7 +198,10 @@ class SearchOptions(Strict):
     max_alternatives: Annotated[int, Field(ge=0, le=100)] = 5
     confidence: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9999
     exhaustive: bool = False
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of random sampling")
+    sampling: Literal["ordered", "random"] = Field(
+        "ordered", description="how bases are drawn: the telling and cheap ones first, or by `seed`"
+    )
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
         None, description="milliseconds; at most `max_deadline_ms` of /v1/limits, which a longer one is cut to"
     )
@@ -204,4 +211,8 @@ class SearchOptions(Strict):
     min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     estimator: Literal["joint", "one_step"] = "joint"
     rotation: Literal["wahba", "mitsuta"] = "wahba"
-    include: list[IncludeName] = Field(default_factory=lambda: list(EVERYTHING))
+    include: list[IncludeName] = Field(
+        default_factory=lambda: list(EVERYTHING),
+        max_length=16,
+        description="parts of the answer; `causes`, which costs time, only where it is named",
+    )

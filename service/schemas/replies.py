@@ -86,8 +86,18 @@ class AlternativeAnswer(Answer):
     pose: PoseAnswer
     covariance: Matrix | None
     score: float
+    ambiguity: AmbiguityAnswer
     reliability: float
     inlier_fraction: float
+
+
+class HingeAnswer(Answer):
+    """The wall that a pose hinges on."""
+
+    scan: list[Index]
+    map: list[Index]
+    direction: Row2 = Field(description="unit vector in the map frame")
+    moves: float = Field(description="metres")
 
 
 class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
@@ -98,6 +108,7 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
     runner_up: float | None = Field(description="score of the best other pose over `score`")
     margin: float | None = Field(description="`score` minus that of the best other pose, nats")
     significance: float = Field(description="probability that chance scores as high; small is good")
+    hinges_on: HingeAnswer | None = Field(description="the wall without which the pose would move most or be free")
 
 
 class SearchAnswer(Answer):
@@ -110,10 +121,19 @@ class SearchAnswer(Answer):
     hypotheses: Index
     verified: Index
     seed: int
+    sampling: Literal["ordered", "random"]
+    rivals_above: float = Field(description="share of the best score above which no rival was missed")
 
 
 class WarningAnswer(Answer):
     """Something to know."""
+
+    code: str
+    message: str
+
+
+class ReasonAnswer(Answer):
+    """Why an answer is not usable."""
 
     code: str
     message: str
@@ -142,6 +162,7 @@ class FoundAnswer(Answer):
     unmatched_scan: list[Index]
     missing_map: list[Index] = Field([], description="where included: map segments that should have been seen")
     diagnostics: AssociationDiagnosticsAnswer | None
+    reasons: list[ReasonAnswer] = Field(description="why not usable, the weightiest first")
     alternatives: list[AlternativeAnswer] = Field([], description="where included: distinct poses, best first")
     search: SearchAnswer
     segments: list[Row4] | None = Field(None, description="where included, and the scan came as ranges or points")
@@ -246,6 +267,8 @@ class Limits(Answer):
     max_body_bytes: int = Field(description="of a request, unpacked")
     max_values: int = Field(description="numbers, strings, arrays and objects in a request")
     max_bodies_bytes: int = Field(description="of all requests being read at once, by one of several workers")
+    max_answers_bytes: int = Field(description="of large answers that wait to be read, in one of several workers")
+    max_connections: int = Field(description="open at once, of one address half of that")
     request_timeout: float = Field(description="seconds that a request may take to arrive, head and body")
     max_map_segments: int
     max_scan_segments: int

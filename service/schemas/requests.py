@@ -18,7 +18,9 @@ class KnownMap(Strict):
     """The map side of known correspondences."""
 
     segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres")
-    sigma: Sigma = Field(0.0, description="standard deviation of the map's lines normal to themselves, metres")
+    sigma: Sigma | None = Field(
+        0.0, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
+    )
 
 
 class EstimatorOptions(Strict):
@@ -108,6 +110,8 @@ class MapDocument(Strict):
     """A map to be stored."""
 
     segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
-    sigma: MapSigma = Field(0.0, description="standard deviation of the map's lines normal to themselves, metres")
+    sigma: MapSigma | None = Field(
+        None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
+    )
     frame_id: FrameId = "map"
     meta: FreeJson = Field(None, description="given back as it was sent")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import chain, islice
 from typing import Annotated, Any
 
 import orjson
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
+
+from .limits import MAX_FAULTS
 
 MAX_MAGNITUDE = 1e9
 MAX_FREE_BYTES = 16_384
@@ -19,6 +22,15 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _few_unknown(cls, value: Any) -> Any:
+        """Leave out all unknown fields but as many as are told: each would become an error before any is looked at."""
+        if not isinstance(value, dict) or len(value) <= len(cls.model_fields) + MAX_FAULTS:
+            return value
+        unknown = islice((name for name in value if name not in cls.model_fields), MAX_FAULTS)
+        return {name: value[name] for name in chain(cls.model_fields.keys() & value.keys(), unknown)}
+
 
 class Answer(BaseModel):
     """What is answered: documents the JSON, is never built while answering."""
@@ -27,9 +39,12 @@ class Answer(BaseModel):
 
 
 def _free_json(value: Any) -> Any:
-    layer, depth = [value], 0
+    layer, depth, count = [value], 0, 0
     while layer:
         depth += 1
+        count += len(layer)
+        if count > MAX_FREE_BYTES:  # each takes one at least
+            raise PydanticCustomError("too_long", f"longer than {MAX_FREE_BYTES} bytes of JSON")
         if depth > MAX_FREE_DEPTH:
             raise PydanticCustomError("too_deep", f"nested more than {MAX_FREE_DEPTH} levels deep")
         inner: list[Any] = []

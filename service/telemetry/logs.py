@@ -1,13 +1,25 @@
-"""The log: one JSON object a line, on stderr."""
+"""The log: one JSON object a line, on stderr.
+
+Who reads it may be slow, or asleep. The service does not wait for that: lines that find no room are counted, and the
+count is told when there is room again.
+"""
 
 from __future__ import annotations
 
 import logging
+import os
+import queue
+import threading
+import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
 
 import orjson
 
+STDERR = 2
+WAITING_LINES = 4096  # that are kept for a reader who is late
+LAST_SECONDS = 0.5  # that an ending process waits for the reader
 _USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
 
 
@@ -28,13 +40,63 @@ class JsonFormatter(logging.Formatter):
         return orjson.dumps(line, default=str).decode()
 
 
+class PatientHandler(logging.Handler):
+    """Hands lines to a thread that writes them to stderr."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lines: queue.Queue[str | None] = queue.Queue(WAITING_LINES)
+        self._lost = 0
+        self._thread = threading.Thread(target=self._write_all, name="log", daemon=True)
+        self._thread.start()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Format a record and hand it over."""
+        try:
+            self._lines.put_nowait(self.format(record))
+        except queue.Full:
+            self._lost += 1
+        except Exception:
+            self.handleError(record)
+
+    def flush(self) -> None:
+        """Wait for what was handed over to be written, for a moment."""
+        give_up = time.monotonic() + LAST_SECONDS
+        while self._lines.unfinished_tasks and self._thread.is_alive() and time.monotonic() < give_up:
+            time.sleep(0.002)
+
+    def close(self) -> None:
+        """Write what is left and end."""
+        self.flush()
+        with suppress(queue.Full):
+            self._lines.put_nowait(None)
+        super().close()
+
+    def _write_all(self) -> None:
+        while (line := self._lines.get()) is not None:
+            lost, self._lost = self._lost, 0
+            if lost:
+                record = logging.LogRecord("linefix", logging.WARNING, "", 0, "lines of the log were lost", None, None)
+                record.count = lost
+                line = self.format(record) + "\n" + line
+            with suppress(OSError):  # nobody reads it any more
+                _write(line.encode("utf-8", "backslashreplace") + b"\n")
+            self._lines.task_done()
+
+
+def _write(data: bytes) -> None:
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(STDERR, rest) :]
+
+
 def log_config(level: str) -> dict[str, Any]:
     """Return what sends every logger of a process to stderr, as JSON; in the form of `logging.config.dictConfig`."""
     return {
         "version": 1,
         "disable_existing_loggers": False,
         "formatters": {"json": {"()": JsonFormatter}},
-        "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+        "handlers": {"stderr": {"class": f"{__name__}.PatientHandler", "formatter": "json"}},
         "root": {"level": level.upper(), "handlers": ["stderr"]},
         # Numba tells every pass of its compiler at debug, Alembic each start that nothing had to be done.
         "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},

@@ -1,9 +1,10 @@
-"""What Prometheus is told."""
+"""Metrics for Prometheus."""
 
 from __future__ import annotations
 
 import asyncio
 import os
+import time
 from collections.abc import Callable
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest, multiprocess, values
@@ -14,6 +15,7 @@ _SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5
 _METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH"))
 _DIRECTORY = "PROMETHEUS_MULTIPROC_DIR"
 REFRESH_SECONDS = 0.5
+EXPOSITION_SECONDS = 0.2  # between two texts; one takes 10 ms of the event loop, more of several workers
 
 
 def share_counts(directory: str, index: int) -> None:
@@ -36,6 +38,8 @@ class Metrics:
     def __init__(self) -> None:
         self.registry = made = CollectorRegistry()
         self._watched: list[tuple[Gauge, Callable[[], float]]] = []
+        self._text: asyncio.Future[bytes] | None = None
+        self._text_after = 0.0
         self.requests = Counter(
             "linefix_http_requests", "Requests answered", ("route", "method", "status"), registry=made
         )
@@ -87,7 +91,24 @@ class Metrics:
         self.search_seconds.observe(seconds)
         self.hypotheses.inc(hypotheses)
 
-    def exposition(self) -> bytes:
+    async def exposition(self) -> bytes:
+        """Return the text that Prometheus reads, as things stand now; however many ask, a few of them in a second.
+
+        Who asks soon after another waits, together with all who do so meanwhile.
+        """
+        if self._text is None:
+            self._text = asyncio.ensure_future(self._next_text())
+        return await asyncio.shield(self._text)
+
+    async def _next_text(self) -> bytes:
+        await asyncio.sleep(max(0.0, self._text_after - time.monotonic()))
+        self._text = None
+        try:
+            return self.rendered()
+        finally:
+            self._text_after = time.monotonic() + EXPOSITION_SECONDS
+
+    def rendered(self) -> bytes:
         """Return the text that Prometheus reads."""
         self.refresh()
         directory = os.environ.get(_DIRECTORY)

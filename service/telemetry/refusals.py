@@ -1,6 +1,6 @@
-"""What is refused before the application sees it, counted and logged once a second.
+"""Refusals that the application never sees, counted and logged once a second.
 
-Under a flood the answers "no" are what costs: nothing of a search may be left for them.
+Under a flood there are thousands a second. A line in the log for each would take time from the searches.
 """
 
 from __future__ import annotations

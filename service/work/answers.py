@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Alternative, AssociationResult, Correspondence
+from association import Alternative, AssociationResult, Correspondence, Hinge
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
 
@@ -89,8 +89,21 @@ def alternative_json(other: Alternative) -> Json:
         "pose": pose_json(other.pose),
         "covariance": matrix_json(other.covariance),
         "score": other.score,
+        "ambiguity": ambiguity_json(other.ambiguity),
         "reliability": other.reliability,
         "inlier_fraction": other.inlier_fraction,
+    }
+
+
+def hinge_json(hinge: Hinge | None) -> Json | None:
+    """Return the wall that a pose hinges on."""
+    if hinge is None:
+        return None
+    return {
+        "scan": list(hinge.scan),
+        "map": list(hinge.map),
+        "direction": list(hinge.direction),
+        "moves": hinge.moves,
     }
 
 
@@ -115,7 +128,9 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
             "runner_up": diagnostics.runner_up,
             "margin": diagnostics.margin,
             "significance": diagnostics.significance,
+            "hinges_on": hinge_json(diagnostics.hinges_on),
         },
+        "reasons": [{"code": reason.code, "message": reason.message} for reason in result.reasons],
         "search": {
             "complete": search.complete,
             "exhaustive": search.exhaustive,
@@ -124,6 +139,8 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
             "hypotheses": search.hypotheses,
             "verified": search.verified,
             "seed": search.seed,
+            "sampling": search.sampling,
+            "rivals_above": search.rivals_above,
         },
         "warnings": [{"code": warning.code, "message": warning.message} for warning in result.warnings],
     }

@@ -11,9 +11,9 @@ from association import CancelledError, Deadline, associate
 
 from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap
-from ..maps.lookup import MapLookup
+from ..maps.lookup import FoundMap, MapLookup
 from ..schemas.encoding import require_finite
-from ..schemas.parts import InlineMap, SearchOptions, StoredMap
+from ..schemas.parts import InlineMap, SearchOptions
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..telemetry.metrics import Metrics
 from .answers import Json, association_json
@@ -50,17 +50,17 @@ class Associator:
     lookup: MapLookup
     metrics: Metrics
 
-    def answer(self, asked: AssociateRequest, job: Job) -> Done:
+    def answer(self, asked: AssociateRequest, on: InlineMap | FoundMap, job: Job) -> Done:
         """Find one scan in one map; raises what `target` and `find` raise."""
-        target = self.target(asked.map, asked.options)
+        target = self.target(on, asked.options)
         job.watch.lap("decode")
         found = self.find(target, asked, asked.options, job.deadline)
         job.watch.lap("search")
         answer = {**found, "map": target.reference, "client_ref": asked.client_ref}
         return job.done(answer, map=target.reference, verdict=found["status"], usable=found["usable"])
 
-    def target(self, asked: InlineMap | StoredMap, options: SearchOptions) -> Target:
-        """Return the map that is asked for, indexed.
+    def target(self, on: InlineMap | FoundMap, options: SearchOptions) -> Target:
+        """Return a map, indexed.
 
         Raises
         ------
@@ -71,9 +71,9 @@ class Associator:
         InputError
             When it cannot be searched.
         """
-        cached, revision = self.lookup.indexed(asked, oriented=options.oriented)
-        if isinstance(asked, StoredMap):
-            return Target(cached, {"map_id": asked.map_id, "revision": revision})
+        cached = self.lookup.indexed(on, oriented=options.oriented)
+        if isinstance(on, FoundMap):
+            return Target(cached, {"map_id": on.record.map_id, "revision": on.record.revision})
         return Target(cached, None)
 
     def find(

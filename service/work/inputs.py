@@ -62,10 +62,12 @@ def association_options_of(options: SearchOptions) -> AssociationOptions:
         confidence=options.confidence,
         exhaustive=options.exhaustive,
         seed=options.seed,
+        sampling=options.sampling,
         oriented=options.oriented,
         offset_tolerance=options.offset_tolerance,
         angle_tolerance=options.angle_tolerance,
         min_overlap=options.min_overlap,
+        causes="causes" in options.include,
         estimator=options.estimator,
         rotation=options.rotation,
     )

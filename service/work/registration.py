@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from registration import Segments, register
+from registration import Segments, register, register_estimating
 
 from ..schemas.requests import RegisterRequest
 from .answers import registration_json
@@ -23,6 +23,10 @@ def answer_registration(asked: RegisterRequest, job: Job) -> Done:
     pairs = pairs_of(asked, len(map_segments), len(scan))
     options = registration_options_of(asked)
     job.watch.lap("decode")
-    result = register(map_segments, scan, pairs, asked.map.sigma, options)
+    sigma = asked.map.sigma
+    if sigma is None:
+        result = register_estimating(map_segments, scan, pairs, options)
+    else:
+        result = register(map_segments, scan, pairs, sigma, options)
     job.watch.lap("search")
     return job.done(registration_json(result, pairs))

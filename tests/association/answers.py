@@ -13,8 +13,9 @@ from association import Prior, SearchReport
 from association.acceptance import Accepted
 from association.context import SearchContext
 from association.explain import Answer, Explanations
-from association.layout import MATCH
+from association.layout import HINGE, MATCH
 from association.ranking import Ranked
+from association.settling import Settled
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 
@@ -56,7 +57,19 @@ def ranked(
     **merits: Any,
 ) -> Ranked:
     """Return an explanation of a scan of 8 segments; `at` in the index frame, `prior` what one says of it."""
-    named = {"inside": True, "length": 30.0, "share": 0.9, "reliability": 0.8, "misfit": 1.0, **merits}
+    usual = {
+        "inside": True,
+        "cost": 6.0,
+        "one_step_cost": 9.0,
+        "length": 30.0,
+        "share": 0.9,
+        "reliability": 0.8,
+        "misfit": 1.0,
+        "blocked": 0.0,
+        "read": 0.0,
+        "passed": 0.0,
+    }
+    named: dict[str, Any] = {**usual, **merits}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
     matches = matches_of([k if k < matched else -1 for k in range(8)])
     return Ranked(estimate_of(found, covariance), score, score + prior, matches=matches, **named)
@@ -77,25 +90,51 @@ def registered_corridor() -> RegistrationResult:
     return register(segments, MeasuredSegments.from_segments(Segments.from_array(ends)), [[0, 0], [1, 1]])
 
 
-def deviating(x: float, y: float, correlation: float = 0.0) -> RegistrationResult:
-    """Return a fixed pose whose position has these deviations."""
-    xy = correlation * x * y
-    return replace(registered_room(), covariance=np.array([[x * x, xy, 0.0], [xy, y * y, 0.0], [0.0, 0.0, 1e-4]]))
+def hinges_of(*each: tuple[int, float, float]) -> Records:
+    """Return what a pose would be without some walls: the wall, by how much it moves, and its deviation then."""
+    hinges = np.zeros(len(each), HINGE)
+    for one, (wall, moves, deviation) in zip(hinges, each, strict=True):
+        one["wall"], one["moves"], one["deviation"], one["dx"], one["dy"] = wall, moves, deviation, 0.6, 0.8
+    return hinges
+
+
+def settled_of(
+    registered: RegistrationResult,
+    hinges: Records | None = None,
+    weakest: float | None = None,
+    wall_sigma: float = 0.015,
+) -> Settled:
+    """Return a pose as registration has it, worked out with the error of walls; it hinges on none, or on these."""
+    covariance = SHARP if registered.covariance is None else registered.covariance
+    values, vectors = np.linalg.eigh(covariance[:2, :2])
+    along = vectors[:, 1] * (1.0 if vectors[0, 1] >= 0.0 else -1.0)
+    return Settled(
+        pose=local(ROOM_INDEX, registered.pose or INSIDE),
+        covariance=covariance,
+        wall_sigma=wall_sigma,
+        weakest=float(np.sqrt(values[1])) if weakest is None else weakest,
+        direction=registered.unobservable or (float(along[0]), float(along[1])),
+        free=registered.degenerate,
+        parallel=registered.degenerate,
+        hinges=hinges_of() if hinges is None else hinges,
+    )
 
 
 def answer_with(
     best: Ranked,
     registered: RegistrationResult | None = None,
     *,
+    settled: Settled | None = None,
     agreement: float = 0.95,
     significance: float = 1e-9,
     accepted: Accepted = NO_PAIRS,
 ) -> Answer:
-    return Answer(best, accepted, registered or registered_room(), agreement, significance)
+    given = registered or registered_room()
+    return Answer(best, accepted, settled or settled_of(given), given, agreement, significance)
 
 
 def explanations_of(answer: Answer | None, *others: Ranked, complete: bool = True) -> Explanations:
     """Return an answer beside other explanations; those within the window first, the best first."""
     own = () if answer is None else (answer.best,)
     listed = sorted((*own, *others), key=lambda one: (not one.inside, -one.value))
-    return Explanations(tuple(listed), answer, SearchReport(complete, False, 0.9999, 12, 34, 5, 0))
+    return Explanations(tuple(listed), answer, SearchReport(complete, False, 0.9999, 12, 34, 5, 0, "ordered", 0.75))

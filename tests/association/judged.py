@@ -1,25 +1,72 @@
-"""Answers whose verdict changes without a jump, beside what the twin says of them."""
+"""Answers whose verdict changes without a jump, beside what the twin says of them by models that are not fitted."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
-from association import HardPrior, SoftPrior
+from association import HardPrior, SoftPrior, reasons, verdict
 from association.context import SearchContext
 from association.explain import Explanations
+from association.models import USUAL, as_model
 from association.options import Prior
 from association.verdict import Verdict, judge
 
-from .answers import answer_with, explanations_of, ranked, registered_corridor, registered_room, room
+from .answers import (
+    answer_with,
+    explanations_of,
+    hinges_of,
+    ranked,
+    registered_corridor,
+    registered_room,
+    room,
+    settled_of,
+)
 from .reference import verdict as twin
 from .scenes import INSIDE, pose
 
 AROUND, BESIDE = HardPrior(INSIDE, 1.0, 0.5), HardPrior(pose(5.0, 2.5, 0.7), 0.5, 0.5)
 SOFT = SoftPrior(INSIDE, np.eye(3))
+
+USUAL_DEVIATION = 0.03
+
+# Of every kind of feature some; of one answer each of the four says something else.
+PLAIN: dict[str, dict[str, list[float]]] = {
+    "probability": {
+        "constant": [-5.0], "lead": [0.25, 20.0, -0.15], "solitude": [0.1], "share": [4.0], "agreement": [3.0],
+        "deviation": [-6.0], "misfit": [-0.5, 1.0, -1.0],
+    },
+    "cautious": {
+        "constant": [-6.0], "lead": [0.1], "share": [5.0, 0.85, -4.0], "root_count": [0.6], "agreement": [3.5],
+        "deviation": [-7.0], "misfit": [-0.7], "chance": [-0.1], "hinge_moves": [-1.0], "null": [-1.0, 0.8, -6.0],
+        "null_gap": [0.05], "null_better": [-3.0],
+    },
+    "probability_with_beams": {
+        "constant": [-2.0], "lead": [0.2], "share": [3.0], "deviation": [-4.0], "read": [2.0], "passed": [-20.0],
+    },
+    "cautious_with_beams": {
+        "constant": [-6.0], "lead": [0.1, 30.0, -0.1], "share": [6.0], "root_score": [0.3], "read": [6.0],
+        "passed": [-30.0], "deviation": [-4.0], "misfit": [-0.4], "null": [-2.0, 0.9, -9.0],
+    },
+}  # fmt: skip
+
+
+@contextmanager
+def judged_by(models: dict[str, dict[str, list[float]]], **bars: float) -> Iterator[None]:
+    """Let these models decide, and these bars in place of those of `association.verdict`."""
+    usual = USUAL._replace(deviation=USUAL_DEVIATION)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verdict, "MODELS", {name: as_model(curves) for name, curves in models.items()})
+        for module in (verdict, reasons):
+            patch.setattr(module, "USUAL", usual)
+        for name, value in bars.items():
+            patch.setattr(verdict, name, value)
+        yield
 
 
 class Numbers(NamedTuple):
@@ -33,6 +80,10 @@ class Numbers(NamedTuple):
     misfit
     deviation : of the position, metres
     chance : log10 of the significance
+    moves : by how much the pose would move without one wall, metres
+    read, passed : shares of the beams
+    wall_error : of the walls, as it turned out, metres
+    cost : of the rivals, over that of the best
     """
 
     score: float = 110.0
@@ -42,6 +93,11 @@ class Numbers(NamedTuple):
     misfit: float = 1.0
     deviation: float = 0.01
     chance: float = -9.0
+    moves: float = 0.02
+    read: float = 0.0
+    passed: float = 0.0
+    wall_error: float = 0.015
+    cost: float = 0.0
 
 
 LIKELY = Numbers()
@@ -61,7 +117,7 @@ class Drawn:
         Of the other rivals, over that of the first.
     prior : float
         What it says of the best.
-    degenerate, complete : bool
+    degenerate, thin, complete : bool
     """
 
     context: SearchContext
@@ -70,18 +126,32 @@ class Drawn:
     beyond: tuple[tuple[float, bool], ...] = ()
     prior: float = 0.0
     degenerate: bool = False
+    thin: bool = False
     complete: bool = True
 
     @property
     def explanations(self) -> Explanations:
         n = self.numbers
-        spread = np.diag([n.deviation**2, 1e-6, 1e-6])
-        best = ranked(n.score, self.prior, matched=self.matched, share=n.share, misfit=n.misfit, covariance=spread)
+        best = ranked(
+            n.score,
+            self.prior,
+            matched=self.matched,
+            share=n.share,
+            misfit=n.misfit,
+            read=n.read,
+            passed=n.passed,
+        )
         registered = registered_corridor() if self.degenerate else registered_room()
-        answer = answer_with(best, registered, agreement=n.agreement, significance=10.0**n.chance)
+        hinges = hinges_of((0, n.moves, 0.01), (3, 0.001, 1.0 if self.thin else 0.02))
+        settled = settled_of(registered, hinges, n.deviation, n.wall_error)
+        chance = 10.0**n.chance
+        answer = answer_with(best, registered, settled=settled, agreement=n.agreement, significance=chance)
         scores = [(n.rival, True), *((n.rival + more, inside) for more, inside in self.beyond)]
         # Within the window the best has the greatest value, whatever the prior says of a rival.
-        others = [ranked(s, min(0.0, best.value - s) if inside else 0.0, inside=inside) for s, inside in scores]
+        others = [
+            ranked(s, min(0.0, best.value - s) if inside else 0.0, inside=inside, cost=best.cost + n.cost)
+            for s, inside in scores
+        ]
         return explanations_of(answer, *others, complete=self.complete)
 
     @property
@@ -90,7 +160,7 @@ class Drawn:
 
     @property
     def expected(self) -> twin.Judged:
-        return twin.judge(self.context, self.explanations, degenerate=self.degenerate)
+        return twin.judge(self.context, self.explanations, PLAIN, USUAL_DEVIATION)
 
     def towards(self, other: Drawn, share: float) -> Drawn:
         """Return the same answer with numbers between those of the two."""
@@ -105,17 +175,20 @@ class Drawn:
 
 def drawn(rng: np.random.Generator, priors: tuple[Prior | None, ...] = (None, SOFT, AROUND, BESIDE)) -> Drawn:
     prior = priors[int(rng.integers(len(priors)))]
-    low, high = [5.0, 0.0, 0.2, 0.3, 0.3, 0.003, -12.0], [120.0, 110.0, 1.0, 1.0, 9.0, 0.45, 0.0]
+    low = [5.0, 0.0, 0.2, 0.3, 0.3, 0.003, -12.0, 0.0, 0.0, 0.0, 0.003, -6.0]
+    high = [120.0, 110.0, 1.0, 1.0, 9.0, 0.55, 0.0, 1.2, 1.0, 0.2, 0.08, 30.0]
     numbers = Numbers(*rng.uniform(low, high).tolist())
     numbers = numbers._replace(rival=min(numbers.rival, numbers.score + float(rng.choice([0.0, 0.0, 7.0]))))
-    if rng.random() < 0.5:
-        numbers = numbers._replace(share=0.9, agreement=0.9, misfit=1.2, deviation=0.02)  # likely, or nearly
-    windowed = isinstance(prior, HardPrior)
+    if rng.random() < 0.5:  # likely, or nearly
+        numbers = numbers._replace(share=0.9, agreement=0.9, misfit=1.2, deviation=0.02, moves=0.05, passed=0.01)
+    windowed, with_beams = isinstance(prior, HardPrior), bool(rng.random() < 0.4)
+    if not with_beams:
+        numbers = numbers._replace(read=0.0, passed=0.0)
     beyond = [(float(rng.normal() * 5.0), not windowed or rng.random() < 0.5) for _ in range(rng.integers(0, 4))]
     said = float(rng.choice([0.0, -1.0, -8.0, -10.0])) if isinstance(prior, SoftPrior) else 0.0
-    context = room(bool(rng.random() < 0.4), prior)
-    matched, degenerate = int(rng.integers(1, 9)), bool(rng.random() < 0.1)
-    return Drawn(context, numbers, matched, tuple(beyond), said, degenerate, bool(rng.random() < 0.9))
+    matched, degenerate, thin = int(rng.integers(1, 9)), bool(rng.random() < 0.1), bool(rng.random() < 0.1)
+    complete = bool(rng.random() < 0.9)
+    return Drawn(room(with_beams, prior), numbers, matched, tuple(beyond), said, degenerate, thin, complete)
 
 
 def crossing(value: Callable[[float], object], high: float = 1.0, halvings: int = 40) -> tuple[float, float]:

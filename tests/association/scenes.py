@@ -103,7 +103,7 @@ def seen(
     return local[order], truth[order]
 
 
-def index_of(endpoints: Any, sigma: float = 0.0) -> MapIndex:
+def index_of(endpoints: Any, sigma: float | None = None) -> MapIndex:
     return MapIndex.build(Segments.from_array(endpoints), sigma)
 
 

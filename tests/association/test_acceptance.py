@@ -11,12 +11,13 @@ import pytest
 from association import MapIndex, Scan
 from association.acceptance import Accepted, accept, register_accepted
 from association.explain import explain
+from association.layout import Lines
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
-from .answers import NO_PAIRS, SCAN
+from .answers import NO_PAIRS, SCAN, registered_room, settled_of
 from .kernels.drawn import in_pieces
 from .reference import acceptance as twin
-from .scenes import INSIDE, ROOM, context_of, index_of, maze, pose, scan_of, seen
+from .scenes import INSIDE, ROOM, context_of, index_of, local, maze, pose, same_pose, scan_of, seen
 
 
 def accepted(index: MapIndex, scan: Scan, **options: Any) -> tuple[Accepted, MapIndex]:
@@ -35,9 +36,8 @@ def test_the_pieces_that_scan_segments_lie_on() -> None:
     answer = explain(context).answer
     assert answer is not None
     best, ends = answer.best, scan.measured.segments.endpoints
-    expected = twin.accept_matches(
-        best.matches["wall"], context.segments.order, ends, best.pose, index.walls.rows, index.pieces
-    )
+    lines = Lines(context.lines.rows, context.lines.row_of, 0.5)
+    expected = twin.accept_matches(best.matches["wall"], lines, ends, best.pose, index.walls.rows, index.pieces)
     got = answer.accepted
     assert got.scan_indices == [pair[0] for pair in expected]
     assert got.map_indices(index) == got.pairs[:, 1].tolist() == [pair[1] for pair in expected]
@@ -60,18 +60,23 @@ def test_map_indices_are_those_that_were_sent() -> None:
 @pytest.mark.parametrize("estimator", ["joint", "one_step"])
 @pytest.mark.parametrize("rotation", ["wahba", "mitsuta"])
 def test_the_pose_is_that_of_registration(estimator: Any, rotation: Any) -> None:
-    """Of the pairs, with the sigma of the map, by the estimator and rotation of the options."""
+    """Of the pairs, with the error of the walls; by the joint estimator the settled one, else one of its own."""
     index = index_of(ROOM, 0.03)
     ends = SCAN.measured.segments.endpoints + np.random.default_rng(0).normal(size=(8, 4)) * 0.02
     measured = MeasuredSegments.from_segments(Segments.from_array(ends), 0.05)
     context = context_of(index, Scan(measured, None), estimator=estimator, rotation=rotation)
     truth = seen(ROOM, INSIDE)[1]
     pairs = np.stack([np.arange(8), truth], axis=1)
-    got = register_accepted(context, replace(NO_PAIRS, pairs=pairs, overlaps=np.ones(8)))
+    at = pose(3.01, 2.52, 0.71)
+    settled = replace(settled_of(registered_room()), pose=local(index, at), wall_sigma=0.04)
+    got = register_accepted(context, replace(NO_PAIRS, pairs=pairs, overlaps=np.ones(8)), settled)
     options = RegistrationOptions(estimator=estimator, rotation=rotation)
-    expected = register(Segments.from_array(ROOM), measured, pairs, 0.03, options)
+    own = at if estimator == "joint" else None
+    expected = register(Segments.from_array(ROOM), measured, pairs, 0.04, options, own)
     assert got is not None
     assert got.pose == expected.pose
+    assert got.pose is not None
+    assert same_pose(got.pose, at, 1e-9, 1e-9) is (estimator == "joint")
     assert (got.diagnostics, got.weights.tolist()) == (expected.diagnostics, expected.weights.tolist())
 
 
@@ -94,4 +99,4 @@ def test_the_ways_to_register_differ() -> None:
 
 
 def test_without_pairs_there_is_no_pose() -> None:
-    assert register_accepted(context_of(index_of(ROOM), SCAN), NO_PAIRS) is None
+    assert register_accepted(context_of(index_of(ROOM), SCAN), NO_PAIRS, settled_of(registered_room())) is None

@@ -26,8 +26,8 @@ def test_without_directions_the_map_is_listed_both_ways() -> None:
 
 
 def test_the_sigma_of_the_map_counts_in_the_scans_variances() -> None:
-    exact = context_of(ROOM_INDEX, SCAN).segments.rows
-    rough = context_of(type(ROOM_INDEX).build(ROOM_INDEX.segments, 0.3), SCAN).segments.rows
+    exact = context_of(ROOM_INDEX, SCAN).lines.rows
+    rough = context_of(type(ROOM_INDEX).build(ROOM_INDEX.segments, 0.3), SCAN).lines.rows
     np.testing.assert_allclose(rough["offset_variance"] - exact["offset_variance"], 0.09)
 
 
@@ -51,7 +51,7 @@ def test_what_the_kernels_are_asked() -> None:
     rules = record(RULES, kept_share=0.6, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.9)
     context = context_of(ROOM_INDEX, SCAN, HARD, min_overlap=0.3)
     question = context.question(rules)
-    assert question.scan is context.segments.rows
+    assert question.scan is context.lines.rows
     assert question.terms["rules"] == rules
     assert question.terms["gates"] == context.gates
     assert question.terms["gates"]["least_overlap"] == 0.3

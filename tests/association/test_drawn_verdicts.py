@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
 from association import Status, tuning
 
-from .judged import Drawn, drawn
+from .judged import PLAIN, Drawn, drawn, judged_by
 from .kernels.drawn import SEEDS
+from .reference.verdict import bar_of
+
+
+@pytest.fixture(autouse=True, scope="module")
+def plain_models() -> Iterator[None]:
+    with judged_by(PLAIN):
+        yield
 
 
 def assert_judged(one: Drawn) -> None:
@@ -18,6 +27,11 @@ def assert_judged(one: Drawn) -> None:
         assert getattr(got, name) == getattr(expected, name), name
     for name in ("probability", "margin", "runner_up"):
         assert getattr(got, name) == pytest.approx(getattr(expected, name)), name
+    assert (got.reasons == ()) is got.usable
+    codes = [reason.code for reason in got.reasons]
+    assert ("elsewhere" in codes) >= (expected.explained < tuning.ELSEWHERE_PROBABILITY)
+    assert ("search_incomplete" in codes) is not one.complete
+    assert ("prior_contradicted" in codes) is expected.contradicted
 
 
 @given(SEEDS)
@@ -29,25 +43,26 @@ def test_the_verdict_is_that_of_the_twin(seed: int) -> None:
 def test_the_verdict_changes_where_that_of_the_twin_does() -> None:
     """On both sides of every change of status between two answers; all kinds of changes come up."""
     rng, kinds = np.random.default_rng(5), set()
-    for _ in range(100):
+    for _ in range(200):
         one, other = drawn(rng, (None,)), drawn(rng, (None,))
         if one.expected.status is not one.towards(other, 1.0).expected.status:
             sides = one.border(other)
             for side in sides:
                 assert_judged(side)
             kinds.add(kind_of(*sides))
-    assert kinds >= {"explained", "right", "careful", "right with beams"}
+    decided = {f"{kind}{beams}" for kind in ("explained", "right", "careful", "null") for beams in ("", " with beams")}
+    assert kinds >= decided | {"deviation"}
 
 
 def kind_of(one: Drawn, other: Drawn) -> str:
-    """Say which chance decides between two answers that are next to each other."""
+    """Say what decides between two answers that are next to each other."""
     a, b = one.expected, other.expected
     beams = " with beams" if one.context.with_beams else ""
     if Status.NO_MATCH in (a.status, b.status):
-        return "explained"
+        return f"explained{beams}"
+    if Status.DEGENERATE in (a.status, b.status):
+        return "deviation"
     if min(a.right, b.right) < tuning.USABLE_PROBABILITY <= max(a.right, b.right):
         return f"right{beams}"
-    for bar, kind in ((tuning.USABLE_CAUTIOUS, "careful"), (tuning.USABLE_BY_CHANCE, "careful by chance")):
-        if min(a.careful, b.careful) < bar <= max(a.careful, b.careful):
-            return f"{kind}{beams}"
-    return "significance"
+    assert min(a.careful, b.careful) < bar_of(one.context) <= max(a.careful, b.careful)
+    return f"null{beams}" if a.asked and b.asked else f"careful{beams}"

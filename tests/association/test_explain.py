@@ -7,6 +7,7 @@ import pytest
 
 from association import Deadline, HardPrior
 from association.explain import explain
+from association.settling import settle
 from association.sight import agreement
 from association.significance import significance
 
@@ -56,6 +57,11 @@ def test_what_is_worked_out_of_the_answer() -> None:
     assert worth > answer.best.score + 3.0
     assert answer.significance == significance(context, worth) < significance(context, answer.best.score)
     assert answer.agreement == agreement(context, answer.best) < 1.0
+    settled = settle(context, answer.best)
+    assert (settled.pose, settled.weakest) == (answer.settled.pose, answer.settled.weakest)
+    found = answer.registered.pose
+    assert found is not None
+    assert same_pose(found, context.in_map(settled.pose), 1e-12, 1e-12)
     assert len(answer.accepted.pairs) == int(answer.best.matched.sum()) == 8
     assert explanations.search.complete
 

@@ -10,63 +10,64 @@ import pytest
 
 from association import HardPrior, MapIndex, SoftPrior
 from association.explain import explain
-from association.families import free_direction, is_degenerate, place_on_family
-from registration import RegistrationResult, RigidTransform
+from association.families import is_degenerate, is_thin, place_on_family
+from association.settling import Settled
+from registration import RigidTransform
 from registration.layout import Floats
 
-from .answers import answer_with, deviating, ranked, registered_corridor, registered_room, room
+from .answers import answer_with, hinges_of, ranked, registered_room, room, settled_of
 from .scenes import INSIDE, context_of, index_of, pose, scan_of
 
 
 @pytest.mark.parametrize(
-    ("registered", "degenerate"),
-    [
-        (deviating(0.49, 0.1), False),
-        (deviating(0.51, 0.1), True),
-        (deviating(0.1, 0.49), False),
-        (deviating(0.1, 0.51), True),
-        (deviating(0.5, 0.5), False),
-        (deviating(0.45, 0.45), False),
-        (deviating(0.45, 0.45, 0.9), True),
-        (deviating(0.45, 0.45, -0.9), True),
-        (deviating(0.49, 0.3, 0.5), True),
-    ],
+    ("weakest", "parallel", "degenerate"),
+    [(0.49, False, False), (0.51, False, True), (0.01, False, False), (0.01, True, True), (0.51, True, True)],
 )
-def test_a_position_is_fixed_to_half_a_metre(registered: RegistrationResult, degenerate: bool) -> None:
-    """Along its weakest direction, whichever that is."""
-    assert is_degenerate(registered) is degenerate
+def test_a_position_is_fixed_to_half_a_metre(weakest: float, parallel: bool, degenerate: bool) -> None:
+    """Along its weakest direction; and by walls that are not all parallel."""
+    assert is_degenerate(replace(settled_of(registered_room()), weakest=weakest, parallel=parallel)) is degenerate
 
 
-def test_what_registration_calls_degenerate_is() -> None:
-    """Without a covariance its word is all there is."""
-    assert is_degenerate(registered_corridor())
-    assert not is_degenerate(registered_room())
-    assert is_degenerate(replace(registered_room(), degenerate=True))
-    assert not is_degenerate(replace(registered_room(), covariance=None))
-    assert is_degenerate(replace(registered_room(), covariance=None, degenerate=True))
+@pytest.mark.parametrize(
+    ("walls", "deviation", "thin"), [(3, 0.51, True), (1, 0.51, True), (3, 0.49, False), (4, 0.51, False)]
+)
+def test_few_walls_of_which_one_alone_decides_are_thin(walls: int, deviation: float, thin: bool) -> None:
+    hinges = hinges_of(*((k, 0.0, deviation if k == 0 else 0.01) for k in range(walls)))
+    assert is_thin(settled_of(registered_room(), hinges)) is thin
+
+
+def settled_on(walls: Floats, seen_walls: Floats) -> Settled:
+    """Search, and return the answer worked out."""
+    answer = explain(context_of(index_of(walls), scan_of(seen_walls))).answer
+    assert answer is not None
+    return answer.settled
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.5, math.pi / 2, 2.0, 3.1])
 def test_the_direction_that_is_not_fixed(angle: float) -> None:
-    """That of the greatest deviation; of the two opposite ones that to the right, or straight up."""
-    d, n = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
-    covariance = np.diag([0.0, 0.0, 1.0])
-    covariance[:2, :2] = 0.36 * np.outer(d, d) + 0.01 * np.outer(n, n)
-    free = free_direction(replace(registered_room(), covariance=covariance))
+    """That along parallel walls; of the two opposite ones that to the right, or straight up."""
+    by = RigidTransform(7.0, -3.0, angle)
+    settled = settled_on(by.apply(WALLS.reshape(-1, 2, 2)).reshape(-1, 4), SEEN)
+    assert settled.parallel
+    assert is_degenerate(settled)
+    d = np.array([math.cos(angle), math.sin(angle)])
     expected = d if d[0] > 1e-9 or (abs(d[0]) < 1e-9 and d[1] > 0.0) else -d
-    assert free == pytest.approx(expected.tolist(), abs=1e-9)
+    assert abs(settled.direction[0] * d[1] - settled.direction[1] * d[0]) < 1e-6
+    assert settled.direction == pytest.approx(expected.tolist(), abs=1e-6) or abs(d[0]) < 1e-9
 
 
-def test_straight_up_is_up() -> None:
-    upright = replace(registered_room(), covariance=np.diag([0.01, 0.36, 1e-4]))
-    assert free_direction(upright) == (0.0, 1.0)
-    assert free_direction(replace(upright, covariance=np.diag([0.36, 0.01, 1e-4]))) == (1.0, 0.0)
-
-
-def test_what_registration_leaves_free_is_free() -> None:
-    assert free_direction(registered_corridor()) == pytest.approx((1.0, 0.0))
-    assert free_direction(replace(registered_room(), unobservable=(0.6, 0.8))) == (0.6, 0.8)
-    assert free_direction(replace(registered_room(), covariance=None)) is None
+@pytest.mark.parametrize(
+    ("degrees", "degenerate"), [(0.0, True), (1.0, True), (2.0, True), (45.0, False), (90.0, False)]
+)
+def test_two_walls_that_are_nearly_parallel_fix_no_position(degrees: float, degenerate: bool) -> None:
+    """Walls are off by centimetres, which such walls turn into metres along them."""
+    turn = math.radians(degrees)
+    second = [20.0, 4.0, 20.0 - 15.0 * math.cos(turn), 4.0 - 15.0 * math.sin(turn)]
+    walls = np.array([[0.0, 0.0, 30.0, 0.0], second])
+    seen_walls = np.array(
+        [[-6.0, -2.0, 6.0, -2.0], [6.0, 2.0, 6.0 - 12.0 * math.cos(turn), 2.0 - 12.0 * math.sin(turn)]]
+    )
+    assert is_degenerate(settled_on(walls, seen_walls)) is degenerate
 
 
 def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | None = None) -> RigidTransform:
@@ -74,7 +75,7 @@ def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | No
     context = context_of(index, scan_of(endpoints), prior)
     answer = explain(context).answer
     assert answer is not None
-    assert answer.registered.degenerate
+    assert is_degenerate(answer.settled)
     found = place_on_family(context, answer)
     assert found is not None
     return found
@@ -117,20 +118,19 @@ def test_of_a_family_the_member_nearest_the_prior(turn: float) -> None:
 def test_of_a_family_the_member_at_which_the_beams_fit_best() -> None:
     """It is where the best explanation lies, along the direction that is free."""
     context = room(with_beams=True)
-    free = replace(registered_room(), unobservable=(0.6, 0.8), covariance=None, degenerate=True)
+    free = replace(settled_of(registered_room()), direction=(0.6, 0.8), free=True)
     best = ranked(at=pose(1.0, -0.5, 0.7))  # of the index frame
-    found = place_on_family(context, answer_with(best, free))
+    found = place_on_family(context, answer_with(best, settled=free))
     assert found is not None
     x, y = context.index.origin
     away = 0.6 * (1.0 + x - INSIDE.x) + 0.8 * (-0.5 + y - INSIDE.y)
     assert (found.x, found.y) == pytest.approx((INSIDE.x + 0.6 * away, INSIDE.y + 0.8 * away))
     assert found.theta == pytest.approx(INSIDE.theta)
     known = SoftPrior(pose(4.0, 2.5, 0.0), np.eye(3))
-    found = place_on_family(room(with_beams=True, prior=known), answer_with(best, free))
+    found = place_on_family(room(with_beams=True, prior=known), answer_with(best, settled=free))
     assert found is not None
     assert (found.x, found.y) == pytest.approx((INSIDE.x + 0.6 * 0.6, INSIDE.y + 0.6 * 0.8)), "a prior goes before"
 
 
-def test_a_pose_that_is_fixed_stays() -> None:
-    for registered in (registered_room(), deviating(0.6, 0.1), replace(registered_room(), pose=None)):
-        assert place_on_family(room(), answer_with(ranked(), registered)) == registered.pose
+def test_without_a_pose_there_is_no_family() -> None:
+    assert place_on_family(room(), answer_with(ranked(), replace(registered_room(), pose=None))) is None

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from association import tuning
-from association.features import Features, features_of, twin_share
+from association.explain import Answer
+from association.features import Features, features_of, twin_share, with_null
+from association.null import Null
+from registration.layout import Records
 
-from .answers import answer_with, ranked, room
+from .answers import answer_with, hinges_of, ranked, registered_room, room, settled_of
 from .reference import verdict as twin
 
 CONTEXT = room()
-LENGTHS = CONTEXT.segments.rows["length"].tolist()  # 9, 5.5, 4, 4, 3, 3, 2, 1.5: the longest first
+LENGTHS = CONTEXT.lines.rows["length"].tolist()  # 9, 5.5, 4, 4, 3, 3, 2, 1.5: the longest first
 
 SCORES = st.floats(1.0, 150.0)
 
 
+def hinging(hinges: Records | None = None, weakest: float = 0.01, score: float = 100.0, **merits: Any) -> Answer:
+    return answer_with(ranked(score, **merits), settled=settled_of(registered_room(), hinges, weakest))
+
+
 def test_features_of_an_answer_beside_two_rivals() -> None:
-    best = ranked(80.0, -2.0, matched=5, share=0.9, length=25.0, misfit=2.0, covariance=np.diag([0.04, 0.09, 1e-4]))
+    best = ranked(80.0, -2.0, matched=5, length=25.0, misfit=2.0, read=0.5, passed=0.04, blocked=4.0)
     rivals = [ranked(74.0), ranked(70.0, -4.0)]
     crowd = math.exp(-4.0 / 4.0) + math.exp(-12.0 / 4.0) + math.exp(-12.0)
     expected = Features(
@@ -37,12 +44,24 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         inverse_count=0.2,
         longest_unmatched=3.0,
         agreement=0.85,
+        read=0.5,
+        passed=0.04,
+        hinge_moves=0.25,
+        hinge_deviation=0.4,
+        chance=-9.0,
+        null=0.7,
+        null_gap=math.sqrt(0.3 * 80.0),
+        null_better=0.0,
+        root_score=math.sqrt(80.0 - 50.0 + 2.0),
+        blocked=2.0,
+        walls=math.sqrt(3.0),
         misfit_of_many=math.log(2.0) * 5.0 / 8.0,
         beyond_nearly_all=0.05,
         root_unmatched=math.sqrt(6.5),
         squared_solitude=math.log(crowd) ** 2,
     )
-    got = features_of(CONTEXT, answer_with(best, agreement=0.85), rivals)
+    settled = settled_of(registered_room(), hinges_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
+    got = features_of(CONTEXT, answer_with(best, settled=settled, agreement=0.85), rivals)
     assert got._asdict() == pytest.approx(expected._asdict())
 
 
@@ -54,15 +73,19 @@ def test_features_say_no_more_beyond_their_limits() -> None:
     assert features_of(CONTEXT, answer_with(ranked(90.0)), [ranked(30.0)]).lead == tuning.MAX_LEAD
     worse = features_of(CONTEXT, answer_with(ranked(30.0)), [ranked(50.0)])
     assert (worse.lead, worse.solitude) == pytest.approx((-20.0, 0.0), abs=1e-5)
-    nothing = features_of(CONTEXT, answer_with(ranked(matched=0, share=0.0, misfit=0.0)), [])
+    nothing = features_of(CONTEXT, answer_with(ranked(matched=0, share=0.0, misfit=0.0), significance=1e-300), [])
     assert (nothing.root_count, nothing.inverse_count, nothing.beyond_nearly_all) == (0.0, 1.0, 0.0)
     assert nothing.misfit == math.log(tuning.LEAST_MISFIT)
     assert (nothing.longest_unmatched, nothing.root_unmatched) == (tuning.LONGEST_UNMATCHED, 4.0)
+    assert nothing.chance == tuning.LEAST_CHANCE_FEATURE
+    assert (nothing.hinge_moves, nothing.hinge_deviation, nothing.walls) == (0.0, 0.0, 0.0)
     whole = features_of(CONTEXT, answer_with(ranked(share=1.0, misfit=1e9)), [])
     assert (whole.longest_unmatched, whole.root_unmatched) == (0.0, 0.0)
     assert whole.misfit == whole.misfit_of_many == math.log(tuning.MOST_MISFIT)
-    loose = ranked(covariance=np.diag([4.0, 1.0, 1e-4]))
-    assert features_of(CONTEXT, answer_with(loose), []).deviation == tuning.MOST_DEVIATION
+    loose = features_of(CONTEXT, hinging(hinges_of((0, 3.0, 0.0), (1, 0.0, 10.0)), 2.0), [])
+    assert (loose.deviation, loose.hinge_moves, loose.hinge_deviation) == (tuning.MOST_DEVIATION,) * 3
+    by_beams = features_of(CONTEXT, hinging(score=40.0, read=0.9), [])
+    assert by_beams.root_score == 0.0
 
 
 @given(
@@ -71,23 +94,80 @@ def test_features_say_no_more_beyond_their_limits() -> None:
     st.floats(0.0, 1.0),
     st.floats(1e-4, 1e5),
     st.floats(0.0, 1.0),
+    st.tuples(st.floats(0.0, 200.0), st.floats(0.0, 1.0)),
 )
+@settings(deadline=None)
 def test_features_are_those_of_the_twin(
-    scores: list[float], matched: int, share: float, misfit: float, agreement: float
+    scores: list[float], matched: int, share: float, misfit: float, agreement: float, null: tuple[float, float]
 ) -> None:
-    best, *rivals = (ranked(score, matched=matched, share=share, misfit=misfit) for score in scores)
-    got = features_of(CONTEXT, answer_with(best, agreement=agreement), rivals)
-    assert got._asdict() == pytest.approx(twin.features(CONTEXT, best, rivals, agreement), abs=1e-9)
+    costs = (5.0 * abs(k - 2) for k in range(len(scores)))
+    made = (ranked(s, matched=matched, share=share, misfit=misfit, cost=c) for s, c in zip(scores, costs, strict=True))
+    best, *rivals = made
+    settled = settled_of(registered_room(), wall_sigma=0.01 + 0.05 * share)
+    answer = answer_with(best, settled=settled, agreement=agreement)
+    got = features_of(CONTEXT, answer, rivals)
+    assert got._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals), abs=1e-9)
+    mirrored = with_null(got, best, Null(*null))
+    assert mirrored._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals, Null(*null)), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("score", "symmetry", "null", "gap", "better"),
+    [
+        (0.0, 0.0, 0.7, 0.3, 0.0),
+        (69.0, 0.0, 0.7, 0.3, 0.0),
+        (80.0, 0.0, 0.8, 0.2, 0.0),
+        (110.0, 0.0, 1.1, -0.1, 0.1),
+        (150.0, 0.0, 1.2, -0.2, 0.2),
+        (110.0, 0.7, 1.1, -0.1, 0.1),
+        (110.0, 0.825, 0.9, 0.1, 0.1),
+        (110.0, 0.95, 0.7, 0.3, 0.1),
+        (110.0, 1.0, 0.7, 0.3, 0.1),
+    ],
+)
+def test_the_mirrored_scan_says_less_the_more_the_map_is_symmetric(
+    score: float, symmetry: float, null: float, gap: float, better: float
+) -> None:
+    """Of an answer with 100 nats: from 70 on, and up to 120; but for what it scores more than the answer."""
+    before = features_of(CONTEXT, answer_with(ranked(100.0)), [])
+    got = with_null(before, ranked(100.0), Null(score, symmetry))
+    assert (got.null, got.null_better) == pytest.approx((null, better))
+    assert math.copysign(got.null_gap**2, got.null_gap) == pytest.approx(100.0 * gap)
+    unmoved = {name: value for name, value in got._asdict().items() if not name.startswith("null")}
+    assert unmoved == {name: value for name, value in before._asdict().items() if not name.startswith("null")}
+
+
+def test_the_gap_to_the_mirrored_scan_has_an_end_and_an_answer_without_score_none() -> None:
+    strong = ranked(300.0)
+    assert features_of(CONTEXT, answer_with(strong), []).null_gap ** 2 == pytest.approx(tuning.MAX_GAP)
+    none = ranked(0.0)
+    assert with_null(features_of(CONTEXT, answer_with(none), []), none, Null(5.0, 0.0)).null == tuning.MOST_NULL
 
 
 def test_twins_share_the_chance() -> None:
     """One that scores 1.5 nats less is one to e as likely; one that scores more is as likely and no more."""
-    best = ranked(50.0)
+    best = answer_with(ranked(50.0))
     assert twin_share(best, []) == 1.0
     assert twin_share(best, [ranked(50.0)] * 3) == pytest.approx(0.25)
     assert twin_share(best, [ranked(80.0)]) == pytest.approx(0.5)
     assert twin_share(best, [ranked(48.5)]) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
     assert twin_share(best, [ranked(52.0, -3.5)]) == pytest.approx(1.0 / (1.0 + math.exp(-1.0))), "with the prior"
+
+
+@pytest.mark.parametrize(("wall_sigma", "lead"), [(0.003, 10.0), (0.02, 10.0), (0.04, 2.5), (0.2, 0.1)])
+def test_where_walls_are_far_off_centimetres_tell_rivals_apart_less(wall_sigma: float, lead: float) -> None:
+    """A rival that explains as much at a cost of 20 more; the score supposes 2 cm. What it explains more counts on."""
+    answer = answer_with(ranked(50.0), settled=settled_of(registered_room(), wall_sigma=wall_sigma))
+    features = features_of(CONTEXT, answer, [ranked(40.0, cost=26.0)])
+    assert features.lead == pytest.approx(lead)
+    assert features.solitude == pytest.approx(lead / tuning.CROWD_TEMPERATURE, abs=1e-3)
+    assert twin_share(answer, [ranked(40.0, cost=26.0)]) == pytest.approx(
+        1.0 / (1.0 + math.exp(-lead / tuning.TWIN_TEMPERATURE))
+    )
+    assert features_of(CONTEXT, answer, [ranked(40.0)]).lead == pytest.approx(10.0)
+    other = 8.0 + 2.0 * (1.0 - min(1.0, 0.02**2 / wall_sigma**2))
+    better = features_of(CONTEXT, answer, [ranked(42.0, cost=2.0), ranked(40.0, cost=26.0)])
+    assert better.lead == pytest.approx(min(lead, other)), "nearest"
 
 
 def test_scan() -> None:

@@ -53,6 +53,15 @@ def test_what_does_not_continue_stays_apart(other: list[float], why: str) -> Non
     assert len(index_of([[0, 0, 2, 0], other]).walls.rows) == 2, why
 
 
+@pytest.mark.parametrize("oriented", [True, False])
+def test_pieces_may_make_a_wall_longer_than_a_segment_may_be(oriented: bool) -> None:
+    """What is taken is limited so that numbers make sense; a wall of allowed pieces does."""
+    rows = [[0, 0, 6e3, 0], [6e3, 0, 1.2e4, 0], [1.2e4, 0, 1.2e4, 9e3], [1.2e4, 9e3, 1.2e4, 1.8e4]]
+    index = MapIndex.build(Segments.from_array(rows), oriented=oriented)
+    np.testing.assert_allclose(np.unique(lengths(index.walls).round(6)), [1.2e4, 1.8e4])
+    assert len(index.undirected.walls.rows) == 4
+
+
 def test_a_slow_bend_is_not_straightened() -> None:
     """Twenty pieces, each within the merging angle of the last, turn by 30 degrees together; a wall beside them not."""
     turns = np.cumsum(np.full(20, math.radians(1.5)))

@@ -1,36 +1,77 @@
-"""The models are those of the file, by name."""
+"""A model adds up a curve for each feature; the fitted ones are those of the file, by name."""
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
-import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+import association
 from association.features import Features
-from association.models import CAUTIOUS, PROBABILITY, WITH_BEAMS, Model
+from association.models import FILE, FITTED_ON, MODELS, USUAL, Curve, Model, as_document, as_model
 
-from .reference.verdict import models
+from .reference import verdict as twin
 
 COUNTED = Features(*(0.1 * k + 0.5 for k in range(len(Features._fields))))
+NAMES = {"probability", "cautious", "probability_with_beams", "cautious_with_beams"}
 
 
 @pytest.mark.parametrize(
-    ("model", "name"), [(PROBABILITY, "probability"), (CAUTIOUS, "cautious"), (WITH_BEAMS, "with_beams")]
+    ("value", "expected"), [(-1.0, -2.0), (0.0, 0.0), (1.0, 2.0), (2.0, 1.0), (3.0, 0.0), (4.0, 3.0)]
 )
-def test_models_are_read_by_name(model: Model, name: str) -> None:
-    terms = models()[name]
-    assert dict(zip(model.names, model.coefficients.tolist(), strict=True)) == terms
-    assert set(terms) <= set(Features._fields)
-    expected = math.fsum(factor * getattr(COUNTED, term) for term, factor in terms.items())
-    assert model.logit(COUNTED) == pytest.approx(expected)
+def test_a_curve_is_a_line_that_bends(value: float, expected: float) -> None:
+    """Up by 2, from 1 on down by 1, from 3 on up by 3."""
+    assert Curve(2.0, ((1.0, -3.0), (3.0, 4.0)))(value) == pytest.approx(expected)
+    assert Curve(2.0)(value) == pytest.approx(2.0 * value)
 
 
-def test_the_three_models_differ() -> None:
-    assert len({PROBABILITY.logit(COUNTED), CAUTIOUS.logit(COUNTED), WITH_BEAMS.logit(COUNTED)}) == 3
+def test_the_odds_are_those_of_the_curves_together() -> None:
+    model = Model({"constant": Curve(-1.0), "share": Curve(3.0, ((0.6, -1.0),))})
+    assert model.logit(COUNTED) == pytest.approx(-0.5 + 3.0 * 0.8 - 0.2)
+    assert model.part(COUNTED, ["share", "lead"]) == pytest.approx(3.0 * 0.8 - 0.2)
+    assert model.part(COUNTED, []) == 0.0
 
 
-def test_what_a_feature_is_multiplied_with() -> None:
-    model = Model(("constant", "share"), np.array([-1.0, 3.0]))
-    assert (model.coefficient("share"), model.coefficient("constant"), model.coefficient("lead")) == (3.0, -1.0, 0.0)
-    assert model.logit(COUNTED) == pytest.approx(-1.0 * 0.5 + 3.0 * 0.8)
+NUMBERS = st.floats(-9.999, 9.999).map(lambda x: float(f"{x:.4g}"))
+CURVES = st.tuples(NUMBERS, st.lists(st.tuples(NUMBERS, NUMBERS), max_size=3)).map(lambda c: [c[0], *sum(c[1], ())])
+
+
+@given(st.dictionaries(st.sampled_from(Features._fields), CURVES))
+@settings(deadline=None)
+def test_models_come_back_from_the_file_as_they_were_written(document: dict[str, list[float]]) -> None:
+    model = as_model(document)
+    assert as_document(model) == document
+    assert model.logit(COUNTED) == pytest.approx(twin.logit(document, COUNTED._asdict()))
+
+
+def test_a_bend_has_a_value_and_a_change() -> None:
+    with pytest.raises(ValueError, match="zip"):
+        as_model({"lead": [0.1, 20.0]})
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
+    document = json.loads((Path(association.__file__).parent / FILE).read_text())
+    assert set(MODELS) == set(document["models"]) == set(FITTED_ON) == NAMES
+    curves = document["models"][name]
+    assert set(curves) <= set(Features._fields)
+    expected = twin.logit(curves, COUNTED._asdict())
+    assert MODELS[name].logit(COUNTED) == pytest.approx(expected)
+    assert all(math.isfinite(number) for curve in curves.values() for number in curve)
+    assert USUAL._asdict() == document["usual"]
+
+
+def test_beams_speak_only_where_there_are_beams() -> None:
+    """A scan without has 0 for both of their shares, which is not what it read."""
+    for name in ("probability", "cautious"):
+        assert not {"read", "passed"} & set(MODELS[name].curves)
+
+
+def test_the_mirrored_scan_counts_only_where_other_buildings_are_reckoned_with() -> None:
+    """The probability does not have it: it is searched only for what would be usable."""
+    for name in ("probability", "probability_with_beams"):
+        assert not any(feature.startswith("null") for feature in MODELS[name].curves)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from association import Beams, HardPrior, MapIndex, Prior, SoftPrior
+from association import Beams, CancelledError, Deadline, HardPrior, MapIndex, Prior, SoftPrior, ranking
+from association import explain as explaining
 from association.candidates import Candidates, find_candidates
 from association.context import SearchContext
+from association.explain import explain
 from association.layout import FOUND, Rays
 from association.ranking import Ranked, rank_candidates
 from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LEAST_DISTINCT, MOST_BEAMS
@@ -80,13 +84,15 @@ def test_the_best_comes_first_with_what_belongs_to_it() -> None:
         True
     ] * 3
     here = [local(context.index, room(k)) for k in (1, 0, 2)]
-    expected = twin.rank(context.segments.rows, here, None, context.index.tables.place, context.gates)
+    expected = twin.rank(context.lines.rows, here, None, context.index.tables.place, context.gates, context.lines.model)
     for one, (at, covariance, merit, matches) in zip(found, expected, strict=True):
         assert same_pose(one.pose, at, 1e-6, 1e-6)
         np.testing.assert_allclose(one.covariance, covariance, rtol=1e-4, atol=1e-9)
-        score, length, share, reliability, misfit = merit[0].item()
+        score, cost, one_step_cost, length, share, reliability, misfit, _, read, passed = merit[0].item()
         assert (one.score, one.value, one.length) == pytest.approx((score, score, length))
+        assert (one.cost, one.one_step_cost) == pytest.approx((cost, one_step_cost), rel=1e-5, abs=1e-6)
         assert (one.share, one.reliability, one.misfit) == pytest.approx((share, reliability, misfit), abs=1e-6)
+        assert (one.read, one.passed) == (read, passed) == (0.0, 0.0)
         np.testing.assert_array_equal(one.matches["wall"], matches["wall"])
         assert one.inside
     assert [round(one.share, 3) for one in found] == [1.0, round(26.5 / 32.0, 3), round(17.5 / 32.0, 3)]
@@ -164,8 +170,9 @@ def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
     rays = Rays(beams.angles[known][::step], beams.ranges[known][::step], 20.0)
     place, here = index.tables.place, local(index, INSIDE)
     moved, (reading, passed), _ = beams_twin.weigh_beams(rays, (0.0, 0.0), here, place)
-    ((_, _, merit, _),) = twin.rank(context.segments.rows, [moved], None, place, context.gates)
+    ((_, _, merit, _),) = twin.rank(context.lines.rows, [moved], None, place, context.gates, context.lines.model)
     expected = merit["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
+    assert (found.read, found.passed) == pytest.approx((reading, passed), abs=1e-4)
     assert found.score == pytest.approx(expected, abs=0.01)
 
 
@@ -211,3 +218,53 @@ def test_nothing_found_is_nothing_ranked() -> None:
     for scan in (scan_of(np.zeros((0, 4))), scan_of(np.zeros((0, 4)), viewpoint=(0.0, 0.0), beams=beams)):
         context = context_of(index, scan)
         assert rank_candidates(context, find_candidates(context)) == []
+
+
+class Looked(Deadline):
+    """A deadline that passes at the so-manieth look."""
+
+    def __init__(self, looks: int) -> None:
+        super().__init__()
+        object.__setattr__(self, "looks", looks)
+
+    @property
+    def passed(self) -> bool:
+        object.__setattr__(self, "looks", self.looks - 1)
+        return self.looks < 0
+
+    looks: int
+
+
+def test_between_poses_the_clock_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """2,000 parallel walls held a search for 150 s."""
+    index = index_of(equal_rooms(3))
+    candidates = candidates_of(index, [room(k) for k in range(3)])
+    everything = rank_candidates(context_of(index, ROOM_SCAN), candidates)
+    assert len(everything) == 3
+    walls = [one.matches["wall"].tolist() for one in everything]
+    monkeypatch.setattr(ranking, "RANKED_AT_ONCE", 1)
+    for looks in range(4):
+        some = rank_candidates(replace(context_of(index, ROOM_SCAN), deadline=Looked(looks)), candidates)
+        assert len(some) == min(3, looks + 1)
+        assert all(one.matches["wall"].tolist() in walls for one in some)
+
+
+def test_who_has_left_is_not_ranked_for() -> None:
+    index = index_of(equal_rooms(3))
+    context = context_of(index, ROOM_SCAN)
+    context.deadline.cancel()
+    with pytest.raises(CancelledError):
+        ranked_at(context, room(0))
+
+
+def test_what_the_deadline_leaves_unranked_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    context = replace(context_of(index_of(equal_rooms(3)), ROOM_SCAN), deadline=Deadline(at=time.monotonic() + 1e3))
+    assert explain(context).search.complete
+    # It passes after the last base and before the first pose is ranked: there is an answer all the same.
+    candidates = find_candidates(context)
+    late = replace(context, deadline=Deadline(at=0.0))
+    assert candidates.report.complete
+    assert len(rank_candidates(late, candidates)) == len(rank_candidates(context, candidates)) > 0
+    monkeypatch.setattr(explaining, "find_candidates", lambda context, effort: candidates)
+    assert explain(context).search.complete
+    assert not explain(late).search.complete

@@ -172,7 +172,7 @@ def test_the_short_search_misses_nothing_that_the_exhaustive_one_finds(seed: int
     short = answer_of(MAZE_INDEX, scan_of(endpoints))
     whole = answer_of(MAZE_INDEX, scan_of(endpoints), exhaustive=True)
     assert whole.search.exhaustive
-    assert whole.search.bases > short.search.bases
+    assert whole.search.bases >= short.search.bases
     assert short.diagnostics is not None
     assert whole.diagnostics is not None
     assert short.diagnostics.score == pytest.approx(whole.diagnostics.score)
@@ -219,14 +219,14 @@ def test_a_segment_across_a_doorway_is_reported_on_both_walls() -> None:
 
 def test_covariance_is_that_of_the_errors() -> None:
     """The mean squared Mahalanobis distance of 300 poses is 3, within four standard deviations of that mean."""
-    rng = np.random.default_rng(9)
+    rng, exact = np.random.default_rng(9), index_of(ROOM, 0.0)
     local = INSIDE.inverse().apply(ROOM.reshape(-1, 2, 2))
     lengths = np.hypot(*(local[:, 1] - local[:, 0]).T)
     points = np.maximum(2, (lengths / 0.05).astype(int))
     total = 0.0
     for _ in range(300):
         noisy = [_fitted(rng, begin, end, count) for (begin, end), count in zip(local, points.tolist(), strict=True)]
-        result = answer_of(ROOM_INDEX, scan_of(noisy))
+        result = answer_of(exact, scan_of(noisy))
         found = pose_in(result)
         error = np.array([found.x - INSIDE.x, found.y - INSIDE.y, found.theta - INSIDE.theta])
         assert result.covariance is not None

@@ -24,7 +24,7 @@ def test_what_should_have_been_seen_is_missing(oriented: bool) -> None:
     context = context_of(index_of(SCREENED), SCAN, oriented=oriented)
     best = explain(context).ranked[0]
     assert missing_segments(context, best) == (8,)
-    rows, walls = context.segments.rows, context.index.walls.rows
+    rows, walls = context.lines.rows, context.index.walls.rows
     expected = missing_twin.missing_pieces(
         rows, best.matches["wall"], (0.0, 0.0), best.pose, walls, context.index.pieces
     )
@@ -36,7 +36,7 @@ def test_what_should_have_been_seen_is_missing(oriented: bool) -> None:
 def test_agreement_is_that_of_the_pose() -> None:
     context = context_of(index_of(SCREENED), SCAN)
     best = explain(context).ranked[0]
-    expected = agreement_twin.agreement(context.segments.rows, (0.0, 0.0), best.pose, context.index.walls.rows)
+    expected = agreement_twin.agreement(context.lines.rows, (0.0, 0.0), best.pose, context.index.walls.rows)
     assert agreement(context, best) == pytest.approx(expected)
     assert 0.5 < expected < 0.95
     elsewhere = context_of(index_of(SCREENED), scan_of(ENDPOINTS))

@@ -28,7 +28,7 @@ def test_it_is_a_probability_that_falls_with_the_score() -> None:
 @pytest.mark.parametrize("score", [40.0, 80.0, 150.0])
 def test_it_bounds_the_chance_of_all_poses_that_can_be_told_apart(score: float) -> None:
     """Those are as many as squares of the offset gate and turns of the angle gate fit in."""
-    gates, rows = CONTEXT.gates[0], CONTEXT.segments.rows
+    gates, rows = CONTEXT.gates[0], CONTEXT.lines.rows
     lengths = np.asarray(INDEX.walls.longest)
     chances = twin.chance_matches(rows, lengths, INDEX.agreeing_share, INDEX.area, CONTEXT.gates)
     poses = INDEX.area / (2.0 * gates["least_offset"]) ** 2 * math.tau / (2.0 * gates["least_angle"])

@@ -24,7 +24,7 @@ FEW = Choice(worlds=("museum", "garage"), conditions=("clean", "sister"), quick=
 
 ANSWER = WorldOutcome(
     world="museum", condition="clean", number=0, held_out=True, form="ranges", truth=[0.0, 0.0, 0.0],
-    pose=[0.1, 0.0, 0.0], status="ok", usable=True, probability=0.99, distance=0.1, angle=0.0, read=1.0,
+    pose=[0.1, 0.0, 0.0], status="ok", usable=True, reasons=[], probability=0.99, distance=0.1, angle=0.0, read=1.0,
     covariance=[1.0, 0.0, 0.0, 1.0, 0.0, 1.0], nees=3.0, walls=7, matched=9, missing=0, scan_segments=9,
     map_segments=100, inlier_fraction=0.9, score=100.0, runner_up=None, margin=None, significance=1e-9, chi2=20.0,
     reliability=0.5, dof=18, alternatives=0, complete=True, milliseconds=1.0,
@@ -143,7 +143,9 @@ def test_wrong_answers_and_strangers_are_counted() -> None:
     assert judged(found, "ranges: clean") == f"{4000.0 / before:.1f} (40.0 of {before:.1f} % of the scans)"
     away = [AWAY] * 3 + [replace(AWAY, read=0.99)] + [replace(AWAY, usable=False, status="no_match", pose=None)] * 4
     assert judged(away, "ranges: sister") == "37.50"
-    assert judged(away, "ranges: in another building: no_match") == "50.0"
+    away[-1] = replace(AWAY, usable=False, status="ambiguous", reasons=["twin", "elsewhere"])
+    away[-2] = replace(AWAY, usable=False, status="ambiguous", reasons=["twin"])
+    assert judged(away, "ranges: in another building: told to be elsewhere") == "37.5"
     assert judged(away, "ranges: mirrored") == "not measured"
     assert judged([replace(ANSWER, form="segments", condition="turning")] * 2, "segments: turning") == "100.0"
     assert could_be_told(AWAY)

@@ -14,6 +14,7 @@ import httpx
 import pytest
 
 from service.schemas import examples
+from tests.running import JSON
 
 WRITERS = 3
 MAPS_EACH = 3
@@ -36,7 +37,7 @@ class Writer:
     def work(self, url: str) -> None:
         """Write until the service is gone."""
         try:
-            with httpx.Client(base_url=url, timeout=30.0) as client:
+            with httpx.Client(base_url=url, timeout=30.0, headers=JSON) as client:
                 while True:
                     self.write(client)
         except httpx.TransportError:
@@ -94,7 +95,7 @@ def stored(client: httpx.Client, name: str) -> State:
 
 
 # Each kill interrupts three writes.
-@pytest.mark.parametrize("kills", [30, pytest.param(334, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [12, pytest.param(334, marks=pytest.mark.long)])
 def test_nothing_acknowledged_is_lost(start_service: Callable[..., Any], tmp_path: Path, kills: int) -> None:
     draw = random.Random(kills)
     writers = [Writer(f"w{i}", random.Random(i)) for i in range(WRITERS)]

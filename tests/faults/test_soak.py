@@ -17,6 +17,7 @@ import orjson
 import pytest
 
 from service.schemas import examples
+from tests.running import JSON
 
 CALLERS = 3
 PAUSE = 0.1  # s between the requests of one caller, in the mean
@@ -80,7 +81,8 @@ class Mix:
 
     def _hang_up(self, client: httpx.Client) -> None:
         body = orjson.dumps({"map": {"segments": rooms(600, 1)}, "scan": {"segments": examples.SEEN}})
-        head = f"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n".encode()
+        head = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+        head += b"Content-Length: %d\r\n\r\n" % len(body)
         with socket.create_connection(("127.0.0.1", self._port), timeout=20) as connection:
             connection.sendall((head + body)[: self._draw.randrange(1, len(head) + len(body) + 1)])
             time.sleep(self._draw.uniform(0.0, 0.02))
@@ -111,7 +113,7 @@ def test_memory_is_flat_under_mixed_load(start_service: Callable[..., Any], requ
     def call(seed: int) -> None:
         mix = Mix(seed, running.port)
         draw = random.Random(seed)
-        with httpx.Client(base_url=running.url, timeout=60.0) as client:
+        with httpx.Client(base_url=running.url, timeout=60.0, headers=JSON) as client:
             while time.monotonic() < end:
                 counts[mix.send(client)] += 1
                 time.sleep(draw.expovariate(1.0 / PAUSE))

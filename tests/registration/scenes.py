@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import Correspondences, MeasuredSegments, RegistrationResult, RigidTransform, Segments
-from registration.layout import Floats
+from registration.layout import SYMMETRIC3, Floats, Records
 
 ROOM: list[list[float]] = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0], [3, 3, 4, 5], [7, 2, 5, 1]]
 POSE = RigidTransform(3.0, 2.0, 0.4)
+Measured = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 
 def diagonal(n: int) -> NDArray[np.intp]:
@@ -98,3 +100,25 @@ def pose_of(result: RegistrationResult) -> RigidTransform:
 def difference(a: RigidTransform, b: RigidTransform) -> Floats:
     """Return pose a minus pose b as (x, y, theta)."""
     return np.array([a.x - b.x, a.y - b.y, math.remainder(a.theta - b.theta, math.tau)])
+
+
+def assert_close(actual: Any, expected: Any) -> None:
+    np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-9)
+
+
+def drawn(seed: int, n: int = 7) -> tuple[np.random.Generator, Correspondences, Floats, Measured]:
+    rng = np.random.default_rng(seed)
+    pairs = correspondences(*noisy_pairs(rng, n, noise=0.05))
+    weights = rng.uniform(0.1, 2.0, n)
+    measured = (pairs.map_normals, pairs.map_offsets, pairs.centroids, pairs.directions, pairs.spreads, weights)
+    return rng, pairs, weights, measured
+
+
+def symmetric(matrix: Floats) -> Records:
+    """Return the upper triangle of a matrix as a kernel takes it."""
+    return np.array([tuple(matrix[np.triu_indices(3)])], SYMMETRIC3)
+
+
+def room(pose: RigidTransform = POSE, sigma: float = 0.02) -> tuple[Segments, MeasuredSegments]:
+    map_segments = Segments.from_array(ROOM)
+    return map_segments, MeasuredSegments.from_segments(seen_from(pose, map_segments), sigma)

@@ -286,13 +286,18 @@ def test_every_compiled_function_is_covered() -> None:
 
 
 def test_clean_leaves_no_kernels(tmp_path: Path) -> None:
-    shutil.copy(ROOT / "Makefile", tmp_path)
-    kept = tmp_path / "registration" / "kernels" / "__pycache__" / "registration-0123"
-    gone = [kept, tmp_path / ".venv", tmp_path / ".venv-peers", tmp_path / "out"]
-    for path in gone:
+    checkout, cache, named = tmp_path / "checkout", tmp_path / "cache", tmp_path / "named"
+    kept = checkout / "registration" / "kernels" / "__pycache__" / "registration-0123"
+    own = cache / "linefix" / "kernels" / "registration-0123"
+    gone = [kept, own, checkout / ".venv", checkout / ".venv-peers", checkout / "out"]
+    left = [cache / "another", named / "registration-0123"]
+    for path in gone + left:
         path.mkdir(parents=True)
         (path / "file").touch()
-    subprocess.run(["make", "clean"], cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    shutil.copy(ROOT / "Makefile", checkout)
+    environment = os.environ | {"XDG_CACHE_HOME": str(cache), "LINEFIX_KERNELS": str(named)}
+    subprocess.run(["make", "clean"], cwd=checkout, env=environment, check=True, capture_output=True, timeout=60)
     assert not any(path.exists() for path in gone)
-    assert not list(tmp_path.rglob("__pycache__"))
-    assert (tmp_path / "registration" / "kernels").exists()
+    assert all((path / "file").exists() for path in left)
+    assert not list(checkout.rglob("__pycache__"))
+    assert (checkout / "registration" / "kernels").exists()

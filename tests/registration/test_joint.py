@@ -1,4 +1,4 @@
-"""Joint sums: adding, removing, costs and the parallel rule."""
+"""Joint sums: adding, removing and costs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from registration import JointSums, MeasuredSegments, Segments
+from registration import JointSums
 
 from .scenes import POSE, correspondences, fitted, noisy_pairs, random_segments, scanned_points
 
@@ -56,38 +56,3 @@ def test_the_cost_is_that_of_all_points_behind_the_segments() -> None:
     scatter = np.sum((own - own.mean(axis=1, keepdims=True)) ** 2)
     expected = (np.sum(distances**2) - scatter) / 0.01**2
     assert sums.cost(POSE.theta, (POSE.x, POSE.y)) == pytest.approx(expected, rel=1e-3)
-
-
-def walls(degrees: list[float], sigma: float) -> JointSums:
-    a = np.radians(degrees)
-    directions = np.stack([np.cos(a), np.sin(a)], axis=1)
-    begins = np.array([[0.0, 0.0], [5.0, 5.0], [-3.0, 8.0]])[: len(a)]
-    segments = Segments.from_array(np.hstack([begins, begins + 4.0 * directions]))
-    scan = MeasuredSegments.from_segments(segments, sigma)
-    return JointSums.of_set(correspondences(segments, scan), scan.points / sigma**2)
-
-
-@pytest.mark.parametrize(
-    ("degrees", "sigma", "expected"),
-    [
-        ([0, 180, 0], 0.02, True),
-        ([0, 90], 0.02, False),
-        # An angle is known to 0.02 / sqrt(80 * 4^2 / 12) rad = 0.111 degrees, so a difference of two to 0.157.
-        ([0, 0.45], 0.02, True),
-        ([0, 0.49], 0.02, False),
-        ([0, 0.49], 0.03, True),
-        # The deviations from the mean are 0, 0.4 and 0.4 degrees: 26 where noise stays below 11.8.
-        ([0, 0.4, -0.4], 0.02, False),
-        ([0, 0.25, -0.25], 0.02, True),
-    ],
-)
-def test_parallel_within_three_standard_deviations(degrees: list[float], sigma: float, expected: bool) -> None:
-    assert walls(degrees, sigma).parallel is expected
-
-
-def test_fewer_than_two_are_parallel() -> None:
-    """Rounding gives one direction a spread, and none have no weight to divide by."""
-    for seed in range(20):
-        pairs = correspondences(*noisy_pairs(np.random.default_rng(seed), 3))
-        assert JointSums.of_pair(pairs, 0, 1e30).parallel is True
-    assert JointSums.of_set(pairs.take(slice(0, 0)), []).parallel is True

@@ -43,6 +43,16 @@ def test_arrays_are_read_only_and_rows_can_be_taken() -> None:
     np.testing.assert_array_equal(s.take([1, 0]).lengths, [2, 1])
 
 
+def test_what_is_made_of_segments_may_be_longer_than_they_may() -> None:
+    long = Segments.derived(np.array([[0.0, 0.0, 3e4, 4e4]]))
+    np.testing.assert_allclose(long.lengths, [5e4])
+    np.testing.assert_allclose(long.directions, [[0.6, 0.8]])
+    np.testing.assert_array_equal(long.shifted([1.0, 2.0]).endpoints, [[1, 2, 30001, 40002]])
+    np.testing.assert_array_equal(long.reversed().endpoints, [[3e4, 4e4, 0, 0]])
+    with pytest.raises(ValueError, match="read-only"):
+        long.lengths[0] = 1.0
+
+
 @pytest.mark.parametrize(
     ("row", "says"),
     [
@@ -69,9 +79,20 @@ def test_what_is_no_array_of_segments_is_refused(array: Any) -> None:
 def test_what_a_caller_does_not_know_is_filled_in() -> None:
     measured = MeasuredSegments.from_segments(Segments.from_array(np.array([[0, 0, 6, 0], [0, 0, 0, 0.03]])))
     np.testing.assert_allclose(measured.sigma, [0.02, 0.02])
-    np.testing.assert_allclose(measured.points, [120, 2])
+    np.testing.assert_allclose(measured.points, [120, 0.6])
+    assert not measured.counted
     np.testing.assert_allclose(measured.spreads, [3.0, 0.03**2 / 12])
     np.testing.assert_allclose(measured.centroids, np.array([[3, 0], [0, 0.015]]))
+
+
+def test_points_that_were_counted_are_told_from_those_that_were_not() -> None:
+    segments = Segments.from_array([[0, 0, 0, 0.03]])
+    counted = MeasuredSegments.from_segments(segments, points=[1.0])
+    assert counted.counted
+    assert counted.points.tolist() == [1.0]
+    with pytest.raises(InvalidArgumentError) as caught:
+        MeasuredSegments.from_segments(segments, points=[0.6])
+    assert (caught.value.argument, caught.value.index) == ("scan.points", 0)
 
 
 @pytest.mark.parametrize(

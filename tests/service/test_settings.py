@@ -67,3 +67,32 @@ def test_no_more_workers_than_searches() -> None:
     assert read_settings(["--workers", "2", "--searches", "2"]).workers == 2
     with pytest.raises(SettingsError, match="workers"):
         read_settings(["--workers", "3", "--searches", "2"])
+
+
+@pytest.mark.parametrize("value", [" ", ",", "  , ", "two words", "caf\xe9", "a\tb"])
+def test_keys_that_nobody_could_send_are_refused(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    """Blank ones left a service that nobody could use, or that everybody could."""
+    monkeypatch.setenv("LINEFIX_KEYS", value)
+    with pytest.raises(SettingsError, match="keys"):
+        read_settings([])
+
+
+def test_keys_that_are_set_to_nothing_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINEFIX_KEYS", "")
+    assert read_settings([]).keys == ()
+
+
+@pytest.mark.parametrize("name", ["max_deadline_ms", "request_timeout", "drain_seconds", "hang_seconds"])
+@pytest.mark.parametrize("value", ["inf", "nan", "-inf", "1e400"])
+def test_times_are_finite(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+    monkeypatch.setenv(f"LINEFIX_{name.upper()}", value)
+    with pytest.raises(SettingsError, match=name):
+        read_settings([])
+
+
+@pytest.mark.parametrize("name", ["LINEFIX_KEYS", "LINEFIX_DATA_DIR", "LINEFIX_HOST", "LINEFIX_DATABASE_URL"])
+def test_what_is_not_utf_8_is_named(name: str) -> None:
+    environment = {**os.environb, name.encode(): b"/tmp/\xff\xfe"}
+    command = [sys.executable, "-m", "service"]
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert (ended.returncode, ended.stderr) == (2, f"linefix: {name}: not UTF-8\n")

@@ -17,6 +17,8 @@ from vectorization import InvalidOptionError, InvalidScanError, LaserScan, Vecto
         ("angle_min", (math.inf, 0.1, [1.0])),
         ("angle_increment", (0.0, 0.0, [1.0])),
         ("angle_increment", (0.0, math.nan, [1.0])),
+        ("angle_increment", (0.0, 1e-200, [1.0] * 50)),
+        ("angle_increment", (0.0, -9e-7, [1.0] * 50)),
         ("angle_increment", (0.0, 0.1, [1.0] * 100)),
         ("ranges", (0.0, 0.1, [[1.0]])),
         ("ranges", (0.0, 0.1, ["1.0"])),
@@ -89,3 +91,14 @@ def test_no_points_are_no_segments() -> None:
 def test_everything_exported_exists_and_is_listed_in_order() -> None:
     assert vectorization.__all__ == sorted(vectorization.__all__)
     assert all(hasattr(vectorization, name) for name in vectorization.__all__)
+
+
+@pytest.mark.parametrize("nearest", [5e-324, 1e-200, 9e-7])
+def test_a_range_of_next_to_nothing_is_none(nearest: float) -> None:
+    angles = np.linspace(-1.0, 1.0, 50)
+    ranges = 2.0 / np.cos(angles)
+    mixed = np.where(np.arange(50) % 10 == 0, nearest, ranges)
+    unknown = np.where(np.arange(50) % 10 == 0, math.nan, ranges)
+    found, without = (vectorize(LaserScan(-1.0, angles[1] - angles[0], r)) for r in (mixed, unknown))
+    np.testing.assert_array_equal(found.measured.segments.endpoints, without.measured.segments.endpoints)
+    assert len(vectorize(LaserScan(-1.0, 0.01, np.full(50, nearest))).measured) == 0

@@ -28,5 +28,6 @@ async def post_associate(request: Request) -> Response:
     exchange = searching(request)
     asked = await exchange.read(partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
-    work = partial(exchange.services.associator.answer, asked, job)
-    return exchange.answer(await exchange.search(work, job.deadline))
+    async with exchange.looking_up(asked.map, asked.options, job.deadline) as on:
+        work = partial(exchange.services.associator.answer, asked, on, job)
+        return exchange.answer(await exchange.search(work, job.deadline))

@@ -44,7 +44,8 @@ async def post_batch(request: Request) -> Response:
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
     """Index the map in one turn at the gate, and search for each scan in another."""
     associator = exchange.services.associator
-    target = await exchange.take_turn(partial(associator.target, asked.map, asked.options), job.deadline)
+    async with exchange.looking_up(asked.map, asked.options, job.deadline) as on:
+        target = await exchange.take_turn(partial(associator.target, on, asked.options), job.deadline)
     job.watch.lap("decode")
     calls = [partial(associator.find_for_batch, target, item, asked.options, job.deadline) for item in items]
     results = await _answer_all(exchange, calls, job)

@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from ..exchange import JSON
 from ..problems import KINDS, MEDIA_TYPE, Kind
+from ..sending import JSON
 
 EVERYWHERE = ("unauthorized", "forbidden", "internal")
 READS_BODY = ("invalid_json", "request_timeout", "too_large", "unsupported_media_type", "invalid_request")

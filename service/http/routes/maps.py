@@ -14,7 +14,8 @@ from ...schemas.encoding import encode
 from ...schemas.replies import MapList, MapSummaryAnswer
 from ...schemas.requests import MapDocument
 from ..etags import demands_of, etag, is_conditional, is_unchanged
-from ..exchange import Exchange, json_response
+from ..exchange import Exchange, ask_store
+from ..sending import json_response
 from .documenting import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 
 router = APIRouter(tags=["maps"])
@@ -57,7 +58,7 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     asked, document = await exchange.read(read_map)
     summary = await services.parse_threads.run(partial(summary_of, asked))
     put = partial(services.store.put, map_id, document, summary, demands)
-    revision, created = await services.store_threads.run(put)
+    revision, created = await ask_store(services, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
     count, bounds = summary
@@ -80,10 +81,10 @@ async def get_map(request: Request, map_id: MapIdPath) -> Response:
     """Give a map back as it was stored."""
     services = Exchange(request).services
     if is_conditional(request):
-        record = await services.store_threads.run(partial(services.store.record, map_id))
+        record = await ask_store(services, partial(services.store.record, map_id))
         if is_unchanged(request, record.revision):
             return Response(status_code=304, headers={"ETag": etag(record.revision)})
-    stored = await services.store_threads.run(partial(services.store.load, map_id))
+    stored = await ask_store(services, partial(services.store.load, map_id))
     return json_response(stored.document, headers={"ETag": etag(stored.record.revision)})
 
 
@@ -102,7 +103,7 @@ async def list_maps(
 ) -> Response:
     """List what is stored, by id."""
     services = Exchange(request).services
-    page = await services.store_threads.run(partial(services.store.list, limit, cursor))
+    page = await ask_store(services, partial(services.store.list, limit, cursor))
     items = [
         {"map_id": item.map_id, "revision": item.revision, "segments": item.segments, "bounds": item.bounds}
         for item in page.maps
@@ -124,7 +125,7 @@ async def delete_map(request: Request, map_id: MapIdPath) -> Response:
     """Forget a map."""
     exchange, demands = Exchange(request), demands_of(request)
     services = exchange.services
-    await services.store_threads.run(partial(services.store.delete, map_id, demands))
+    await ask_store(services, partial(services.store.delete, map_id, demands))
     services.metrics.map_changes.labels("deleted").inc()
     exchange.note(map={"map_id": map_id})
     return Response(status_code=204)

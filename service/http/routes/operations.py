@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from ...schemas.encoding import encode
 from ...schemas.replies import Limits, Live, Version
 from ...version import VERSION
-from ..exchange import json_response
+from ..sending import json_response
 from ..services import services_of
 from .documenting import EVERYWHERE, problems
 
@@ -48,6 +48,8 @@ async def limits(request: Request) -> Response:
         "max_body_bytes",
         "max_values",
         "max_bodies_bytes",
+        "max_answers_bytes",
+        "max_connections",
         "request_timeout",
         "max_map_segments",
         "max_scan_segments",
@@ -70,5 +72,5 @@ async def limits(request: Request) -> Response:
 )
 async def metrics(request: Request) -> Response:
     """Give the counts, over all workers."""
-    text = services_of(request.scope).metrics.exposition()
+    text = await services_of(request.scope).metrics.exposition()
     return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")

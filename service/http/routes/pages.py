@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from base64 import b64encode
+from functools import cache
+from hashlib import sha256
 from importlib.resources import files
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
@@ -17,6 +21,11 @@ ASSETS = {
     "favicon.png": "image/png",
 }
 
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+_POLICY = (
+    "default-src 'none'; script-src 'self' {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 START = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -40,22 +49,45 @@ START = """<!doctype html>
 """
 
 
+@cache
+def _content(name: str) -> bytes:
+    """Return a file of the page; once for all who read it, however slowly."""
+    return files("fastapi_offline").joinpath("static", name).read_bytes()
+
+
 @router.get("/", response_class=HTMLResponse)
 async def start() -> HTMLResponse:
     """Point to what there is."""
-    return HTMLResponse(START)
+    return _page(START)
+
+
+@router.get("/openapi.json")
+async def contract(request: Request) -> Response:
+    """Give the contract; from bytes that all who read it share, however slowly."""
+    return Response(await request.app.state.contract.body(), media_type="application/json")
 
 
 @router.get("/docs", response_class=HTMLResponse)
 async def docs() -> HTMLResponse:
     """Show the contract with Swagger UI, whose files come from an installed package."""
-    return get_swagger_ui_html(
+    page = get_swagger_ui_html(
         openapi_url="/openapi.json",
         title="Linefix",
         swagger_js_url="/docs/assets/swagger-ui-bundle.js",
         swagger_css_url="/docs/assets/swagger-ui.css",
         swagger_favicon_url="/docs/assets/favicon.png",
     )
+    return _page(bytes(page.body).decode())
+
+
+def _page(text: str) -> HTMLResponse:
+    """Return a page that runs nothing but its own, and stands in no other."""
+    scripts = " ".join(
+        "'sha256-" + b64encode(sha256(script.encode()).digest()).decode() + "'" for script in _SCRIPT.findall(text)
+    )
+    policy = _POLICY.format(scripts=scripts)
+    headers = {"Content-Security-Policy": policy, "X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
+    return HTMLResponse(text, headers={**headers, "Cross-Origin-Opener-Policy": "same-origin"})
 
 
 @router.get("/docs/assets/{name}")
@@ -64,5 +96,4 @@ async def asset(name: str) -> Response:
     media_type = ASSETS.get(name)
     if media_type is None:
         raise NotFoundError("there is no such file")
-    data = files("fastapi_offline").joinpath("static", name).read_bytes()
-    return Response(data, media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})
+    return Response(_content(name), media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})

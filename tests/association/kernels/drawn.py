@@ -9,8 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
-from association.layout import Indices
-from association.scan_segments import gates
+from association.context import ANY
+from association.layout import Indices, Workspace
+from association.scan_lines import gates
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -23,6 +24,8 @@ INDEX = index_of(MAZE)
 TABLES = INDEX.tables
 PLACE = TABLES.place
 GATES = gates(AssociationOptions())
+TERMS = context_of(INDEX, scan_of([[0.0, 0.0, 1.0, 0.0]])).question(ANY).terms  # under the usual options
+MODEL = TERMS["model"]
 SMALL = np.diag([1e-4, 1e-4, 1e-6])  # a pose's covariance
 
 
@@ -36,8 +39,8 @@ class Drawn:
         To draw more with.
     endpoints : (n, 4) in the scan frame
     truth : (n,) the wall of each segment or -1, by scan index
-    order : (n,) the scan index of each row
-    scan : (n,) of `SCAN_SEGMENT`
+    row_of : (n,) the row that each segment is part of, by scan index
+    scan : (rows,) of `SCAN_LINE`
     at : RigidTransform
         Index frame from scan frame.
     """
@@ -45,7 +48,7 @@ class Drawn:
     rng: np.random.Generator
     endpoints: Floats
     truth: Truth
-    order: Indices
+    row_of: Indices
     scan: Records
     at: RigidTransform
 
@@ -60,8 +63,12 @@ def drawn(seed: int, radius: float = 10.0, clutter: int = 5, index: MapIndex = I
     x, y = rng.uniform(8.0, 22.0, 2)
     at = RigidTransform(x, y, rng.uniform(-3.0, 3.0))
     endpoints, truth = seen(MAZE, at, noise=0.02, cut=0.5, clutter=clutter, seed=seed, radius=radius)
-    segments = context_of(index, scan_of(endpoints)).segments
-    return Drawn(rng, endpoints, truth, segments.order, segments.rows, local(index, at))
+    lines = context_of(index, scan_of(endpoints)).lines
+    return Drawn(rng, endpoints, truth, lines.row_of, lines.rows, local(index, at))
+
+
+def workspace_of(scan: Records, index: MapIndex = INDEX) -> Workspace:
+    return Workspace.of(len(scan), len(index.walls.rows))
 
 
 def covariance(rng: np.random.Generator) -> Floats:

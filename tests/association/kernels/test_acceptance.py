@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import acceptance
-from association.layout import ENDS, MATCH, VIEW, Workspace, as_records, record
+from association.layout import ENDS, MATCH, SCAN_LINE, VIEW, Lines, as_records, record
 from association.tuning import MAX_RIVALS
 
 from ..records import estimate_of
 from ..reference import acceptance as twin
 from ..reference.matching import match_scan
 from ..scenes import context_of, index_of, local, pose, scan_of
-from .drawn import GATES, SEEDS, SMALL, drawn, in_pieces
+from .drawn import GATES, SEEDS, SMALL, drawn, in_pieces, workspace_of
 
 
 def test_union_length() -> None:
@@ -49,8 +49,9 @@ def test_accept_matches(seed: int) -> None:
     d = drawn(seed, radius=12.0, clutter=3, index=index)
     matches, _ = match_scan(d.scan, d.at, SMALL, index.tables.place, GATES)
     ends, walls = as_records(ENDS, d.endpoints), index.walls.rows
-    got = acceptance.accept_matches(matches, d.order, ends, estimate_of(d.at), walls, index.pieces)
-    expected = twin.accept_matches(matches["wall"], d.order, d.endpoints, d.at, walls, index.pieces)
+    lines = Lines(d.scan, d.row_of, 0.5)
+    got = acceptance.accept_matches(matches, lines, ends, estimate_of(d.at), walls, index.pieces)
+    expected = twin.accept_matches(matches["wall"], lines, d.endpoints, d.at, walls, index.pieces)
     assert_pairs(*got, expected)
     assert len(expected) > 0
 
@@ -64,14 +65,15 @@ def assert_pairs(
     assert len(rivals) == starts[-1]
 
 
-def accepted_on(walls: list[list[float]], segment: list[float]) -> tuple[np.ndarray, ...]:
-    """Accept a segment, in the frame of the map, as one on the wall that its midpoint is nearest to."""
+def accepted_on(walls: list[list[float]], *segments: list[float]) -> tuple[np.ndarray, ...]:
+    """Accept segments of one line, in the frame of the map, as on the wall that its midpoint is nearest to."""
     index = index_of(walls)
-    rows = context_of(index, scan_of([segment])).segments.rows
-    matches, _ = match_scan(rows, local(index, pose()), SMALL, index.tables.place, GATES)
+    lines = context_of(index, scan_of(segments)).lines
+    assert len(lines.rows) == 1
+    matches, _ = match_scan(lines.rows, local(index, pose()), SMALL, index.tables.place, GATES)
     return acceptance.accept_matches(
-        matches, np.zeros(1, np.intp), as_records(ENDS, np.array([segment])), estimate_of(local(index, pose())),
-        index.walls.rows, index.pieces,
+        matches, Lines(lines.rows, lines.row_of, 0.5), as_records(ENDS, np.array(segments)),
+        estimate_of(local(index, pose())), index.walls.rows, index.pieces,
     )  # fmt: skip
 
 
@@ -83,6 +85,23 @@ def test_only_long_segments_are_accepted_on_both_sides_of_a_doorway() -> None:
     pairs, overlaps, rivals, _ = accepted_on(walls, [2.375, 0.0, 5.5, 0.0])
     assert (pairs.tolist(), rivals.tolist()) == ([[0, 0]], [1])
     assert overlaps[0] == pytest.approx((1.625 + 1.1) / 3.125)
+
+
+def test_segments_of_one_line_are_accepted_one_by_one() -> None:
+    """Those of which half lies on the wall; whether they may bridge a doorway is told by the line."""
+    wall = [[0.0, 0.0, 4.0, 0.0]]
+    on, beyond = [0.5, 0.0, 3.0, 0.0], [3.2, 0.0, 4.7, 0.0]
+    pairs, overlaps, _, _ = accepted_on(wall, beyond, on)
+    assert pairs.tolist() == [[0, 0], [1, 0]]
+    assert overlaps.tolist() == pytest.approx([0.8 / 1.5, 1.0])
+    beyond = [3.3, 0.0, 4.8, 0.0]
+    pairs, overlaps, rivals, starts = accepted_on(wall, beyond, on)
+    assert (pairs.tolist(), overlaps.tolist()) == ([[1, 0]], pytest.approx([1.0]))
+    assert (rivals.tolist(), starts.tolist()) == ([], [0, 0])
+    walls = [[0.0, 0.0, 4.0, 0.0], [4.4, 0.0, 8.0, 0.0]]
+    pairs, overlaps, rivals, _ = accepted_on(walls, [2.0, 0.0, 3.5, 0.0], [3.5, 0.0, 5.1, 0.0])
+    assert (pairs.tolist(), rivals.tolist()) == ([[0, 0], [1, 1]], [0])
+    assert overlaps.tolist() == pytest.approx([1.0, (0.5 + 0.7) / 1.6])
 
 
 def test_of_many_pieces_the_first_are_named() -> None:
@@ -98,8 +117,9 @@ def test_of_many_pieces_the_first_are_named() -> None:
 def test_nothing_matched_is_nothing_accepted() -> None:
     index, matches = index_of([[0.0, 0.0, 1.0, 0.0]]), np.zeros(2, MATCH)
     matches["wall"] = -1
+    lines = Lines(np.zeros(2, SCAN_LINE), np.arange(2), 0.5)
     got = acceptance.accept_matches(
-        matches, np.arange(2), np.zeros(2, ENDS), estimate_of(pose()), index.walls.rows, index.pieces
+        matches, lines, np.zeros(2, ENDS), estimate_of(pose()), index.walls.rows, index.pieces
     )
     assert [len(array) for array in got] == [0, 0, 0, 1]
 
@@ -114,7 +134,7 @@ def test_missing_pieces(seed: int) -> None:
     on_map = rng.random(len(d.scan)) < 0.8
     matches["wall"] = np.where(on_map, rng.integers(0, len(index.walls.rows), len(d.scan)), -1)
     viewpoint = rng.normal(size=2).tolist()
-    view, work = record(VIEW, x=viewpoint[0], y=viewpoint[1]), Workspace.of(len(d.scan))
+    view, work = record(VIEW, x=viewpoint[0], y=viewpoint[1]), workspace_of(d.scan, index)
     got = acceptance.missing_pieces(d.scan, matches, view, estimate_of(d.at), index.tables.place, index.pieces, work)
     expected = twin.missing_pieces(d.scan, matches["wall"], viewpoint, d.at, index.walls.rows, index.pieces)
     assert sorted(got.tolist()) == expected

@@ -23,7 +23,7 @@ from .drawn import INDEX, MAZE, PLACE, SEEDS, drawn
 
 def agreement(scan: Records, viewpoint: np.ndarray, at: RigidTransform) -> float:
     view = record(VIEW, x=viewpoint[0], y=viewpoint[1])
-    return comparing.agreement(scan, view, estimate_of(at), PLACE, Workspace.of(len(scan)))
+    return comparing.agreement(scan, view, estimate_of(at), PLACE, Workspace.of(len(scan), len(PLACE.walls)))
 
 
 @given(SEEDS)
@@ -75,6 +75,6 @@ def test_agreement(seed: int) -> None:
 
 def test_agreement_of_the_true_pose_is_whole_and_of_half_a_turn_is_not() -> None:
     at = pose(14.0, 15.0, 0.4)
-    scan, here = context_of(INDEX, scan_of(seen(MAZE, at, radius=12.0)[0])).segments.rows, local(INDEX, at)
+    scan, here = context_of(INDEX, scan_of(seen(MAZE, at, radius=12.0)[0])).lines.rows, local(INDEX, at)
     assert agreement(scan, np.zeros(2), here) > 0.9
     assert agreement(scan, np.zeros(2), moved(here, [math.pi, 0.0, 0.0])) < 0.6

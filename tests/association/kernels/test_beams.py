@@ -70,7 +70,7 @@ def test_refine_by_beams(seed: int) -> None:
     """In the same workspace one after the other."""
     rng = np.random.default_rng(seed)
     rays, truth, viewpoint, view = drawn_rays(rng, 60)
-    work = Workspace.of(1)
+    work = Workspace.of(1, 1)
     for count in (len(rays.angles), 16, 12):
         some = rays._replace(angles=rays.angles[:count], ranges=rays.ranges[:count])
         start = moved(truth, rng.normal(size=3) * [0.02, 0.05, 0.05])
@@ -89,7 +89,7 @@ def test_weigh_beams(seed: int) -> None:
     rays, truth, viewpoint, view = drawn_rays(rng, 40)
     starts = [moved(truth, rng.normal(size=3) * scale) for scale in (0.0, [0.02, 0.1, 0.1], [0.1, 1.0, 1.0], 0.05)]
     poses, out = np.concatenate([estimate_of(at) for at in starts]), np.zeros(4, BEAM_EVIDENCE)
-    beams.weigh_beams(rays, view, poses, PLACE, 3, Workspace.of(1), out)
+    beams.weigh_beams(rays, view, poses, PLACE, 3, Workspace.of(1, 1), out)
     for k, start in enumerate(starts):
         at, there, here = twin.weigh_beams(rays, viewpoint, start, PLACE)
         if k == 3:
@@ -101,7 +101,7 @@ def test_weigh_beams(seed: int) -> None:
 def test_beams_move_a_pose_to_where_they_fit() -> None:
     poses, out = estimate_of(moved(HERE, [0.02, 0.1, -0.08])), np.zeros(1, BEAM_EVIDENCE)
     rays = Rays(ANGLES, read(ROOM_INDEX, INSIDE), 20.0)
-    beams.weigh_beams(rays, np.zeros(1, VIEW), poses, ROOM_INDEX.tables.place, 1, Workspace.of(1), out)
+    beams.weigh_beams(rays, np.zeros(1, VIEW), poses, ROOM_INDEX.tables.place, 1, Workspace.of(1, 1), out)
     assert same_pose(pose_of(poses[0]), HERE, 1e-3, 1e-3)
     assert out[0]["read"] > 0.99
 
@@ -111,6 +111,6 @@ def test_few_beams_do_not_move_a_pose(count: int, moves: bool) -> None:
     start, ranges = moved(HERE, [0.01, 0.03, -0.03]), read(ROOM_INDEX, INSIDE)
     estimate, every = estimate_of(start), slice(None, None, 240 // count)
     rays = Rays(ANGLES[every][:count], ranges[every][:count], 20.0)
-    view, work = np.zeros(1, VIEW), Workspace.of(1)
+    view, work = np.zeros(1, VIEW), Workspace.of(1, 1)
     beams.refine_by_beams(rays, view[0], estimate[0], ROOM_INDEX.tables.place, 0.35, work)
     assert same_pose(pose_of(estimate[0]), start, 1e-9, 1e-9) is not moves

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from association import AssociationOptions
 from association.kernels import matching
 from association.layout import MATCH
-from association.scan_segments import gates
+from association.scan_lines import gates
 from registration.layout import Records
 
 from ..records import NOTHING_KNOWN, assert_records, estimate_of
@@ -54,7 +54,7 @@ def test_match_scan(seed: int, gates: Records) -> None:
 def test_a_long_segment_bridges_a_doorway(gap: float, overlap: float) -> None:
     """It lies on the walls on both sides; the gap counts against it, and a wider one is none that it bridges."""
     index = index_of([[0.0, 0.0, 3.0, 0.0], [3.0 + gap, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
-    scan = context_of(index, scan_of([[0.0, 0.0, 6.0, 0.0]])).segments.rows
+    scan = context_of(index, scan_of([[0.0, 0.0, 6.0, 0.0]])).lines.rows
     matches = np.zeros(1, MATCH)
     matching.match_scan(scan, estimate_of(local(index, pose()))[0], index.tables.place, GATES[0], 0.0, matches)
     assert matches["overlap"][0] == pytest.approx(overlap)
@@ -69,7 +69,7 @@ def test_long_segments_on_walls_with_doorways(seed: int) -> None:
     walls = [[ends[k - 1, 1] if k else 0.0, 0.0, ends[k, 0], 0.0] for k in range(6)]
     index = index_of([*walls, [20.0, 5.0, 0.0, 5.0]])
     begin, length = rng.uniform(-1.0, 8.0), rng.uniform(2.0, 9.0)
-    scan = context_of(index, scan_of([[begin, 0.05, begin + length, 0.05]])).segments.rows
+    scan = context_of(index, scan_of([[begin, 0.05, begin + length, 0.05]])).lines.rows
     loose, at = gates(AssociationOptions(min_overlap=0.0)), local(index, pose())
     matches = np.zeros(1, MATCH)
     matching.match_scan(scan, estimate_of(at)[0], index.tables.place, loose[0], 0.0, matches)
@@ -104,7 +104,7 @@ def test_may_score(seed: int) -> None:
 
 def test_a_pose_over_a_doorway_may_score() -> None:
     """The raster has the direction of a run also where its walls are farther away than they are listed."""
-    segments = context_of(INDEX, scan_of([[0.0, 0.0, 6.0, 0.0]])).segments.rows
+    segments = context_of(INDEX, scan_of([[0.0, 0.0, 6.0, 0.0]])).lines.rows
     spreads, matches = twin.angle_spreads(segments, 0.0, GATES), np.zeros(1, MATCH)
     for jamb in np.linspace(3.0, 3.5, 11):
         index = index_of([[0.0, 0.0, jamb, 0.0], [jamb + 1.45, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])

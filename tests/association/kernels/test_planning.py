@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
+from dataclasses import astuple, dataclass
 
 import numpy as np
 import pytest
@@ -10,14 +12,17 @@ from hypothesis import given, settings
 
 from association.kernels import planning
 from association.kernels.proposing import search_base
-from association.layout import FOUND, PROGRESS, RULES, Plan, Question, Words, Workspace, record
+from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, Plan, Question, Words, record
+from association.tuning import REUSE
 from registration.layout import Records
 
 from ..reference import planning as twin
+from ..reference.consensus import Pairs, freedom_taken
+from ..reference.scans import freedom_alone
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, SEEDS, TABLES, Drawn, drawn, oblique
+from .drawn import INDEX, MODEL, SEEDS, TABLES, Drawn, drawn, oblique, workspace_of
 
-RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95)
+RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95, enough=np.inf)
 BASES = 8  # segments that bases are made of
 
 
@@ -65,10 +70,11 @@ def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
     bases, expected = planning.plan_bases(scan, count, runs, area), twin.plan_bases(scan, count, runs, area)
     assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
     np.testing.assert_allclose(bases["merit"], [base[2] for base in expected], rtol=1e-9)
-    uses = np.zeros(count)
-    taken = [planning.next_base(bases, uses) for _ in range(len(expected) + 1)]
-    assert taken == [*twin.order_of(expected), -1]
-    assert uses.sum() == 2 * len(expected)
+    for fade in (math.log(REUSE), 0.0):
+        left, uses = bases.copy(), np.zeros(count)
+        taken = [planning.next_base(left, uses, fade) for _ in range(len(expected) + 1)]
+        assert taken == [*twin.order_of(expected, fade), -1]
+        assert uses.sum() == 2 * len(expected)
 
 
 def test_bound_is_never_below_what_can_have_been_missed() -> None:
@@ -121,15 +127,66 @@ def test_fewest_segments(seed: int) -> None:
     assert planning.fewest_segments(gains, beyond, needed) == twin.fewest_segments(gains.tolist(), beyond, needed)
 
 
-def plan_of(scan: Records, rng: np.random.Generator) -> Plan:
+def test_drawn_chance() -> None:
+    for count in range(8):
+        for fewest in range(2, max(3, count + 1)):
+            assert planning.drawn_chance(fewest, count) == pytest.approx(twin.drawn_chance(fewest, count))
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_least_freedom(seed: int) -> None:
+    """Brute force over all sets; some lines take as much as others, and some sets come to what is needed to the bit."""
+    rng = np.random.default_rng(seed)
+    scan = np.zeros(int(rng.integers(1, 9)), SCAN_LINE)
+    scan["gain"], scan["freedom"] = rng.integers(1, 9, len(scan)), rng.integers(1, 6, len(scan))
+    freest = np.argsort(-scan["freedom"], kind="stable")
+    for needed in (*rng.integers(1, int(scan["gain"].sum()) + 1, 5), scan["gain"].sum()):
+        got = planning.least_freedom(scan, freest, float(needed))
+        assert got == twin.least_freedom(scan, needed) == twin.least_freedom_sorted(scan, needed)
+    assert planning.least_freedom(scan, freest, 0.0) == 0.0
+    assert planning.least_freedom(scan, freest, scan["gain"].sum() + 1.0) == scan["freedom"].max()
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_no_set_takes_less_freedom(seed: int) -> None:
+    """Brute force over the sets of some lines, on walls that lie as they do, several of them on one wall."""
+    d = drawn(seed)
+    scan = d.scan[np.sort(d.rng.choice(len(d.scan), 7, replace=False))].copy()
+    walls = np.zeros(len(scan), WALL)
+    walls["dx"], walls["dy"] = scan["dx"], scan["dy"]
+    of_wall = np.arange(len(scan))
+    for k in range(3):  # these lie on the wall of the first, farther on
+        scan[["dx", "dy", "angle"]][k] = scan[["dx", "dy", "angle"]][0]
+        of_wall[k] = 0
+    model = MODEL[0]
+    for line in scan:
+        line["freedom"] = freedom_alone(line, model)
+    freest = np.argsort(-scan["freedom"], kind="stable")
+    taken = {}
+    for size in range(1, len(scan) + 1):
+        for some in itertools.combinations(range(len(scan)), size):
+            held = np.where(np.isin(np.arange(len(scan)), some), of_wall, -1)
+            pairs = Pairs.of(scan, held, walls, float(model["wall_variance"]))
+            taken[some] = freedom_taken(pairs.information(0.0), model), scan["gain"][list(some)].sum()
+    for needed in d.rng.uniform(1.0, scan["gain"].sum(), 8):
+        least = min(freedom for freedom, gain in taken.values() if gain >= needed)
+        assert planning.least_freedom(scan, freest, needed) <= least + 1e-9
+
+
+def plan_of(scan: Records, rng: np.random.Generator, *, drawn_by_chance: bool) -> Plan:
     n = min(len(scan), BASES)
     return Plan(
         bases=planning.plan_bases(scan, n, INDEX.runs, INDEX.area),
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
+        freest=np.argsort(-scan["freedom"], kind="stable"),
         inliers=sampled(n, 8, rng),
         missing=np.full((n, 8), ~np.uint64(0)),
+        fade=0.0 if drawn_by_chance else math.log(REUSE),
+        random=drawn_by_chance,
     )
 
 
@@ -137,52 +194,90 @@ def start_of(scan: Records) -> Records:
     return record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
 
 
-def asked(d: Drawn) -> Question:
-    return context_of(INDEX, scan_of(d.endpoints)).question(RULE)
+@dataclass(frozen=True)
+class Effort:
+    """How far a search goes: the chance of having missed something, the value that ends it, the order of bases."""
+
+    allowed: float
+    enough: float = math.inf
+    by_chance: bool = False
 
 
-def expected_end(d: Drawn, allowed: float) -> tuple[int, int, float, float]:
-    """Go through the bases one by one; return why it ends, how many there were, the bound and the share missed."""
-    question, found, state = asked(d), np.zeros(64, FOUND), start_of(d.scan)
-    plan, work = plan_of(question.scan, np.random.default_rng(0)), Workspace.of(len(d.scan))
-    beyond, residual, tried, bound, missed = (
-        d.scan["gain"][BASES:].sum(),
-        d.scan["gain"].copy(),
-        [],
-        d.scan["gain"].sum(),
-        1.0,
+@dataclass(frozen=True)
+class End:
+    """Why a search ended, after how many bases, the bound, and the share that may have been missed."""
+
+    why: int
+    bases: int
+    bound: float
+    missed: float
+
+
+def asked(d: Drawn, effort: Effort) -> Question:
+    rules = RULE.copy()
+    rules["enough"] = effort.enough
+    return context_of(INDEX, scan_of(d.endpoints)).question(rules)
+
+
+def expected_end(d: Drawn, effort: Effort) -> End:
+    """Go through the bases one by one."""
+    question, found, state = asked(d, effort), np.zeros(64, FOUND), start_of(d.scan)
+    plan, work = (
+        plan_of(question.scan, np.random.default_rng(0), drawn_by_chance=effort.by_chance),
+        workspace_of(d.scan),
     )
-    order = twin.order_of([base.item() for base in plan.bases])
+    gains, beyond = plan.best_gains.tolist(), float(d.scan["gain"][BASES:].sum())
+    residual, tried, bound, missed = d.scan["gain"].copy(), [], float(d.scan["gain"].sum()), 1.0
+    order = twin.order_of([base.item() for base in plan.bases], plan.fade)
     for count, k in enumerate(order, 1):
         base = plan.bases[k]
         search_base(question, TABLES, base, found, state[0], work, 10**9)
-        needed = 0.95 * state["best_value"][0]
+        best = float(state["best_value"][0])
+        state["least_freedom"] = twin.least_freedom_sorted(d.scan, 0.65 * best)
+        needed = 0.95 * best + twin.least_freedom_sorted(d.scan, 0.95 * best)
         a, b = base["sliding"], base["crossing"]
         if twin.is_telling(d.scan, a, b):
             tried.append(base)
             less = min(residual[[a, b]])
             residual[[a, b]] -= less
             bound -= less
-            fewest = twin.fewest_segments(plan.best_gains.tolist(), beyond, needed)
-            missed = twin.missed_share(plan.inliers, tried, fewest)
-        if allowed >= 0.0 and bound < needed:
-            return planning.PROVEN, count, bound, missed
-        if missed <= allowed:
-            return planning.CONFIDENT, count, bound, missed
-    return planning.EXHAUSTED, len(order), bound, missed
+            fewest = twin.fewest_segments(gains, beyond, needed)
+            by_chance = missed * (1.0 - twin.drawn_chance(fewest, len(gains)))
+            missed = by_chance if effort.by_chance else twin.missed_share(plan.inliers, tried, fewest)
+        proven = effort.allowed >= 0.0 and bound < needed
+        if best >= effort.enough or (missed <= effort.allowed and not proven):
+            return End(planning.CONFIDENT, count, bound, missed)
+        if proven:
+            return End(planning.PROVEN, count, bound, missed)
+    return End(planning.EXHAUSTED, len(order), bound, missed)
 
 
-def end_of(d: Drawn, allowed: float, budget: int) -> tuple[tuple[int, int, float, float], Records, int]:
+def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
     """Advance until it ends; return how, what was found, and the number of calls."""
-    question, found, progress = asked(d), np.zeros(64, FOUND), start_of(d.scan)
-    plan, work = plan_of(question.scan, np.random.default_rng(0)), Workspace.of(len(d.scan))
+    question, found, progress = asked(d, effort), np.zeros(64, FOUND), start_of(d.scan)
+    plan, work = (
+        plan_of(question.scan, np.random.default_rng(0), drawn_by_chance=effort.by_chance),
+        workspace_of(d.scan),
+    )
     why, calls = planning.BUDGET, 0
     while why == planning.BUDGET:
-        why = planning.advance(question, TABLES, plan, found, progress, work, allowed, budget)
+        why = planning.advance(question, TABLES, plan, found, progress, work, effort.allowed, budget)
         calls += 1
     state = progress[0]
-    end = why, int(state["bases"]), float(state["bound"]), float(state["missed"])
+    end = End(why, int(state["bases"]), float(state["bound"]), float(state["missed"]))
     return end, found[: int(state["count"])], calls
+
+
+def assert_ends_alike(d: Drawn, effort: Effort) -> End:
+    """Compare with the twin, and with a search that is interrupted."""
+    end, found, calls = end_of(d, effort, 10**9)
+    assert astuple(end) == pytest.approx(astuple(expected_end(d, effort)))
+    assert calls == 1
+    again, same, calls = end_of(d, effort, 300)
+    assert again == end
+    np.testing.assert_array_equal(same, found)
+    assert calls > 1 or end.bases == 1
+    return end
 
 
 @given(SEEDS)
@@ -191,18 +286,35 @@ def test_advance(seed: int) -> None:
     """It ends where its twin does and for the same reason, with the same poses however often it is interrupted."""
     d = drawn(seed, radius=8.0, clutter=seed % 4)
     for allowed in (-1.0, 0.0, 0.02, 0.3):
-        end, found, calls = end_of(d, allowed, 10**9)
-        assert end == pytest.approx(expected_end(d, allowed))
-        assert calls == 1
-        again, same, calls = end_of(d, allowed, 300)
-        assert again == end
-        np.testing.assert_array_equal(same, found)
-        assert calls > 1 or allowed > 0.0
+        assert_ends_alike(d, Effort(allowed))
+
+
+@given(SEEDS)
+@settings(max_examples=8, deadline=None)
+def test_advance_through_bases_that_are_drawn(seed: int) -> None:
+    """The chance of having missed something is that of independent draws; bases are not spread over the segments."""
+    d = drawn(seed, radius=8.0, clutter=seed % 4)
+    for allowed in (-1.0, 0.3, 0.9):
+        assert_ends_alike(d, Effort(allowed, by_chance=True))
+
+
+@given(SEEDS)
+@settings(max_examples=8, deadline=None)
+def test_a_value_that_is_enough_ends_it(seed: int) -> None:
+    """Whatever may have been missed, and where all bases were to be gone through, too."""
+    d = drawn(seed, radius=8.0, clutter=seed % 4)
+    end, found, _ = end_of(d, Effort(-1.0), 10**9)
+    best = float(found["value"].max(initial=0.0))
+    assert assert_ends_alike(d, Effort(-1.0, enough=best + 1e-6)) == end
+    if best > 0.0:
+        early = assert_ends_alike(d, Effort(-1.0, enough=best - 1e-6))
+        assert early.why == planning.CONFIDENT
+        assert early.bases <= end.bases
 
 
 def test_all_three_ends_are_met() -> None:
     ends = {
-        expected_end(drawn(seed, radius=8.0, clutter=seed % 4), allowed)[0]
+        expected_end(drawn(seed, radius=8.0, clutter=seed % 4), Effort(allowed)).why
         for seed in range(8)
         for allowed in (-1.0, 0.0, 0.3)
     }

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association.context import ANY
 from association.kernels import ranking
-from association.layout import MATCH, MERIT, TERMS, VIEW, Place, Question, Workspace, record
+from association.layout import MATCH, MERIT, VIEW, Place, Question, Workspace, record
 from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_FAMILY
 from registration import RigidTransform
 from registration.layout import Records
@@ -17,16 +16,15 @@ from ..records import assert_records, covariance_of, estimate_of, pose_of
 from ..reference import ranking as twin
 from ..reference.geometry import moved
 from ..scenes import INSIDE, ROOM, context_of, index_of, local, pose, same_pose, scan_of, seen
-from .drawn import GATES, PLACE, SEEDS, drawn
+from .drawn import GATES, MODEL, PLACE, SEEDS, TERMS, drawn
 
 
 def ranked(scan: Records, poses: list[RigidTransform], view: Records, place: Place) -> tuple[Records, Records, Records]:
     """Return estimates, merits and matches."""
-    terms = np.zeros(1, TERMS)
-    terms["gates"], terms["rules"] = GATES, ANY
     estimates = np.concatenate([estimate_of(at, np.full((3, 3), 9.0)) for at in poses])
     merits, matches = np.zeros(len(poses), MERIT), np.zeros((len(poses), len(scan)), MATCH)
-    ranking.rank(Question(scan, terms), place, view, estimates, merits, matches, Workspace.of(len(scan)))
+    work = Workspace.of(len(scan), len(place.walls))
+    ranking.rank(Question(scan, TERMS), place, view, estimates, merits, matches, work)
     return estimates, merits, matches
 
 
@@ -46,7 +44,7 @@ def test_rank(seed: int) -> None:
     for sighted in (0, 1):
         view = record(VIEW, x=viewpoint[0], y=viewpoint[1], sighted=sighted)
         estimates, merits, matches = ranked(d.scan, poses, view, PLACE)
-        expected = twin.rank(d.scan, poses, viewpoint if sighted else None, PLACE, GATES)
+        expected = twin.rank(d.scan, poses, viewpoint if sighted else None, PLACE, GATES, MODEL)
         for k, (at, covariance, merit, match) in enumerate(expected):
             assert same_pose(pose_of(estimates[k]), at, 1e-5, 1e-6)
             np.testing.assert_allclose(covariance_of(estimates[k]), covariance, rtol=1e-4, atol=1e-8)
@@ -59,7 +57,7 @@ def test_lines_of_sight_are_spared_where_a_pose_is_far_behind(lacking: int, char
     """Of two equal rooms the second has a screen that the scan sees through, and may lack some of the walls."""
     second = ROOM[: len(ROOM) - lacking] + np.tile([20.0, 0.0], 2)
     index = index_of(np.vstack([ROOM, second, [[24.0, 0.5, 24.0, 3.5]]]))
-    scan = context_of(index, scan_of(seen(ROOM, INSIDE)[0])).segments.rows
+    scan = context_of(index, scan_of(seen(ROOM, INSIDE)[0])).lines.rows
     poses = [local(index, INSIDE), local(index, pose(INSIDE.x + 20.0, INSIDE.y, INSIDE.theta))]
     place, view = index.tables.place, record(VIEW, sighted=1)
     blind, both, alone = (
@@ -79,12 +77,21 @@ def test_distinct(seed: int) -> None:
     roots = rng.normal(size=(40, 3, 3)) * rng.choice([0.02, 0.3], (40, 1, 1))
     covariances, order = roots @ roots.transpose(0, 2, 1) + 1e-4 * np.eye(3), rng.permutation(40)
     estimates = np.concatenate([estimate_of(at, c) for at, c in zip(poses, covariances, strict=True)])
-    rules = DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY
+    scores = rng.uniform(0.0, 10.0, 40)
+    rules = DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, 6.0
     for most in (5, 40):
-        got = ranking.distinct(estimates, order, most, *rules)
-        assert got.tolist() == twin.distinct(poses, covariances, order, most, *rules)
+        got = ranking.distinct(estimates, scores, order, most, *rules)
+        assert got.tolist() == twin.distinct(poses, covariances, scores, order, most, *rules)
+
+
+def test_a_pose_of_a_family_does_not_stand_for_a_much_better_one() -> None:
+    """A window put the worse one first: along a corridor, 2 m of it uncertain."""
+    poses = np.concatenate([estimate_of(pose(x), np.diag([4.0, 1e-4, 1e-4])) for x in (0.0, 1.0, 3.0)])
+    for better, places in ((5.9, [0]), (6.1, [0, 2])):
+        scores = np.array([10.0, 10.0, 10.0 + better])
+        assert ranking.distinct(poses, scores, np.arange(3), 3, 0.3, 0.1, 12.8, 6.0).tolist() == places
 
 
 def test_a_pose_without_a_covariance_stands_for_those_near_it_alone() -> None:
     poses = np.concatenate([estimate_of(pose(x)) for x in (0.0, 0.2, 0.5)])
-    assert ranking.distinct(poses, np.arange(3), 3, 0.3, 0.1, 12.8).tolist() == [0, 2]
+    assert ranking.distinct(poses, np.zeros(3), np.arange(3), 3, 0.3, 0.1, 12.8, 6.0).tolist() == [0, 2]

@@ -76,7 +76,7 @@ def test_sight_penalty(seed: int) -> None:
 def penalty(scan: list[list[float]], at: RigidTransform, walls: np.ndarray) -> float:
     """Return what lines of sight speak against a pose at which the first segment is matched."""
     index = index_of(walls)
-    rows = context_of(index, scan_of(scan)).segments.rows
+    rows = context_of(index, scan_of(scan)).lines.rows
     matches, blockers = np.zeros(len(rows), MATCH), no_blockers(index.walls.rows)
     matches["wall"][1:] = -1
     view, estimate = np.zeros(1, VIEW), estimate_of(local(index, at))

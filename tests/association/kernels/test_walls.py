@@ -11,6 +11,7 @@ from hypothesis import given, settings
 
 from association.kernels import walls
 from association.layout import ENDS, GRID_SHAPE, POINT, as_records, record
+from association.tuning import MOST_LOOKS, RUN_GAP
 from registration import Segments
 from registration.layout import Floats, Records
 
@@ -35,7 +36,7 @@ def continued(rng: np.random.Generator) -> Floats:
             length = rng.uniform(0.2, 3.0)
             end = x + length * math.cos(angle), y + length * math.sin(angle)
             pieces.append([x, y, *end])
-            gap, step = rng.uniform(-0.5, 0.5), rng.uniform(-0.05, 0.05)
+            gap, step = rng.uniform(-0.5, 0.5) * rng.choice([1.0, 6.0]), rng.uniform(-0.05, 0.05)
             x = end[0] + gap * math.cos(angle) - step * math.sin(angle)
             y = end[1] + gap * math.sin(angle) + step * math.cos(angle)
             angle += rng.uniform(-0.05, 0.05)
@@ -56,6 +57,49 @@ def test_a_long_chain_has_one_label(sign: float) -> None:
     chain = np.stack([x[:-1], 0.3 * x[:-1], x[1:], 0.3 * x[1:]], axis=1)
     for order in (np.arange(121), np.arange(121)[::-1], np.random.default_rng(0).permutation(121)):
         assert labels_of(chain[order], 0.3, 0.03, 0.035) == [0] * 121
+
+
+def test_what_repeats_a_wall_is_of_it() -> None:
+    """Sent twice, in pieces over the whole, and a long one over many cells."""
+    whole, pieces = [0.0, 0.0, 40.0, 8.0], np.linspace(0.0, 1.0, 9)[:, None] * [40.0, 8.0]
+    again = np.hstack([pieces[:-1], pieces[1:]])[::2]
+    beside, across = [10.0, 2.1, 15.0, 3.1], [10.0, 2.0, 15.0, 3.1]
+    for order in (np.arange(8), np.arange(8)[::-1]):
+        ends = np.vstack([whole, whole, again, beside, across])
+        labels = np.array(labels_of(ends[order], 0.3, 0.03, 0.035))[np.argsort(order)]
+        assert len(set(labels[:6])) == 1
+        assert len({labels[0], labels[6], labels[7]}) == 3
+
+
+def test_a_wall_is_merged_however_many_others_are_about() -> None:
+    """Only so many are compared with one piece; those near it, so that on no building there are more."""
+    x = np.linspace(0.0, 5.7, 20)
+    chain = np.stack([x, np.full(20, 3.0), x + 0.3, np.full(20, 3.0)], axis=1)
+    rng = np.random.default_rng(0)
+    begins, angles = rng.uniform(0.0, 6.0, (900, 2)), rng.uniform(0.5, 2.5, 900)
+    others = np.hstack([begins, begins + np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+    for ends in (np.vstack([chain, others]), np.vstack([others, chain])):
+        labels = np.array(labels_of(ends, RUN_GAP, 0.03, 0.035))
+        assert len(set(labels[(ends[:, 1] == 3.0) & (ends[:, 3] == 3.0)])) == 1
+
+
+def test_a_long_wall_sent_twice_is_one() -> None:
+    """Beyond the places along it that are looked at its begin is."""
+    wall, rng = [33.3, 77.7, 9000.0, 1000.0], np.random.default_rng(0)
+    begins = rng.uniform(-9000.0, -10.0, (4000, 2))
+    ends = np.vstack([wall, [33.3, 87.7, 9000.0, 1010.0], wall, np.hstack([begins, begins + np.array([0.0, 1.0])])])
+    assert labels_of(ends, 0.3, 0.03, 0.035)[:3] == [0, 1, 0]
+
+
+def test_one_piece_is_compared_with_so_many() -> None:
+    """100,000 long walls in one place took minutes."""
+    rng = np.random.default_rng(0)
+    begins = rng.uniform(-0.1, 0.1, (2 * MOST_LOOKS, 2))
+    ends = np.vstack(
+        [[[-3.0, 0.0, 0.0, 0.0], [0.0, 0.0, 3.0, 0.0]], np.hstack([begins, begins + np.array([0.0, 5.0])])]
+    )
+    assert labels_of(ends, 0.3, 0.03, 0.035)[:2] == [0, 1]
+    assert labels_of(ends[: MOST_LOOKS // 2], 0.3, 0.03, 0.035)[:2] == [0, 0]
 
 
 def test_no_pieces() -> None:

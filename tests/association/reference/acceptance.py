@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
-from association.layout import Pieces
+from association.layout import Lines, Pieces
 from association.tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS
 from registration import RigidTransform
 from registration.layout import Floats, Records
@@ -35,17 +34,16 @@ def run_of(walls: Records, wall: int) -> list[int]:
 
 
 def accept_matches(
-    matched: Any, order: Any, scan_ends: Floats, pose: RigidTransform, walls: Records, pieces: Pieces
+    matched: Any, lines: Lines, scan_ends: Floats, pose: RigidTransform, walls: Records, pieces: Pieces
 ) -> list[Pair]:
-    """List the pairs by scan index; `matched` (n,) is the wall of each row, `order` (n,) its scan index."""
+    """List the pairs by scan index; `matched` (n,) is the wall of each line."""
     found = []
     piece_ends = pieces.ends.view(np.float64).reshape(-1, 2, 2)
-    for i, wall in sorted(zip(np.asarray(order).tolist(), np.asarray(matched).tolist(), strict=True)):
+    for i, row in enumerate(lines.row_of.tolist()):
+        wall = int(matched[row])
         if wall < 0:
             continue
-        run = [wall]
-        if math.dist(scan_ends[i, :2], scan_ends[i, 2:]) > BRIDGING:
-            run = run_of(walls, wall)
+        run = run_of(walls, wall) if lines.rows["length"][row] > BRIDGING else [wall]
         d = direction(walls[run[0]])
         low, high = sorted(pose.apply(scan_ends[i].reshape(2, 2)) @ d)
         spans = {p: sorted(piece_ends[p] @ d) for w in run for p in pieces_of(pieces, w)}
@@ -54,7 +52,9 @@ def accept_matches(
         points = low + (high - low) * (np.arange(SAMPLES) + 0.5) / SAMPLES
         on_any = np.any([(points >= first) & (points <= last) for first, last in spans.values()], axis=0)
         others = [p for p in spans if p != most and lies_on[p] > 0.0]
-        found.append((i, most, float(on_any.mean()), others[:MAX_RIVALS]))
+        # A line as a whole lies on its wall; one of several segments may be the one that does not.
+        if on_any.mean() >= lines.least_overlap or (lines.row_of == row).sum() == 1:
+            found.append((i, most, float(on_any.mean()), others[:MAX_RIVALS]))
     return found
 
 

@@ -20,7 +20,7 @@ from association.tuning import (
 from registration import RigidTransform
 from registration.layout import SEEN
 
-from .consensus import solve
+from .consensus import Pairs, solve
 from .geometry import Vector, direction, listed, normal
 from .sight import first_hit
 
@@ -65,7 +65,7 @@ def refine_by_beams(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: 
         return pose
     seen = np.zeros(len(ends), SEEN)
     seen["centroid_x"], seen["centroid_y"] = np.array(ends).T
-    return solve(seen, place.walls[lines], np.ones(len(lines)), pose)[0]
+    return solve(Pairs(seen, place.walls[lines], np.eye(2 * len(lines))), pose).pose
 
 
 def weigh_beams(

@@ -1,67 +1,144 @@
-"""Twins of the kernels that grow and shrink a consensus set."""
+"""Twins of the kernels that grow, shrink and score a consensus set: generalised least squares, solved from nothing.
+
+Each pair gives two residuals, the offset of its centroid and its direction times the root of its spread. Both have the
+variance of the segment; the offsets of all pairs of a wall have the variance of the wall in common besides.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from association.layout import Integers, Place
+from association.layout import MATCH, MODEL, Integers, Place
 from association.tuning import MAX_STEP, MAX_TURN, SPRING
 from registration import RigidTransform
-from registration.layout import Floats, Records
+from registration.layout import Floats, Record, Records
 
 from .geometry import TURN, direction, normal, point, rotation, translation, wrap
 from .matching import match_scan
 
 
-def value_matches(scan: Records, matches: Records) -> float:
-    """Give a match its gain less half its chi-square; one that is worth nothing is none."""
-    for segment, match in zip(scan, matches, strict=True):
-        match["worth"] = 0.0
-        if match["wall"] >= 0:
-            angle = math.asin(match["sine"])
-            chi2 = match["offset"] ** 2 / segment["offset_variance"] + angle**2 / segment["angle_variance"]
-            match["worth"] = max(0.0, segment["gain"] * match["overlap"] - 0.5 * chi2)
-            match["wall"] = match["wall"] if match["worth"] > 0.0 else -1
-    return float(matches["worth"].sum())
+@dataclass(frozen=True)
+class Pairs:
+    """Scan lines on walls, and what their residuals are compared with.
 
-
-def solve(seen: Records, lines: Records, weights: Floats, start: RigidTransform) -> tuple[RigidTransform, Floats]:
-    """Lay segments on lines, held by the spring to where they start; return the pose and its information.
-
-    By the method of Levenberg and Marquardt from `start`. A segment counts as its mean, and as its direction times the
-    root of its spread.
+    Attributes
+    ----------
+    scan : (n,) of `SCAN_LINE`
+    walls : (n,) of `WALL`, that of each line
+    covariance : (2 n, 2 n) of all offsets, m^2, and behind them of all directions times the root of the spread
     """
 
+    scan: Records
+    walls: Records
+    covariance: Floats
+
+    @classmethod
+    def of(cls, scan: Records, held: Integers, walls: Records, wall_variance: float) -> Pairs:
+        """Take the scan lines on a wall; `held` (n,) is the wall of each or -1."""
+        on = np.asarray(held) >= 0
+        chosen, wall = scan[on], held[on]
+        own = np.diag(np.tile(1.0 / chosen["weight"], 2))
+        common = np.zeros_like(own)
+        common[: len(wall), : len(wall)] = wall_variance * (wall[:, None] == wall[None, :])
+        return cls(chosen, walls[wall], own + common)
+
+    def residuals(self, at: RigidTransform) -> Floats:
+        """Return the residuals at a pose, (2 n,) metres."""
+        offsets, turns = [], []
+        for one, wall in zip(self.scan, self.walls, strict=True):
+            r, n = rotation(at.theta), normal(wall)
+            mean = r @ point(one, "centroid_x", "centroid_y") + translation(at)
+            offsets.append(float(n @ mean - wall["offset"]))
+            turns.append(math.sqrt(one["spread"]) * float(n @ r @ direction(one)))
+        return np.array(offsets + turns)
+
+    def derivatives(self, theta: float) -> Floats:
+        """Return those of the residuals by x, y and theta, (2 n, 3)."""
+        offsets, turns = [], []
+        for one, wall in zip(self.scan, self.walls, strict=True):
+            r, n = rotation(theta), normal(wall)
+            offsets.append([*n, n @ TURN @ r @ point(one, "centroid_x", "centroid_y")])
+            turns.append([0.0, 0.0, math.sqrt(one["spread"]) * (n @ TURN @ r @ direction(one))])
+        return np.array(offsets + turns).reshape(-1, 3)
+
+    def cost(self, at: RigidTransform) -> float:
+        """Return the chi-square of the residuals at a pose."""
+        r = self.residuals(at)
+        return float(r @ np.linalg.solve(self.covariance, r))
+
+    def one_step_cost(self, start: RigidTransform) -> float:
+        """Return the cost at Wahba's rotation and its best translation, which the spring holds to `start`."""
+        trust = self.scan["weight"] * self.scan["spread"]
+        turns = [
+            complex(*direction(wall)) / complex(*direction(one))
+            for one, wall in zip(self.scan, self.walls, strict=True)
+        ]
+        theta = float(np.angle(trust @ np.array(turns)))
+        held = RigidTransform(start.x, start.y, theta)
+        whitening, spring = np.linalg.inv(np.linalg.cholesky(self.covariance)), math.sqrt(SPRING) * np.eye(2)
+        rows = np.vstack([spring, whitening @ self.derivatives(theta)[:, :2]])
+        step = np.linalg.lstsq(rows, -np.concatenate([np.zeros(2), whitening @ self.residuals(held)]))[0]
+        return self.cost(RigidTransform(start.x + step[0], start.y + step[1], theta))
+
+    def information(self, theta: float) -> Floats:
+        """Return the information of (x, y, theta), (3, 3)."""
+        j = self.derivatives(theta)
+        return np.asarray(j.T @ np.linalg.solve(self.covariance, j))
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Where pairs cost least, held by the spring to where the search began."""
+
+    pose: RigidTransform
+    information: Floats
+    cost: float
+
+
+def solve(pairs: Pairs, start: RigidTransform) -> Solved:
+    """Minimise cost and spring by the method of Levenberg and Marquardt from `start`."""
+    whitening, spring = np.linalg.inv(np.linalg.cholesky(pairs.covariance)), math.sqrt(SPRING)
+
     def residuals(x: Floats) -> Floats:
-        return _linearised(seen, lines, weights, start, x)[0]
+        return np.concatenate(
+            [spring * (x[:2] - translation(start)), whitening @ pairs.residuals(RigidTransform(*x.tolist()))]
+        )
 
     def jacobian(x: Floats) -> Floats:
-        return _linearised(seen, lines, weights, start, x)[1]
+        return np.concatenate([spring * np.eye(2, 3), whitening @ pairs.derivatives(x[2])])
 
     begin = [start.x, start.y, start.theta]
-    x = least_squares(residuals, begin, jacobian, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
-    return RigidTransform(*x.tolist()), jacobian(x).T @ jacobian(x)
+    found = least_squares(residuals, begin, jacobian, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    j = jacobian(found.x)
+    return Solved(RigidTransform(*found.x.tolist()), j.T @ j, 2.0 * float(found.cost))
 
 
-def _linearised(
-    seen: Records, lines: Records, weights: Floats, start: RigidTransform, x: Floats
-) -> tuple[Floats, Floats]:
-    """Return the residuals at (x, y, theta), and their derivatives."""
-    r, t, spring = rotation(x[2]), x[:2], math.sqrt(SPRING)
-    residuals: list[float] = list(spring * (t - translation(start)))
-    rows: list[Any] = [[spring, 0.0, 0.0], [0.0, spring, 0.0]]
-    for one, line, weight in zip(seen, lines, weights, strict=True):
-        n, root = normal(line), math.sqrt(weight)
-        mean = r @ point(one, "centroid_x", "centroid_y")
-        spread = math.sqrt(one["spread"]) * r @ direction(one)
-        residuals += [root * float(n @ (mean + t) - line["offset"]), root * float(n @ spread)]
-        rows += [root * np.array([*n, n @ TURN @ mean]), root * np.array([0.0, 0.0, n @ TURN @ spread])]
-    return np.array(residuals), np.array(rows)
+def freedom_taken(information: Floats, model: Record) -> float:
+    """Return half of the logarithm of ``det(1 + F S)``."""
+    s = np.diag([model["free_distance"] ** 2, model["free_distance"] ** 2, model["free_angle"] ** 2])
+    return 0.5 * float(np.log(np.linalg.det(np.eye(3) + information @ s)))
+
+
+def value_pairs(scan: Records, at: RigidTransform, walls: Records, wall_variance: float, matches: Records) -> float:
+    """Give each match what the set loses without it at this pose; what is worth nothing is no match."""
+    held = matches["wall"].copy()
+    whole = Pairs.of(scan, held, walls, wall_variance).cost(at)
+    matches["worth"] = 0.0
+    total = 0.0
+    for i in np.nonzero(held >= 0)[0]:
+        others = np.where(np.arange(len(held)) == i, -1, held)
+        gain = float(scan["gain"][i] * matches["overlap"][i])
+        worth = gain - 0.5 * (whole - Pairs.of(scan, others, walls, wall_variance).cost(at))
+        if worth > 0.0:
+            matches["worth"][i] = worth
+            total += gain
+        else:
+            matches["wall"][i] = -1
+    return total
 
 
 @dataclass(frozen=True)
@@ -74,33 +151,71 @@ class Refined:
     pose : RigidTransform
     covariance : (3, 3)
     matches : (n,) of `MATCH`
-    held : (n,) the walls that the pose was solved with last, or -1; where the rounds end early not those of `matches`
+    cost : float
+        In the score; 0 where that is 0.
+    free : bool
+        Whether in any round the spring alone held a direction: rounding of the sums then moves the pose along it.
     """
 
     score: float
     pose: RigidTransform
     covariance: Floats
     matches: Records
-    held: Integers
+    cost: float = 0.0
+    free: bool = False
 
 
 def refine(
-    scan: Records, pose: RigidTransform, covariance: Floats, place: Place, gates: Records, rounds: int
+    scan: Records, start: RigidTransform, spread: Floats, place: Place, gates: Records, model: Records, rounds: int
 ) -> Refined:
-    """Match and solve anew from nothing in every round."""
-    held = np.full(len(scan), -1)
+    """Match and solve anew from nothing in every round; `start` has the covariance `spread`."""
+    variance = float(model["wall_variance"][0])
+    pose, covariance = start, spread
+    held, cost, information, free = np.full(len(scan), -1), 0.0, np.zeros((3, 3)), False
+
+    def moved() -> bool:
+        nonlocal pose, covariance, cost, information, free
+        pairs = Pairs.of(scan, held, place.walls, variance)
+        solved = solve(pairs, pose)
+        information, covariance = solved.information, np.asarray(np.linalg.inv(solved.information))
+        free = free or bool(np.trace(covariance) > 0.1 / SPRING)
+        turn, step = wrap(solved.pose.theta - pose.theta), np.hypot(solved.pose.x - pose.x, solved.pose.y - pose.y)
+        near = bool(abs(turn) <= MAX_TURN and step <= MAX_STEP)
+        cost = solved.cost if near else pairs.cost(pose)
+        pose = solved.pose if near else pose
+        return near
+
     for _ in range(rounds):
         matches, _ = match_scan(scan, pose, covariance, place, gates)
         if (matches["wall"] == held).all():
             break
-        held = matches["wall"]
-        some = held >= 0
-        if not some.any():
-            return Refined(0.0, pose, covariance, matches, held)
-        solved, information = solve(scan[some], place.walls[held[some]], scan["weight"][some], pose)
-        covariance = np.asarray(np.linalg.inv(information), np.float64)
-        if abs(wrap(solved.theta - pose.theta)) > MAX_TURN or np.hypot(solved.x - pose.x, solved.y - pose.y) > MAX_STEP:
+        held = matches["wall"].copy()
+        if not (held >= 0).any():
+            return Refined(0.0, pose, covariance, matches, free=free)
+        if not moved():
             break
-        pose = solved
     matches, _ = match_scan(scan, pose, covariance, place, gates)
-    return Refined(value_matches(scan, matches), pose, covariance, matches, held)
+    before, grown = held, matches["wall"].copy()
+    gain = value_pairs(scan, pose, place.walls, variance, matches)
+    held = matches["wall"].copy()
+    if not (held >= 0).any():
+        return Refined(0.0, pose, covariance, matches, free=free)
+    if (grown != before).any() or (held != grown).any():  # those that come and are worth nothing count as a change
+        moved()
+    score = gain - 0.5 * cost - freedom_taken(information, model[0])
+    return Refined(max(0.0, score), pose, covariance, matches, cost if score > 0.0 else 0.0, free)
+
+
+def model_of(wall_variance: float, free_distance: float, free_angle: float) -> Records:
+    """Return these, (1,) of `MODEL`."""
+    model = np.zeros(1, MODEL)
+    model[0] = wall_variance, free_distance, free_angle
+    return model
+
+
+def matches_on(walls: Integers) -> Records:
+    """Return whole matches with these walls, or -1."""
+    matches = np.zeros(len(walls), MATCH)
+    matches["wall"] = walls
+    matches["overlap"] = matches["wall"] >= 0
+    return matches

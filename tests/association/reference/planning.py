@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -15,7 +16,6 @@ from association.tuning import (
     GAIN_POWER,
     HYPOTHESIS_SCALE,
     MIN_CROSSING_BASE,
-    REUSE,
     SHORT_LENGTH,
     SHORT_POWER,
     SINE_POWER,
@@ -76,11 +76,11 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> list[Base
     return bases
 
 
-def order_of(bases: list[Base]) -> list[int]:
-    """Return the bases in the order in which they are taken: each use of a segment makes its others worth less."""
+def order_of(bases: list[Base], fade: float) -> list[int]:
+    """Return the bases in the order in which they are taken: each use of a segment adds `fade` to its others' merit."""
     left, uses, order = list(range(len(bases))), dict.fromkeys(range(1000), 0), []
     while left:
-        worth = {k: bases[k][2] + math.log(REUSE) * (uses[bases[k][0]] + uses[bases[k][1]]) for k in left}
+        worth = {k: bases[k][2] + fade * (uses[bases[k][0]] + uses[bases[k][1]]) for k in left}
         best = max(worth, key=worth.__getitem__)
         left.remove(best)
         order.append(best)
@@ -93,6 +93,25 @@ def fewest_segments(best_gains: list[float], beyond: float, needed: float) -> in
     """Return how many of the largest gains, with all beyond, come to what is needed; two at least."""
     enough = [m for m in range(len(best_gains) + 1) if beyond + sum(best_gains[:m]) >= needed]
     return max(2, min(enough, default=len(best_gains)))
+
+
+def drawn_chance(fewest: int, count: int) -> float:
+    """Return of all pairs of segments the share of which both are among the first ones; 1 where there is no pair."""
+    pairs = list(itertools.combinations(range(count), 2))
+    return sum(b < fewest for _, b in pairs) / len(pairs) if pairs else 1.0
+
+
+def least_freedom(scan: Records, needed: float) -> float:
+    """Return the least freedom that any set takes whose gains come to `needed`, by its freest line alone."""
+    sets = [list(s) for m in range(1, len(scan) + 1) for s in itertools.combinations(range(len(scan)), m)]
+    enough = [s for s in sets if scan["gain"][s].sum() >= needed]
+    return min((float(scan["freedom"][s].max()) for s in enough), default=float(scan["freedom"].max(initial=0.0)))
+
+
+def least_freedom_sorted(scan: Records, needed: float) -> float:
+    """Return the least freedom such that the lines that take no more come to `needed` together: as above, for many."""
+    enough = [f for f in scan["freedom"] if scan["gain"][scan["freedom"] <= f].sum() >= needed]
+    return 0.0 if needed <= 0.0 else float(min(enough, default=scan["freedom"].max(initial=0.0)))
 
 
 def missed_share(inliers: np.ndarray, bases: list[Record], fewest: int) -> float:

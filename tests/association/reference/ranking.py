@@ -12,8 +12,8 @@ from association.tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_V
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
-from .consensus import refine
-from .geometry import Vector, direction, wrap
+from .consensus import Pairs, refine
+from .geometry import Vector, wrap
 from .sight import count_blockers, sight_penalty
 
 START = np.diag([START_VARIANCE, START_VARIANCE, START_ANGLE_VARIANCE])
@@ -21,43 +21,59 @@ Ranked = tuple[RigidTransform, Floats, Records, Records]  # pose, covariance, me
 
 
 def rank(
-    scan: Records, poses: list[RigidTransform], viewpoint: Vector | None, place: Place, gates: Records
+    scan: Records,
+    poses: list[RigidTransform],
+    viewpoint: Vector | None,
+    place: Place,
+    gates: Records,
+    model: Records,
 ) -> list[Ranked]:
     """Refine one pose after the other; lines of sight from the viewpoint count for those that are not far behind."""
     ranked: list[Ranked] = []
     best = 0.0
     for at in poses:
-        found = refine(scan, at, START, place, gates, ROUNDS)
-        score, matches, on, held = found.score, found.matches, found.matches["wall"] >= 0, found.held >= 0
+        found = refine(scan, at, START, place, gates, model, ROUNDS)
+        score, matches, on = found.score, found.matches, found.matches["wall"] >= 0
         merit = np.zeros(1, MERIT)
+        merit["cost"] = found.cost
         merit["length"] = scan["length"][on].sum()
         merit["share"] = scan["length"][on].sum() / scan["length"].sum()
-        merit["reliability"] = reliability(direction(place.walls[found.held[held]]), scan["weight"][held])
+        pairs = Pairs.of(scan, matches["wall"], place.walls, float(model["wall_variance"][0]))
+        if score > 0.0:
+            merit["one_step_cost"] = pairs.one_step_cost(found.pose)
+        merit["reliability"] = reliability(pairs.information(found.pose.theta)[:2, :2])
         merit["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
         if viewpoint is not None and score > best - FAR_BEHIND:
-            score -= sight_penalty(count_blockers(scan, on, viewpoint, found.pose, place.walls), place.walls)
+            merit["blocked"] = sight_penalty(count_blockers(scan, on, viewpoint, found.pose, place.walls), place.walls)
+            score -= float(merit["blocked"][0])
             best = max(best, score)
         merit["score"] = score
         ranked.append((found.pose, found.covariance, merit, matches))
     return ranked
 
 
-def reliability(directions: Floats, weights: Floats) -> float:
-    """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E, the mean of v v'."""
-    if not len(weights):
+def reliability(information: Floats) -> float:
+    """Eqs. (22) to (28): twice the root of the product of the eigenvalues of E, which add up to 1.
+
+    E, the mean of v v' by weight, is turned by a right angle from the information of the place, (2, 2); that has the
+    walls' own errors in it.
+    """
+    if not information.any():
         return 0.0
-    e = np.einsum("i,ij,ik->jk", weights, directions, directions) / weights.sum()
+    e = information / np.trace(information)
     return 2.0 * math.sqrt(max(0.0, float(np.prod(np.linalg.eigvalsh(e)))))
 
 
 def distinct(
     poses: list[RigidTransform],
     covariances: Floats,
+    scores: Floats,
     order: Any,
     most: int,
     distance: float,
     angle: float,
     family: float,
+    much_better: float,
 ) -> list[int]:
     """Take the best pose, strike what it stands for, and so on."""
     left: list[int] = np.asarray(order).tolist()
@@ -68,7 +84,10 @@ def distinct(
         information = np.linalg.inv(covariances[best])
         steps = {i: _step(poses[best], poses[i]) for i in left}
         near = {i for i, s in steps.items() if np.hypot(s[0], s[1]) < distance and abs(s[2]) < angle}
-        left = [i for i in left if i not in near and steps[i] @ information @ steps[i] >= family]
+        struck = {
+            i for i, s in steps.items() if s @ information @ s < family and scores[i] <= scores[best] + much_better
+        }
+        left = [i for i in left if i not in near | struck]
     return kept
 
 

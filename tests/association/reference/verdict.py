@@ -1,55 +1,96 @@
-"""Twin of the verdict: one number after the other, from the explanations and the file of the models."""
+"""Twin of the verdict: one number after the other, from the explanations and models written as for the file."""
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass
-from pathlib import Path
-from typing import cast
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
-import association
 from association import HardPrior, Status, tuning
 from association.context import SearchContext
-from association.explain import Explanations
+from association.explain import Answer, Explanations
+from association.null import Null, null_of
 from association.ranking import Ranked
+from registration.observability import MAX_DEVIATION
 
 Numbers = dict[str, float]
+Document = Mapping[str, list[float]]  # for each feature its slope, then value and change of slope of each bend
 
 
-def models() -> dict[str, Numbers]:
-    text = (Path(association.__file__).parent / "models.json").read_text()
-    return cast("dict[str, Numbers]", json.loads(text)["models"])
+def worth(one: Ranked, wall_sigma: float) -> float:
+    """Return the value of an explanation, its cost weighed with the walls' own error where that is more than usual."""
+    cost = 0.5 * one.cost
+    return one.value + cost - cost / max(1.0, (wall_sigma / tuning.MODEL_OFFSET) ** 2)
 
 
-def evidence(best: Ranked, rivals: list[Ranked], temperature: float) -> float:
+def evidence(answer: Answer, rivals: list[Ranked], temperature: float) -> float:
     """Sum what the rivals weigh beside the best, at most one each."""
-    return sum(min(1.0, math.exp((rival.value - best.value) / temperature)) for rival in rivals)
+    least = worth(answer.best, answer.settled.wall_sigma)
+    gaps = (worth(rival, answer.settled.wall_sigma) - least for rival in rivals)
+    return sum(min(1.0, math.exp(gap / temperature)) for gap in gaps)
 
 
-def features(context: SearchContext, best: Ranked, rivals: list[Ranked], agreement: float) -> Numbers:
+def root(x: float) -> float:
+    """Return the root of a number, with its sign."""
+    return -math.sqrt(-x) if x < 0.0 else math.sqrt(x)
+
+
+def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null: Null | None = None) -> Numbers:
+    """Return the features by name; without a null those of the least there is."""
+    best, hinges = answer.best, answer.settled.hinges.tolist()
     matched = [wall >= 0 for wall in best.matches["wall"]]
-    clutter = [length for length, on in zip(context.segments.rows["length"], matched, strict=True) if not on]
+    clutter = [length for length, on in zip(context.lines.rows["length"], matched, strict=True) if not on]
     count = sum(matched)
-    crowd = evidence(best, rivals, tuning.CROWD_TEMPERATURE) + math.exp(tuning.LEAST_CROWD)
+    sigma = answer.settled.wall_sigma
+    nearest = max((worth(rival, sigma) for rival in rivals), default=-math.inf)
+    crowd = evidence(answer, rivals, tuning.CROWD_TEMPERATURE) + math.exp(tuning.LEAST_CROWD)
     misfit = math.log(sorted((tuning.LEAST_MISFIT, best.misfit, tuning.MOST_MISFIT))[1])
+    by_segments = best.score - tuning.BEAMS_READ * best.read + tuning.BEAMS_PASSED * best.passed
+    share, counts = 0.0, 1.0
+    if null is not None:
+        share = min(tuning.MOST_NULL, null.score / best.score)
+        alike = (null.symmetry - tuning.UNLIKE_SYMMETRY) / (tuning.SYMMETRIC - tuning.UNLIKE_SYMMETRY)
+        counts = 1.0 - sorted((0.0, alike, 1.0))[1]
+    counted = tuning.NULL_SHARE + counts * max(0.0, share - tuning.NULL_SHARE)
+    gap = min(tuning.MAX_GAP, max(-tuning.MAX_GAP, (1.0 - counted) * best.score))
     return {
         "constant": 1.0,
-        "lead": min(tuning.MAX_LEAD, best.value - (rivals[0].value if rivals else 0.0)),
+        "lead": min(tuning.MAX_LEAD, worth(best, sigma) - nearest if rivals else best.value),
         "solitude": -math.log(crowd),
         "share": best.share,
         "root_count": count**0.5,
         "root_length": best.length**0.5,
-        "deviation": min(best.deviation, tuning.MOST_DEVIATION),
+        "deviation": min(answer.settled.weakest, tuning.MOST_DEVIATION),
         "misfit": misfit,
         "inverse_count": 1.0 / count if count else 1.0,
         "longest_unmatched": min(max([0.0, *clutter]), tuning.LONGEST_UNMATCHED),
-        "agreement": agreement,
+        "agreement": answer.agreement,
+        "read": best.read,
+        "passed": best.passed,
+        "hinge_moves": min(max([0.0, *(one[1] for one in hinges)]), tuning.MOST_DEVIATION),
+        "hinge_deviation": min(max([0.0, *(one[2] for one in hinges)]), tuning.MOST_DEVIATION),
+        "chance": max(tuning.LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
+        "null": counted,
+        "null_gap": root(gap),
+        "null_better": max(0.0, share - 1.0),
+        "root_score": root(max(0.0, by_segments)),
+        "blocked": best.blocked**0.5,
+        "walls": len(hinges) ** 0.5,
         "misfit_of_many": misfit * min(1.0, count / tuning.MANY),
         "beyond_nearly_all": max(0.0, best.share - tuning.NEARLY_ALL),
         "root_unmatched": min(sum(clutter), tuning.MOST_UNMATCHED) ** 0.5,
         "squared_solitude": math.log(crowd) ** 2,
     }
+
+
+def logit(model: Document, numbers: Numbers) -> float:
+    """Add up the curves: a line from 0 to the value, steeper or less steep beyond each bend."""
+    total = 0.0
+    for name, (slope, *bends) in model.items():
+        total += slope * numbers[name]
+        for start, more in zip(bends[::2], bends[1::2], strict=True):
+            total += more * max(0.0, numbers[name] - start)
+    return total
 
 
 def logistic(x: float) -> float:
@@ -58,7 +99,10 @@ def logistic(x: float) -> float:
 
 @dataclass(frozen=True)
 class Judged:
-    """What the verdict should say, and the chances behind it; see `association.verdict`."""
+    """What the verdict should say, and the chances behind it; see `association.verdict`.
+
+    `asked` says whether the scan had to be compared with the mirrored one.
+    """
 
     status: Status
     usable: bool
@@ -69,72 +113,78 @@ class Judged:
     right: float = 0.0
     careful: float = 0.0
     explained: float = 0.0
+    asked: bool = False
 
 
-def judge(context: SearchContext, explanations: Explanations, *, degenerate: bool) -> Judged:
-    """Judge an answer of which it is known whether it is degenerate; without one there is no match."""
-    answer, window = explanations.answer, context.prior if isinstance(context.prior, HardPrior) else None
+def bar_of(context: SearchContext) -> float:
+    """Return what the careful chance has to reach."""
+    return tuning.USABLE_CAUTIOUS if context.scan.beams is None else tuning.USABLE_CAUTIOUS_WITH_BEAMS
+
+
+def judge(
+    context: SearchContext, explanations: Explanations, models: Mapping[str, Document], usual_deviation: float
+) -> Judged:
+    """Judge an answer; without one there is no match."""
+    answer = explanations.answer
     if answer is None:
         return Judged(Status.NO_MATCH, False, 0.0, len(explanations.ranked) > 0, None, None)
     best = answer.best
     others = [one for one in explanations.ranked if one is not best]
     rivals = [one for one in others if one.inside]
-    right, careful, explained = chances(context, explanations)
     elsewhere = max((other.score for other in others), default=-math.inf) > best.score + tuning.CONTRADICTION
-    status = _status(context, explanations, (right, careful, explained), degenerate=degenerate, capped=elsewhere)
+    free = answer.settled.parallel or answer.settled.weakest > MAX_DEVIATION
+    hinges = answer.settled.hinges
+    thin = len(hinges) <= tuning.FEW_WALLS and max(hinges["deviation"], default=0.0) > MAX_DEVIATION
+    chances = _chances(context, explanations, models, usual_deviation)
+    likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
+    if likely and not free and chances.careful >= bar_of(context):
+        careful = logistic(
+            logit(cautious_of(context, models), features(context, answer, rivals, null_of(context, best)))
+        )
+        twins = evidence(answer, rivals, tuning.TWIN_TEMPERATURE)
+        chances = replace(chances, careful=careful / (1.0 + twins), asked=True)
+    status = Status.OK if likely and chances.careful >= bar_of(context) else Status.AMBIGUOUS
+    if free:
+        status = Status.DEGENERATE
+    if chances.explained < tuning.NO_MATCH_PROBABILITY:
+        status = Status.NO_MATCH
+    window, pose = context.prior, answer.registered.pose
     contradicted = elsewhere or best.value < best.score + tuning.FAR_FROM_PRIOR
-    pose = answer.registered.pose
-    if status is not Status.NO_MATCH and window is not None and pose is not None and not window.contains(pose):
-        contradicted = True
-    return Judged(
-        status,
-        status is Status.OK and explanations.search.complete and not contradicted,
-        min(right, tuning.CONTRADICTED) if contradicted else right,
-        contradicted,
-        best.value - rivals[0].value if rivals else None,
-        max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,
-        right,
-        careful,
-        explained,
+    if isinstance(window, HardPrior) and status is not Status.NO_MATCH and pose is not None:
+        contradicted = contradicted or not window.contains(pose)
+    return replace(
+        chances,
+        status=status,
+        usable=status is Status.OK and explanations.search.complete and not contradicted,
+        probability=min(chances.right, tuning.CONTRADICTED) if contradicted else chances.right,
+        contradicted=contradicted,
+        margin=best.value - rivals[0].value if rivals else None,
+        runner_up=max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,
     )
 
 
-def chances(context: SearchContext, explanations: Explanations) -> tuple[float, float, float]:
-    """Return that the pose is right, the same with strangers about, and that it or a twin of it explains the scan."""
+def cautious_of(context: SearchContext, models: Mapping[str, Document]) -> Document:
+    return models["cautious" if context.scan.beams is None else "cautious_with_beams"]
+
+
+def _chances(
+    context: SearchContext, explanations: Explanations, models: Mapping[str, Document], usual_deviation: float
+) -> Judged:
+    """Return the chances before the mirrored scan is asked; the rest is filled in later."""
     answer = explanations.answer
     assert answer is not None
     rivals = [one for one in explanations.ranked if one is not answer.best and one.inside]
-    numbers = features(context, answer.best, rivals, answer.agreement)
-    names = ("with_beams", "with_beams") if context.scan.beams is not None else ("probability", "cautious")
-    alone, of_position = [], []
-    for name in names:
-        terms = {term: factor * numbers[term] for term, factor in models()[name].items()}
-        alone.append(sum(terms.values()))
-        of_position.append(sum(value for term, value in terms.items() if term != "deviation"))
-    share = 1.0 / (1.0 + evidence(answer.best, rivals, tuning.TWIN_TEMPERATURE))
-    counted = of_position if answer.significance > tuning.CHANCE else of_position[:1]
-    return logistic(alone[0]) * share, logistic(alone[1]) * share, min(map(logistic, counted))
-
-
-def _status(
-    context: SearchContext,
-    explanations: Explanations,
-    chances: tuple[float, float, float],
-    *,
-    degenerate: bool,
-    capped: bool,
-) -> Status:
-    answer = explanations.answer
-    assert answer is not None
-    right, careful, explained = chances
-    bar = tuning.USABLE_PROBABILITY if context.scan.beams is not None else tuning.USABLE_CAUTIOUS
-    if answer.significance > tuning.LIKELY_BY_CHANCE:
-        bar = tuning.USABLE_BY_CHANCE
-    few = sum(wall >= 0 for wall in answer.best.matches["wall"]) < tuning.FEWEST
-    if explained < tuning.NO_MATCH_PROBABILITY:
-        return Status.NO_MATCH
-    if degenerate:
-        return Status.DEGENERATE
-    if capped or right < tuning.USABLE_PROBABILITY or careful < bar or (few and answer.best.share < tuning.MOSTLY):
-        return Status.AMBIGUOUS
-    return Status.OK
+    numbers, cautious = features(context, answer, rivals), cautious_of(context, models)
+    usual = models["probability" if context.scan.beams is None else "probability_with_beams"]
+    twins = 1.0 + evidence(answer, rivals, tuning.TWIN_TEMPERATURE)
+    return Judged(
+        Status.NO_MATCH,
+        False,
+        0.0,
+        False,
+        None,
+        None,
+        right=logistic(logit(usual, numbers)) / twins,
+        careful=logistic(logit(cautious, numbers)) / twins,
+        explained=logistic(logit(cautious, {**numbers, "deviation": usual_deviation})),
+    )

@@ -13,17 +13,23 @@ from .geometry import point
 
 
 def collinear_groups(ends: Floats, max_gap: float, max_lateral: float, max_angle: float) -> list[int]:
-    """Compare the end of every piece with the begin of every other; label by the lowest index that links lead to."""
+    """Compare every piece with the begin of every other; label by the lowest index that links lead to.
+
+    One that begins along another has to end beside its line, too.
+    """
     count = len(ends)
     label = list(range(count))
     turns = np.arctan2(ends[:, 3] - ends[:, 1], ends[:, 2] - ends[:, 0])
     for i in range(count):
         d = np.array([math.cos(turns[i]), math.sin(turns[i])])
         for j in range(count):
-            gap = ends[j, :2] - ends[i, 2:]
-            along, aside = abs(gap @ d), abs(gap @ [-d[1], d[0]])
+            begin, end = ends[j, :2] - ends[i, 2:], ends[j, 2:] - ends[i, 2:]
+            length, along = math.dist(ends[i, :2], ends[i, 2:]), begin @ d
+            aside, beyond = (abs(gap @ [-d[1], d[0]]) for gap in (begin, end))
             turn = abs(math.remainder(turns[j] - turns[i], math.tau))
-            if i != j and along <= max_gap and aside <= max_lateral and turn <= max_angle:
+            continues = abs(along) <= max_gap
+            repeats = -length - max_gap <= along <= max_gap and beyond <= max_lateral
+            if i != j and (continues or repeats) and aside <= max_lateral and turn <= max_angle:
                 one, other = sorted((label[i], label[j]))
                 label = [one if value == other else value for value in label]
     return label

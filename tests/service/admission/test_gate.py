@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import threading
 import time
 
@@ -140,6 +141,31 @@ def test_a_failure_gives_the_slot_back() -> None:
             with pytest.raises(ZeroDivisionError):
                 await gate.ask(lambda: 1 // 0)
             assert await gate.ask(lambda: 3) == 3
+
+    in_loop(scenario)
+
+
+def test_what_fails_after_its_caller_has_left_is_not_reported_as_a_defect() -> None:
+    async def scenario() -> None:
+        reported: list[dict[str, object]] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: reported.append(context))
+        async with gate_of(1, 0) as gate:
+
+            def fail() -> None:
+                gate.release.wait()
+                raise ZeroDivisionError
+
+            asked = gate.ask(fail)
+            await until(lambda: gate.running == 1)
+            asked.cancel()
+            await asyncio.wait({asked})
+            gate.release.set()
+            await until(lambda: gate.running == 0)
+            # asyncio reports what nobody looked at when it is forgotten.
+            gate.asked.clear()
+            del asked
+            gc.collect()
+        assert not reported
 
     in_loop(scenario)
 

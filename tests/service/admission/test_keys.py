@@ -6,7 +6,7 @@ import pytest
 from pydantic import SecretStr
 
 from service.admission.errors import MissingKeyError, UnknownKeyError
-from service.admission.keys import Keyring
+from service.admission.keys import Keyring, address_of
 
 RING = Keyring([SecretStr("sesame"), SecretStr("open")])
 
@@ -52,6 +52,20 @@ def test_a_key_that_is_none(value: bytes) -> None:
         RING.holder(sent(value))
 
 
-def test_without_keys_whoever_comes_is_nobody_in_particular() -> None:
+def test_without_keys_whoever_comes_is_known_by_the_address() -> None:
     for values in ((), (b"Bearer sesame",), (b"x", b"y")):
+        assert Keyring([]).holder(sent(*values), ("192.0.2.7", 5)) == bytes((192, 0, 2, 7))
         assert Keyring([]).holder(sent(*values)) is None
+
+
+def test_a_client_has_one_address_whatever_the_port() -> None:
+    same = [
+        [("192.0.2.7", 1), ("192.0.2.7", 2), ("::ffff:192.0.2.7", 3)],
+        # Who has one address of such a network has all of them.
+        [("2001:db8:0:1::1", 1), ("2001:db8:0:1:ffff::2", 1)],
+        [("fe80::1%eth0", 1), ("fe80::2%eth1", 1)],
+        [("client.sock", 0)],
+    ]
+    found = [{address_of(client) for client in clients} for clients in same]
+    assert [len(one) for one in found] == [1] * len(same)
+    assert len(set.union(*found)) == len(same)

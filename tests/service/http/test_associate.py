@@ -59,6 +59,62 @@ def test_points_are_found(client: httpx.Client) -> None:
     assert answer["pose"]["y"] == pytest.approx(0.0, abs=0.02)
 
 
+def test_the_error_of_the_walls_is_estimated_where_it_is_null_or_left_out(client: httpx.Client) -> None:
+    def variance(where: dict[str, Any]) -> float:
+        return float(associated(client, map=where)["covariance"][0][0])
+
+    def sent(**sigma: float | None) -> float:
+        return variance({"segments": examples.WALLS, **sigma})
+
+    assert sent() == sent(sigma=None)
+    assert 3.0 * sent(sigma=0.0) < sent() < sent(sigma=0.05)
+    for sigma in ({}, {"sigma": None}, {"sigma": 0.0}):
+        document = {"segments": examples.WALLS, **sigma}
+        assert client.put("/v1/maps/of-some-error", json=document).is_success
+        assert variance({"map_id": "of-some-error"}) == sent(**sigma)
+        assert client.get("/v1/maps/of-some-error").json() == document
+
+
+def test_what_is_strange_about_a_scan_is_told(client: httpx.Client) -> None:
+    def codes(scan: dict[str, Any]) -> list[str]:
+        warnings = associated(client, scan=scan)["warnings"]
+        assert all(warning["message"].endswith((".", "?")) for warning in warnings)
+        return [warning["code"] for warning in warnings]
+
+    good = laser(range_max=30.0)
+    assert codes({"laser": good}) == []
+    assert codes({"laser": {**good, "ranges": [2.0] * 400 + good["ranges"][400:]}}) == ["stuck_ranges"]
+    assert "scan_exceeds_map" in codes({"laser": {**good, "ranges": [r and 3.28 * r for r in good["ranges"]]}})
+
+
+def test_reasons_are_given_where_an_answer_is_not_usable(client: httpx.Client) -> None:
+    assert associated(client)["reasons"] == []
+    answer = associated(client, scan={"segments": examples.SEEN[:1]})
+    assert not answer["usable"]
+    assert answer["reasons"]
+    assert all(reason.keys() == {"code", "message"} for reason in answer["reasons"])
+    answer = associated(client, scan={"segments": []})
+    assert [reason["code"] for reason in answer["reasons"]] == ["elsewhere"]
+
+
+def test_numbers_beside_a_pose(client: httpx.Client) -> None:
+    """What it hinges on, down to where rivals were looked for, and the paper's measures of each alternative."""
+    rectangle = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]]}
+    corner = {"segments": [[-3.5, 1.0, -3.5, -3.0], [-3.5, -3.0, 2.5, -3.0]]}
+    answer = associated(client, map=rectangle, scan=corner, options={"sampling": "random", "seed": 4})
+    search = answer["search"]
+    assert (search["sampling"], search["seed"]) == ("random", 4)
+    assert 0.5 < search["rivals_above"] < 1.0
+    hinge = answer["diagnostics"]["hinges_on"]
+    assert hinge["moves"] > 1.0
+    assert len(hinge["scan"]) == len(hinge["map"]) == 1
+    assert math.hypot(*hinge["direction"]) == pytest.approx(1.0)
+    assert answer["alternatives"]
+    for other in answer["alternatives"]:
+        assert other["ambiguity"]["total"] >= 0.0
+        assert 0.0 <= other["reliability"] <= 1.0
+
+
 def test_an_empty_scan_is_no_match(client: httpx.Client) -> None:
     for scan in ({"segments": []}, {"points": []}, {"laser": {**laser(), "ranges": [None] * 10}}):
         answer = associated(client, scan=scan)

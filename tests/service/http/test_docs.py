@@ -47,3 +47,23 @@ def test_the_named_settings_exist() -> None:
 
     for name in re.findall(r"LINEFIX_([A-Z_]+)", TEXT):
         assert name.lower() in Settings.model_fields, name
+
+
+ROW = re.compile(r"\| `(\w+)` \| (\S+)[^|]*\| (above )?(\d+)[^|]*\| (\d*)[^|]*\|")
+
+
+def test_the_settings_are_as_the_table_says() -> None:
+    from service.settings import Settings
+
+    rows = ROW.findall(TEXT.partition("## Operations")[2])
+    fields = {name: field for name, field in Settings.model_fields.items() if field.annotation in (int, float)}
+    assert {name for name, *_ in rows} == fields.keys()
+    for name, default, above, least, most in rows:
+        bounds = {key: value for one in fields[name].metadata for key, value in _limits(one)}
+        said = {"gt" if above else "ge": float(least), **({"le": float(most)} if most else {})}
+        assert bounds == said, name
+        assert default == "the" or float(default) == fields[name].default, name
+
+
+def _limits(bound: object) -> list[tuple[str, float]]:
+    return [(key, float(getattr(bound, key))) for key in ("ge", "gt", "le") if hasattr(bound, key)]

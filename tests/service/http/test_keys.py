@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import httpx
 import pytest
 
 from service.schemas import examples
-from tests.running import RunningService, running
-
-
-@pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    with running(tmp_path_factory.mktemp("guarded"), keys="sesame,open") as service:
-        yield service
-        assert "sesame" not in service.log()
+from tests.running import RunningService
 
 
 def test_probes_and_pages_ask_for_no_key(guarded: RunningService) -> None:

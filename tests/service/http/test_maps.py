@@ -132,3 +132,14 @@ def test_a_damaged_map_is_named_and_not_served(start_service: Callable[..., Any]
     assert '"damaged"' in quarantined[0]
     assert running.client.put("/v1/maps/damaged", json=examples.MAP).status_code == 200
     assert running.client.get("/v1/maps/damaged").json() == examples.MAP
+
+
+def test_what_is_stored_can_be_searched(client: httpx.Client) -> None:
+    """Two pieces of one wall are longer together than a segment may be."""
+    segments = [[0.0, 0.0, 6e3, 0.0], [6e3, 0.0, 1.2e4, 0.0], [1.2e4, 0.0, 1.2e4, 50.0], [0.0, 50.0, 0.0, 0.0]]
+    assert client.put("/v1/maps/long", json={"segments": segments}).status_code == 201
+    for oriented in (True, False):
+        body = {"map": {"map_id": "long"}, "scan": {"segments": [[1.0, -1.0, 5.0, -1.0]]}}
+        answer = client.post("/v1/associate", json={**body, "options": {"oriented": oriented}})
+        assert answer.status_code == 200, answer.text
+    client.delete("/v1/maps/long")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
 from collections.abc import Iterator
 from typing import Any
 
 import httpx
 import pytest
 
+from service.http.openapi import Contract
 from service.http.problems import KINDS
+from service.threads import Threads
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +25,33 @@ def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, A
     for path, item in document["paths"].items():
         for method, operation in item.items():
             yield method.upper(), path, operation
+
+
+def test_it_is_made_once_and_beside_the_event_loop() -> None:
+    """Each who asked had it encoded anew, and the first had the event loop wait for a third of a second."""
+    made: list[str] = []
+    threads = Threads(1, "aside")
+
+    def describe() -> dict[str, Any]:
+        made.append(threading.current_thread().name)
+        return {"openapi": "3.1.0"}
+
+    async def ask() -> list[bytes]:
+        contract = Contract(describe, threads)
+        return [*await asyncio.gather(contract.body(), contract.body()), await contract.body()]
+
+    one, *others = asyncio.run(ask())
+    threads.close()
+    assert one == b'{"openapi":"3.1.0"}'
+    assert all(other is one for other in others)
+    assert len(made) == 1
+    assert made[0].startswith("aside")
+
+
+def test_it_is_json(service: Any) -> None:
+    answer = httpx.get(service.url + "/openapi.json")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "application/json")
+    assert answer.json()["openapi"].startswith("3.")
 
 
 def test_every_route_is_in_it(document: dict[str, Any]) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 import socket
 import threading
 from collections.abc import Callable
@@ -13,7 +16,7 @@ import orjson
 import pytest
 
 from service.schemas import examples
-from tests.running import RunningService, until
+from tests.running import JSON, RunningService, until
 from tests.service.searches import heavy_body
 
 
@@ -50,14 +53,14 @@ RUNNING, WAITING = "linefix_searches_running", "linefix_searches_waiting"
 
 
 def ask(running: RunningService, body: bytes) -> httpx.Response:
-    return httpx.post(running.url + "/v1/associate", content=body, timeout=60)
+    return httpx.post(running.url + "/v1/associate", content=body, headers=JSON, timeout=60)
 
 
 def refused(running: RunningService) -> bytes:
     """Return what a request is told whose body has not come."""
     answer = b""
     with running.connection() as connection:
-        connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n")
+        connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n")
         connection.settimeout(0.2)
         with suppress(TimeoutError):
             while part := connection.recv(4096):
@@ -78,8 +81,8 @@ def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable
         assert b'"code":"overloaded"' in answer
         # What needs no search is answered all the same, also on a connection that was refused before.
         with running.connection() as connection:
-            connection.sendall(b"POST /v1/register HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\n{}" * 3)
-            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+            connection.sendall(b"POST /v1/register HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\n{}" * 3)
+            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n")
             answers = b""
             while not answers.endswith(b'{"status":"ok"}'):
                 part = connection.recv(65_536)
@@ -102,7 +105,8 @@ def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., Run
     busy.start()
     until(lambda: running.count(RUNNING) == 1.0)
     body = orjson.dumps(examples.ASSOCIATE)
-    head = f"POST /v1/associate HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n"
+    head = "POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    head += f"Content-Length: {len(body)}\r\n\r\n"
     with socket.create_connection(("127.0.0.1", running.port), timeout=20) as connection:
         connection.sendall(head.encode() + body)
         until(lambda: running.count(WAITING) == 1.0 or not busy.is_alive())
@@ -124,3 +128,20 @@ def test_before_the_kernels_are_there_nothing_is_searched(
     assert running.client.get("/readyz").json()["detail"] == "the kernels are being compiled"
     assert running.client.put("/v1/maps/m", json=examples.MAP).status_code == 201
     assert running.client.get("/v1/maps/m").json() == examples.MAP
+
+
+def test_pages_run_nothing_but_their_own(client: httpx.Client) -> None:
+    for path in ("/", "/docs"):
+        headers = client.get(path).headers
+        policy = headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert "'unsafe-inline'" not in policy.partition("style-src")[0]
+        assert (headers["x-frame-options"], headers["referrer-policy"]) == ("DENY", "no-referrer")
+        scripts = re.findall(r"<script>(.*?)</script>", client.get(path).text, re.DOTALL)
+        for script in scripts:
+            digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+            assert f"script-src 'self' 'sha256-{digest}';" in policy
+    assert len(scripts) == 1
+    for path in ("/livez", "/nothing", "/docs", "/v1/limits"):
+        assert client.get(path).headers["x-content-type-options"] == "nosniff"

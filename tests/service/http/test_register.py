@@ -53,6 +53,20 @@ def test_the_paper_s_estimator(client: httpx.Client) -> None:
     assert answer["diagnostics"]["ambiguity_before"]["rotation"] == pytest.approx(2.0 * 2 * (math.pi / 2) ** 2)
 
 
+def test_the_error_of_the_walls_is_estimated_where_it_is_null(client: httpx.Client) -> None:
+    def variance(**sigma: float | None) -> float:
+        answer = registered(client, map={"segments": examples.WALLS, **sigma}, scan={"segments": examples.SEEN})
+        assert answer["usable"]
+        return float(answer["covariance"][0][0])
+
+    assert variance() == variance(sigma=0.0)
+    assert 3.0 * variance() < variance(sigma=None) < variance(sigma=0.05)
+    nothing = {"segments": examples.SEEN, "sigma": 0.0}
+    assert registered(client, map={"segments": examples.WALLS, "sigma": None}, scan=nothing)["usable"]
+    body = {**examples.REGISTER, "map": {"segments": examples.WALLS}, "scan": nothing, "correspondences": None}
+    assert client.post("/v1/register", json=body).status_code == 422
+
+
 def test_parallel_pairs_are_degenerate_and_say_along_what(client: httpx.Client) -> None:
     answer = registered(client, correspondences=[[0, 0]])
     assert (answer["status"], answer["usable"], answer["covariance"]) == ("degenerate", False, None)

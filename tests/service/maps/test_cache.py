@@ -109,7 +109,7 @@ def test_hits_and_misses_are_counted() -> None:
     cache = IndexCache(100, metrics)
     for name in "aab":
         cache.get(name, lambda: a_map(1))
-    text = metrics.exposition().decode()
+    text = metrics.rendered().decode()
     assert "linefix_map_cache_hits_total 1.0" in text
     assert "linefix_map_cache_misses_total 2.0" in text
 

@@ -13,9 +13,9 @@ import pytest
 from association import InvalidMapError
 from registration import InputError
 from service.database_url import database_url
-from service.maps import IndexCache, MapStore, Preconditions
-from service.maps.errors import UnknownMapError
-from service.maps.lookup import MapLookup, summary_of
+from service.maps import CachedMap, IndexCache, MapStore, Preconditions
+from service.maps.errors import BusyStoreError, UnknownMapError
+from service.maps.lookup import OVERHEAD, MapLookup, summary_of
 from service.parsing.parser_process import LARGE, ParserProcess
 from service.schemas import examples
 from service.schemas.parts import InlineMap, StoredMap
@@ -31,6 +31,13 @@ class Lookup(MapLookup):
         self.store = MapStore(database_url(f"sqlite:///{folder / 'maps.sqlite3'}"))
         self.parser = ParserProcess()
         super().__init__(self.cache, self.store, self.parser)
+
+    def look(self, asked: InlineMap | StoredMap, *, oriented: bool) -> tuple[CachedMap, int | None]:
+        """Find and index, as for one request."""
+        if isinstance(asked, InlineMap):
+            return self.indexed(asked, oriented=oriented), None
+        found = self.find(asked.map_id, oriented=oriented)
+        return self.indexed(found, oriented=oriented), found.record.revision
 
     def put(self, map_id: str, **parts: Any) -> None:
         self.store.put(map_id, orjson.dumps(parts), (6, (0.0, 0.0, 1.0, 1.0)), Preconditions())
@@ -49,42 +56,42 @@ def inline(**parts: Any) -> InlineMap:
 
 
 def test_a_map_that_is_sent_again_is_not_indexed_again(lookup: Lookup) -> None:
-    first, revision = lookup.indexed(inline(), oriented=True)
+    first, revision = lookup.look(inline(), oriented=True)
     assert revision is None
-    assert lookup.indexed(inline(), oriented=True)[0] is first
+    assert lookup.look(inline(), oriented=True)[0] is first
 
 
 @pytest.mark.parametrize(
     "parts", [{"sigma": 0.05}, {"frame_id": "other"}, {"segments": [*examples.WALLS[:-1], [-4.0, 3.0, -4.0, -3.001]]}]
 )
 def test_everything_that_an_answer_rests_on_names_the_index(lookup: Lookup, parts: dict[str, Any]) -> None:
-    plain, _ = lookup.indexed(inline(), oriented=True)
-    other, _ = lookup.indexed(inline(**parts), oriented=True)
+    plain, _ = lookup.look(inline(), oriented=True)
+    other, _ = lookup.look(inline(**parts), oriented=True)
     assert other is not plain
     assert other.frame_id == parts.get("frame_id", "map")
-    assert other.index.sigma == parts.get("sigma", 0.0)
-    assert lookup.indexed(inline(), oriented=True)[0] is plain
+    assert other.index.sigma == parts.get("sigma")
+    assert lookup.look(inline(), oriented=True)[0] is plain
 
 
 def test_a_map_without_directions_is_another_one_in_the_cache(lookup: Lookup) -> None:
-    one, other, again = (lookup.indexed(inline(), oriented=oriented)[0] for oriented in (True, False, True))
+    one, other, again = (lookup.look(inline(), oriented=oriented)[0] for oriented in (True, False, True))
     assert len(other.index.segments) == 2 * len(one.index.segments)
     assert again is one
-    assert lookup.cache.bytes == one.index.nbytes + other.index.nbytes
+    assert lookup.cache.bytes == one.index.nbytes + other.index.nbytes + 2 * OVERHEAD
     assert other.index.undirected is other.index
 
 
 def test_a_stored_map_is_the_one_that_is_stored_now(lookup: Lookup) -> None:
     asked = StoredMap(map_id="m")
     with pytest.raises(UnknownMapError):
-        lookup.indexed(asked, oriented=True)
+        lookup.look(asked, oriented=True)
     lookup.put("m", segments=examples.WALLS)
-    first, revision = lookup.indexed(asked, oriented=True)
+    first, revision = lookup.look(asked, oriented=True)
     assert (revision, first.frame_id) == (1, "map")
-    assert lookup.indexed(asked, oriented=True)[0] is first
-    assert lookup.indexed(asked, oriented=False)[0] is not first
+    assert lookup.look(asked, oriented=True)[0] is first
+    assert lookup.look(asked, oriented=False)[0] is not first
     lookup.put("m", segments=examples.WALLS, frame_id="new", sigma=0.1)
-    second, revision = lookup.indexed(asked, oriented=True)
+    second, revision = lookup.look(asked, oriented=True)
     assert (revision, second.frame_id, second.index.sigma) == (2, "new", 0.1)
 
 
@@ -98,8 +105,21 @@ def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup)
         return load(map_id)
 
     lookup.store.load = changing  # type: ignore[method-assign]
-    found, revision = lookup.indexed(StoredMap(map_id="m"), oriented=True)
+    found, revision = lookup.look(StoredMap(map_id="m"), oriented=True)
     assert (found.frame_id, revision) == ("change 1", 3)
+
+
+def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(lookup: Lookup) -> None:
+    lookup.put("m", segments=examples.WALLS)
+    lookup.look(StoredMap(map_id="m"), oriented=True)
+    found = lookup.find("m", oriented=True)
+    assert found.document is None
+    lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
+    assert lookup.indexed(found, oriented=True).frame_id == "map"  # read again
+    lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
+    lookup.put("m", segments=examples.WALLS, frame_id="other")
+    with pytest.raises(BusyStoreError):
+        lookup.indexed(found, oriented=True)
 
 
 def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:
@@ -108,9 +128,9 @@ def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:
     lookup.put("small", segments=examples.WALLS)
     lookup.put("large", segments=rows)
     assert len(lookup.store.load("large").document) > LARGE
-    lookup.indexed(StoredMap(map_id="small"), oriented=True)
+    lookup.look(StoredMap(map_id="small"), oriented=True)
     assert lookup.parser.pid is None
-    assert lookup.indexed(StoredMap(map_id="large"), oriented=True)[0].index.nbytes > 0
+    assert lookup.look(StoredMap(map_id="large"), oriented=True)[0].index.nbytes > 0
     assert lookup.parser.pid is not None
 
 

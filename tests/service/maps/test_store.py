@@ -321,6 +321,8 @@ def test_commits_wait_for_the_disk(database: str) -> None:
             return [connection.exec_driver_sql(question).scalar() for question in questions]
 
     if database.startswith("sqlite"):
+        with opened(database):
+            pass
         mode, sync = said(database, "PRAGMA journal_mode", "PRAGMA synchronous")
         assert (mode, sync) in (("wal", 2), ("delete", 3))
         assert (mode == "wal") == (sqlite3.sqlite_version_info >= (3, 51, 3))

@@ -109,7 +109,7 @@ def test_a_batch_is_read_scan_by_scan() -> None:
 def test_of_a_map_what_was_sent_is_kept_and_no_more() -> None:
     asked, document = read_map(orjson.dumps({"segments": [ROW], "meta": [1]}), LIMITS)
     assert orjson.loads(document) == {"segments": [ROW], "meta": [1]}
-    assert (asked.sigma, asked.frame_id) == (0.0, "map")
+    assert (asked.sigma, asked.frame_id) == (None, "map")
     full = {"segments": [ROW], "sigma": 0.1, "frame_id": "f", "meta": None}
     assert orjson.loads(read_map(orjson.dumps(full), LIMITS)[1]) == full
 

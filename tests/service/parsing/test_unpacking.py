@@ -7,11 +7,16 @@ import tracemalloc
 
 import pytest
 
+from service.admission.errors import TooMuchHeldError
 from service.parsing.errors import NotJsonError
-from service.parsing.unpacking import unpack
+from service.parsing.unpacking import unpack as unpack_counted
 from service.schemas.errors import BodyTooLargeError
 
 MEGABYTE = 1 << 20
+
+
+def unpack(packed: bytes, max_bytes: int) -> bytearray:
+    return unpack_counted(packed, max_bytes, lambda count: None)
 
 
 @pytest.mark.parametrize("size", [0, 1, 1000, 3 * MEGABYTE])
@@ -60,12 +65,26 @@ def test_a_body_in_many_pieces() -> None:
     ("packed", "message"),
     [
         (b"not gzip", "is not gzip"),
-        (gzip.compress(b"{}")[:-4], "cut short"),
-        (gzip.compress(b"{}") + b"more", "follows"),
-        (gzip.compress(b"{}") * 2, "follows"),
+        (gzip.compress(b"{}", mtime=0)[:-4], "cut short"),
+        (gzip.compress(b"{}", mtime=0) + b"more", "follows"),
+        (gzip.compress(b"{}", mtime=0) * 2, "follows"),
         (b"", "cut short"),
     ],
 )
 def test_what_is_not_gzip(packed: bytes, message: str) -> None:
     with pytest.raises(NotJsonError, match=message):
         unpack(packed, 1000)
+
+
+def test_what_comes_out_is_counted_as_it_comes() -> None:
+    packed = gzip.compress(bytes(10 * MEGABYTE))
+    counted: list[int] = []
+    unpack_counted(packed, 10 * MEGABYTE, counted.append)
+    assert sum(counted) == 10 * MEGABYTE
+    assert max(counted) <= MEGABYTE
+
+    def full(count: int) -> None:
+        raise TooMuchHeldError
+
+    with pytest.raises(TooMuchHeldError):
+        unpack_counted(packed, 10 * MEGABYTE, full)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import httpx
+import pytest
 
-from tests.running import RunningService, until
+from tests.running import JSON, RunningService, family_of, until
+from tests.running import running as running_service
 from tests.service.searches import heavy_body
 
 
@@ -19,7 +23,7 @@ def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -
     body = heavy_body()
 
     def ask() -> None:
-        answers.append(httpx.post(running.url + "/v1/associate", content=body, timeout=60).status_code)
+        answers.append(httpx.post(running.url + "/v1/associate", content=body, headers=JSON, timeout=60).status_code)
 
     busy = threading.Thread(target=ask)
     busy.start()
@@ -46,3 +50,28 @@ def test_a_second_ctrl_c_cuts_the_draining_short(start_service: Callable[..., Ru
     running.process.send_signal(signal.SIGINT)
     assert running.process.wait(15) == 0
     assert time.monotonic() - begun < 4.0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., RunningService], workers: int) -> None:
+    """It ended at once, without its last answers, and left its counts in shared memory."""
+    kept = set(Path("/dev/shm").glob("linefix-*"))
+    running = start_service(drain_seconds=1.0, workers=workers, searches=2)
+    begun = time.monotonic()
+    for pid in family_of(running.process.pid):
+        os.kill(pid, signal.SIGHUP)  # as a terminal does: to all of them
+    assert running.process.wait(15) == 0
+    assert time.monotonic() - begun > 0.9
+    assert "Traceback" not in running.log()
+    assert set(Path("/dev/shm").glob("linefix-*")) == kept
+
+
+def test_started_to_outlive_its_terminal_it_does(tmp_path: Path) -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with running_service(tmp_path) as running:
+            running.process.send_signal(signal.SIGHUP)
+            time.sleep(0.5)
+            assert running.client.get("/readyz").status_code == 200
+    finally:
+        signal.signal(signal.SIGHUP, before)

@@ -10,6 +10,7 @@ from typing import Any
 
 from service.schemas import examples
 from service.work.warmup import warm_up
+from tests.running import until
 
 LASER = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}
 SEGMENTS = examples.ASSOCIATE["scan"]["segments"]
@@ -66,9 +67,8 @@ def compiled_by_requests() -> list[str]:
     warm_up()
     before = signatures()
     app = create_app(Settings(data_dir=sys.argv[1]))
-    with TestClient(app) as client:
-        while client.get("/readyz").status_code != 200:
-            pass
+    with TestClient(app, base_url="http://localhost") as client:
+        until(lambda: client.get("/readyz").status_code == 200)
         for path, bodies in (("/v1/associate", associations()), ("/v1/register", registrations())):
             for body in bodies:
                 answer = client.post(path, json=body)

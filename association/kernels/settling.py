@@ -1,0 +1,244 @@
+"""Compiled settling of an answer: its pose with the walls' own error estimated, and what it would be without a wall."""
+
+import math
+
+import numpy as np
+
+from registration.compiling import inlined, kernel
+from registration.kernels import keep_alive
+from registration.layout import PAIR, Record, Records
+
+from ..layout import ESTIMATE, Integers, Question, Workspace
+from ..tuning import (
+    COMMON_WALL_ERROR,
+    FREE_DEVIATION,
+    LEAST_KNOWN_VARIANCE,
+    LEAST_WALL_ERROR,
+    ROUGH_SHARE,
+    ROUGHNESS,
+    SETTLING_ROUNDS,
+    UNSEEN_ERROR,
+    USUAL_WALL_ERROR,
+    USUAL_WALLS,
+)
+from .consensus import change, solve, start_over
+
+
+@inlined
+def settled_weight(line: Record, wall_variance: float) -> float:
+    """Return the weight of a scan line, 1/m^2, on walls that are so rough along themselves."""
+    return 1.0 / (1.0 / line.weight - ROUGHNESS * ROUGHNESS + ROUGH_SHARE * wall_variance)
+
+
+@kernel
+def weakest(covariance: Record) -> tuple[float, float, float]:
+    """Return the position's deviation along its weakest direction, metres, and that unit direction."""
+    middle = 0.5 * (covariance.xx + covariance.yy)
+    half = 0.5 * (covariance.xx - covariance.yy)
+    angle = 0.5 * math.atan2(covariance.xy, half)
+    return math.sqrt(max(0.0, middle + math.hypot(half, covariance.xy))), math.cos(angle), math.sin(angle)
+
+
+@kernel
+def add_all(scan: Records, matches: Records, walls: Records, wall_variance: float, work: Workspace) -> None:
+    """Fill the sums of `work` with all matches, walls off with that variance."""
+    start_over(work)
+    held = work.held
+    shares = work.shares
+    sums = work.scratch[0].sums
+    for i in range(len(scan)):
+        w = matches[i].wall
+        if w >= 0:
+            weight = settled_weight(scan[i], wall_variance)
+            change(sums, shares[w], walls[w], scan[i], weight, wall_variance, 1.0)
+            held[i] = w
+
+
+@kernel
+def copy_estimate(one: Record, other: Record) -> None:
+    """Write the first to the second."""
+    other.theta = one.theta
+    other.x = one.x
+    other.y = one.y
+    other.xx = one.xx
+    other.xy = one.xy
+    other.xt = one.xt
+    other.yy = one.yy
+    other.yt = one.yt
+    other.tt = one.tt
+
+
+@kernel
+def unlike(scan: Records, matches: Records, walls: Records, wall_variance: float) -> float:
+    """Return how far the directions of the matched walls are from parallel, as a chi-square of the pairs' angles.
+
+    With a_k the information of a pair's angle, that of the common direction from which ``sum a_k sin^2`` is least: the
+    smaller eigenvalue of ``sum a_k d d'``.
+    """
+    xx = 0.0
+    xy = 0.0
+    yy = 0.0
+    for i in range(len(scan)):
+        w = matches[i].wall
+        if w >= 0:
+            angle = settled_weight(scan[i], wall_variance) * scan[i].spread
+            xx += angle * walls[w].dx * walls[w].dx
+            xy += angle * walls[w].dx * walls[w].dy
+            yy += angle * walls[w].dy * walls[w].dy
+    return max(0.0, 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy))
+
+
+@kernel
+def estimated_variance(pose: Record, of_wall: Integers, wall_variance: float, usual: float, work: Workspace) -> float:
+    """Return the variance of the walls' own errors that their residuals show, shrunk to `usual` where walls are few.
+
+    The mean residual of wall k, m_k, has the variance ``(V + 1 / s_k) (1 - h_k)`` at the pose that was fitted to all,
+    with its leverage h_k. Hence V is about ``sum(m_k^2 - (1 - h_k) / s_k) / sum(1 - h_k)``; `USUAL_WALLS` more walls
+    are taken to have shown `usual`.
+    """
+    shares = work.shares
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    found = USUAL_WALLS * usual
+    count = USUAL_WALLS
+    for w in of_wall:
+        share = shares[w]
+        mean = (share.c * c + share.s * s + share.x * pose.x + share.y * pose.y + share.one) / share.weight
+        gx = share.x / share.weight
+        gy = share.y / share.weight
+        gt = (share.s * c - share.c * s) / share.weight
+        variance = wall_variance + 1.0 / share.weight
+        spread = gx * gx * pose.xx + gy * gy * pose.yy + gt * gt * pose.tt
+        spread += 2.0 * (gx * gy * pose.xy + gx * gt * pose.xt + gy * gt * pose.yt)
+        free = max(0.0, 1.0 - spread / variance)
+        found += mean * mean - free / share.weight
+        count += free
+    # What so few walls show is uncertain itself: Student's t has that much more variance. And those that are farthest
+    # off matched nothing.
+    unsure = UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0))
+    return unsure * max(found / count, LEAST_WALL_ERROR**2)
+
+
+@kernel
+def settle(
+    question: Question, walls: Records, matches: Records, start: Records, map_variance: float, settled: Records,
+    hinges: Records, work: Workspace,
+) -> int:  # fmt: skip
+    """Work out the pose of a consensus set from `start` (1,), with the error of the walls as their residuals show it.
+
+    `map_variance` is known of it, m^2; negative where nothing is. Writes `settled` (1,) and, for each wall that holds a
+    match, `hinges`, unless that has no room for any; returns how many walls that are.
+    """
+    scan = question.scan
+    out = settled[0]
+    pose = out.pose
+    information = work.scratch[0].information
+    value = work.scratch[0].value
+    sums = work.scratch[0].sums
+    of_wall = np.empty(len(scan), dtype=np.int64)
+    count = 0
+    add_all(scan, matches, walls, USUAL_WALL_ERROR**2, work)
+    for i in range(len(scan)):
+        w = matches[i].wall
+        if w >= 0:
+            known = False
+            for k in range(count):
+                known = known or of_wall[k] == w
+            if not known:
+                of_wall[count] = w
+                count += 1
+    copy_estimate(start[0], pose)
+    out.wall_variance = max(map_variance, LEAST_KNOWN_VARIANCE) if map_variance >= 0.0 else USUAL_WALL_ERROR**2
+    for _ in range(1 if map_variance >= 0.0 else SETTLING_ROUNDS):
+        add_all(scan, matches, walls, out.wall_variance, work)
+        if not solve(sums, pose, information, value):
+            break
+        if map_variance < 0.0:
+            out.wall_variance = estimated_variance(pose, of_wall[:count], out.wall_variance, USUAL_WALL_ERROR**2, work)
+    other = np.zeros(1, dtype=ESTIMATE)
+    add_all(scan, matches, walls, max(out.wall_variance, COMMON_WALL_ERROR**2), work)
+    copy_estimate(pose, other[0])
+    solve(sums, other[0], information, value)
+    out.weakest, out.dx, out.dy = weakest(other[0])
+    out.unlike = unlike(scan, matches, walls, out.wall_variance)
+    add_all(scan, matches, walls, out.wall_variance, work)
+    solve(sums, pose, information, value)
+    if len(hinges) > 0:
+        leave_each_out(question, walls, matches, of_wall[:count], settled, hinges, work)
+    keep_alive(other)
+    return count
+
+
+@kernel
+def leave_each_out(
+    question: Question, walls: Records, matches: Records, of_wall: Integers, settled: Records, hinges: Records,
+    work: Workspace,
+) -> None:  # fmt: skip
+    """Write what the settled pose would be without each wall; the sums hold all, and do so again."""
+    scan = question.scan
+    shares = work.shares
+    information = work.scratch[0].information
+    value = work.scratch[0].value
+    sums = work.scratch[0].sums
+    pose = settled[0].pose
+    wall_variance = settled[0].wall_variance
+    one = np.zeros(1, dtype=ESTIMATE)
+    without = one[0]
+    for k in range(len(of_wall)):
+        w = of_wall[k]
+        for sign in (-1.0, 1.0):
+            for i in range(len(scan)):
+                if matches[i].wall == w:
+                    weight = settled_weight(scan[i], wall_variance)
+                    change(sums, shares[w], walls[w], scan[i], weight, wall_variance, sign)
+            if sign > 0.0:
+                break
+            copy_estimate(pose, without)
+            hinge = hinges[k]
+            hinge.wall = w
+            moved = solve(sums, without, information, value)
+            x = without.x - pose.x
+            y = without.y - pose.y
+            hinge.moves = math.hypot(x, y)
+            hinge.deviation, hinge.dx, hinge.dy = weakest(without)
+            if not moved:
+                hinge.deviation = FREE_DEVIATION
+            elif hinge.moves > hinge.deviation:
+                hinge.dx = x / hinge.moves
+                hinge.dy = y / hinge.moves
+    keep_alive(one)
+
+
+@kernel
+def pairs_of(scan: Records, matches: Records, walls: Records) -> Records:
+    """Return the matches as pairs, (n,) of `PAIR`, a line of the scan and the wall that it lies on each."""
+    count = 0
+    for i in range(len(scan)):
+        if matches[i].wall >= 0:
+            count += 1
+    pairs = np.zeros(count, dtype=PAIR)
+    k = 0
+    for i in range(len(scan)):
+        if matches[i].wall < 0:
+            continue
+        wall = walls[matches[i].wall]
+        line = pairs[k].map
+        seen = pairs[k].scan
+        k += 1
+        middle = 0.5 * (wall.begin + wall.end)
+        line.dx = wall.dx
+        line.dy = wall.dy
+        line.offset = wall.offset
+        line.x = wall.dx * middle - wall.dy * wall.offset
+        line.y = wall.dy * middle + wall.dx * wall.offset
+        line.length = wall.end - wall.begin
+        seen.dx = scan[i].dx
+        seen.dy = scan[i].dy
+        seen.centroid_x = scan[i].centroid_x
+        seen.centroid_y = scan[i].centroid_y
+        seen.spread = scan[i].spread
+        seen.x = scan[i].x
+        seen.y = scan[i].y
+        seen.length = scan[i].length
+        seen.variance = 1.0 / scan[i].weight - ROUGHNESS * ROUGHNESS
+    return pairs

@@ -1,0 +1,92 @@
+"""Why an answer is not usable: codes for programs and a sentence for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .features import Features
+from .models import USUAL, Model
+from .result import Reason, Status
+from .tuning import TELLING_REASON
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What the verdict is, beside its probabilities.
+
+    Attributes
+    ----------
+    status : Status
+    complete, contradicted : bool
+        Whether the search was, and whether the prior speaks against the answer.
+    elsewhere : bool
+        Whether little speaks for this map at all.
+    thin : bool
+        Whether few walls fix the pose, and one of them alone decides.
+    """
+
+    status: Status
+    complete: bool
+    contradicted: bool
+    elsewhere: bool
+    thin: bool
+
+
+SENTENCES: Mapping[str, str] = {
+    "prior_contradicted": "The prior and the scan do not agree on where the robot is.",
+    "search_incomplete": "The deadline ended the search; a better pose may have been missed.",
+    "free_direction": "The walls that were seen leave the position free along one direction.",
+    "elsewhere": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
+    "twin": "Another pose explains the scan about as well.",
+    "one_wall_decides": "Without one of the walls the pose would be another, or free.",
+    "unexplained": "Much is seen that the map does not show, or the map shows much that is not seen.",
+    "too_little": "Too little of the scan lies on the map.",
+}
+
+# What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
+FEATURES_OF: Mapping[str, tuple[str, ...]] = {
+    "twin": ("lead", "solitude", "squared_solitude"),
+    "one_wall_decides": ("hinge_moves", "hinge_deviation", "deviation"),
+    "unexplained": (
+        "share", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed", "misfit",
+        "misfit_of_many", "blocked",
+    ),
+    "too_little": ("root_count", "inverse_count", "root_length", "chance", "root_score", "walls"),
+    "elsewhere": ("null", "null_gap", "null_better"),
+}  # fmt: skip
+
+
+def reasons_of(standing: Standing, features: Features | None, cautious: Model | None) -> tuple[Reason, ...]:
+    """List why an answer is not usable, the weightiest first.
+
+    Parameters
+    ----------
+    standing : Standing
+    features : Features or None
+        Of the best explanation; None where there is none.
+    cautious : Model or None
+        Whose odds fall short.
+    """
+    codes = []
+    if standing.contradicted:
+        codes.append("prior_contradicted")
+    if not standing.complete:
+        codes.append("search_incomplete")
+    if standing.elsewhere:
+        codes.append("elsewhere")
+    if standing.status is Status.DEGENERATE:
+        codes.append("free_direction")
+    elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
+        codes += ["too_little"] if standing.thin else []
+        codes += [code for code in _weighed(features, cautious) if code not in codes]
+    return tuple(Reason(code, SENTENCES[code]) for code in codes)
+
+
+def _weighed(features: Features, cautious: Model) -> list[str]:
+    """Order the reasons by what their features take from the logarithm of the odds; at least the first of them."""
+    lacking = {
+        code: cautious.part(USUAL, names) - cautious.part(features, names) for code, names in FEATURES_OF.items()
+    }
+    ordered = sorted(lacking, key=lambda code: -lacking[code])
+    return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]

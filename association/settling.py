@@ -1,0 +1,81 @@
+"""The answer worked out: its pose with the error of the map's walls, and what it would be without each of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from registration import RigidTransform
+from registration.chi_square import chi_square_quantile
+from registration.layout import Floats, Records
+from registration.observability import THREE_SIGMA_TAIL
+
+from .context import ANY, SearchContext
+from .kernels.settling import settle as settle_matches
+from .layout import HINGE, SETTLED
+from .ranking import Ranked
+from .tuning import ONE_OF_MANY
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A pose that reckons with walls that are off, as far as their residuals show it.
+
+    Attributes
+    ----------
+    pose : RigidTransform
+        Index frame from scan frame.
+    covariance : (3, 3)
+        Of additive (x, y, theta).
+    wall_sigma : float
+        Standard deviation of the walls' own offsets, metres: the map's, or estimated.
+    weakest : float
+        Standard deviation of the position along its weakest direction if walls are off by centimetres, metres.
+    direction : (float, float)
+        That direction, a unit vector of which the first component is not negative.
+    free : bool
+        Whether the pose itself is one of many along that direction: parallel walls, or a deviation of metres.
+    parallel : bool
+        Whether all walls are parallel within three standard deviations of their angles.
+    hinges : (k,) of `HINGE`
+        What the pose would be without each of its walls.
+    """
+
+    pose: RigidTransform
+    covariance: Floats
+    wall_sigma: float
+    weakest: float
+    direction: tuple[float, float]
+    free: bool
+    parallel: bool
+    hinges: Records
+
+
+def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Settled:
+    """Work out the pose of a consensus set; without `hinges` there are none."""
+    settled = np.zeros(1, SETTLED)
+    without = np.zeros(len(best.matches) if hinges else 0, HINGE)
+    known = context.index.sigma
+    count = settle_matches(
+        context.question(ANY), context.index.walls.rows, best.matches, best.estimate,
+        -1.0 if known is None else known**2, settled, without, context.workspace,
+    )  # fmt: skip
+    theta, x, y, xx, xy, xt, yy, yt, tt = settled["pose"][0].item()
+    covariance = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
+    _, variance, weakest, dx, dy, unlike = settled[0].item()
+    sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
+    pairs = int(best.matched.sum())
+    parallel = pairs < 2 or unlike <= chi_square_quantile(pairs - 1, THREE_SIGMA_TAIL)
+    spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
+    return Settled(
+        pose=RigidTransform(x, y, theta),
+        covariance=covariance,
+        wall_sigma=math.sqrt(variance),
+        weakest=weakest,
+        direction=(sign * dx, sign * dy),
+        free=parallel or spread > ONE_OF_MANY**2,
+        parallel=parallel,
+        hinges=without[:count],
+    )

@@ -1,0 +1,112 @@
+"""What a caller should know beside the verdict: what is wrong, or strange, about the scan that was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .causes import Cause, Mistake
+from .context import SearchContext
+from .extents import inner_extent
+from .options import Beams
+from .result import AssociationWarning, SearchReport
+from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
+from .verdict import Verdict
+
+# By what a scan is multiplied that was sent in them.
+UNITS = {
+    0.001: "millimetres",
+    0.01: "centimetres",
+    0.1: "decimetres",
+    1000.0: "kilometres",
+    0.3048: "feet",
+    0.0254: "inches",
+}
+SENTENCES: Mapping[Mistake, str] = {
+    Mistake.MIRRORED: "With left and right exchanged the scan fits much better: is the laser mounted upside down, or "
+    "are its angles counted clockwise? Send its ranges in reverse order, or negate every y and exchange begin and end.",
+    Mistake.REVERSED: "With begin and end of every segment exchanged the scan fits much better: free space has to lie "
+    "on the left of the segments of scan and map alike. Exchange the ends of those that have it on the right, or say "
+    '"oriented": false.',
+}
+
+
+def warnings_of(
+    context: SearchContext, search: SearchReport, verdict: Verdict, causes: Sequence[Cause] = ()
+) -> tuple[AssociationWarning, ...]:
+    """List what is strange about the scan, then about the search, then what mistakes would explain."""
+    found = {
+        "no_segments": _no_segments(context),
+        "stuck_ranges": _stuck_ranges(context.scan.beams),
+        "scan_exceeds_map": _exceeding(context),
+        "faces_away": _facing_away(context),
+        "prior_contradicted": "A clearly better pose lies where the prior says it should not."
+        if verdict.contradicted
+        else None,
+        "search_incomplete": None
+        if search.complete
+        else "The deadline ended the search; a better pose may have been missed.",
+    }
+    found |= {str(cause.mistake): _mistaken(cause) for cause in causes}
+    return tuple(AssociationWarning(code, message) for code, message in found.items() if message is not None)
+
+
+def _mistaken(cause: Cause) -> str:
+    if cause.mistake is not Mistake.SCALE:
+        return SENTENCES[cause.mistake]
+    unit = UNITS.get(cause.factor)
+    what = f"the scan seems to be in {unit}" if unit else "the scan or the map is not to scale"
+    return (
+        f"With all lengths times {cause.factor:.4g} the scan fits much better: {what}. Send both in metres: multiply "
+        "the scan by this, or divide the map."
+    )
+
+
+def _no_segments(context: SearchContext) -> str | None:
+    if len(context.scan.measured):
+        return None
+    return "The scan has no segments, so that nothing could be searched."
+
+
+def _stuck_ranges(beams: Beams | None) -> str | None:
+    """Tell where most of the ranges have one value: walls are never so."""
+    if beams is None:
+        return None
+    returns = beams.ranges[np.isfinite(beams.ranges)]
+    values, counts = np.unique(returns, return_counts=True)
+    most = int(counts.max(initial=0))
+    if most < LEAST_STUCK or most < STUCK_SHARE * len(returns):
+        return None
+    value = float(values[counts.argmax()])
+    return (
+        f"{most} of {len(returns)} ranges are {value:g} m to the digit: does the laser hang, is it covered, or does it "
+        "report this value where nothing came back? Send such beams as null, or, where nothing came back, as more than "
+        "range_max."
+    )
+
+
+def _exceeding(context: SearchContext) -> str | None:
+    """Tell where the scan, but for its outermost pieces, would not fit into the box around the map."""
+    reach, room = inner_extent(context.scan.measured.segments), context.index.diagonal
+    if reach <= EXCEEDING * room:
+        return None
+    return (
+        f"The scan is {reach:.3g} m wide, the map {room:.3g} m from corner to corner: is one of them not in metres, or "
+        "is most of what is seen not on the map?"
+    )
+
+
+def _facing_away(context: SearchContext) -> str | None:
+    """Tell where segments have another left, where free space is, than where the sensor stood."""
+    if context.scan.viewpoint is None or not context.options.oriented:
+        return None
+    segments = context.scan.measured.segments
+    fronts = np.einsum("ij,ij->i", segments.normals, np.asarray(context.scan.viewpoint) - segments.midpoints)
+    away = int((fronts < -FACING).sum())
+    if not away:
+        return None
+    return (
+        f"{away} of {len(segments)} segments show their back to the viewpoint, from where nobody can see them: are "
+        "begin and end exchanged, or is this not the sensor's frame?"
+    )

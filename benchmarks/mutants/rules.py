@@ -1,0 +1,73 @@
+"""Which tests are those of a module, and which of its mutants are no mistakes."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from .drawing import Mutant
+
+EQUIVALENT = Path(__file__).with_name("equivalent.toml")
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """Tests that are run together.
+
+    Attributes
+    ----------
+    tests : tuple of str
+        Folders and files.
+    compiled : bool
+        Whether kernels are compiled; where each mutant would have to be it is quicker without.
+    """
+
+    tests: tuple[str, ...]
+    compiled: bool = True
+
+
+KERNELS = "/kernels/"
+SUITES = {
+    "registration/compiling.py": Suite(("tests/registration/test_compiling.py",)),
+    "registration/kernels/": Suite(
+        ("tests/registration/test_kernels.py", "tests/registration/test_pair_kernels.py"), compiled=False
+    ),
+    "registration/": Suite(
+        tuple(
+            f"tests/registration/test_{name}.py"
+            for name in ("degenerate", "joint", "one_step", "public_api", "register", "segments", "statistics")
+        )
+    ),
+    "vectorization/kernels/": Suite(
+        ("tests/vectorization/test_kernels.py", "tests/vectorization/test_vectorize.py"), compiled=False
+    ),
+    "vectorization/": Suite(("tests/vectorization",)),
+    "association/kernels/": Suite(("tests/association/kernels",), compiled=False),
+    "association/": Suite(("tests/association",)),
+    "simulation/": Suite(("tests/simulation",)),
+    "service/admission/": Suite(("tests/service/admission", "tests/service/http/test_fairness.py")),
+    "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py")),
+    "service/parsing/": Suite(("tests/service/parsing", "tests/service/http/test_bodies.py")),
+    "service/process/": Suite(("tests/service/process", "tests/service/http/test_refusals.py")),
+    "service/telemetry/": Suite(("tests/service/telemetry",)),
+    "service/work/": Suite(("tests/service/work", "tests/service/http")),
+    "service/": Suite(("tests/service",)),
+}
+"""By the beginning of a module's path; the first that applies."""
+
+
+def suite_of(path: str) -> Suite:
+    """Return the tests that have to notice a mistake in a module."""
+    return next(suite for begin, suite in SUITES.items() if path.startswith(begin))
+
+
+def known_equivalents() -> dict[tuple[str, str, str], str]:
+    """Return why mutants make no difference, by path and changed lines; written by hand, one by one."""
+    entries = tomllib.loads(EQUIVALENT.read_text()).get("equivalent", [])
+    return {(entry["path"], entry["before"], entry["after"]): entry["why"] for entry in entries}
+
+
+def key_of(mutant: Mutant) -> tuple[str, str, str]:
+    """Return what a mutant is looked up by."""
+    return mutant.path, mutant.before, mutant.after

@@ -1,0 +1,230 @@
+"""Runs tests on the copy of the code, each time in a process forked from this one, which has loaded what is heavy."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import traceback
+from collections import defaultdict
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import numba
+import numpy  # noqa: F401  loaded before the fork
+import pydantic  # noqa: F401
+import pytest
+import scipy.special
+import scipy.stats  # noqa: F401
+
+from .drawing import Mutant, mutated
+from .rules import Suite
+
+WALL_FACTOR = 8.0  # of the processor time allowed; other work on the machine takes the rest
+LEAST_SECONDS, TIMES = 30.0, 4.0  # of processor time: what tests took before, times this, and no less than that
+BASELINE_SECONDS = 3600.0
+SKIPPED = "long"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a mutant.
+
+    Attributes
+    ----------
+    killed : bool
+    by : str
+        The test that noticed it, "time" where the tests did not end; empty for one that survived.
+    seconds : float
+        Of processor time, without that of services that it started.
+    """
+
+    killed: bool
+    by: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """What a run of tests came to.
+
+    Attributes
+    ----------
+    failed : tuple of str
+        Names of tests.
+    seconds : dict
+        Of processor time, by file.
+    """
+
+    failed: tuple[str, ...]
+    seconds: dict[str, float]
+
+    @property
+    def total(self) -> float:
+        """Processor time of all files, seconds."""
+        return sum(self.seconds.values())
+
+
+NOTHING = Ran((), {})
+
+
+class Watcher:
+    """Pytest's plugin: notes what failed and what each file took; takes the quick files first."""
+
+    def __init__(self, report: Path, baseline: Ran) -> None:
+        self._report = report
+        self._baseline = baseline
+        self.failed: list[str] = []
+        self.seconds: dict[str, float] = defaultdict(float)
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Leave out what fails without any mistake; pytest keeps what is equal in order."""
+        items[:] = [item for item in items if item.nodeid not in self._baseline.failed]
+        items.sort(key=lambda item: self._baseline.seconds.get(_file(item.nodeid), 0.0))
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
+        """Count the processor time of a test, and of the processes that it waited for."""
+        before = sum(os.times()[:4])
+        yield
+        self.seconds[_file(item.nodeid)] += sum(os.times()[:4]) - before
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note what failed."""
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Note what could not even be loaded."""
+        if report.failed:
+            self.failed.append(report.nodeid or "loading")
+
+    def pytest_sessionfinish(self) -> None:
+        """Tell the process that waits."""
+        self._report.write_text(json.dumps({"failed": self.failed, "seconds": self.seconds}))
+
+
+class Runner:
+    """Runs tests in a copy of the code.
+
+    Parameters
+    ----------
+    root : Path
+        The project.
+    place : Path
+        Where the copy and what is kept for the next time go.
+    """
+
+    def __init__(self, root: Path, place: Path) -> None:
+        self.tree = place / "tree"
+        self._report = place / "report.json"
+        self._log = place / "log"
+        self._known: dict[Suite, Ran] = {}
+        shutil.rmtree(self.tree, ignore_errors=True)
+        self.tree.mkdir(parents=True)
+        listed = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, check=True).stdout
+        for name in listed.decode().split("\0"):
+            if name and (root / name).exists():
+                (self.tree / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(root / name, self.tree / name)
+        # Not LINEFIX_KERNELS, which tests take from the services that they start.
+        os.environ.setdefault("NUMBA_CACHE_DIR", str(place.absolute() / "kernels"))
+
+    def baseline(self, suite: Suite) -> Ran:
+        """Return what the tests take without any mistake, and what fails all the same."""
+        if suite not in self._known:
+            found = self._run(suite, NOTHING, BASELINE_SECONDS, stop=False)
+            if found is not None and found.total > LEAST_SECONDS:  # the first time kernels may have been compiled
+                found = self._run(suite, NOTHING, BASELINE_SECONDS, stop=False)
+            if found is None:
+                raise RuntimeError(f"the tests do not end, see {self._log}: {suite.tests}")
+            self._known[suite] = found
+        return self._known[suite]
+
+    def outcome(self, mutant: Mutant, suite: Suite) -> Outcome:
+        """Return whether the tests notice a mistake."""
+        baseline = self.baseline(suite)
+        path = self.tree / mutant.path
+        whole = path.with_name(path.name + ".whole")
+        shutil.copy2(path, whole)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        try:
+            path.write_text(mutated(self.tree, mutant))
+            found = self._run(suite, baseline, max(LEAST_SECONDS, TIMES * baseline.total), stop=True)
+        finally:
+            whole.replace(path)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        if found is None:
+            return Outcome(True, "time", took)
+        return Outcome(bool(found.failed), next(iter(found.failed), ""), took)
+
+    def _run(self, suite: Suite, baseline: Ran, seconds: float, *, stop: bool) -> Ran | None:
+        """Return what a run of pytest reports, None where it does not end in time."""
+        self._report.unlink(missing_ok=True)
+        sys.stdout.flush()
+        pid = os.fork()
+        if pid == 0:
+            self._test(suite, Watcher(self._report, baseline), seconds, stop=stop)
+        give_up = time.monotonic() + WALL_FACTOR * seconds
+        while os.waitpid(pid, os.WNOHANG) == (0, 0):
+            if time.monotonic() > give_up:
+                os.killpg(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
+                break
+            time.sleep(0.05)
+        with suppress(ProcessLookupError):
+            os.killpg(pid, signal.SIGKILL)  # services that it left behind
+        if not self._report.exists():
+            return None
+        told = json.loads(self._report.read_text())
+        return Ran(tuple(told["failed"]), told["seconds"])
+
+    def _test(self, suite: Suite, watcher: Watcher, seconds: float, *, stop: bool) -> None:
+        """Be the process that runs tests; does not return."""
+        try:
+            os.setpgid(0, 0)
+            os.chdir(self.tree)
+            sys.path[:] = [str(self.tree), *(path for path in sys.path if path not in ("", str(self.tree.parent)))]
+            for name in [name for name in sys.modules if name.split(".")[0] in ("benchmarks", "registration")]:
+                del sys.modules[name]  # those of the project itself
+            sys.dont_write_bytecode = True
+            os.environ |= {"PYTHONDONTWRITEBYTECODE": "1", "NUMBA_DISABLE_JIT": "0" if suite.compiled else "1"}
+            numba.core.config.reload_config()  # type: ignore[no-untyped-call]
+            resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
+            with self._log.open("w") as log:
+                os.dup2(log.fileno(), 1)
+                os.dup2(log.fileno(), 2)
+            generate = [phase for phase in hypothesis.Phase if phase not in (hypothesis.Phase.shrink,)]
+            hypothesis.settings.register_profile("mutants", phases=generate, database=None, derandomize=True)
+            hypothesis.settings.load_profile("mutants")
+            usual = [
+                "-q",
+                "-W",
+                "ignore::pytest.PytestAssertRewriteWarning",
+                "-p",
+                "no:cacheprovider",
+                "-p",
+                "no:faulthandler",
+                "-m",
+                f"not {SKIPPED}",
+                "--tb=line",
+            ]
+            pytest.main([*usual, *(["-x"] if stop else []), *suite.tests], plugins=[watcher])
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stderr.flush()
+            os._exit(0)
+
+
+def _file(nodeid: str) -> str:
+    return nodeid.split("::", 1)[0]

@@ -1,0 +1,42 @@
+"""Kernels as plain Python, where ``NUMBA_DISABLE_JIT`` is set: for a debugger, for coverage, for tests of mistakes.
+
+A compiled kernel reads the fields of a record as attributes. Plain elements of structured arrays have none: here they
+are made `numpy.record`, on which it works the same way.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def interpreted(function: Function) -> Function:
+    """Return a kernel that is not compiled, with records as it expects them."""
+
+    @functools.wraps(function)
+    def run(*arguments: Any) -> Any:
+        names = function.__globals__
+        for name, value in names.items():
+            names[name] = _record_type(value) if isinstance(value, np.dtype) else value
+        return function(*map(with_attributes, arguments))
+
+    return cast(Function, run)
+
+
+def with_attributes(value: Any) -> Any:
+    """Return arrays of records, single ones, and tuples of both, as what has its fields as attributes; no copies."""
+    if isinstance(value, np.ndarray | np.void) and value.dtype.names is not None:
+        return value.view(_record_type(value.dtype))
+    if isinstance(value, tuple):
+        parts = map(with_attributes, value)
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    return value
+
+
+def _record_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
+    return np.dtype((np.record, dtype)) if dtype.names is not None and dtype.type is np.void else dtype

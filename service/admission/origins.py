@@ -1,0 +1,87 @@
+"""Who may ask through a browser.
+
+Without keys whatever runs on the operator's machine may use the service, and so might any web page that the operator
+looks at: by a name of its own that it has resolve to the service's address, or by a form or a script that sends without
+looking at the answer. A key keeps both out, since no page knows it.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from collections.abc import Iterable, Sequence
+from urllib.parse import urlsplit
+
+from .errors import ForeignHostError, ForeignOriginError
+
+LOCAL = frozenset(("localhost", "localhost."))
+
+
+class Origins:
+    """Knows under which hosts the service is asked for.
+
+    Parameters
+    ----------
+    hosts : sequence of str
+        Names beside `localhost` and every address.
+    guarded : bool
+        Whether the service has keys: then nothing is refused here.
+    """
+
+    def __init__(self, hosts: Sequence[str], *, guarded: bool) -> None:
+        self._hosts = LOCAL | {host.lower() for host in hosts}
+        self._guarded = guarded
+
+    def require(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
+        """Refuse what the page of another site may have sent.
+
+        Parameters
+        ----------
+        headers : iterable of (bytes, bytes)
+            Names in lower case, as ASGI has them.
+
+        Raises
+        ------
+        ForeignHostError
+            When the host is neither an address nor a name that is known. Only HTTP/1.0, which no browser speaks, has
+            none.
+        ForeignOriginError
+            When a browser says that another site's page sends this.
+        """
+        if self._guarded:
+            return
+        found = {name: value.decode("latin-1").strip().lower() for name, value in headers if name in _LOOKED_AT}
+        host = found.get(b"host")
+        if host is not None and not self._is_known(host):
+            raise ForeignHostError
+        origin = found.get(b"origin")
+        if found.get(b"sec-fetch-site") == "cross-site" or (origin is not None and not _is_same(origin, host)):
+            raise ForeignOriginError
+
+    def _is_known(self, host: str) -> bool:
+        found = _HOST.fullmatch(host)
+        return found is not None and (found["name"] in self._hosts or _is_address(found["name"] or found["address"]))
+
+
+_LOOKED_AT = frozenset((b"host", b"origin", b"sec-fetch-site"))
+_HOST = re.compile(r"(?:(?P<name>[a-z0-9._-]+)|\[(?P<address>[0-9a-f:.]+)\])(?::[0-9]*)?")
+_PORTS = {"http": 80, "https": 443}
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_same(origin: str, host: str | None) -> bool:
+    """Tell whether a page's origin is the host that it asks, whichever scheme a proxy before it speaks."""
+    try:
+        page = urlsplit(origin)
+        asked = urlsplit(f"//{host or ''}")
+        usual = _PORTS.get(page.scheme)
+        return bool(page.hostname) and (page.hostname, page.port or usual) == (asked.hostname, asked.port or usual)
+    except ValueError:
+        return False

@@ -1,0 +1,46 @@
+"""Answers that are too large to be handed over in one piece.
+
+What is handed to the server waits in its memory for as long as the client takes to read it. Large answers go piece by
+piece, and what they hold until then is counted: of all together, and of each who asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from .services import services_of
+from .state import state_of
+
+PIECE = 65_536  # bytes
+JSON = "application/json"
+
+
+class CountedResponse(Response):
+    """An answer whose bytes count as held until the client has taken them, all but the last few.
+
+    Raises
+    ------
+    TooMuchHeldError, ShareHeldError
+        When it is sent, before its first byte: when too much waits to be read already.
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        state = state_of(scope)
+        holder = None if state is None or state.ticket is None else state.ticket.holder
+        with services_of(scope).answers.account(holder) as account:
+            account.take(len(self.body))
+            whole = memoryview(self.body)
+            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+            for begin in range(0, len(whole), PIECE):
+                piece, more = bytes(whole[begin : begin + PIECE]), begin + PIECE < len(whole)
+                await send({"type": "http.response.body", "body": piece, "more_body": more})
+
+
+def json_response(data: bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """Return JSON that is encoded already."""
+    kind = Response if len(data) <= PIECE else CountedResponse
+    return kind(data, status, headers, JSON)

@@ -1,0 +1,182 @@
+"""Why an answer is not usable is told where it is so, and only there, the weightiest first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import pytest
+
+from association import AssociationResult, Deadline, HardPrior, Status, associate, reasons
+from association.features import Features
+from association.models import USUAL, as_model
+from association.reasons import FEATURES_OF, SENTENCES, Standing, reasons_of
+from association.tuning import TELLING_REASON
+
+from .scenes import (
+    CORRIDOR,
+    INSIDE,
+    ROOM,
+    answer_of,
+    equal_rooms,
+    index_of,
+    maze,
+    pose,
+    scan_of,
+    seen,
+)
+
+USUAL_ONE = Features(*([0.0] * len(Features._fields)))
+# One feature of each reason, from which every unit takes a nat.
+MODEL = as_model({name: [-1.0] for name in ("lead", "hinge_moves", "share", "root_count", "null")})
+ONE_OF = {"twin": "lead", "one_wall_decides": "hinge_moves", "unexplained": "share", "too_little": "root_count"}
+ONE_OF["elsewhere"] = "null"
+NOTHING: Mapping[str, float] = {}
+
+
+@pytest.fixture(autouse=True)
+def usual_answer() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reasons, "USUAL", USUAL_ONE)
+        yield
+
+
+def codes_of(
+    status: Status = Status.AMBIGUOUS,
+    taken: Mapping[str, float] = NOTHING,
+    *,
+    complete: bool = True,
+    contradicted: bool = False,
+    strange: bool = False,
+    thin: bool = False,
+) -> list[str]:
+    """Return the codes of an answer of which these reasons take so many nats."""
+    standing = Standing(status, complete, contradicted, elsewhere=strange, thin=thin)
+    features = USUAL_ONE._replace(**{ONE_OF[code]: nats for code, nats in taken.items()})
+    told = reasons_of(standing, features, MODEL)
+    assert all(reason.message == SENTENCES[reason.code] for reason in told)
+    return [reason.code for reason in told]
+
+
+@pytest.mark.parametrize("code", sorted(ONE_OF))
+def test_what_takes_from_the_odds_is_the_reason(code: str) -> None:
+    """Alone, whether it is much or little: something has to be."""
+    assert codes_of(taken={code: 5.0}) == [code]
+    assert codes_of(taken={code: 0.1}) == [code]
+
+
+def test_the_weightiest_comes_first_and_what_weighs_little_is_not_told() -> None:
+    just, less = TELLING_REASON + 0.01, TELLING_REASON - 0.01
+    taken = {"twin": 2.0, "unexplained": 7.0, "too_little": just, "one_wall_decides": less, "elsewhere": -4.0}
+    assert codes_of(taken=taken) == ["unexplained", "twin", "too_little"]
+
+
+def test_several_features_of_a_reason_count_together() -> None:
+    """Each of the fitted features that is laid to a reason, and no feature is laid to two."""
+    names = [name for some in FEATURES_OF.values() for name in some]
+    assert len(set(names)) == len(names)
+    assert set(names) == set(Features._fields) - {"constant"}
+    model = as_model({"lead": [-1.0], "solitude": [-1.0], "share": [-1.0]})
+    features = USUAL_ONE._replace(lead=0.8, solitude=0.8, share=1.2)
+    told = reasons_of(Standing(Status.AMBIGUOUS, True, False, False, False), features, model)
+    assert [reason.code for reason in told] == ["twin", "unexplained"]
+
+
+def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:
+    """The prior, the deadline, another building, a thin answer; nothing twice."""
+    everything = codes_of(
+        complete=False, contradicted=True, strange=True, thin=True, taken={"twin": 3.0, "too_little": 4.0}
+    )
+    assert everything == ["prior_contradicted", "search_incomplete", "elsewhere", "too_little", "twin"]
+    assert codes_of(thin=True, taken={"unexplained": 3.0}) == ["too_little", "unexplained"]
+    assert codes_of(strange=True, taken={"elsewhere": 9.0}) == ["elsewhere"]
+
+
+@pytest.mark.parametrize("status", [Status.OK, Status.NO_MATCH])
+def test_where_the_models_do_not_decide_they_are_not_asked(status: Status) -> None:
+    assert codes_of(status, taken={"twin": 9.0}) == []
+    assert codes_of(status, complete=False, taken={"twin": 9.0}) == ["search_incomplete"]
+    assert codes_of(status, contradicted=True, taken={"twin": 9.0}) == ["prior_contradicted"]
+
+
+def test_a_free_direction_is_told_instead_of_what_is_weighed() -> None:
+    assert codes_of(Status.DEGENERATE, taken={"one_wall_decides": 9.0}) == ["free_direction"]
+    assert codes_of(Status.DEGENERATE, strange=True) == ["elsewhere", "free_direction"]
+    for status in set(Status) - {Status.DEGENERATE}:
+        assert "free_direction" not in codes_of(status, taken={"one_wall_decides": 9.0})
+
+
+def test_without_an_answer_there_is_nothing_to_weigh() -> None:
+    told = reasons_of(Standing(Status.NO_MATCH, True, False, elsewhere=True, thin=False), None, None)
+    assert [reason.code for reason in told] == ["elsewhere"]
+
+
+# In drawn worlds, by the fitted models.
+
+
+@pytest.fixture
+def fitted(usual_answer: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reasons, "USUAL", USUAL)
+
+
+def codes(result: AssociationResult) -> list[str]:
+    assert (result.reasons == ()) is result.usable
+    return [reason.code for reason in result.reasons]
+
+
+ROOM_SCAN = scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0])
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_room_that_is_seen_whole_needs_no_reason() -> None:
+    assert codes(answer_of(index_of(ROOM), ROOM_SCAN)) == []
+
+
+@pytest.mark.usefixtures("fitted")
+def test_equal_rooms_are_twins() -> None:
+    assert codes(answer_of(index_of(equal_rooms(2)), ROOM_SCAN)) == ["twin"]
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_corridor_is_free_along_itself() -> None:
+    told = codes(answer_of(index_of(CORRIDOR), scan_of(seen(CORRIDOR, pose(4.0, 0.8, 0.05))[0])))
+    assert "free_direction" in told
+    assert set(told) <= {"free_direction", "elsewhere"}
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_corner_is_too_little() -> None:
+    """Two walls of a room, of which either alone holds the pose along the other."""
+    told = codes(answer_of(index_of(ROOM), scan_of([[-3, -1, 5.5, -1], [5.5, -1, 5.5, 2.5]])))
+    assert {"too_little", "one_wall_decides"} <= set(told)
+    assert "free_direction" not in told
+
+
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize("seed", [3, 4, 5, 6, 7])
+def test_a_scan_of_another_building_is_elsewhere(seed: int) -> None:
+    """Most of it does not fit, wherever it is laid."""
+    ends = seen(maze(seed), pose(15.0, 14.0, 0.5), noise=0.01, radius=7.0, seed=seed)[0]
+    result = answer_of(index_of(maze(1)), scan_of(ends))
+    assert result.status is Status.NO_MATCH or codes(result)[0] == "elsewhere"
+    if result.status is Status.AMBIGUOUS:
+        assert "unexplained" in codes(result)
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_deadline_is_told() -> None:
+    result = associate(index_of(ROOM), ROOM_SCAN, deadline=Deadline(at=0.0))
+    assert codes(result)[0] == "search_incomplete"
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_prior_that_the_scan_contradicts_is_told() -> None:
+    """A window in which the room does not fit as well as it does outside."""
+    for away in (pose(6.0, 2.0), pose(-30.0, 0.0)):
+        assert codes(answer_of(index_of(ROOM), ROOM_SCAN, HardPrior(away, 0.5, 0.3)))[0] == "prior_contradicted"
+    assert codes(answer_of(index_of(ROOM), ROOM_SCAN, HardPrior(INSIDE, 0.5, 0.3))) == []
+
+
+def test_every_reason_has_a_sentence_of_its_own() -> None:
+    assert set(FEATURES_OF) <= set(SENTENCES)
+    assert len(set(SENTENCES.values())) == len(SENTENCES)
+    assert all(sentence.endswith((".", "?")) for sentence in SENTENCES.values())

@@ -1,0 +1,96 @@
+"""The file that SQLite keeps the maps in."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from service.database_url import database_url
+from service.maps import MapStore, Preconditions
+from service.maps.errors import StoreAwayError
+from service.schemas import examples
+from tests.running import RunningService, children_of, until
+
+
+def open_store(path: Path, *, may_make: bool = True) -> MapStore:
+    store = MapStore(database_url(f"sqlite:///{path}"), may_make=may_make)
+    store.open()
+    return store
+
+
+def put(store: MapStore) -> None:
+    store.put("m", b"{}", (1, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+
+
+def test_it_is_for_its_owner_alone(tmp_path: Path) -> None:
+    before = os.umask(0o022)
+    try:
+        store = open_store(tmp_path / "data" / "maps.sqlite3")
+        put(store)
+    finally:
+        os.umask(before)
+    for path in (tmp_path / "data", *(tmp_path / "data").iterdir()):
+        assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0, path
+    store.close()
+
+
+def test_one_that_is_moved_away_is_missed(tmp_path: Path) -> None:
+    path, away = tmp_path / "maps.sqlite3", tmp_path / "away"
+    store = open_store(path)
+    put(store)
+    path.rename(away)
+    for call in (store.open, lambda: store.load("m"), lambda: put(store), lambda: store.list(10, "")):
+        with pytest.raises(StoreAwayError, match="gone"):
+            call()
+    assert not path.exists()
+    away.rename(path)
+    assert store.load("m").record.revision == 1
+    put(store)
+    assert store.load("m").record.revision == 2
+    store.close()
+
+
+def test_another_in_its_place_is_the_one_from_then_on(tmp_path: Path) -> None:
+    path = tmp_path / "maps.sqlite3"
+    store = open_store(path)
+    put(store)
+    path.rename(tmp_path / "away")
+    other = open_store(path)
+    for _ in range(3):
+        put(other)
+    assert store.load("m").record.revision == 3
+    put(store)
+    assert other.load("m").record.revision == 4
+    store.close()
+    other.close()
+
+
+def test_who_stands_in_for_another_makes_none(tmp_path: Path) -> None:
+    path = tmp_path / "maps.sqlite3"
+    with pytest.raises(StoreAwayError):
+        open_store(path, may_make=False)
+    assert not path.exists()
+    open_store(path).close()
+    open_store(path, may_make=False).close()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_without_its_file_the_service_is_not_ready(start_service: Callable[..., RunningService], workers: int) -> None:
+    """A new one was made, empty, and all was well."""
+    running = start_service(workers=workers, searches=2)
+    path = running.data_dir / "maps.sqlite3"
+    running.client.put("/v1/maps/m", json=examples.MAP).raise_for_status()
+    path.rename(path.with_name("away"))
+    until(lambda: running.client.get("/readyz").status_code == 503)
+    for answer in (running.client.get("/v1/maps/m"), running.client.put("/v1/maps/m", json=examples.MAP)):
+        assert (answer.status_code, answer.json()["code"]) == (503, "not_ready")
+    assert running.client.post("/v1/associate", json={**examples.ASSOCIATE, "options": {}}).status_code == 200
+    assert not path.exists()
+    assert len(children_of(running.process.pid)) > 0
+    path.with_name("away").rename(path)
+    assert running.client.get("/v1/maps/m").json() == examples.MAP
+    assert running.client.get("/readyz").status_code == 200

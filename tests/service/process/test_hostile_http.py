@@ -1,0 +1,204 @@
+"""HTTP as nobody should send it: what it costs the service, and what the sender is told."""
+
+from __future__ import annotations
+
+import re
+import socket
+import threading
+import time
+from contextlib import suppress
+
+import orjson
+import pytest
+
+from service.schemas import examples
+from tests.running import RunningService
+
+HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+CHUNKED = HEAD + b"Transfer-Encoding: chunked\r\n\r\n"
+LIVEZ = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n"
+BODY = orjson.dumps(examples.ASSOCIATE)
+LAST_CHUNK = b"0\r\n"
+
+
+def ask(service: RunningService, *pieces: bytes, pause: float = 0.05, end: bool = False) -> bytes:
+    """Send pieces, and return everything that is answered until the service closes or is silent for a while."""
+    answer = b""
+    with service.connection() as connection:
+        with suppress(ConnectionError):
+            for piece in pieces:
+                connection.sendall(piece)
+                time.sleep(pause)
+            if end:
+                connection.shutdown(socket.SHUT_WR)
+        connection.settimeout(3.0)
+        with suppress(TimeoutError, ConnectionError):
+            while part := connection.recv(65_536):
+                answer += part
+                connection.settimeout(1.0)
+    return answer
+
+
+def statuses(answer: bytes) -> list[int]:
+    return [int(status) for status in re.findall(rb"HTTP/1\.1 (\d{3})", answer) if status != b"100"]
+
+
+def pour(service: RunningService, head: bytes, piece: bytes, most: int) -> int:
+    """Send a head, then a piece again and again until the service has enough; return how many bytes it took."""
+    sent = 0
+    with service.connection(timeout=5.0) as connection, suppress(OSError):
+        connection.sendall(head)
+        while sent < most:
+            connection.sendall(piece)
+            sent += len(piece)
+    return sent
+
+
+TRAILERS = {
+    "many short": b"a: b\r\n" * 10_000,
+    "one long": b"c" * 60_000,
+    "of a body that is there": b"a: b\r\n" * 10_000,
+}
+
+
+@pytest.mark.parametrize("kind", TRAILERS)
+def test_trailers_cost_nothing(service: RunningService, kind: str) -> None:
+    """121 MB of them took 2.9 GB, before a key was asked for."""
+    head = b"GET /livez HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" + LAST_CHUNK
+    if kind == "of a body that is there":
+        head = CHUNKED + b"%x\r\n%b\r\n" % (len(BODY), BODY) + LAST_CHUNK
+    with service.peak_mb() as peak:
+        before = service.memory_mb()
+        sent = pour(service, head + (b"x: " if kind == "one long" else b""), TRAILERS[kind], 120_000_000)
+        assert peak() - before < 20.0
+    assert sent < 60_000_000
+
+
+def test_a_few_trailers_are_passed_over(service: RunningService) -> None:
+    sent = CHUNKED + b"%x\r\n%b\r\n0\r\nX-Checksum: 1\r\nHost: evil\r\n\r\n" % (len(BODY), BODY)
+    answer = ask(service, sent + LIVEZ)
+    assert answer.count(b"HTTP/1.1 200") == 2
+
+
+def test_what_a_chunk_is_called_has_an_end(service: RunningService) -> None:
+    assert pour(service, CHUNKED + b"1;", b"e" * 60_000, 120_000_000) < 60_000_000
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        (b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer wrong\r\n", b"40"),
+        (b"POST /nothing HTTP/1.1\r\nHost: localhost\r\n", b"404"),
+        (b"GET /livez HTTP/1.1\r\nHost: localhost\r\n", b"200"),
+    ],
+)
+@pytest.mark.parametrize("framing", [b"Content-Length: 9000000\r\n\r\n", b"Transfer-Encoding: chunked\r\n\r\n"])
+def test_what_is_refused_is_not_read_on(guarded: RunningService, head: bytes, status: bytes, framing: bytes) -> None:
+    """After a 401 the server read 4.9 GB more."""
+    piece = b"10000\r\n" + b"x" * 65_536 + b"\r\n" if b"chunked" in framing else b"x" * 65_536
+    with guarded.connection(timeout=5.0) as connection:
+        connection.sendall(head + framing)
+        assert connection.recv(65_536)[9:].startswith(status)
+        sent = 0
+        with suppress(OSError):
+            while sent < 150_000_000:
+                connection.sendall(piece)
+                sent += len(piece)
+        assert sent < 60_000_000
+
+
+def test_an_unknown_key_ends_the_connection(guarded: RunningService) -> None:
+    for key in (b"", b"Authorization: Bearer wrong\r\n"):
+        answer = ask(guarded, b"GET /v1/limits HTTP/1.1\r\nHost: localhost\r\n" + key + b"\r\n" + LIVEZ)
+        assert answer[9:12] in (b"401", b"403")
+        assert b"connection: close" in answer
+        assert len(statuses(answer)) == 1
+
+
+def test_many_requests_at_once_are_all_answered_in_order(service: RunningService) -> None:
+    count = 3000
+    requests = b"".join(
+        b"GET /livez HTTP/1.1\r\nHost: localhost\r\nX-Request-Id: %d\r\n\r\n" % number for number in range(count)
+    )
+    answer = b""
+    with service.connection() as connection:
+        sending = threading.Thread(target=connection.sendall, args=(requests,))
+        sending.start()
+        while answer.count(b'{"status":"ok"}') < count:
+            part = connection.recv(65_536)
+            assert part, answer.count(b"HTTP/1.1 200")
+            answer += part
+        sending.join()
+    ids = [int(line.split(b": ")[1]) for line in answer.split(b"\r\n") if line.startswith(b"x-request-id")]
+    assert ids == list(range(count))
+
+
+def test_many_requests_at_once_take_little_memory(service: RunningService) -> None:
+    """Each read held some ten thousand of them, each with all that belongs to one, and that on every connection."""
+    requests = b"GET / HTTP/1.1\r\nHost:1\r\n\r\n" * 10_000
+    connections = [socket.create_connection(("127.0.0.1", service.port), timeout=20) for _ in range(40)]
+    with service.peak_mb() as peak:
+        before = service.memory_mb()
+        for connection in connections:
+            connection.setblocking(False)
+            with suppress(BlockingIOError):
+                connection.send(requests)
+        time.sleep(1.0)
+        assert peak() - before < 50.0
+    for connection in connections:
+        connection.close()
+
+
+NOT_HTTP = {
+    "a head of 60 kB": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nA: " + b"a" * 60_000 + b"\r\n\r\n",
+    "a head of 300 fields": b"GET /livez HTTP/1.1\r\nHost: localhost\r\n" + b"a: b\r\n" * 300 + b"\r\n",
+    "no host": b"GET /livez HTTP/1.1\r\n\r\n",
+    "two hosts": b"GET /livez HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n",
+    "two hosts in HTTP/1.0": b"GET /livez HTTP/1.0\r\nHost: localhost\r\nHost: localhost\r\n\r\n",
+    "a host that is none": b"GET /livez HTTP/1.1\r\nHost: a b\r\n\r\n",
+    "another coding before chunked": HEAD + b"Transfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n",
+    "chunked twice": HEAD + b"Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+    "chunked in HTTP/1.0": HEAD.replace(b"1.1", b"1.0") + b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+    "a chunk without a size": CHUNKED + b"zz\r\n",
+    "a chunk longer than it says": CHUNKED + b"2\r\n{}}\r\n",
+}
+
+
+@pytest.mark.parametrize("kind", NOT_HTTP)
+def test_what_is_not_http_is_told_so(service: RunningService, kind: str) -> None:
+    answer = ask(service, NOT_HTTP[kind])
+    assert answer.startswith(b"HTTP/1.1 400 "), answer
+    assert b'"code":"invalid_http"' in answer
+    assert statuses(answer) == [400]
+
+
+def test_http_1_0_needs_no_host(service: RunningService) -> None:
+    assert ask(service, b"GET /livez HTTP/1.0\r\n\r\n").startswith(b"HTTP/1.1 200")
+
+
+@pytest.mark.parametrize("rubbish", [b"RUBBISH\r\n\r\n", CHUNKED + b"zz\r\n"])
+def test_what_comes_before_rubbish_is_answered_first(service: RunningService, rubbish: bytes) -> None:
+    answer = ask(service, HEAD + b"Content-Length: %d\r\n\r\n" % len(BODY) + BODY + LIVEZ + rubbish)
+    assert statuses(answer) == [200, 200, 400]
+
+
+def test_half_a_body_is_told_so(service: RunningService) -> None:
+    for sent in (HEAD + b"Content-Length: 100\r\n\r\n{}", CHUNKED + b"2\r\n{}\r\n", HEAD):
+        assert ask(service, sent, end=True).startswith(b"HTTP/1.1 400 "), sent
+
+
+def test_who_says_no_more_is_answered_all_the_same(service: RunningService) -> None:
+    for sent in (LIVEZ, HEAD + b"Content-Length: %d\r\n\r\n" % len(BODY) + BODY, LIVEZ + LIVEZ):
+        answer = ask(service, sent, pause=0.0, end=True)
+        assert answer.count(b"HTTP/1.1 200") == sent.count(b" HTTP/1.1\r\n"), answer
+
+
+@pytest.mark.parametrize("split", [20, 80, 130])
+def test_an_upgrade_in_a_head_of_two_packets_keeps_its_body(service: RunningService, split: int) -> None:
+    head = HEAD + b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAMAAABkAARA\r\n"
+    for framed in (
+        head + b"Content-Length: %d\r\n\r\n" % len(BODY) + BODY,
+        head + b"Transfer-Encoding: chunked\r\n\r\n%x\r\n%b\r\n0\r\n\r\n" % (len(BODY), BODY),
+    ):
+        answer = ask(service, framed[:split], framed[split:] + LIVEZ)
+        assert answer.count(b"HTTP/1.1 200") == 2, answer

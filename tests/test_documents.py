@@ -1,0 +1,46 @@
+"""What the documents point at is there: links, files, modules, targets, tests."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")])
+MADE = "out/"  # what a command writes is there only afterwards
+LINK = re.compile(r"\]\((?!https?:|#)([^)\s#]+)")
+FILE = re.compile(r"(?<![\w./-])(?:[\w.*-]+/)+[\w*-]+\.(?:py|json|md|png|csv|cpp|toml)\b")
+FOLDER = re.compile(r"`((?:service|association|registration|vectorization|simulation|tests|docs|examples)/[\w/.-]*)`")
+MODULE = re.compile(r"python -m ([a-z_.]+)")
+TARGET = re.compile(r"`make ([a-z-]+)|^make ([a-z-]+)", re.MULTILINE)
+TEST = re.compile(r"`(test_\w+)`")
+
+
+def missing(document: Path) -> Iterator[str]:
+    text = document.read_text()
+    for path in {*LINK.findall(text)}:
+        if not (document.parent / path).exists():
+            yield f"link to {path}"
+    rest = LINK.sub("", text)
+    for path in {*FILE.findall(rest), *FOLDER.findall(rest)}:
+        if not path.startswith(MADE) and not any(ROOT.glob(path.rstrip("/"))):
+            yield path
+    for module in {*MODULE.findall(text)} - {"pytest"}:
+        place = ROOT / module.replace(".", "/")
+        if not place.with_suffix(".py").exists() and not (place / "__main__.py").exists():
+            yield f"python -m {module}"
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for target in {first or second for first, second in TARGET.findall(text)} - targets:
+        yield f"make {target}"
+    tests = "\n".join(path.read_text() for path in ROOT.glob("tests/**/test_*.py"))
+    for test in {*TEST.findall(text)}:
+        if f"def {test}(" not in tests:
+            yield test
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_what_a_document_points_at_is_there(document: Path) -> None:
+    assert sorted(missing(document)) == []
