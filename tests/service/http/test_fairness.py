@@ -9,12 +9,12 @@ from collections.abc import Callable
 import httpx
 
 from tests.running import RunningService
-from tests.service.searches import searched_for_a_while
+from tests.service.searches import searched_briefly
 
 
 def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., RunningService]) -> None:
     running = start_service(keys="flood,robot", searches=1, queue=8)
-    body = searched_for_a_while()
+    body = searched_briefly()
     answers: Counter[tuple[str, int]] = Counter()
     waits: set[str | None] = set()
     lock, begun, enough = threading.Lock(), threading.Event(), threading.Event()
@@ -51,7 +51,7 @@ def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Runn
 
 def test_a_key_alone_has_all_of_the_service(start_service: Callable[..., RunningService]) -> None:
     running = start_service(keys="one,other", searches=2, queue=8)
-    body = searched_for_a_while()
+    body = searched_briefly()
     answers: list[int] = []
 
     def ask() -> None:

@@ -17,7 +17,7 @@ import pytest
 
 from service.schemas import examples
 from tests.running import JSON, RunningService, until
-from tests.service.searches import heavy_body
+from tests.service.searches import searched_for, store_hard_map
 
 
 def test_probes_and_version(client: httpx.Client) -> None:
@@ -70,7 +70,8 @@ def refused(running: RunningService) -> bytes:
 
 def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable[..., RunningService]) -> None:
     running = start_service(searches=1, queue=0)
-    busy = threading.Thread(target=ask, args=(running, heavy_body(190_000)))
+    store_hard_map(running)
+    busy = threading.Thread(target=ask, args=(running, searched_for()))
     busy.start()
     try:
         # Between parsing and searching there is a place for a moment.
@@ -101,7 +102,8 @@ def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable
 
 def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., RunningService]) -> None:
     running = start_service(searches=1, queue=1)
-    busy = threading.Thread(target=ask, args=(running, heavy_body(190_000)))
+    store_hard_map(running)
+    busy = threading.Thread(target=ask, args=(running, searched_for()))
     busy.start()
     until(lambda: running.count(RUNNING) == 1.0)
     body = orjson.dumps(examples.ASSOCIATE)

@@ -14,13 +14,14 @@ import pytest
 
 from tests.running import JSON, RunningService, family_of, until
 from tests.running import running as running_service
-from tests.service.searches import heavy_body
+from tests.service.searches import searched_for, store_hard_map
 
 
 def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -> None:
     running = start_service(drain_seconds=1.0)
     answers: list[int] = []
-    body = heavy_body()
+    store_hard_map(running)
+    body = searched_for()
 
     def ask() -> None:
         answers.append(httpx.post(running.url + "/v1/associate", content=body, headers=JSON, timeout=60).status_code)

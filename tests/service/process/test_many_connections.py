@@ -15,7 +15,7 @@ import pytest
 from service.schemas import examples
 from tests.running import RunningService, until
 from tests.service.parsing.bodies import large_map
-from tests.service.searches import heavy_body
+from tests.service.searches import searched_for, store_hard_map
 
 HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 HELD = {
@@ -77,7 +77,8 @@ def test_an_address_keeps_its_connections_beside_another_s_flood(start_service: 
 
 def test_where_all_are_at_work_a_new_one_is_told_so(start_service: Callable[..., RunningService]) -> None:
     running = start_service(max_connections=8, queue=16, searches=1)
-    large, small = heavy_body(), orjson.dumps({**examples.ASSOCIATE, "options": {}})
+    store_hard_map(running)
+    large, small = searched_for(), orjson.dumps({**examples.ASSOCIATE, "options": {}})
     with ExitStack() as stack:
         stack.enter_context(connect(running, "127.0.0.2")).sendall(post(large))
         until(lambda: running.count("linefix_searches_running") == 1.0)

@@ -19,7 +19,7 @@ from service.part import Part
 from service.process.workers import take_part
 from service.schemas import examples
 from tests.running import JSON, RunningService, children_of, is_running, running, until
-from tests.service.searches import heavy_body, searched_for_a_while
+from tests.service.searches import searched_briefly, searched_for, store_hard_map
 
 POSTS = 'linefix_http_requests_total{method="POST",route="/v1/associate",status="200"}'
 
@@ -111,7 +111,7 @@ def test_a_worker_that_does_not_answer_is_replaced(pair: RunningService) -> None
 
 
 def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
-    body, enough = searched_for_a_while(), threading.Event()
+    body, enough = searched_briefly(), threading.Event()
     statuses: list[int] = []
 
     def ask() -> None:
@@ -137,7 +137,8 @@ def test_all_drain_and_end_together(start_service: Callable[..., RunningService]
     service = start_service(workers=2, searches=2)
     until(lambda: ready(service) == 2)
     answers: list[int] = []
-    body = heavy_body()
+    store_hard_map(service)
+    body = searched_for()
 
     def ask() -> None:
         answers.append(httpx.post(service.url + "/v1/associate", content=body, headers=JSON, timeout=60).status_code)
