@@ -12,7 +12,7 @@ from .context import SearchContext
 from .ranking import Ranked, rank_candidates
 from .result import SearchReport
 from .settling import Settled, settle
-from .sight import agreement
+from .sight import BeamShares, agreement, compare_beams
 from .significance import significance
 
 
@@ -31,6 +31,8 @@ class Answer:
         That pose on the map's own segments.
     agreement : float
         Share of directions in which the scan shows what the map does, 0 to 1.
+    beams : BeamShares
+        How many of the beams do not read what the map shows.
     significance : float
         Probability that chance scores as high.
     """
@@ -40,6 +42,7 @@ class Answer:
     settled: Settled
     registered: RegistrationResult
     agreement: float
+    beams: BeamShares
     significance: float
 
 
@@ -94,4 +97,5 @@ def _answer(context: SearchContext, best: Ranked) -> Answer | None:
     if registered is None:
         return None
     chance = significance(context, float(best.matches["worth"].sum()))
-    return Answer(best, accepted, settled, registered, agreement(context, best), chance)
+    beams = compare_beams(context, settled)
+    return Answer(best, accepted, settled, registered, agreement(context, best), beams, chance)

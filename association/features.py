@@ -19,16 +19,18 @@ from .tuning import (
     MANY,
     MAX_GAP,
     MAX_LEAD,
-    MODEL_OFFSET,
     MOST_DEVIATION,
     MOST_MISFIT,
     MOST_NULL,
     MOST_UNMATCHED,
     NEARLY_ALL,
     NULL_SHARE,
+    RIVAL_SHARE,
     SYMMETRIC,
     TWIN_TEMPERATURE,
+    UNCOUNTED_SHARE,
     UNLIKE_SYMMETRY,
+    USUAL_WALLS,
 )
 
 
@@ -39,7 +41,7 @@ class Features(NamedTuple):
     ----------
     constant : 1
     lead : over the best other explanation, nats
-    solitude : minus the log of the others' tempered evidence
+    solitude : minus the log of the others' tempered evidence, of what may have been missed the less
     share : of the scan's length that is matched
     root_count : square root of the number of matched segments
     root_length : square root of their length, sqrt(m)
@@ -49,6 +51,7 @@ class Features(NamedTuple):
     longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`
     agreement : share of directions in which the scan shows what the map does
     read, passed : shares of the beams that read the wall they should, and that passed through one; 0 without beams
+    root_farther, root_nearer : roots of the shares of the beams that read farther, and nearer, than the map shows
     hinge_moves : by how much the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
     hinge_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
     chance : log10 of the significance, from `LEAST_CHANCE_FEATURE`
@@ -78,6 +81,8 @@ class Features(NamedTuple):
     agreement: float
     read: float
     passed: float
+    root_farther: float
+    root_nearer: float
     hinge_moves: float
     hinge_deviation: float
     chance: float
@@ -95,9 +100,9 @@ class Features(NamedTuple):
 
 def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]) -> Features:
     """Return the features of an answer beside its rivals, best first; with the least null there is."""
-    best, hinges, gaps = answer.best, answer.settled.hinges, gaps_of(answer, rivals)
-    lead = -max(gaps) if rivals else best.value
-    crowd = math.log(_evidence(gaps, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
+    best, hinges, weighed = answer.best, answer.settled.hinges, weigh(answer.best, rivals)
+    lead = -max(gap for gap, _ in weighed) if rivals else best.value
+    crowd = math.log(_evidence(weighed, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
     count = int(best.matched.sum())
     unmatched = context.lines.rows["length"][~best.matched]
     misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
@@ -115,6 +120,8 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
         agreement=answer.agreement,
         read=best.read,
         passed=best.passed,
+        root_farther=math.sqrt(answer.beams.farther),
+        root_nearer=math.sqrt(answer.beams.nearer),
         hinge_moves=min(float(hinges["moves"].max(initial=0.0)), MOST_DEVIATION),
         hinge_deviation=min(float(hinges["deviation"].max(initial=0.0)), MOST_DEVIATION),
         chance=max(LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
@@ -145,25 +152,45 @@ def _root_gap(gap: float) -> float:
     return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
 
 
-def gaps_of(answer: Answer, rivals: Sequence[Ranked]) -> list[float]:
-    """Return by how much each rival is worth more than the best, nats, with the walls as far off as they turned out.
+class Weighed(NamedTuple):
+    """A rival beside the best explanation.
 
-    Where the answer's walls are off by more than the score supposes, by centimetres, the centimetres that tell rivals
-    apart count that much less: a cost is what it is by the variance that it was weighed with.
+    Attributes
+    ----------
+    gap : by how much it is worth more, nats, with the walls as far off as they may be
+    counted : how far it counts, 0 to 1: fully where the search cannot have missed one as good
     """
-    supposed = MODEL_OFFSET**2
-    share = min(1.0, supposed / answer.settled.wall_sigma**2)
 
-    def worth(one: Ranked) -> float:
-        return one.value + 0.5 * (1.0 - share) * one.cost
-
-    return [worth(rival) - worth(answer.best) for rival in rivals]
+    gap: float
+    counted: float
 
 
-def twin_share(answer: Answer, rivals: Sequence[Ranked]) -> float:
+def weigh(best: Ranked, rivals: Sequence[Ranked]) -> list[Weighed]:
+    """Weigh the rivals of the best explanation."""
+    least, value = worth(best), best.value
+    shares = [rival.value / value if value > 0.0 else 1.0 for rival in rivals]
+    counted = [min(1.0, max(0.0, (share - UNCOUNTED_SHARE) / (RIVAL_SHARE - UNCOUNTED_SHARE))) for share in shares]
+    return [Weighed(worth(rival) - least, part) for rival, part in zip(rivals, counted, strict=True)]
+
+
+def worth(one: Ranked) -> float:
+    """Return the value of an explanation, nats, where nobody knows how far the walls are off.
+
+    The value takes half the cost, the likelihood of its residuals where walls are off by `MODEL_OFFSET`. Of n matches
+    with an unknown variance, which `USUAL_WALLS` (k) before are taken to have shown to be as much, the likelihood is
+    Student's t: ``log G((n + k) / 2) - log G(k / 2) - n / 2 log(k / 2) - (n + k) / 2 log(1 + cost / k)``. Where the
+    walls of a map are off by more, the centimetres that tell rivals apart count that much less.
+    """
+    n, k = int(one.matched.sum()), USUAL_WALLS
+    student = math.lgamma(0.5 * (n + k)) - math.lgamma(0.5 * k) - 0.5 * n * math.log(0.5 * k)
+    student -= 0.5 * (n + k) * math.log1p(one.cost / k)
+    return one.value + 0.5 * one.cost + student
+
+
+def twin_share(best: Ranked, rivals: Sequence[Ranked]) -> float:
     """Return the chance of the best explanation among those that are about as good, above 0 and up to 1."""
-    return 1.0 / (1.0 + _evidence(gaps_of(answer, rivals), TWIN_TEMPERATURE))
+    return 1.0 / (1.0 + _evidence(weigh(best, rivals), TWIN_TEMPERATURE))
 
 
-def _evidence(gaps: Sequence[float], temperature: float) -> float:
-    return sum(math.exp(min(0.0, gap) / temperature) for gap in gaps)
+def _evidence(weighed: Sequence[Weighed], temperature: float) -> float:
+    return sum(counted * math.exp(min(0.0, gap) / temperature) for gap, counted in weighed)

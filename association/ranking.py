@@ -242,12 +242,12 @@ def _beam_evidence(context: SearchContext, poses: Records, most: int, refined: i
     """
     evidence = np.zeros(len(poses), BEAM_EVIDENCE)
     weigh_beams(
-        _rays(context, most), context.view, poses, context.index.tables.place, refined, context.workspace, evidence
+        rays_of(context, most), context.view, poses, context.index.tables.place, refined, context.workspace, evidence
     )
     return evidence
 
 
-def _rays(context: SearchContext, most: int) -> Rays:
+def rays_of(context: SearchContext, most: int) -> Rays:
     """Return at most `most` of the beams of which something is known, evenly spread."""
     beams = context.scan.beams
     assert beams is not None

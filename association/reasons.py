@@ -49,8 +49,8 @@ FEATURES_OF: Mapping[str, tuple[str, ...]] = {
     "twin": ("lead", "solitude", "squared_solitude"),
     "one_wall_decides": ("hinge_moves", "hinge_deviation", "deviation"),
     "unexplained": (
-        "share", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed", "misfit",
-        "misfit_of_many", "blocked",
+        "share", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
+        "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
     ),
     "too_little": ("root_count", "inverse_count", "root_length", "chance", "root_score", "walls"),
     "elsewhere": ("null", "null_gap", "null_better"),

@@ -120,7 +120,7 @@ class _Chances:
     def of(cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool) -> _Chances:
         form = "_with_beams" if context.with_beams else ""
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
-        features, share = features_of(context, answer, rivals), twin_share(answer, rivals)
+        features, share = features_of(context, answer, rivals), twin_share(answer.best, rivals)
         right, careful = usual.logit(features), cautious.logit(features)
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
         explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))

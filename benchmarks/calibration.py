@@ -64,7 +64,7 @@ class Task:
     bends: tuple[float, ...]
 
 
-BEAMS = ("read", "passed")
+BEAMS = ("read", "passed", "root_farther", "root_nearer")
 # Chosen one after the other by what each takes off the cross-validated log-loss, until none takes off 0.0002 more.
 LIKELY = (
     "constant", "deviation", "lead", "blocked", "agreement", "root_length", "inverse_count", "longest_unmatched",
@@ -78,6 +78,7 @@ CAREFUL = (
 CAREFUL_WITH_BEAMS = (
     "constant", "null_gap", "longest_unmatched", "root_length", "passed", "share", "deviation", "null", "null_better",
     "read", "solitude", "lead", "root_unmatched", "agreement", "misfit_of_many", "hinge_deviation", "hinge_moves",
+    "root_farther", "root_nearer",
 )  # fmt: skip
 BENDS = (0.2, 0.5, 0.8)  # quantiles of a feature at which its curve may bend
 TASKS = {
@@ -106,7 +107,7 @@ class Fitted:
 
 
 def _shares(examples: Sequence[Example], temperature: float) -> np.ndarray:
-    return np.array([1.0 / (1.0 + np.exp(e.gaps / temperature).sum()) for e in examples])
+    return np.array([1.0 / (1.0 + (e.counted * np.exp(e.gaps / temperature)).sum()) for e in examples])
 
 
 def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:

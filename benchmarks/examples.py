@@ -11,7 +11,7 @@ from association import Beams, Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.explain import explain
 from association.families import is_degenerate
-from association.features import Features, features_of, gaps_of, with_null
+from association.features import Features, features_of, weigh, with_null
 from association.null import null_of
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES
@@ -50,6 +50,7 @@ class Example:
         It is reported on by a fit without that one.
     features : Features
     gaps : (n,) how much less than the best the rivals are worth, nats, 0 or less
+    counted : (n,) how far each of them counts, 0 to 1
     right, degenerate : bool
     told : bool
         Whether the scan shows that the answer is not where it was taken, where the answer is wrong.
@@ -61,6 +62,7 @@ class Example:
     fold: str
     features: Features
     gaps: np.ndarray
+    counted: np.ndarray
     right: bool
     degenerate: bool
     told: bool
@@ -106,7 +108,7 @@ class Case:
         if found.answer is None:
             return None
         best, rivals, pose = found.answer.best, found.rivals, found.answer.registered.pose
-        right = False
+        weighed, right = weigh(best, rivals), False
         if self.truth is not None and pose is not None:
             distance, angle = offset(pose, self.truth)
             right = distance < self.distance and angle < self.angle
@@ -116,7 +118,8 @@ class Case:
             condition=self.condition,
             fold=self.fold,
             features=with_null(features_of(context, found.answer, rivals), best, null_of(context, best)),
-            gaps=np.minimum(0.0, gaps_of(found.answer, rivals)),
+            gaps=np.minimum(0.0, [one.gap for one in weighed]),
+            counted=np.array([one.counted for one in weighed]),
             right=right,
             degenerate=is_degenerate(found.answer.settled),
             told=not right and (self.told is None or pose is None or self.told(pose)),

@@ -2,23 +2,53 @@
 
 import math
 
-from registration.compiling import kernel
+from registration.compiling import inlined, kernel
 from registration.kernels import joint_add, joint_solve
 from registration.layout import Record, Records
 
-from ..layout import Place, Rays, Workspace
+from ..layout import Integers, Place, Rays, Workspace
 from ..tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
+    FARTHER_BY,
     LEAST_INCIDENCE,
     LEAST_POINTS,
     NEAR,
+    NEARER_BY,
     PASSED_SLACK,
     SURE_LENGTH,
+    WALL_BEHIND,
 )
 from .consensus import clear, hold
 from .sight import first_hit
+
+
+@inlined
+def across_wall(
+    ray: Record, angle: float, distance: float, walls: Records, starts: Integers, items: Integers, shape: Record
+) -> tuple[float, int]:
+    """Return how much farther than the map shows a beam reads, metres across the wall, and the wall; -1 for none.
+
+    At a grazing angle the pose decides the range, so that it counts across the wall.
+    """
+    dx = math.cos(angle)
+    dy = math.sin(angle)
+    ray.dx = dx
+    ray.dy = dy
+    expected, w = first_hit(ray, walls, starts, items, shape)
+    if w < 0:
+        return 0.0, w
+    return (distance - expected) * max(LEAST_INCIDENCE, abs(walls[w].dx * dy - walls[w].dy * dx)), w
+
+
+@inlined
+def put_sensor(ray: Record, view: Record, pose: Record) -> None:
+    """Let a ray begin where the sensor is."""
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    ray.x = c * view.x - s * view.y + pose.x
+    ray.y = s * view.x + c * view.y + pose.y
 
 
 @kernel
@@ -34,31 +64,54 @@ def beam_evidence(rays: Rays, view: Record, pose: Record, place: Place, ray: Rec
     starts = place.grid.starts
     items = place.grid.items
     shape = place.grid.shape[0]
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
-    ray.x = c * view.x - s * view.y + pose.x
-    ray.y = s * view.x + c * view.y + pose.y
+    put_sensor(ray, view, pose)
     read = 0.0
     passed = 0.0
     for i in range(len(angles)):
-        dx = math.cos(pose.theta + angles[i])
-        dy = math.sin(pose.theta + angles[i])
         if math.isinf(ranges[i]):
             continue
-        ray.dx = dx
-        ray.dy = dy
         ray.limit = min(rays.reach, ranges[i] + BEHIND)
-        expected, w = first_hit(ray, walls, starts, items, shape)
+        across, w = across_wall(ray, pose.theta + angles[i], ranges[i], walls, starts, items, shape)
         if w < 0:
             continue
-        incidence = max(LEAST_INCIDENCE, abs(walls[w].dx * dy - walls[w].dy * dx))
-        across = (ranges[i] - expected) * incidence
         read += math.exp(-0.5 * across * across / (NEAR * NEAR))
         if across > CERTAIN:
             passed += min(1.0, (walls[w].end - walls[w].begin) / SURE_LENGTH)
     n = max(1, len(angles))
     evidence.read = read / n
     evidence.passed = passed / n
+
+
+@kernel
+def beam_shares(rays: Rays, views: Records, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
+    """Return the shares of the beams that read farther, and nearer, than the map shows from the first pose.
+
+    Where the map shows nothing, and where nothing came back, nothing is compared. `views` and `poses` (1,).
+    """
+    angles = rays.angles
+    ranges = rays.ranges
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    pose = poses[0]
+    ray = work.scratch[0].ray
+    put_sensor(ray, views[0], pose)
+    farther = 0
+    nearer = 0
+    for i in range(len(angles)):
+        if math.isinf(ranges[i]):
+            continue
+        ray.limit = min(rays.reach, ranges[i] + WALL_BEHIND)
+        across, w = across_wall(ray, pose.theta + angles[i], ranges[i], walls, starts, items, shape)
+        if w < 0:
+            continue
+        if across > FARTHER_BY:
+            farther += 1
+        elif across < -NEARER_BY:
+            nearer += 1
+    n = max(1, len(angles))
+    return farther / n, nearer / n
 
 
 @kernel

@@ -16,6 +16,7 @@ from association.explain import Answer, Explanations
 from association.layout import HINGE, MATCH
 from association.ranking import Ranked
 from association.settling import Settled
+from association.sight import BeamShares
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 
@@ -25,6 +26,7 @@ from .scenes import CORRIDOR, INSIDE, ROOM, beams_of, context_of, index_of, loca
 ROOM_INDEX = index_of(ROOM)
 SCAN = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
 SHARP = np.diag([1e-4, 1e-4, 1e-6])
+NOTHING_AMISS = BeamShares()
 NO_PAIRS = Accepted(np.zeros((0, 2), np.intp), np.zeros(0), np.zeros(0, np.intp), np.zeros(1, np.intp))
 
 
@@ -126,11 +128,12 @@ def answer_with(
     *,
     settled: Settled | None = None,
     agreement: float = 0.95,
+    beams: BeamShares = NOTHING_AMISS,
     significance: float = 1e-9,
     accepted: Accepted = NO_PAIRS,
 ) -> Answer:
     given = registered or registered_room()
-    return Answer(best, accepted, settled or settled_of(given), given, agreement, significance)
+    return Answer(best, accepted, settled or settled_of(given), given, agreement, beams, significance)
 
 
 def explanations_of(answer: Answer | None, *others: Ranked, complete: bool = True) -> Explanations:

@@ -13,6 +13,7 @@ from association import tuning
 from association.explain import Answer
 from association.features import Features, features_of, twin_share, with_null
 from association.null import Null
+from association.sight import BeamShares
 from registration.layout import Records
 
 from .answers import answer_with, hinges_of, ranked, registered_room, room, settled_of
@@ -30,7 +31,7 @@ def hinging(hinges: Records | None = None, weakest: float = 0.01, score: float =
 
 def test_features_of_an_answer_beside_two_rivals() -> None:
     best = ranked(80.0, -2.0, matched=5, length=25.0, misfit=2.0, read=0.5, passed=0.04, blocked=4.0)
-    rivals = [ranked(74.0), ranked(70.0, -4.0)]
+    rivals = [ranked(74.0, matched=5), ranked(70.0, -4.0, matched=5)]
     crowd = math.exp(-4.0 / 4.0) + math.exp(-12.0 / 4.0) + math.exp(-12.0)
     expected = Features(
         constant=1.0,
@@ -46,6 +47,8 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         agreement=0.85,
         read=0.5,
         passed=0.04,
+        root_farther=0.3,
+        root_nearer=0.4,
         hinge_moves=0.25,
         hinge_deviation=0.4,
         chance=-9.0,
@@ -61,7 +64,7 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         squared_solitude=math.log(crowd) ** 2,
     )
     settled = settled_of(registered_room(), hinges_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
-    got = features_of(CONTEXT, answer_with(best, settled=settled, agreement=0.85), rivals)
+    got = features_of(CONTEXT, answer_with(best, settled=settled, agreement=0.85, beams=BeamShares(0.09, 0.16)), rivals)
     assert got._asdict() == pytest.approx(expected._asdict())
 
 
@@ -100,11 +103,11 @@ def test_features_say_no_more_beyond_their_limits() -> None:
 def test_features_are_those_of_the_twin(
     scores: list[float], matched: int, share: float, misfit: float, agreement: float, null: tuple[float, float]
 ) -> None:
-    costs = (5.0 * abs(k - 2) for k in range(len(scores)))
-    made = (ranked(s, matched=matched, share=share, misfit=misfit, cost=c) for s, c in zip(scores, costs, strict=True))
-    best, *rivals = made
-    settled = settled_of(registered_room(), wall_sigma=0.01 + 0.05 * share)
-    answer = answer_with(best, settled=settled, agreement=agreement)
+    parts: dict[str, Any] = {"share": share, "misfit": misfit}
+    best, *rivals = (
+        ranked(score, matched=max(0, matched - k), cost=5.0 * abs(k - 2), **parts) for k, score in enumerate(scores)
+    )
+    answer = answer_with(best, agreement=agreement)
     got = features_of(CONTEXT, answer, rivals)
     assert got._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals), abs=1e-9)
     mirrored = with_null(got, best, Null(*null))
@@ -146,7 +149,7 @@ def test_the_gap_to_the_mirrored_scan_has_an_end_and_an_answer_without_score_non
 
 def test_twins_share_the_chance() -> None:
     """One that scores 1.5 nats less is one to e as likely; one that scores more is as likely and no more."""
-    best = answer_with(ranked(50.0))
+    best = ranked(50.0)
     assert twin_share(best, []) == 1.0
     assert twin_share(best, [ranked(50.0)] * 3) == pytest.approx(0.25)
     assert twin_share(best, [ranked(80.0)]) == pytest.approx(0.5)
@@ -154,20 +157,22 @@ def test_twins_share_the_chance() -> None:
     assert twin_share(best, [ranked(52.0, -3.5)]) == pytest.approx(1.0 / (1.0 + math.exp(-1.0))), "with the prior"
 
 
-@pytest.mark.parametrize(("wall_sigma", "lead"), [(0.003, 10.0), (0.02, 10.0), (0.04, 2.5), (0.2, 0.1)])
-def test_where_walls_are_far_off_centimetres_tell_rivals_apart_less(wall_sigma: float, lead: float) -> None:
-    """A rival that explains as much at a cost of 20 more; the score supposes 2 cm. What it explains more counts on."""
-    answer = answer_with(ranked(50.0), settled=settled_of(registered_room(), wall_sigma=wall_sigma))
-    features = features_of(CONTEXT, answer, [ranked(40.0, cost=26.0)])
-    assert features.lead == pytest.approx(lead)
-    assert features.solitude == pytest.approx(lead / tuning.CROWD_TEMPERATURE, abs=1e-3)
-    assert twin_share(answer, [ranked(40.0, cost=26.0)]) == pytest.approx(
-        1.0 / (1.0 + math.exp(-lead / tuning.TWIN_TEMPERATURE))
+@pytest.mark.parametrize(("cost", "lead"), [(0.0, 11.99), (6.0, 6.26), (60.0, 1.40)])
+def test_the_farther_walls_are_off_the_less_centimetres_tell_rivals_apart(cost: float, lead: float) -> None:
+    """A rival that explains 10 nats less at a cost of 20 more, beside an answer whose walls fit well, or badly.
+
+    With 8 matches, and 2 walls for what was supposed: ``10 - 20 / 2 + 5 log((cost + 22) / (cost + 2))``.
+    """
+    answer, rival = answer_with(ranked(50.0, cost=cost)), ranked(40.0, cost=cost + 20.0)
+    features = features_of(CONTEXT, answer, [rival])
+    assert features.lead == pytest.approx(lead, abs=0.01)
+    assert features.solitude == pytest.approx(lead / tuning.CROWD_TEMPERATURE, abs=0.01)
+    assert twin_share(answer.best, [rival]) == pytest.approx(
+        1.0 / (1.0 + math.exp(-lead / tuning.TWIN_TEMPERATURE)), abs=0.002
     )
-    assert features_of(CONTEXT, answer, [ranked(40.0)]).lead == pytest.approx(10.0)
-    other = 8.0 + 2.0 * (1.0 - min(1.0, 0.02**2 / wall_sigma**2))
-    better = features_of(CONTEXT, answer, [ranked(42.0, cost=2.0), ranked(40.0, cost=26.0)])
-    assert better.lead == pytest.approx(min(lead, other)), "nearest"
+    assert features_of(CONTEXT, answer, [ranked(40.0, cost=cost)]).lead == pytest.approx(10.0)
+    nearest = features_of(CONTEXT, answer, [ranked(42.0, cost=cost), rival])
+    assert nearest.lead == pytest.approx(min(lead, 8.0), abs=0.01)
 
 
 def test_scan() -> None:

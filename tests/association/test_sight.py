@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from association.explain import explain
-from association.sight import agreement, missing_segments
+from association.sight import BeamShares, agreement, compare_beams, missing_segments
 from association.tuning import NEUTRAL
 
-from .answers import SCAN
+from .answers import SCAN, room
 from .reference import acceptance as missing_twin
 from .reference import agreement as agreement_twin
 from .scenes import INSIDE, ROOM, context_of, index_of, scan_of, seen
@@ -41,3 +43,15 @@ def test_agreement_is_that_of_the_pose() -> None:
     assert 0.5 < expected < 0.95
     elsewhere = context_of(index_of(SCREENED), scan_of(ENDPOINTS))
     assert agreement(elsewhere, best) == NEUTRAL
+
+
+def test_beams_are_compared_at_the_settled_pose() -> None:
+    """All read what the map shows; a wall more is in the way of some. Segments alone have no beams."""
+    context = room(with_beams=True)
+    explained = explain(context).answer
+    assert explained is not None
+    assert explained.beams == compare_beams(context, explained.settled) == BeamShares(0.0, 0.0)
+    screened = replace(context, index=index_of(SCREENED))
+    passed = compare_beams(screened, explained.settled).farther
+    assert 0.05 < passed < 0.5
+    assert compare_beams(room(), explained.settled) == BeamShares()

@@ -64,6 +64,34 @@ def test_beam_evidence(seed: int) -> None:
         assert out[0].item() == pytest.approx(twin.beam_evidence(rays, viewpoint, at, PLACE))
 
 
+def shares_of(ranges: np.ndarray) -> tuple[float, float]:
+    rays, view, place = Rays(ANGLES, ranges, 20.0), np.zeros(1, VIEW), ROOM_INDEX.tables.place
+    return beams.beam_shares(rays, view, estimate_of(HERE), place, Workspace.of(1, 1))
+
+
+def test_beams_that_read_farther_and_nearer_than_the_map_shows() -> None:
+    """By 5 and 10 cm across the wall; behind a reading the wall is looked for far beyond what evidence asks for."""
+    ranges = read(ROOM_INDEX, INSIDE)
+    assert shares_of(ranges) == (0.0, 0.0)
+    assert shares_of(ranges + 0.049)[0] == 0.0
+    assert shares_of(ranges - 0.099)[1] == 0.0
+    assert shares_of(ranges + 0.4)[0] == 1.0
+    assert shares_of(0.02 * ranges)[1] == 1.0
+    some = np.arange(240) < 60
+    assert shares_of(np.where(some, 1.5 * ranges, math.inf)) == (0.25, 0.0)
+    assert shares_of(np.full(240, math.inf)) == (0.0, 0.0)
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_beam_shares(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rays, truth, viewpoint, view = drawn_rays(rng, 120)
+    for at in (truth, moved(truth, rng.normal(size=3) * [0.1, 0.3, 0.3])):
+        found = beams.beam_shares(rays, view, estimate_of(at), PLACE, Workspace.of(1, 1))
+        assert found == pytest.approx(twin.beam_shares(rays, viewpoint, at, PLACE))
+
+
 @given(SEEDS)
 @settings(max_examples=12, deadline=None)
 def test_refine_by_beams(seed: int) -> None:

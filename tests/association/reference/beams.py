@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -11,11 +12,14 @@ from association.tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
+    FARTHER_BY,
     LEAST_INCIDENCE,
     LEAST_POINTS,
     NEAR,
+    NEARER_BY,
     PASSED_SLACK,
     SURE_LENGTH,
+    WALL_BEHIND,
 )
 from registration import RigidTransform
 from registration.layout import SEEN
@@ -27,21 +31,35 @@ from .sight import first_hit
 Evidence = tuple[float, float]  # read, passed
 
 
-def beam_evidence(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place) -> Evidence:
-    """Compare every beam with the first wall on its way."""
-    read = passed = 0.0
+def offsets(
+    rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place, behind: float
+) -> Iterator[tuple[float, np.void]]:
+    """Yield how much farther each beam reads than the first wall on its way, metres across that, and the wall."""
     for angle, distance in zip(rays.angles + pose.theta, rays.ranges, strict=True):
         if distance == math.inf:
             continue
-        limit = min(rays.reach, distance + BEHIND)
+        limit = min(rays.reach, distance + behind)
         expected, w = first_hit(pose.apply(viewpoint), angle, limit, place.walls)
         if w >= 0:
             wall = place.walls[w]
             sine = abs(normal(wall) @ [math.cos(angle), math.sin(angle)])
-            across = (distance - expected) * max(LEAST_INCIDENCE, sine)
-            read += math.exp(-0.5 * (across / NEAR) ** 2)
-            passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
+            yield (distance - expected) * max(LEAST_INCIDENCE, sine), wall
+
+
+def beam_evidence(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place) -> Evidence:
+    """Compare every beam with the first wall on its way."""
+    read = passed = 0.0
+    for across, wall in offsets(rays, viewpoint, pose, place, BEHIND):
+        read += math.exp(-0.5 * (across / NEAR) ** 2)
+        passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
     return read / max(1, len(rays.angles)), passed / max(1, len(rays.angles))
+
+
+def beam_shares(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place) -> tuple[float, float]:
+    """Count the beams that read farther than the map shows, and nearer."""
+    across = np.array([offset for offset, _ in offsets(rays, viewpoint, pose, place, WALL_BEHIND)])
+    n = max(1, len(rays.angles))
+    return float((across > FARTHER_BY).sum()) / n, float((across < -NEARER_BY).sum()) / n
 
 
 def refine_by_beams(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:
@@ -52,13 +70,13 @@ def refine_by_beams(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: 
             continue
         end = np.asarray(viewpoint) + distance * np.array([math.cos(angle), math.sin(angle)])
         there = pose.apply(end)
-        offsets = {}
+        across = {}
         for w in listed(place.grid, there):
             wall = place.walls[w]
             if wall["begin"] - NEAR <= direction(wall) @ there <= wall["end"] + NEAR:
-                offsets[w] = abs(normal(wall) @ there - wall["offset"])
-        nearest = min(offsets, key=lambda w: offsets[w], default=-1)
-        if nearest >= 0 and offsets[nearest] < gate:
+                across[w] = abs(normal(wall) @ there - wall["offset"])
+        nearest = min(across, key=lambda w: across[w], default=-1)
+        if nearest >= 0 and across[nearest] < gate:
             ends.append(end)
             lines.append(nearest)
     if len(lines) < LEAST_POINTS:

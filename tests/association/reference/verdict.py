@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from association import HardPrior, Status, tuning
 from association.context import SearchContext
 from association.explain import Answer, Explanations
@@ -17,17 +19,27 @@ Numbers = dict[str, float]
 Document = Mapping[str, list[float]]  # for each feature its slope, then value and change of slope of each bend
 
 
-def worth(one: Ranked, wall_sigma: float) -> float:
-    """Return the value of an explanation, its cost weighed with the walls' own error where that is more than usual."""
-    cost = 0.5 * one.cost
-    return one.value + cost - cost / max(1.0, (wall_sigma / tuning.MODEL_OFFSET) ** 2)
+def worth(one: Ranked) -> float:
+    """Return the value of an explanation with its residuals' likelihood averaged over how far the walls may be off.
+
+    Their variance over the supposed one, e to the t, is a scaled inverse chi-square of so many degrees of freedom.
+    """
+    n, k = sum(wall >= 0 for wall in one.matches["wall"]), tuning.USUAL_WALLS
+    t = np.linspace(-60.0, 60.0, 24_001)
+    density = 0.5 * k * (math.log(0.5 * k) - t - np.exp(-t)) - math.lgamma(0.5 * k)
+    logs = density - 0.5 * n * t - 0.5 * one.cost * np.exp(-t)
+    return one.value + 0.5 * one.cost + float(logs.max() + np.log(np.exp(logs - logs.max()).sum() * (t[1] - t[0])))
 
 
 def evidence(answer: Answer, rivals: list[Ranked], temperature: float) -> float:
     """Sum what the rivals weigh beside the best, at most one each."""
-    least = worth(answer.best, answer.settled.wall_sigma)
-    gaps = (worth(rival, answer.settled.wall_sigma) - least for rival in rivals)
-    return sum(min(1.0, math.exp(gap / temperature)) for gap in gaps)
+    least = worth(answer.best)
+    total = 0.0
+    for rival in rivals:
+        share = rival.value / answer.best.value
+        counted = np.interp(share, [tuning.UNCOUNTED_SHARE, tuning.RIVAL_SHARE], [0.0, 1.0])
+        total += float(counted) * min(1.0, math.exp((worth(rival) - least) / temperature))
+    return total
 
 
 def root(x: float) -> float:
@@ -41,8 +53,7 @@ def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null:
     matched = [wall >= 0 for wall in best.matches["wall"]]
     clutter = [length for length, on in zip(context.lines.rows["length"], matched, strict=True) if not on]
     count = sum(matched)
-    sigma = answer.settled.wall_sigma
-    nearest = max((worth(rival, sigma) for rival in rivals), default=-math.inf)
+    nearest = max((worth(rival) for rival in rivals), default=-math.inf)
     crowd = evidence(answer, rivals, tuning.CROWD_TEMPERATURE) + math.exp(tuning.LEAST_CROWD)
     misfit = math.log(sorted((tuning.LEAST_MISFIT, best.misfit, tuning.MOST_MISFIT))[1])
     by_segments = best.score - tuning.BEAMS_READ * best.read + tuning.BEAMS_PASSED * best.passed
@@ -55,7 +66,7 @@ def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null:
     gap = min(tuning.MAX_GAP, max(-tuning.MAX_GAP, (1.0 - counted) * best.score))
     return {
         "constant": 1.0,
-        "lead": min(tuning.MAX_LEAD, worth(best, sigma) - nearest if rivals else best.value),
+        "lead": min(tuning.MAX_LEAD, worth(best) - nearest if rivals else best.value),
         "solitude": -math.log(crowd),
         "share": best.share,
         "root_count": count**0.5,
@@ -67,6 +78,8 @@ def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null:
         "agreement": answer.agreement,
         "read": best.read,
         "passed": best.passed,
+        "root_farther": answer.beams.farther**0.5,
+        "root_nearer": answer.beams.nearer**0.5,
         "hinge_moves": min(max([0.0, *(one[1] for one in hinges)]), tuning.MOST_DEVIATION),
         "hinge_deviation": min(max([0.0, *(one[2] for one in hinges)]), tuning.MOST_DEVIATION),
         "chance": max(tuning.LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
