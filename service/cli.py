@@ -46,10 +46,20 @@ def unknown_settings() -> list[str]:
 
 def run(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
+    from .database_file import file_of, make_file
     from .process.listening import listen
     from .process.server import serve_alone
     from .telemetry.logs import log_config
 
+    kept = file_of(settings.url)
+    if kept is not None and not kept.exists():
+        try:
+            make_file(kept)
+        except OSError as error:
+            # Running all the same it would never be ready, and only its log would say why.
+            wrong = f"no maps can be kept in {kept.parent}: {error.strerror}"
+            print(f"linefix: {wrong}; name another directory with --data-dir, or LINEFIX_DATA_DIR", file=sys.stderr)
+            return 1
     logging.config.dictConfig(log_config(settings.log_level))
     try:
         listener = listen(settings)

@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from .database import DatabaseFile, file_of, open_engine
+from ..database_file import file_of
+from .database import DatabaseFile, open_engine
 from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, UnknownMapError
 from .failures import damaged, failures_as_store_errors
 from .preconditions import Preconditions
