@@ -63,7 +63,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services
-    app.state.contract = Contract(partial(describe, app), services.parse_threads)
+    app.state.contract = Contract(partial(describe, app, guarded=bool(settings.keys)), services.parse_threads)
     for module in (register, associate, batch, vectorize, maps, operations, pages):
         app.include_router(module.router)
     handle_errors(app)
