@@ -78,7 +78,7 @@ def parse(data: bytes | bytearray, limits: Limits) -> Any:
         # The parser's message names the kind of error and its place, and repeats nothing of the text.
         what = f"{error.msg} at line {error.lineno} column {error.colno}"
         if _NO_NUMBER.match(error.doc, error.pos):
-            what += ": NaN and Infinity are not JSON; a range without a return is null"
+            what += ": NaN and Infinity are not JSON; an unknown range is null, no return a number above range_max"
         raise NotJsonError(what) from None
 
 

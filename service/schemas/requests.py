@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from .arrays import MapSegmentRows, PairRows, PointRows, Weights
 from .errors import TooManyError
 from .limits import Limits
-from .parts import AnyMap, AnyPrior, AnyScan, Laser, MapSigma, MeasuredFields, RaySigma, SearchOptions
-from .strict import FrameId, FreeJson, Pose, Sigma, Strict
+from .parts import (
+    AnyMap,
+    AnyPrior,
+    AnyScan,
+    Laser,
+    MapSigma,
+    MeasuredFields,
+    RaySigma,
+    SearchOptions,
+    require_at_the_sensor,
+)
+from .strict import FrameId, FreeJson, Point, Pose, Sigma, Strict
 
 
 class KnownMap(Strict):
@@ -85,8 +95,8 @@ class VectorizeOptions(Strict):
     """How to cut points into segments."""
 
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
-    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(5, description="least number behind a segment")
-    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.15, description="of a segment, metres")
+    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(4, description="least number behind a segment")
+    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.1, description="of a segment, metres")
     max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(
         None, description="metres between neighbours on one segment; null: by the angle between the beams"
     )
@@ -97,6 +107,11 @@ class VectorizeRequest(Strict):
 
     laser: Laser | None = None
     points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
+    viewpoint: Point | None = Field(
+        default_factory=lambda: [0.0, 0.0],
+        description="where the sensor stood, metres: on the left of every segment; null: not from one place, as a "
+        "contour, and segments run as their points do",
+    )
     options: VectorizeOptions = VectorizeOptions()
 
     @model_validator(mode="after")
@@ -104,6 +119,13 @@ class VectorizeRequest(Strict):
         if (self.laser is None) == (self.points is None):
             raise PydanticCustomError("one_of", "expected either laser or points")
         return self
+
+    @field_validator("viewpoint")
+    @classmethod
+    def _from_the_sensor(cls, value: list[float] | None, info: ValidationInfo) -> list[float] | None:
+        if info.data.get("laser") is not None:
+            require_at_the_sensor(value)
+        return value
 
 
 class MapDocument(Strict):

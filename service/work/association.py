@@ -102,8 +102,8 @@ class Associator:
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
         answer = association_json(result, frozenset(options.include))
         answer["frame_id"] = target.cached.frame_id
-        answer["child_frame_id"] = sought.scan.frame_id
-        answer["stamp"] = sought.scan.stamp
+        answer["child_frame_id"] = sought.scan.told_frame_id
+        answer["stamp"] = sought.scan.told_stamp
         if "segments" in options.include:
             answer["segments"] = None if scanned.segments is None else scanned.segments.tolist()
         return answer

@@ -19,7 +19,7 @@ from ..schemas.parts import (
 )
 from ..schemas.requests import RegisterRequest
 from ..schemas.strict import Pose
-from .scanning import Scanned, scan_laser, scan_points
+from .scanning import Scanned, scan_laser, scan_points, viewpoint_of
 
 
 def transform_of(pose: Pose) -> RigidTransform:
@@ -38,7 +38,7 @@ def measured_of(scan: MeasuredFields) -> MeasuredSegments:
 
 def scanned_of(scan: SegmentScan | LaserScan | PointScan) -> Scanned:
     """Return what the robot saw, whatever form it came in."""
-    viewpoint = None if scan.viewpoint is None else (scan.viewpoint[0], scan.viewpoint[1])
+    viewpoint = viewpoint_of(scan.viewpoint)
     if isinstance(scan, LaserScan):
         return scan_laser(scan.laser, scan.sigma, viewpoint)
     if isinstance(scan, PointScan):

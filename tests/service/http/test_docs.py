@@ -10,11 +10,14 @@ import pytest
 
 from service.http.problems import TABLE
 
-TEXT = (Path(__file__).parents[3] / "docs" / "http.md").read_text()
+ROOT = Path(__file__).parents[3]
+TEXT = (ROOT / "docs" / "http.md").read_text()
+README = (ROOT / "README.md").read_text()
 STORED = re.findall(
     r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT
 )
-EXAMPLES = re.findall(r"curl -s localhost:8000(/v1/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT)
+ASKED = r"curl -s localhost:8000(/v1/\S+) -H 'Content-Type: application/json' -d '([^']*)'"
+EXAMPLES = re.findall(ASKED, TEXT)
 
 
 def test_there_are_examples() -> None:
@@ -34,7 +37,18 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
         assert len(answer.json()["segments"]) == 1
     else:
         assert (answer.json()["status"], answer.json()["usable"]) == ("ok", True)
+        assert answer.json().get("warnings", []) == []
         assert answer.json()["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_first_thing_that_a_reader_tries_is_answered_as_the_readme_says(client: httpx.Client) -> None:
+    ((path, body),) = re.findall(ASKED, README)
+    answer = client.post(path, content=body.encode()).json()
+    assert (answer["status"], answer["usable"], answer["unmatched_scan"]) == ("ok", True, [4])
+    assert answer["warnings"] == []
+    said = re.search(r'"pose":\{"x":([\d.]+), ?"y":([\d.]+), ?"theta":([\d.]+)\}', README)
+    assert said is not None
+    assert [float(number) for number in said.groups()] == pytest.approx(list(answer["pose"].values()), abs=1e-3)
 
 
 def test_every_code_is_described() -> None:
