@@ -11,7 +11,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from ..admission.entrance import GUARDED
-from ..schemas import replies, requests
+from ..schemas import parts, replies, requests
 from ..schemas.encoding import encode
 from ..threads import Threads
 
@@ -31,7 +31,7 @@ _REQUESTS = (
     requests.AssociateRequest,
     requests.BatchRequest,
     requests.VectorizeRequest,
-    requests.MapDocument,
+    parts.MapDocument,
 )
 
 

@@ -39,4 +39,4 @@ VECTORIZE: dict[str, Any] = {
     "points": [[2.0, 0.1 * i] for i in range(20)] + [[2.0 - 0.1 * i, 2.0] for i in range(20)],
     "options": {"min_points": 5},
 }
-MAP: dict[str, Any] = {"segments": WALLS, "sigma": 0.01, "frame_id": "map", "meta": {"floor": 3}}
+MAP: dict[str, Any] = {"segments": WALLS, "sigma": 0.01, "oriented": True, "frame_id": "map", "meta": {"floor": 3}}

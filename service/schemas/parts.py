@@ -29,19 +29,30 @@ EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segme
 INLINE, STORED = "<inline>", "<stored>"
 BY_SEGMENTS, BY_LASER, BY_POINTS = "<segments>", "<laser>", "<points>"
 SOFT, HARD = "<soft>", "<hard>"
-_BESIDE_A_MAP = frozenset(("sigma", "frame_id"))
+_BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta"))
 _BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint"))
 TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, SOFT, HARD))
 
 
-class InlineMap(Strict):
-    """A map in the request itself."""
+class MapDocument(Strict):
+    """A map, as a file of its own or to be stored."""
 
     segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
     sigma: MapSigma | None = Field(
         None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
     )
+    oriented: bool | None = Field(
+        None,
+        description="false: directions of its segments mean nothing; null: they do; a request's option goes first",
+    )
     frame_id: FrameId = "map"
+    meta: FreeJson = Field(None, description="given back as it was sent")
+
+
+class InlineMap(MapDocument):
+    """A map in the request itself."""
+
+    meta: FreeJson = Field(None, description="taken, so that a map's file may be sent as it is, and not used")
 
 
 class StoredMap(Strict):
@@ -258,7 +269,10 @@ class SearchOptions(Strict):
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
         None, description="milliseconds; at most `max_deadline_ms` of /v1/limits, which a longer one is cut to"
     )
-    oriented: bool = Field(True, description="false: directions of segments mean nothing")
+    oriented: bool | None = Field(
+        None,
+        description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
+    )
     offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(None, description="metres")
     angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = Field(None, description="radians")
     min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5

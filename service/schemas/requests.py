@@ -7,27 +7,26 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from .arrays import MapSegmentRows, PairRows, PointRows, Weights
+from .arrays import PairRows, PointRows, Weights
 from .errors import TooManyError
 from .limits import Limits
 from .parts import (
     AnyMap,
     AnyPrior,
     AnyScan,
+    InlineMap,
     Laser,
-    MapSigma,
     MeasuredFields,
     RaySigma,
     SearchOptions,
     require_at_the_sensor,
 )
-from .strict import FrameId, FreeJson, Point, Pose, Sigma, Strict
+from .strict import FreeJson, Point, Pose, Sigma, Strict
 
 
-class KnownMap(Strict):
+class KnownMap(InlineMap):
     """The map side of known correspondences."""
 
-    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres")
     sigma: Sigma | None = Field(
         0.0, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
     )
@@ -41,7 +40,10 @@ class EstimatorOptions(Strict):
     k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
     k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
     evaluate_at: Pose | None = Field(None, description="also give the ambiguity at this pose")
-    oriented: bool = Field(True, description="false: directions of segments mean nothing")
+    oriented: bool | None = Field(
+        None,
+        description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
+    )
 
 
 class RegisterRequest(Strict):
@@ -126,14 +128,3 @@ class VectorizeRequest(Strict):
         if info.data.get("laser") is not None:
             require_at_the_sensor(value)
         return value
-
-
-class MapDocument(Strict):
-    """A map to be stored."""
-
-    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
-    sigma: MapSigma | None = Field(
-        None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
-    )
-    frame_id: FrameId = "map"
-    meta: FreeJson = Field(None, description="given back as it was sent")

@@ -95,7 +95,7 @@ class Associator:
             raise CancelledError
         if deadline.passed:
             raise DeadlinePassedError
-        prior, how = prior_of(sought.prior), association_options_of(options)
+        prior, how = prior_of(sought.prior), association_options_of(options, oriented=target.cached.oriented)
         begun = time.perf_counter()
         result = associate(target.cached.index, scanned.scan, prior, how, deadline)
         seconds = time.perf_counter() - begun
