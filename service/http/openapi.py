@@ -31,6 +31,7 @@ _REQUESTS = (
     requests.AssociateRequest,
     requests.BatchRequest,
     requests.VectorizeRequest,
+    requests.CheckRequest,
     parts.MapDocument,
 )
 

@@ -93,6 +93,28 @@ class BatchItem(Strict):
     prior: AnyPrior | None = None
 
 
+MOST_SAMPLES = 64
+
+
+class CheckRequest(Strict):
+    """Sample scans to check a map by, and where they were taken, as far as that is known."""
+
+    scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)]
+    poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = Field(
+        None, description="one per scan, or null; of the scan's frame in the map's, as their sender has it"
+    )
+    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+        None, description="milliseconds; what it leaves no time for is left out"
+    )
+    client_ref: FreeJson = Field(None, description="given back as it was sent")
+
+    @model_validator(mode="after")
+    def _as_many(self) -> CheckRequest:
+        if self.poses is not None and len(self.poses) != len(self.scans):
+            raise PydanticCustomError("poses", "expected one pose, or null, per scan")
+        return self
+
+
 class VectorizeOptions(Strict):
     """How to cut points into segments."""
 

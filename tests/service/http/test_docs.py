@@ -22,7 +22,13 @@ EXAMPLES = re.findall(ASKED, TEXT)
 
 def test_there_are_examples() -> None:
     assert [path for path, _ in STORED] == ["/v1/maps/hq-3"]
-    assert [path for path, _ in EXAMPLES] == ["/v1/register", "/v1/associate", "/v1/vectorize", "/v1/associate"]
+    assert [path for path, _ in EXAMPLES] == [
+        "/v1/register",
+        "/v1/associate",
+        "/v1/vectorize",
+        "/v1/associate",
+        "/v1/maps/hq-3:check",
+    ]
 
 
 @pytest.mark.parametrize(("path", "body"), EXAMPLES)
@@ -35,6 +41,8 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
     assert answer.status_code == 200, answer.text
     if path == "/v1/vectorize":
         assert len(answer.json()["segments"]) == 1
+    elif path.endswith(":check"):
+        assert (answer.json()["findings"], answer.json()["samples"]["usable"]) == ([], 1)
     else:
         assert (answer.json()["status"], answer.json()["usable"]) == ("ok", True)
         assert answer.json().get("warnings", []) == []
@@ -54,6 +62,14 @@ def test_the_first_thing_that_a_reader_tries_is_answered_as_the_readme_says(clie
 def test_every_code_is_described() -> None:
     for kind in TABLE:
         assert re.search(rf"\| [^|]*{kind.status}[^|]*\| [^|]*`{kind.code}`", TEXT), kind.code
+
+
+def test_every_finding_of_a_check_is_described() -> None:
+    source = "".join(path.read_text() for path in (ROOT / "association" / "checking").glob("*.py"))
+    codes = set(re.findall(r'Finding\(\s*"(\w+)"', source))
+    assert len(codes) >= 13
+    described = TEXT.partition("### Check")[2].partition("## Errors")[0]
+    assert {code for code in codes if f"| `{code}` |" not in described} == set()
 
 
 def test_the_named_settings_exist() -> None:
