@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from registration.layout import Floats, Records
+from registration.layout import Floats
 
 from ..layout import Grid
 from ..map_index import MapIndex
@@ -38,22 +38,12 @@ Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
 
-def drawing_findings(index: MapIndex) -> Iterator[Finding]:
-    """Tell what is doubtful in how the lines of a directed map were drawn."""
-    pairs = near_pairs(index.grid, len(index.walls.rows))
-    sides = beside(index.walls.rows, pairs)
+def drawing_findings(index: MapIndex, pairs: Beside) -> Iterator[Finding]:
+    """Tell what is doubtful in how the lines of a directed map were drawn; `pairs` are its walls beside each other."""
     yield from _short(index)
-    yield from _doubled(index, pairs, sides)
-    yield from _overlapping(index, pairs, sides)
+    yield from _doubled(index, pairs)
+    yield from _overlapping(index, pairs)
     yield from _gaping(index)
-
-
-def drawn_both_ways(index: MapIndex) -> Flags:
-    """Tell of each wall whether another lies on it that runs the other way: a wall without thickness, (walls,)."""
-    pairs = near_pairs(index.grid, len(index.walls.rows))
-    found = np.zeros(len(index.walls.rows), dtype=bool)
-    found[pairs[beside(index.walls.rows, pairs).opposite]] = True
-    return found
 
 
 def near_pairs(grid: Grid, count: int) -> Indices:
@@ -74,14 +64,14 @@ def near_pairs(grid: Grid, count: int) -> Indices:
 
 
 class Beside:
-    """How the second wall of each pair runs beside the first: (p,) each, metres.
+    """How the second wall of each of the `pairs`, (p, 2), runs beside the first: (p,) each, metres.
 
     `shared` is the length that they run beside each other, `off` how far the second lies to the left of the first
     there, `along` whether both run the same way; of pairs that are not parallel `shared` is 0.
     """
 
-    def __init__(self, shared: Floats, off: Floats, along: Flags, shorter: Floats) -> None:
-        self.shared, self.off, self.along, self.shorter = shared, off, along, shorter
+    def __init__(self, pairs: Indices, shared: Floats, off: Floats, along: Flags, shorter: Floats) -> None:
+        self.pairs, self.shared, self.off, self.along, self.shorter = pairs, shared, off, along, shorter
 
     @property
     def for_long(self) -> Flags:
@@ -93,9 +83,17 @@ class Beside:
         """Whether they lie on one another and run in opposite ways."""
         return self.for_long & (np.abs(self.off) < SAME_LINE) & ~self.along
 
+    def both_ways(self, count: int) -> Flags:
+        """Tell of each of `count` walls whether another lies on it that runs the other way: it has no thickness."""
+        found = np.zeros(count, dtype=bool)
+        found[self.pairs[self.opposite]] = True
+        return found
 
-def beside(walls: Records, pairs: Indices) -> Beside:
-    """Compare the walls of each pair (p, 2)."""
+
+def beside(index: MapIndex) -> Beside:
+    """Compare the walls of a directed map that are near to each other."""
+    walls = index.walls.rows
+    pairs = near_pairs(index.grid, len(walls))
     a, b = walls[pairs[:, 0]], walls[pairs[:, 1]]
     parallel = np.abs(a["dx"] * b["dy"] - a["dy"] * b["dx"]) < PARALLEL
     along = a["dx"] * b["dx"] + a["dy"] * b["dy"] > 0.0
@@ -109,7 +107,7 @@ def beside(walls: Records, pairs: Indices) -> Beside:
     middle = 0.5 * (low + high)
     slope = (o2 - o1) / np.where(np.abs(s2 - s1) > 1e-9, s2 - s1, 1.0)
     shorter = np.minimum(a["end"] - a["begin"], b["end"] - b["begin"])
-    return Beside(np.where(parallel, high - low, 0.0), o1 + slope * (middle - s1), along, shorter)
+    return Beside(pairs, np.where(parallel, high - low, 0.0), o1 + slope * (middle - s1), along, shorter)
 
 
 def _short(index: MapIndex) -> Iterator[Finding]:
@@ -126,13 +124,13 @@ def _short(index: MapIndex) -> Iterator[Finding]:
         )
 
 
-def _doubled(index: MapIndex, pairs: Indices, sides: Beside) -> Iterator[Finding]:
+def _doubled(index: MapIndex, sides: Beside) -> Iterator[Finding]:
     apart = np.abs(sides.off)
     near = sides.for_long & (apart >= SAME_LINE) & (apart < DOUBLE)
     # Back to back they are the two faces of one wall, as they should be.
     doubled = near & (sides.along | (sides.off > 0.0))
     if doubled.any():
-        found = segments_of(index, np.unique(pairs[doubled]))
+        found = segments_of(index, np.unique(sides.pairs[doubled]))
         yield Finding(
             "doubled_faces",
             f"{len(found)} segments run beside another that looks the same way, or at it, less than {100.0 * DOUBLE:g} "
@@ -141,7 +139,7 @@ def _doubled(index: MapIndex, pairs: Indices, sides: Beside) -> Iterator[Finding
             found,
         )
     if sides.opposite.any():
-        found = segments_of(index, np.unique(pairs[sides.opposite]))
+        found = segments_of(index, np.unique(sides.pairs[sides.opposite]))
         yield Finding(
             "both_ways",
             f"{len(found)} segments lie on another that runs the other way: walls without thickness. Two faces drawn "
@@ -150,9 +148,9 @@ def _doubled(index: MapIndex, pairs: Indices, sides: Beside) -> Iterator[Finding
         )
 
 
-def _overlapping(index: MapIndex, pairs: Indices, sides: Beside) -> Iterator[Finding]:
-    beside = sides.along & (np.abs(sides.off) < SAME_LINE) & (sides.shared > OVERLAP)
-    found = set(segments_of(index, np.unique(pairs[beside])))
+def _overlapping(index: MapIndex, sides: Beside) -> Iterator[Finding]:
+    on_it = sides.along & (np.abs(sides.off) < SAME_LINE) & (sides.shared > OVERLAP)
+    found = set(segments_of(index, np.unique(sides.pairs[on_it])))
     found |= {piece for one, other, room in _neighbours(index) if room < -OVERLAP for piece in (one, other)}
     if found:
         yield Finding(
