@@ -18,10 +18,12 @@ from .tuning import (
     GREATEST_SIGMA,
     HIDDEN_SCALE,
     LEAST_SIGMA,
+    LITTLE,
     MANY,
     MOVED_METRES,
     MOVED_RADIANS,
     SAME_FACTOR,
+    WIDEST,
 )
 
 
@@ -39,45 +41,49 @@ def judge_samples(samples: Sequence[Sample], *, sigma: float | None, oriented: b
     present: Way = oriented, sigma
     if not samples:
         return SampleReport((), Advice(), 0, 0)
-    best = _best_way(samples, present)
+    directed = _best_directions(samples, present)
+    off = _sigma_of(samples, directed)
+    best = _nearest_way(samples, present, directed, off)
     usable, would_be = (sum(one.trials[way].usable for one in samples if way in one.trials) for way in (present, best))
-    findings = []
-    if best[0] != oriented:
-        findings.append(
-            Finding(
-                "undirected",
-                f"The scans fit better where directions mean nothing: {would_be} of {len(samples)} are usable instead "
-                f'of {usable}. Say "oriented": false.',
-            )
-        )
-    scale = _scaled(samples, least=SAME_FACTOR if best[0] else HIDDEN_SCALE)
-    others = (_mirrored(samples, present), _reversed(samples), scale, _moved(samples))
-    findings += [found for found in others if found is not None]
+    scale = _scaled(samples, least=SAME_FACTOR if directed else HIDDEN_SCALE)
+    mistakes = [found for found in (_mirrored(samples, present), _reversed(samples), scale) if found is not None]
     # What is off because of a mistake is no measure of the walls.
-    known = not any(others) and any(one.trials[best].offsets for one in samples if best in one.trials)
-    advice = Advice(_sigma_of(samples, best) if known else None, best[0] if known else None)
-    return SampleReport(tuple(findings), advice, usable, would_be)
+    advice = Advice() if mistakes or off is None else Advice(off, directed)
+    findings = [found for found in (*mistakes, _moved(samples)) if found is not None]
+    if directed != oriented and _reversed(samples) is None:  # which fits either way round, too
+        findings.insert(0, _undirected(len(samples), usable, would_be))
+    return SampleReport(tuple(findings), advice, usable, usable if advice.oriented is None else would_be)
 
 
-def _best_way(samples: Sequence[Sample], present: Way) -> Way:
-    """Return the way in which the scans fit best; the present one, and directions, unless another is clearly better."""
-    ways = {way for one in samples for way in one.trials}
+def _undirected(count: int, usable: int, would_be: int) -> Finding:
+    return Finding(
+        "undirected",
+        f"The scans fit better where directions mean nothing: {would_be} of {count} are usable instead of {usable}. "
+        'Say "oriented": false.',
+    )
 
-    def worth(way: Way) -> tuple[int, float]:
-        tried = [one.trials[way] for one in samples if way in one.trials]
-        return sum(one.usable for one in tried), sum(one.score for one in tried)
 
-    def best_of(directed: bool) -> Way | None:
-        own = [way for way in ways if way[0] == directed]
-        return max(own, key=lambda way: (*worth(way), way == present), default=None)
+def _best_directions(samples: Sequence[Sample], present: Way) -> bool:
+    """Tell whether directions should mean something: as they do now, unless the scans fit clearly better otherwise."""
 
-    best, other = best_of(present[0]), best_of(not present[0])
-    assert best is not None
-    if other is None:
-        return best
-    (usable, score), (usable_otherwise, score_otherwise) = worth(best), worth(other)
+    def worth(directed: bool) -> tuple[int, float]:
+        ways = {way for one in samples for way in one.trials if way[0] == directed}
+        usable = (sum(one.trials[way].usable for one in samples if way in one.trials) for way in ways)
+        return max(usable, default=0), sum(one.trials[directed, WIDEST].score for one in both)
+
+    both = [one for one in samples if {(True, WIDEST), (False, WIDEST)} <= one.trials.keys()]
+    (usable, score), (usable_otherwise, score_otherwise) = worth(present[0]), worth(not present[0])
     more = usable_otherwise > usable + BETTER_USABLE * len(samples)
-    return other if more or (score_otherwise > BETTER_SCORE * score and usable_otherwise >= usable) else best
+    better = more or (score_otherwise > BETTER_SCORE * score and usable_otherwise >= usable)
+    return present[0] is not better
+
+
+def _nearest_way(samples: Sequence[Sample], present: Way, directed: bool, off: float | None) -> Way:
+    """Return what was tried and is nearest to walls that are so far off; no sigma at all stands for little."""
+    ways = [way for one in samples for way in one.trials if way[0] == directed]
+    if off is None or not ways:
+        return present
+    return min(ways, key=lambda way: abs(math.log((way[1] or LITTLE) / off)))
 
 
 def _mirrored(samples: Sequence[Sample], present: Way) -> Finding | None:
@@ -143,11 +149,16 @@ def _moved(samples: Sequence[Sample]) -> Finding | None:
     )
 
 
-def _sigma_of(samples: Sequence[Sample], way: Way) -> float | None:
-    """Return how far walls are off, metres: the root mean square over walls of what the scans saw of each."""
+def _sigma_of(samples: Sequence[Sample], directed: bool) -> float | None:
+    """Return how far walls are off, metres: the root mean square over walls of what the scans saw of each.
+
+    Where they are thought to be off by little, those that are off by more are left out, and poses give way to the rest:
+    it is taken where they may be off by the most that was tried.
+    """
     seen: dict[int, list[float]] = {}
     for one in samples:
-        for wall, offset in one.trials[way].offsets.items() if way in one.trials else ():
+        trial = one.trials.get((directed, WIDEST))
+        for wall, offset in trial.offsets.items() if trial is not None else ():
             seen.setdefault(wall, []).append(offset)
     if not seen:
         return None

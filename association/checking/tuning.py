@@ -53,7 +53,9 @@ SMALLEST, LARGEST = 2.0, 3000.0  # m, tables; the diagonal of what robots drive 
 
 # --- Samples ----------------------------------------------------------------------------------------------------------
 
-SIGMAS = (0.05, 0.1, 0.15, 0.2)  # m, tables; what is tried beside an estimate: half the thickness of walls
+SIGMAS = (0.05, 0.1, 0.2)  # m, tables; what is tried beside the map's own: half the thickness of walls, or more
+WIDEST = max(SIGMAS)
+LITTLE = 0.01  # m, tables; what an estimate comes to where walls are right
 BETTER_SCALED = 1.05  # times, tables
 BETTER_SCORE = 1.15  # times, tables
 BETTER_USABLE = 0.15  # of the scans, tables
