@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RegistrationOptions, RegistrationResult, register
+from registration import RegistrationOptions, RegistrationResult, RigidTransform, register
 
 from .context import SearchContext
 from .kernels.acceptance import accept_matches
@@ -58,6 +58,17 @@ def accept(context: SearchContext, best: Ranked) -> Accepted:
     lines = Lines(context.lines.rows, context.lines.row_of, float(context.gates["least_overlap"][0]))
     found = accept_matches(best.matches, lines, ends, best.estimate, index.walls.rows, index.pieces)
     return Accepted(*found)
+
+
+def overlaps_at(context: SearchContext, best: Ranked, accepted: Accepted, pose: RigidTransform) -> Floats:
+    """Return the share of each accepted segment's length that lies on its wall, or run, at a pose in the map, (n,)."""
+    index, ends = context.index, as_records(ENDS, context.scan.measured.segments.endpoints)
+    at = best.estimate.copy()
+    at["x"], at["y"], at["theta"] = pose.x - index.origin[0], pose.y - index.origin[1], pose.theta
+    every = Lines(context.lines.rows, context.lines.row_of, 0.0)  # however little of a segment lies there
+    pairs, overlaps, _, _ = accept_matches(best.matches, every, ends, at, index.walls.rows, index.pieces)
+    shares: Floats = overlaps[np.searchsorted(pairs[:, 0], accepted.pairs[:, 0])]
+    return shares
 
 
 def register_accepted(context: SearchContext, accepted: Accepted, settled: Settled) -> RegistrationResult | None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from registration import Ambiguity, Correspondences, OneStepSums
 
-from .acceptance import correspondences
+from .acceptance import correspondences, overlaps_at
 from .causes import Cause
 from .context import SearchContext
 from .explain import Answer, Explanations
@@ -19,6 +20,7 @@ from .result import (
     Alternative,
     AssociationDiagnostics,
     AssociationResult,
+    Correspondence,
     Hinge,
     Status,
 )
@@ -45,7 +47,7 @@ def report(
         pose=verdict.pose,
         covariance=None if degenerate or context.options.estimator == "one_step" else answer.settled.covariance,
         unobservable=answer.settled.direction if degenerate else None,
-        correspondences=correspondences(context.index, answer.accepted, answer.registered),
+        correspondences=_correspondences(context, answer, verdict),
         unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
         missing_map=tuple(i for i in missing_segments(context, answer.best) if i not in on_map),
         diagnostics=_diagnostics(context, answer, verdict),
@@ -54,6 +56,14 @@ def report(
         search=explanations.search,
         warnings=warnings_of(context, explanations.search, verdict, causes),
     )
+
+
+def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
+    """Return the consensus set, with the overlaps at the pose that is answered."""
+    accepted = answer.accepted
+    if verdict.pose is not None:
+        accepted = replace(accepted, overlaps=overlaps_at(context, answer.best, accepted, verdict.pose))
+    return correspondences(context.index, accepted, answer.registered)
 
 
 def _no_match(

@@ -23,7 +23,7 @@ from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
-from .http.routes import associate, batch, maps, operations, pages, register, vectorize
+from .http.routes import associate, batch, check, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
@@ -63,8 +63,9 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services
-    app.state.contract = Contract(partial(describe, app), services.parse_threads)
-    for module in (register, associate, batch, vectorize, maps, operations, pages):
+    app.state.contract = Contract(partial(describe, app, guarded=bool(settings.keys)), services.parse_threads)
+    # A path of a map's check looks like that of a map, too: it comes first.
+    for module in (register, associate, batch, vectorize, check, maps, operations, pages):
         app.include_router(module.router)
     handle_errors(app)
     app.add_middleware(Reception, services=services)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import logging.config
 import os
@@ -17,6 +18,8 @@ USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve -
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
 # this when they are loaded, so before anything imports numpy.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# What a disk may be mended of while the service runs, and says that it is not ready.
+AILING_DISK = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
 KERNELS = "LINEFIX_KERNELS"  # read by registration.compiling, which is not loaded here for its name
 
 
@@ -50,6 +53,10 @@ def run(settings: Settings) -> int:
     from .process.server import serve_alone
     from .telemetry.logs import log_config
 
+    wrong = cannot_keep_maps(settings)
+    if wrong is not None:
+        print(f"linefix: {wrong}; name another directory with --data-dir, or LINEFIX_DATA_DIR", file=sys.stderr)
+        return 1
     logging.config.dictConfig(log_config(settings.log_level))
     try:
         listener = listen(settings)
@@ -61,6 +68,24 @@ def run(settings: Settings) -> int:
 
         return supervise(settings, listener)
     return serve_alone(settings, listener)
+
+
+def cannot_keep_maps(settings: Settings) -> str | None:
+    """Make the file of the maps where there is none; return why that will never do, None where it does or may yet.
+
+    Running all the same the service would never be ready, and only its log would say why.
+    """
+    from .database_file import file_of, make_file
+
+    kept = file_of(settings.url)
+    if kept is None or kept.exists():
+        return None
+    try:
+        make_file(kept)
+    except OSError as error:
+        if error.errno not in AILING_DISK:
+            return f"no maps can be kept in {kept.parent}: {error.strerror}"
+    return None
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import ipaddress
 import os
 import re
@@ -10,13 +11,24 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_validator
-from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
 from .database_url import database_url
 from .schemas.limits import Limits
 
 Finite = Annotated[float, AllowInfNan(False)]
+HELP = "Start the service. Each option may also be set in the environment, as LINEFIX_ and its name: LINEFIX_PORT=8001."
+# What the help calls the values of settings that are no numbers, and defaults that are found when the service starts.
+_METAVARS = {
+    "host": "ADDRESS",
+    "data_dir": "DIRECTORY",
+    "database_url": "URL",
+    "keys": "KEY,...",
+    "hosts": "NAME,...",
+    "log_level": "LEVEL",
+}
+_DEFAULTS = {"data_dir": "~/.local/share/linefix", "searches": "the cores"}
 _PRINTABLE = re.compile(r"[!-~]+")
 
 
@@ -48,7 +60,6 @@ class Settings(BaseSettings):
         extra="forbid",
         cli_kebab_case=True,
         cli_implicit_flags=True,
-        cli_prog_name="linefix serve",
         frozen=True,
     )
 
@@ -165,8 +176,12 @@ def read_settings(arguments: Sequence[str]) -> Settings:
         When a value is wrong, or the service would listen to the world without keys.
     """
     _require_text(arguments)
+    parser = argparse.ArgumentParser(prog="linefix serve", description=HELP, allow_abbrev=False)
     try:
-        settings = Settings(_cli_parse_args=list(arguments))
+        source: CliSettingsSource[argparse.ArgumentParser] = CliSettingsSource(
+            Settings, root_parser=parser, add_argument_method=_add_argument
+        )
+        settings = Settings(_cli_settings_source=source(args=list(arguments)))
     except ValidationError as error:
         wrong = (f"{'.'.join(str(part) for part in item['loc'])}: {item['msg']}" for item in error.errors())
         raise SettingsError("; ".join(wrong)) from error
@@ -178,6 +193,19 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     if settings.workers > settings.searches:
         raise SettingsError(f"workers: at most as many as searches, of which there are {settings.searches}")
     return settings
+
+
+def _add_argument(parser: argparse.ArgumentParser, *names: str, **how: Any) -> None:
+    """Add an option to the command line, described in words of its user."""
+    name = names[0].lstrip("-").replace("-", "_")
+    field = Settings.model_fields[name]
+    default = _DEFAULTS.get(name, field.default)
+    how["help"] = field.description
+    if default not in (None, (), False):
+        how["help"] += f" (default: {default})"
+    if field.annotation is not bool:
+        how["metavar"] = _METAVARS.get(name, "N" if field.annotation is int else "X")
+    parser.add_argument(*names, **how)
 
 
 def _require_text(arguments: Sequence[str]) -> None:

@@ -13,6 +13,8 @@ from .ticket import Ticket
 
 SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize"))
 """Paths whose POST needs a turn at the gate."""
+MAPS, CHECK = "/v1/maps/", ":check"
+"""How the path of a map's check begins and ends, which needs one to be read, too."""
 GUARDED = "/v1/"
 """What asks for a key begins so; probes and pages stay open."""
 
@@ -21,9 +23,13 @@ Head = Mapping[str, Any]
 Headers = Sequence[tuple[bytes, bytes]]
 
 
-def is_search(method: str, path: str) -> bool:
-    """Tell whether a request needs a turn at the gate."""
-    return method == "POST" and path in SEARCHING
+def search_of(method: str, path: str) -> str | None:
+    """Return the route of a request that needs a turn at the gate, a map's id left out; None where it needs none."""
+    if method == "POST" and path in SEARCHING:
+        return path
+    if method in ("GET", "HEAD", "POST") and path.startswith(MAPS) and path.endswith(CHECK):
+        return MAPS + "{map_id}" + CHECK
+    return None
 
 
 class Entrance:
@@ -67,7 +73,7 @@ class Entrance:
         holder = self._keyring.holder(headers, head.get("client")) if path.startswith(GUARDED) else None
         if method in ("POST", "PUT"):
             self._check_length(headers)
-        if not is_search(method, path):
+        if search_of(method, path) is None:
             return Ticket(holder)
         self._gate.require_place(holder)
         return Ticket(holder, self._gate)

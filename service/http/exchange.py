@@ -20,7 +20,7 @@ from ..maps.lookup import FoundMap
 from ..parsing.parser_process import LARGE
 from ..parsing.unpacking import unpack
 from ..schemas.limits import Limits
-from ..schemas.parts import InlineMap, SearchOptions, StoredMap
+from ..schemas.parts import InlineMap, StoredMap
 from ..work.job import Done, Job, Stopwatch
 from .sending import json_response
 from .services import Services, services_of
@@ -95,11 +95,11 @@ class Exchange:
 
     @asynccontextmanager
     async def looking_up(
-        self, asked: InlineMap | StoredMap, options: SearchOptions, deadline: Deadline
+        self, asked: InlineMap | StoredMap, deadline: Deadline, *, oriented: bool | None
     ) -> AsyncIterator[InlineMap | FoundMap]:
         """Look a stored map up before its turn at the gate: a database that hangs holds up nobody else.
 
-        Its document counts as held until the block ends.
+        Its document counts as held until the block ends. `oriented` None is as the map itself says.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class Exchange:
             yield asked
             return
         left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
-        find = partial(self.services.lookup.find, asked.map_id, oriented=options.oriented)
+        find = partial(self.services.lookup.find, asked.map_id, oriented=oriented)
         try:
             async with asyncio.timeout(left):
                 found = await ask_store(self.services, find)

@@ -10,7 +10,8 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from ..schemas import replies, requests
+from ..admission.entrance import GUARDED
+from ..schemas import parts, replies, requests
 from ..schemas.encoding import encode
 from ..threads import Threads
 
@@ -30,12 +31,13 @@ _REQUESTS = (
     requests.AssociateRequest,
     requests.BatchRequest,
     requests.VectorizeRequest,
-    requests.MapDocument,
+    requests.CheckRequest,
+    parts.MapDocument,
 )
 
 
-def describe(app: FastAPI) -> dict[str, Any]:
-    """Return the OpenAPI document of an application."""
+def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
+    """Return the OpenAPI document of an application; `guarded` says whether it asks for keys."""
     document = get_openapi(
         title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes, tags=app.openapi_tags
     )
@@ -45,8 +47,10 @@ def describe(app: FastAPI) -> dict[str, Any]:
     schemas = components.setdefault("schemas", {})
     schemas |= asked["$defs"] | failed["$defs"]
     components["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
-    # A service without keys asks for none.
-    document["security"] = [{"key": []}, {}]
+    if guarded:
+        for path, item in document["paths"].items():
+            for operation in item.values() if path.startswith(GUARDED) else ():
+                operation["security"] = [{"key": []}]
     return document
 
 

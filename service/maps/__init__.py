@@ -2,13 +2,14 @@
 
 from .cache import CachedMap, IndexCache
 from .preconditions import Preconditions
-from .records import Bounds, MapPage, MapRecord, MapSummary, StoredMap
+from .records import Bounds, MapOutline, MapPage, MapRecord, MapSummary, StoredMap
 from .store import MapStore
 
 __all__ = [
     "Bounds",
     "CachedMap",
     "IndexCache",
+    "MapOutline",
     "MapPage",
     "MapRecord",
     "MapStore",

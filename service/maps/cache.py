@@ -23,6 +23,11 @@ class CachedMap:
     frame_id: str
     bytes: int
 
+    @property
+    def oriented(self) -> bool:
+        """Whether directions of its segments mean anything; else it is listed both ways."""
+        return len(self.index.segments) == self.index.directed
+
 
 class IndexCache:
     """Builds what it does not have; callers that want the same map wait for one build.

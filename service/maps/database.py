@@ -10,6 +10,7 @@ from typing import Any
 from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import Connection
 
+from ..database_file import file_of, make_file
 from .errors import ReadOnlyStoreError, StoreAwayError
 
 BUSY_SECONDS = 5.0
@@ -39,13 +40,6 @@ def open_engine(url: URL) -> Engine:
     engine = create_engine(url, connect_args=unsaid, pool_pre_ping=True, pool_timeout=BUSY_SECONDS, max_overflow=20)
     event.listen(engine, "connect", _prepare_postgresql)
     return engine
-
-
-def file_of(url: URL) -> Path | None:
-    """Return the file that a database is kept in; None where it is in no file of its own, or the URL says how."""
-    if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:" or "uri" in url.query:
-        return None
-    return Path(url.database).absolute()
 
 
 class DatabaseFile:
@@ -92,25 +86,10 @@ class DatabaseFile:
         return self._known == (found.st_dev, found.st_ino)
 
     def _make(self) -> None:
-        folder = self._path.parent
-        missing = [one for one in (folder, *folder.parents) if not one.exists()]
         try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            for made in missing:
-                _sync(made.parent)
-            # What SQLite puts beside it later has the same permissions.
-            os.close(os.open(self._path, os.O_RDWR | os.O_CREAT, 0o600))
-            _sync(folder)
+            make_file(self._path)
         except OSError as error:
             raise ReadOnlyStoreError("the file of the maps, or its directory, cannot be made") from error
-
-
-def _sync(folder: Path) -> None:
-    opened = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(opened)
-    finally:
-        os.close(opened)
 
 
 def _prepare_sqlite(connection: Any, _: Any) -> None:

@@ -13,11 +13,10 @@ from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
-from ..schemas.parts import InlineMap
-from ..schemas.requests import MapDocument
+from ..schemas.parts import InlineMap, MapDocument
 from .cache import CachedMap, IndexCache
 from .errors import BusyStoreError
-from .records import Bounds, MapRecord
+from .records import MapOutline, MapRecord
 from .store import MapStore
 
 MAX_EXTENT = 1e5  # m
@@ -56,8 +55,10 @@ class MapLookup:
         self._store = store
         self._parser = parser
 
-    def find(self, map_id: str, *, oriented: bool) -> FoundMap:
+    def find(self, map_id: str, *, oriented: bool | None) -> FoundMap:
         """Look a stored map up, with its document where it is not indexed yet; runs in a thread that may wait.
+
+        `oriented` None is as the map itself says.
 
         Looked up before every use, so that a change by another worker is never missed.
 
@@ -67,15 +68,16 @@ class MapLookup:
             When no such map is stored, or it is damaged, or the store does not answer.
         """
         record = self._store.record(map_id)
-        if self._cache.has((record, oriented)):
+        if self._cache.has((record, is_oriented(oriented, record.oriented))):
             return FoundMap(record, None)
         stored = self._store.load(map_id)
         return FoundMap(stored.record, stored.document)
 
-    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool) -> CachedMap:
+    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None) -> CachedMap:
         """Return a map ready to be searched.
 
-        Whether its directions count makes it another index, with a place of its own in the cache.
+        Whether its directions count makes it another index, with a place of its own in the cache; `oriented` None is as
+        the map itself says.
 
         Runs off the event loop.
 
@@ -89,11 +91,13 @@ class MapLookup:
             When the map of the request cannot be searched.
         """
         if isinstance(asked, FoundMap):
-            return self._cache.get((asked.record, oriented), partial(self._read, asked, oriented))
+            directed = is_oriented(oriented, asked.record.oriented)
+            return self._cache.get((asked.record, directed), partial(self._read, asked, directed))
         # Robots send the same map with every scan: what is in it names it.
         digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
-        key = digest, asked.sigma, asked.frame_id, oriented
-        return self._cache.get(key, lambda: self._index(asked, oriented))
+        directed = is_oriented(oriented, asked.oriented)
+        key = digest, asked.sigma, asked.frame_id, directed
+        return self._cache.get(key, lambda: self._index(asked, directed))
 
     def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
         document = found.document
@@ -114,8 +118,13 @@ class MapLookup:
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
 
 
-def summary_of(document: MapDocument) -> tuple[int, Bounds]:
-    """Return the number of segments, and the bounds, of a map that is to be stored.
+def is_oriented(asked: bool | None, own: bool | None) -> bool:
+    """Tell whether directions mean anything: as the request says, else as the map does, else yes."""
+    return next((said for said in (asked, own) if said is not None), True)
+
+
+def outline_of(document: MapDocument) -> MapOutline:
+    """Return what is told of a map that is to be stored.
 
     Raises
     ------
@@ -130,4 +139,4 @@ def summary_of(document: MapDocument) -> tuple[int, Bounds]:
         raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="segments")
     # No negative zeros: not every database keeps them.
     low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
-    return len(segments), (low[0], low[1], high[0], high[1])
+    return MapOutline(len(segments), (low[0], low[1], high[0], high[1]), document.sigma, document.oriented)

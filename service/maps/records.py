@@ -14,21 +14,43 @@ ABSENT = ""  # the sha256 of a map that was deleted
 
 @dataclass(frozen=True, slots=True)
 class MapRecord:
-    """What identifies the content of a stored map."""
+    """What identifies the content of a stored map; `oriented` is in it, too, and is needed before it is read."""
 
     map_id: str
     revision: int
     sha256: str
+    oriented: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MapOutline:
+    """What is told of a map without its content.
+
+    Attributes
+    ----------
+    segments : int
+        How many.
+    bounds : tuple
+        ``min_x, min_y, max_x, max_y``, metres.
+    sigma : float, or None
+        Standard deviation of its lines, metres; None where the map says nothing.
+    oriented : bool, or None
+        Whether directions of its segments mean anything; None where the map says nothing.
+    """
+
+    segments: int
+    bounds: Bounds
+    sigma: float | None = None
+    oriented: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class MapSummary:
-    """A stored map without its content; bounds are ``min_x, min_y, max_x, max_y`` in metres."""
+    """A stored map without its content."""
 
     map_id: str
     revision: int
-    segments: int
-    bounds: Bounds
+    outline: MapOutline
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,23 +84,31 @@ def digest(document: object) -> str:
     return hashlib.sha256(document).hexdigest() if isinstance(document, bytes) else "damaged"
 
 
-def columns_of(record: MapRecord, segments: int, bounds: Bounds) -> dict[str, Any]:
+NOTHING = MapOutline(0, (0.0, 0.0, 0.0, 0.0))
+"""Of a map that was deleted."""
+_SEALED = (
+    "map_id", "revision", "sha256", "segments", "min_x", "min_y", "max_x", "max_y", "sigma", "oriented",
+)  # fmt: skip
+
+
+def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
     """Return a sealed row of `maps`.
 
     The seal is a SHA-256 of all that the row says: a flipped bit in a revision is found as surely as one in a document.
     """
-    numbers = tuple(value + 0.0 for value in bounds)  # SQLite does not keep the sign of zero
-    names = ("map_id", "revision", "sha256", "segments", "min_x", "min_y", "max_x", "max_y")
-    what = (record.map_id, record.revision, record.sha256, segments, *numbers)
-    return dict(zip(names, what, strict=True)) | {"seal": _seal(*what), "quarantined": False}
+    # SQLite does not keep the sign of zero.
+    numbers = tuple(value + 0.0 for value in outline.bounds)
+    sigma = None if outline.sigma is None else outline.sigma + 0.0
+    what = (record.map_id, record.revision, record.sha256, outline.segments, *numbers, sigma, outline.oriented)
+    return dict(zip(_SEALED, what, strict=True)) | {"seal": seal(*what), "quarantined": False}
 
 
 def is_sealed(row: Row[Any]) -> bool:
     """Tell whether a row of `maps` is as it was written."""
-    what = (row.map_id, row.revision, row.sha256, row.segments, row.min_x, row.min_y, row.max_x, row.max_y)
-    return bool(row.seal == _seal(*what))
+    return bool(row.seal == seal(*(getattr(row, name) for name in _SEALED)))
 
 
-def _seal(*what: object) -> str:
+def seal(*what: object) -> str:
+    """Return the SHA-256 of what a row says, in this order."""
     # repr tells 1 from 1.0 from "1", and gives a float to the bit.
     return hashlib.sha256(repr(what).encode("utf-8", "surrogatepass")).hexdigest()

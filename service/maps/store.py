@@ -10,11 +10,23 @@ from typing import Any, TypeVar
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from .database import DatabaseFile, file_of, open_engine
+from ..database_file import file_of
+from .database import DatabaseFile, open_engine
 from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, UnknownMapError
 from .failures import damaged, failures_as_store_errors
 from .preconditions import Preconditions
-from .records import ABSENT, Bounds, MapPage, MapRecord, MapSummary, StoredMap, columns_of, digest, is_sealed
+from .records import (
+    ABSENT,
+    NOTHING,
+    MapOutline,
+    MapPage,
+    MapRecord,
+    MapSummary,
+    StoredMap,
+    columns_of,
+    digest,
+    is_sealed,
+)
 from .schema import upgrade
 from .tables import documents, maps
 
@@ -58,32 +70,28 @@ class MapStore:
         """Close all connections."""
         self._engine.dispose()
 
-    def put(
-        self, map_id: str, document: bytes, summary: tuple[int, Bounds], demands: Preconditions
-    ) -> tuple[int, bool]:
+    def put(self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions) -> tuple[int, bool]:
         """Store a map; return its revision, and whether there was none before.
 
         The transaction is on the disk when this returns, and was read back. A damaged map is replaced as any other.
         """
-        written = self._twice(lambda: self._put(map_id, document, summary, demands))
+        written = self._twice(lambda: self._put(map_id, document, outline, demands))
         # In damaged tables another connection may read other rows than the one that wrote: look before promising.
         with suppress(UnknownMapError):  # deleted by another meanwhile
             self.load(map_id)
         return written
 
-    def _put(
-        self, map_id: str, document: bytes, summary: tuple[int, Bounds], demands: Preconditions
-    ) -> tuple[int, bool]:
+    def _put(self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions) -> tuple[int, bool]:
         with self._writing() as connection:
             row = _locked(connection, map_id)
             last, exists = _last(connection, map_id, row)
             demands.check(last if exists else None)
-            record = MapRecord(map_id, last + 1, digest(document))
+            record = MapRecord(map_id, last + 1, digest(document), outline.oriented)
             if row is None:
                 # Not an upsert: of two first writers one has to fail here, and look again.
-                connection.execute(insert(maps), columns_of(record, *summary))
+                connection.execute(insert(maps), columns_of(record, outline))
             else:
-                _update(connection, maps, columns_of(record, *summary))
+                _update(connection, maps, columns_of(record, outline))
             content = {"map_id": map_id, "revision": record.revision, "document": document}
             if not _update(connection, documents, content):
                 connection.execute(insert(documents), content)
@@ -103,7 +111,7 @@ class MapStore:
             demands.check(last if exists else None)
             if not exists:
                 raise UnknownMapError
-            _update(connection, maps, columns_of(MapRecord(map_id, last, ABSENT), 0, (0.0, 0.0, 0.0, 0.0)))
+            _update(connection, maps, columns_of(MapRecord(map_id, last, ABSENT), NOTHING))
             connection.execute(delete(documents).where(documents.c.map_id == map_id))
 
     def record(self, map_id: str) -> MapRecord:
@@ -199,7 +207,7 @@ def _row(connection: Connection, map_id: str, columns: Select[Any]) -> Row[Any]:
 def _trusted(row: Row[Any]) -> MapRecord:
     if row.quarantined or not is_sealed(row):
         raise CorruptMapError
-    return MapRecord(row.map_id, row.revision, row.sha256)
+    return MapRecord(row.map_id, row.revision, row.sha256, row.oriented)
 
 
 def _document_revision(connection: Connection, map_id: str) -> Any:
@@ -233,4 +241,5 @@ def _update(connection: Connection, table: Table, values: dict[str, Any]) -> boo
 
 
 def _summary(row: Row[Any]) -> MapSummary:
-    return MapSummary(row.map_id, row.revision, row.segments, (row.min_x, row.min_y, row.max_x, row.max_y))
+    bounds = row.min_x, row.min_y, row.max_x, row.max_y
+    return MapSummary(row.map_id, row.revision, MapOutline(row.segments, bounds, row.sigma, row.oriented))

@@ -22,6 +22,8 @@ maps = Table(
     Column("min_y", Float, nullable=False),
     Column("max_x", Float, nullable=False),
     Column("max_y", Float, nullable=False),
+    Column("sigma", Float, nullable=True),
+    Column("oriented", Boolean, nullable=True),
     Column("seal", String(64), nullable=False, server_default=""),
     Column("quarantined", Boolean, nullable=False, server_default=false()),
 )

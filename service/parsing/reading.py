@@ -12,7 +12,8 @@ from ..schemas.encoding import encode
 from ..schemas.errors import InvalidRequestError, RequestError, TooManyError
 from ..schemas.faults import faults_of
 from ..schemas.limits import Limits
-from ..schemas.requests import BatchItem, BatchRequest, MapDocument
+from ..schemas.parts import MapDocument
+from ..schemas.requests import BatchItem, BatchRequest
 from .errors import NotJsonError
 
 M = TypeVar("M", bound=BaseModel)
@@ -50,7 +51,7 @@ def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, l
 def read_map(data: bytes | bytearray, limits: Limits) -> tuple[MapDocument, bytes]:
     """Return a map that is to be stored, and the document that is kept of it: what was sent and no more."""
     asked = read_model(MapDocument, data, limits)
-    document = {name: getattr(asked, name) for name in ("segments", "sigma", "frame_id", "meta")}
+    document = {name: getattr(asked, name) for name in ("segments", "sigma", "oriented", "frame_id", "meta")}
     return asked, encode({name: value for name, value in document.items() if name in asked.model_fields_set})
 
 
@@ -78,7 +79,7 @@ def parse(data: bytes | bytearray, limits: Limits) -> Any:
         # The parser's message names the kind of error and its place, and repeats nothing of the text.
         what = f"{error.msg} at line {error.lineno} column {error.colno}"
         if _NO_NUMBER.match(error.doc, error.pos):
-            what += ": NaN and Infinity are not JSON; a range without a return is null"
+            what += ": NaN and Infinity are not JSON; an unknown range is null, no return a number above range_max"
         raise NotJsonError(what) from None
 
 

@@ -13,7 +13,7 @@ from starlette.types import Scope
 from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
-from ..admission.entrance import is_search
+from ..admission.entrance import search_of
 from ..admission.errors import AdmissionError, MissingKeyError, UnknownKeyError
 from ..http.problems import RAISED
 from ..http.reception import taken_or_made
@@ -61,7 +61,7 @@ class AdmittingProtocol(ReceiptProtocol):
         cycle.response_started = cycle.response_complete = True
         self.write_refusal(error, taken_or_made(scope["headers"]), close=close)
         kind, method, path = RAISED[type(error)], scope["method"], scope["path"]
-        self._services.refusals.count(path if is_search(method, path) else OTHER, method, kind.code, kind.status)
+        self._services.refusals.count(search_of(method, path) or OTHER, method, kind.code, kind.status)
         if close:
             return
         if self.pipeline:

@@ -167,17 +167,21 @@ SigmaOrSigmas = Annotated[
 Weights = Annotated[
     Floats,
     PlainValidator(_column_validator(NUMBERS, 0, 1e100, ("pairs", "weights"))),
-    WithJsonSchema({"type": "array", "items": _number(0, 1e100)}),
+    # What is next to 0 and is not 0 the library refuses: its squares would be.
+    WithJsonSchema({"type": "array", "items": {"anyOf": [{"const": 0}, _number(1e-100, 1e100)]}}),
 ]
 
 
 def _covariance(value: Any) -> Floats:
     if type(value) is not list:
         raise PydanticCustomError("not_an_array", "expected an array")
-    # A few more than are right are looked at, for what is wrong with them.
-    matrix = _rows(value[:MAX_FAULTS], 3, NUMBERS, -_M, _M)
-    if len(value) != 3 or matrix.shape != (3, 3):
+    if len(value) in (6, 36):
+        raise PydanticCustomError(
+            "covariance", "expected 3 rows of 3 numbers, of x, y and yaw: of ROS's 36 those of rows and columns 0, 1, 5"
+        )
+    if len(value) != 3:
         raise PydanticCustomError("covariance", "expected 3 rows of 3 numbers")
+    matrix = _rows(value, 3, NUMBERS, -_M, _M)
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
         raise PydanticCustomError("covariance", "expected a symmetric matrix")
     try:

@@ -35,8 +35,12 @@ BATCH: dict[str, Any] = {
     "scans": [{"segments": SEEN}, {"segments": SEEN[:3]}],
     "priors": [None, {"x": 1.0, "y": 0.5, "theta": 1.6, "radius": 2.0, "angle": 0.5}],
 }
+CHECK: dict[str, Any] = {
+    "scans": [{"segments": SEEN}, {"segments": SEEN[:4]}],
+    "poses": [{"x": 1.0, "y": 0.5, "theta": 1.57}, None],
+}
 VECTORIZE: dict[str, Any] = {
     "points": [[2.0, 0.1 * i] for i in range(20)] + [[2.0 - 0.1 * i, 2.0] for i in range(20)],
     "options": {"min_points": 5},
 }
-MAP: dict[str, Any] = {"segments": WALLS, "sigma": 0.01, "frame_id": "map", "meta": {"floor": 3}}
+MAP: dict[str, Any] = {"segments": WALLS, "sigma": 0.01, "oriented": True, "frame_id": "map", "meta": {"floor": 3}}

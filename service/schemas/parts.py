@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from .arrays import (
@@ -18,7 +18,7 @@ from .arrays import (
     SigmaOrSigmas,
     Spreads,
 )
-from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict
+from .strict import Angle, FrameId, FreeJson, MapId, Point, Pose, Strict, in_radians
 
 MapSigma = Annotated[float, Field(ge=0.0, le=10.0)]
 RaySigma = Annotated[float, Field(ge=1e-6, le=10.0)]
@@ -29,19 +29,30 @@ EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segme
 INLINE, STORED = "<inline>", "<stored>"
 BY_SEGMENTS, BY_LASER, BY_POINTS = "<segments>", "<laser>", "<points>"
 SOFT, HARD = "<soft>", "<hard>"
-_BESIDE_A_MAP = frozenset(("sigma", "frame_id"))
+_BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta"))
 _BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint"))
 TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, SOFT, HARD))
 
 
-class InlineMap(Strict):
-    """A map in the request itself."""
+class MapDocument(Strict):
+    """A map, as a file of its own or to be stored."""
 
     segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
     sigma: MapSigma | None = Field(
         None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
     )
+    oriented: bool | None = Field(
+        None,
+        description="false: directions of its segments mean nothing; null: they do; a request's option goes first",
+    )
     frame_id: FrameId = "map"
+    meta: FreeJson = Field(None, description="given back as it was sent")
+
+
+class InlineMap(MapDocument):
+    """A map in the request itself."""
+
+    meta: FreeJson = Field(None, description="taken, so that a map's file may be sent as it is, and not used")
 
 
 class StoredMap(Strict):
@@ -75,6 +86,22 @@ class _Scan(Strict):
         description="where the sensor stood, metres; null: not from one place, so lines of sight are no evidence",
     )
 
+    @property
+    def told_stamp(self) -> Any:
+        """When it was taken, as sent."""
+        return self.stamp
+
+    @property
+    def told_frame_id(self) -> str:
+        """The frame that it is in."""
+        return self.frame_id
+
+
+def require_at_the_sensor(viewpoint: list[float] | None) -> None:
+    """Refuse another viewpoint of ranges than where they were measured."""
+    if viewpoint is not None and any(viewpoint):
+        raise PydanticCustomError("viewpoint", "beams start at the sensor: viewpoint is [0, 0] or null")
+
 
 class MeasuredFields(Strict):
     """Segments of a scan with what is known of the points behind them."""
@@ -100,16 +127,36 @@ class SegmentScan(_Scan, MeasuredFields):
     """A scan as segments."""
 
 
+class Header(Strict):
+    """The header of a LaserScan message: `stamp` and `frame_id` of the scan, where it says nothing of them itself."""
+
+    stamp: FreeJson = Field(None, description="given back as it was sent")
+    frame_id: FrameId = ""
+    seq: Any = None
+
+
+Increment = Annotated[
+    float,
+    AfterValidator(in_radians(-1.0, 1.0, "1 either way at most")),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number", "minimum": a, "maximum": b} for a, b in ((-1.0, -1e-6), (1e-6, 1.0))]}
+    ),
+]
+
+
 class Laser(Strict):
     """One turn of a scanner, as in a LaserScan message."""
 
     angle_min: Angle = Field(description="radians, of the first beam")
-    angle_increment: Annotated[float, Field(ge=-1.0, le=1.0)] = Field(description="radians from beam to beam")
-    ranges: Ranges = Field(description="metres; null or outside [range_min, range_max]: no return")
+    angle_increment: Increment = Field(description="radians from beam to beam; negative for one that turns clockwise")
+    ranges: Ranges = Field(
+        description="metres; null or below range_min: nothing is known of that beam; above range_max: nothing came back"
+    )
     range_min: Annotated[float, Field(ge=0.0, le=1e9)] | None = Field(None, description="metres")
     range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
         None, description="metres; a range of exactly this is a return"
     )
+    header: Header | None = Field(None, description="of a LaserScan message")
     angle_max: Any = Field(None, description="of a LaserScan message; taken and not used, as the next three")
     time_increment: Any = None
     scan_time: Any = None
@@ -122,10 +169,23 @@ class LaserScan(_Scan):
     laser: Laser
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
 
+    @property
+    def told_stamp(self) -> Any:
+        """The scan's own stamp, or that of its header."""
+        header = self.laser.header
+        return header.stamp if self.stamp is None and header is not None else self.stamp
+
+    @property
+    def told_frame_id(self) -> str:
+        """The scan's own frame, or that of its header."""
+        header = self.laser.header
+        if "frame_id" in self.model_fields_set or header is None:
+            return self.frame_id
+        return header.frame_id or self.frame_id
+
     @model_validator(mode="after")
     def _from_the_sensor(self) -> LaserScan:
-        if self.viewpoint is not None and any(self.viewpoint):
-            raise PydanticCustomError("viewpoint", "beams start at the sensor: viewpoint is [0, 0] or null")
+        require_at_the_sensor(self.viewpoint)
         return self
 
 
@@ -171,8 +231,12 @@ class SoftPriorFields(Pose):
 class HardPriorFields(Pose):
     """A window that the answer must lie in."""
 
-    radius: Annotated[float, Field(ge=0.0, le=1e9)] = Field(description="metres around (x, y)")
-    angle: Annotated[float, Field(ge=0.0, le=1e9)] = Field(description="radians around theta")
+    radius: Annotated[float, Field(gt=0.0, le=1e6)] = Field(description="metres around (x, y)")
+    angle: Annotated[
+        float,
+        AfterValidator(in_radians(5e-324, 4.0, "above 0 and up to 4")),
+        Field(json_schema_extra={"exclusiveMinimum": 0.0, "maximum": 4.0}),
+    ] = Field(description="radians around theta")
 
 
 def _prior_kind(value: Any) -> str | None:
@@ -195,7 +259,7 @@ AnyPrior = Annotated[
 class SearchOptions(Strict):
     """How to search, and what to put into the answer."""
 
-    max_alternatives: Annotated[int, Field(ge=0, le=100)] = 5
+    max_alternatives: Annotated[int, Field(ge=0, le=50)] = 5
     confidence: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9999
     exhaustive: bool = False
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of random sampling")
@@ -205,7 +269,10 @@ class SearchOptions(Strict):
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
         None, description="milliseconds; at most `max_deadline_ms` of /v1/limits, which a longer one is cut to"
     )
-    oriented: bool = Field(True, description="false: directions of segments mean nothing")
+    oriented: bool | None = Field(
+        None,
+        description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
+    )
     offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(None, description="metres")
     angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = Field(None, description="radians")
     min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5

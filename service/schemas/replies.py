@@ -237,6 +237,8 @@ class MapSummaryAnswer(Answer):
     revision: Annotated[int, Field(ge=1)]
     segments: Index
     bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
+    sigma: float | None = Field(description="of its lines, metres; null where the map says nothing")
+    oriented: bool | None = Field(description="whether directions mean anything; null where the map says nothing")
 
 
 class MapList(Answer):

@@ -4,20 +4,29 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from .arrays import MapSegmentRows, PairRows, PointRows, Weights
+from .arrays import PairRows, PointRows, Weights
 from .errors import TooManyError
 from .limits import Limits
-from .parts import AnyMap, AnyPrior, AnyScan, Laser, MapSigma, MeasuredFields, RaySigma, SearchOptions
-from .strict import FrameId, FreeJson, Pose, Sigma, Strict
+from .parts import (
+    AnyMap,
+    AnyPrior,
+    AnyScan,
+    InlineMap,
+    Laser,
+    MeasuredFields,
+    RaySigma,
+    SearchOptions,
+    require_at_the_sensor,
+)
+from .strict import FreeJson, Point, Pose, Sigma, Strict
 
 
-class KnownMap(Strict):
+class KnownMap(InlineMap):
     """The map side of known correspondences."""
 
-    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres")
     sigma: Sigma | None = Field(
         0.0, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
     )
@@ -31,7 +40,10 @@ class EstimatorOptions(Strict):
     k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
     k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
     evaluate_at: Pose | None = Field(None, description="also give the ambiguity at this pose")
-    oriented: bool = Field(True, description="false: directions of segments mean nothing")
+    oriented: bool | None = Field(
+        None,
+        description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
+    )
 
 
 class RegisterRequest(Strict):
@@ -81,12 +93,34 @@ class BatchItem(Strict):
     prior: AnyPrior | None = None
 
 
+MOST_SAMPLES = 64
+
+
+class CheckRequest(Strict):
+    """Sample scans to check a map by, and where they were taken, as far as that is known."""
+
+    scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)]
+    poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = Field(
+        None, description="one per scan, or null; of the scan's frame in the map's, as their sender has it"
+    )
+    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+        None, description="milliseconds; what it leaves no time for is left out"
+    )
+    client_ref: FreeJson = Field(None, description="given back as it was sent")
+
+    @model_validator(mode="after")
+    def _as_many(self) -> CheckRequest:
+        if self.poses is not None and len(self.poses) != len(self.scans):
+            raise PydanticCustomError("poses", "expected one pose, or null, per scan")
+        return self
+
+
 class VectorizeOptions(Strict):
     """How to cut points into segments."""
 
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
-    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(5, description="least number behind a segment")
-    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.15, description="of a segment, metres")
+    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(4, description="least number behind a segment")
+    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.1, description="of a segment, metres")
     max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(
         None, description="metres between neighbours on one segment; null: by the angle between the beams"
     )
@@ -97,6 +131,11 @@ class VectorizeRequest(Strict):
 
     laser: Laser | None = None
     points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
+    viewpoint: Point | None = Field(
+        default_factory=lambda: [0.0, 0.0],
+        description="where the sensor stood, metres: on the left of every segment; null: not from one place, as a "
+        "contour, and segments run as their points do",
+    )
     options: VectorizeOptions = VectorizeOptions()
 
     @model_validator(mode="after")
@@ -105,13 +144,9 @@ class VectorizeRequest(Strict):
             raise PydanticCustomError("one_of", "expected either laser or points")
         return self
 
-
-class MapDocument(Strict):
-    """A map to be stored."""
-
-    segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
-    sigma: MapSigma | None = Field(
-        None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
-    )
-    frame_id: FrameId = "map"
-    meta: FreeJson = Field(None, description="given back as it was sent")
+    @field_validator("viewpoint")
+    @classmethod
+    def _from_the_sensor(cls, value: list[float] | None, info: ValidationInfo) -> list[float] | None:
+        if info.data.get("laser") is not None:
+            require_at_the_sensor(value)
+        return value

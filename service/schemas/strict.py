@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import chain, islice
 from typing import Annotated, Any
 
 import orjson
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from .limits import MAX_FAULTS
@@ -62,9 +63,26 @@ def _free_json(value: Any) -> Any:
 FreeJson = Annotated[Any, PlainValidator(_free_json), WithJsonSchema({})]
 """Anything, given back as it was sent."""
 
+
+def in_radians(low: float, high: float, said: str) -> Callable[[float], float]:
+    """Return what refuses an angle beyond its limits, `said` in words: most who send one mean degrees."""
+
+    def check(value: float) -> float:
+        if not low <= value <= high:
+            raise PydanticCustomError("radians", f"expected radians, {said}; is it in degrees?")
+        return value
+
+    return check
+
+
 Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
 # Two turns either way. Beyond that it is in degrees, and would choose a wrong place without a word.
-Angle = Annotated[float, Field(ge=-4.0 * math.pi, le=4.0 * math.pi)]
+_TURNS = 4.0 * math.pi
+Angle = Annotated[
+    float,
+    AfterValidator(in_radians(-_TURNS, _TURNS, "two turns either way at most")),
+    Field(json_schema_extra={"minimum": -_TURNS, "maximum": _TURNS}),
+]
 Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
 FrameId = Annotated[str, Field(max_length=256)]
 MapId = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)]

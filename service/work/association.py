@@ -95,15 +95,15 @@ class Associator:
             raise CancelledError
         if deadline.passed:
             raise DeadlinePassedError
-        prior, how = prior_of(sought.prior), association_options_of(options)
+        prior, how = prior_of(sought.prior), association_options_of(options, oriented=target.cached.oriented)
         begun = time.perf_counter()
         result = associate(target.cached.index, scanned.scan, prior, how, deadline)
         seconds = time.perf_counter() - begun
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
         answer = association_json(result, frozenset(options.include))
         answer["frame_id"] = target.cached.frame_id
-        answer["child_frame_id"] = sought.scan.frame_id
-        answer["stamp"] = sought.scan.stamp
+        answer["child_frame_id"] = sought.scan.told_frame_id
+        answer["stamp"] = sought.scan.told_stamp
         if "segments" in options.include:
             answer["segments"] = None if scanned.segments is None else scanned.segments.tolist()
         return answer

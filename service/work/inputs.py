@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from association import AssociationOptions, HardPrior, Prior, Scan, SoftPrior
 from registration import InvalidArgumentError, MeasuredSegments, RegistrationOptions, RigidTransform, Segments
 
+from ..maps.lookup import is_oriented
 from ..schemas.parts import (
     HardPriorFields,
     LaserScan,
@@ -19,7 +20,7 @@ from ..schemas.parts import (
 )
 from ..schemas.requests import RegisterRequest
 from ..schemas.strict import Pose
-from .scanning import Scanned, scan_laser, scan_points
+from .scanning import Scanned, scan_laser, scan_points, viewpoint_of
 
 
 def transform_of(pose: Pose) -> RigidTransform:
@@ -38,7 +39,7 @@ def measured_of(scan: MeasuredFields) -> MeasuredSegments:
 
 def scanned_of(scan: SegmentScan | LaserScan | PointScan) -> Scanned:
     """Return what the robot saw, whatever form it came in."""
-    viewpoint = None if scan.viewpoint is None else (scan.viewpoint[0], scan.viewpoint[1])
+    viewpoint = viewpoint_of(scan.viewpoint)
     if isinstance(scan, LaserScan):
         return scan_laser(scan.laser, scan.sigma, viewpoint)
     if isinstance(scan, PointScan):
@@ -55,15 +56,15 @@ def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:
     return HardPrior(transform_of(prior), prior.radius, prior.angle)
 
 
-def association_options_of(options: SearchOptions) -> AssociationOptions:
-    """Return how to search."""
+def association_options_of(options: SearchOptions, *, oriented: bool) -> AssociationOptions:
+    """Return how to search a map whose directions count, or do not."""
     return AssociationOptions(
         max_alternatives=options.max_alternatives,
         confidence=options.confidence,
         exhaustive=options.exhaustive,
         seed=options.seed,
         sampling=options.sampling,
-        oriented=options.oriented,
+        oriented=oriented,
         offset_tolerance=options.offset_tolerance,
         angle_tolerance=options.angle_tolerance,
         min_overlap=options.min_overlap,
@@ -82,7 +83,7 @@ def registration_options_of(asked: RegisterRequest) -> RegistrationOptions:
         k_translation=options.k_translation,
         k_rotation=options.k_rotation,
         evaluate_at=None if options.evaluate_at is None else transform_of(options.evaluate_at),
-        oriented=options.oriented,
+        oriented=is_oriented(options.oriented, asked.map.oriented),
         weighting=asked.weighting,
         weights=asked.weights,
     )

@@ -21,6 +21,11 @@ Viewpoint = tuple[float, float] | None
 _OPTIONS = frozenset(("sigma", "min_points", "min_length", "max_gap"))
 
 
+def viewpoint_of(place: list[float] | None) -> Viewpoint:
+    """Return where the sensor stood, metres; None where the scan is not from one place."""
+    return None if place is None else (place[0], place[1])
+
+
 @dataclass(frozen=True, slots=True)
 class Scanned:
     """A scan, and its segments where the caller did not send them."""

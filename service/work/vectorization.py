@@ -7,7 +7,7 @@ from vectorization import VectorizationOptions
 from ..schemas.requests import VectorizeRequest
 from .answers import vectorization_json
 from .job import Done, Job
-from .scanning import vectorize_laser, vectorize_points
+from .scanning import vectorize_laser, vectorize_points, viewpoint_of
 
 _PLACES = ("", "/options")  # where scan and options stand in the request
 
@@ -27,6 +27,6 @@ def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
         found = vectorize_laser(asked.laser, options, _PLACES)
     else:
         assert asked.points is not None  # the model takes exactly one of the two
-        found = vectorize_points(asked.points, options, (0.0, 0.0), _PLACES)
+        found = vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES)
     job.watch.lap("search")
     return job.done(vectorization_json(found))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from association import AssociationOptions, Beams, Deadline, HardPrior, MapIndex, Scan, SoftPrior, associate
+from association.checking import check_map, try_sample
 from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
 
@@ -22,7 +23,7 @@ ROOM = np.array(
 
 
 def warm_up() -> None:
-    """Register, vectorize and associate once in each way that has kernels of its own."""
+    """Register, vectorize, associate and check a map once in each way that has kernels of its own."""
     room = Segments.from_array(ROOM)
     measured = MeasuredSegments.from_segments(room)
     pairs = np.repeat(np.arange(len(room))[:, None], 2, axis=1)
@@ -47,6 +48,10 @@ def warm_up() -> None:
         (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
     ):
         associate(index, scan, prior, how, Deadline())
+    check_map(index)
+    one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
+    for scan in (beams, one_wall):
+        try_sample(index, scan, Deadline(), oriented=True)
 
 
 def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from service.database_url import database_url
-from service.maps import MapStore, Preconditions
+from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.schemas import examples
 
-BOX = (4, (-1.5, 0.0, 1.0, 1e5))
+BOX = MapOutline(4, (-1.5, 0.0, 1.0, 1e5))
 # Small ones lie among the rows, large ones on pages of their own.
 DOCUMENTS = {f"map-{i}": random.Random(i).randbytes(200 if i % 3 else 3000) for i in range(12)}
 
@@ -53,7 +53,7 @@ def look(store: MapStore) -> Counter[str]:
         assert page is CorruptMapError
     else:
         for item in page.maps:
-            assert (item.revision, item.segments, item.bounds) == (2, *BOX), item
+            assert (item.revision, item.outline.segments, item.outline.bounds) == (2, BOX.segments, BOX.bounds), item
     return seen
 
 

@@ -96,3 +96,32 @@ def test_what_is_not_utf_8_is_named(name: str) -> None:
     command = [sys.executable, "-m", "service"]
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert (ended.returncode, ended.stderr) == (2, f"linefix: {name}: not UTF-8\n")
+
+
+def test_the_help_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    """Types and functions of the program are no help."""
+    with pytest.raises(SystemExit) as ended:
+        read_settings(["--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    for inner in (
+        "_data_home",
+        "_cores",
+        "factory",
+        "SecretStr",
+        "tuple",
+        "null",
+        "{",
+        "Path",
+        "--host str",
+        "--port int",
+        "==",
+    ):
+        assert inner not in text, inner
+    flat = " ".join(text.split())
+    assert "--keys KEY,..." in flat
+    assert "--data-dir DIRECTORY" in flat
+    assert "(default: ~/.local/share/linefix)" in flat
+    assert "(default: the cores)" in flat
+    assert "(default: 8000)" in flat
+    assert "LINEFIX_" in flat

@@ -28,6 +28,6 @@ async def post_associate(request: Request) -> Response:
     exchange = searching(request)
     asked = await exchange.read(partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
-    async with exchange.looking_up(asked.map, asked.options, job.deadline) as on:
+    async with exchange.looking_up(asked.map, job.deadline, oriented=asked.options.oriented) as on:
         work = partial(exchange.services.associator.answer, asked, on, job)
         return exchange.answer(await exchange.search(work, job.deadline))

@@ -44,7 +44,7 @@ async def post_batch(request: Request) -> Response:
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
     """Index the map in one turn at the gate, and search for each scan in another."""
     associator = exchange.services.associator
-    async with exchange.looking_up(asked.map, asked.options, job.deadline) as on:
+    async with exchange.looking_up(asked.map, job.deadline, oriented=asked.options.oriented) as on:
         target = await exchange.take_turn(partial(associator.target, on, asked.options), job.deadline)
     job.watch.lap("decode")
     calls = [partial(associator.find_for_batch, target, item, asked.options, job.deadline) for item in items]

@@ -7,12 +7,13 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from ...maps.lookup import summary_of
+from ...maps import MapOutline
+from ...maps.lookup import outline_of
 from ...parsing.reading import read_map
 from ...schemas import examples
 from ...schemas.encoding import encode
+from ...schemas.parts import MapDocument
 from ...schemas.replies import MapList, MapSummaryAnswer
-from ...schemas.requests import MapDocument
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..exchange import Exchange, ask_store
 from ..sending import json_response
@@ -24,6 +25,18 @@ MapIdPath = Annotated[
 ]
 STORE = ("overloaded", "read_only", "not_ready")
 ETAG: dict[str, Any] = {**REQUEST_ID, "ETag": {"description": "the revision in quotes", "schema": {"type": "string"}}}
+
+
+def _told(map_id: str, revision: int, outline: MapOutline) -> dict[str, Any]:
+    """Return a map without its content, as JSON."""
+    return {
+        "map_id": map_id,
+        "revision": revision,
+        "segments": outline.segments,
+        "bounds": outline.bounds,
+        "sigma": outline.sigma,
+        "oriented": outline.oriented,
+    }
 
 
 def _conditional(*names: str) -> list[dict[str, Any]]:
@@ -56,14 +69,13 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     exchange, demands = Exchange(request), demands_of(request)
     services = exchange.services
     asked, document = await exchange.read(read_map)
-    summary = await services.parse_threads.run(partial(summary_of, asked))
-    put = partial(services.store.put, map_id, document, summary, demands)
+    outline = await services.parse_threads.run(partial(outline_of, asked))
+    put = partial(services.store.put, map_id, document, outline, demands)
     revision, created = await ask_store(services, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
-    count, bounds = summary
-    answer = {"map_id": map_id, "revision": revision, "segments": count, "bounds": bounds}
-    return json_response(encode(answer), 201 if created else 200, {"ETag": etag(revision)})
+    answer = encode(_told(map_id, revision, outline))
+    return json_response(answer, 201 if created else 200, {"ETag": etag(revision)})
 
 
 @router.get(
@@ -104,10 +116,7 @@ async def list_maps(
     """List what is stored, by id."""
     services = Exchange(request).services
     page = await ask_store(services, partial(services.store.list, limit, cursor))
-    items = [
-        {"map_id": item.map_id, "revision": item.revision, "segments": item.segments, "bounds": item.bounds}
-        for item in page.maps
-    ]
+    items = [_told(item.map_id, item.revision, item.outline) for item in page.maps]
     return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import SecretStr
 
-from service.admission.entrance import SEARCHING, Entrance
+from service.admission.entrance import SEARCHING, Entrance, search_of
 from service.admission.errors import ForeignHostError, MissingKeyError, QueueFullError, ShareUsedError, UnknownKeyError
 from service.admission.keys import Keyring
 from service.admission.origins import Origins
@@ -35,6 +35,18 @@ def key(name: str) -> list[tuple[bytes, bytes]]:
 
 def length(count: int) -> list[tuple[bytes, bytes]]:
     return [(b"content-length", b"%d" % count)]
+
+
+def test_what_needs_a_turn_at_the_gate() -> None:
+    """Counted under a route that nobody can make more of: without the id of a map."""
+    for path in SEARCHING:
+        assert search_of("POST", path) == path
+        assert search_of("GET", path) is None
+    for method in ("GET", "HEAD", "POST"):
+        assert search_of(method, "/v1/maps/hq-3:check") == "/v1/maps/{map_id}:check"
+        assert search_of(method, "/v1/maps/hq-3") is None
+    assert search_of("PUT", "/v1/maps/hq-3:check") is None
+    assert search_of("GET", "/v2/maps/hq-3:check") is None
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT"])

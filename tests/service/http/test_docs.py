@@ -10,16 +10,25 @@ import pytest
 
 from service.http.problems import TABLE
 
-TEXT = (Path(__file__).parents[3] / "docs" / "http.md").read_text()
+ROOT = Path(__file__).parents[3]
+TEXT = (ROOT / "docs" / "http.md").read_text()
+README = (ROOT / "README.md").read_text()
 STORED = re.findall(
     r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT
 )
-EXAMPLES = re.findall(r"curl -s localhost:8000(/v1/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT)
+ASKED = r"curl -s localhost:8000(/v1/\S+) -H 'Content-Type: application/json' -d '([^']*)'"
+EXAMPLES = re.findall(ASKED, TEXT)
 
 
 def test_there_are_examples() -> None:
     assert [path for path, _ in STORED] == ["/v1/maps/hq-3"]
-    assert [path for path, _ in EXAMPLES] == ["/v1/register", "/v1/associate", "/v1/vectorize", "/v1/associate"]
+    assert [path for path, _ in EXAMPLES] == [
+        "/v1/register",
+        "/v1/associate",
+        "/v1/vectorize",
+        "/v1/associate",
+        "/v1/maps/hq-3:check",
+    ]
 
 
 @pytest.mark.parametrize(("path", "body"), EXAMPLES)
@@ -32,14 +41,35 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
     assert answer.status_code == 200, answer.text
     if path == "/v1/vectorize":
         assert len(answer.json()["segments"]) == 1
+    elif path.endswith(":check"):
+        assert (answer.json()["findings"], answer.json()["samples"]["usable"]) == ([], 1)
     else:
         assert (answer.json()["status"], answer.json()["usable"]) == ("ok", True)
+        assert answer.json().get("warnings", []) == []
         assert answer.json()["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_first_thing_that_a_reader_tries_is_answered_as_the_readme_says(client: httpx.Client) -> None:
+    ((path, body),) = re.findall(ASKED, README)
+    answer = client.post(path, content=body.encode()).json()
+    assert (answer["status"], answer["usable"], answer["unmatched_scan"]) == ("ok", True, [4])
+    assert answer["warnings"] == []
+    said = re.search(r'"pose":\{"x":([\d.]+), ?"y":([\d.]+), ?"theta":([\d.]+)\}', README)
+    assert said is not None
+    assert [float(number) for number in said.groups()] == pytest.approx(list(answer["pose"].values()), abs=1e-3)
 
 
 def test_every_code_is_described() -> None:
     for kind in TABLE:
         assert re.search(rf"\| [^|]*{kind.status}[^|]*\| [^|]*`{kind.code}`", TEXT), kind.code
+
+
+def test_every_finding_of_a_check_is_described() -> None:
+    source = "".join(path.read_text() for path in (ROOT / "association" / "checking").glob("*.py"))
+    codes = set(re.findall(r'Finding\(\s*"(\w+)"', source))
+    assert len(codes) >= 13
+    described = TEXT.partition("### Check")[2].partition("## Errors")[0]
+    assert {code for code in codes if f"| `{code}` |" not in described} == set()
 
 
 def test_the_named_settings_exist() -> None:

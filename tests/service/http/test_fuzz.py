@@ -71,6 +71,8 @@ OPERATIONS = [
     ("GET", "/v1/maps/{map_id}"),
     ("DELETE", "/v1/maps/{map_id}"),
     ("GET", "/v1/maps"),
+    ("GET", "/v1/maps/{map_id}:check"),
+    ("POST", "/v1/maps/{map_id}:check"),
     ("GET", "/v1/limits"),
     ("GET", "/version"),
     ("GET", "/livez"),

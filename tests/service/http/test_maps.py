@@ -21,7 +21,8 @@ def test_a_map_comes_back_to_the_bit(client: httpx.Client) -> None:
     }
     put = client.put("/v1/maps/bits", json=document)
     assert put.status_code == 201
-    assert put.json() == {"map_id": "bits", "revision": 1, "segments": 2, "bounds": [0.0, 2.0**-40, 1e3 + 1 / 3, 4.4]}
+    told = {"map_id": "bits", "revision": 1, "segments": 2, "bounds": [0.0, 2.0**-40, 1e3 + 1 / 3, 4.4]}
+    assert put.json() == {**told, "sigma": 0.1, "oriented": None}
     got = client.get("/v1/maps/bits")
     assert got.json() == document
     assert str(got.json()["segments"][1][0]) == "-0.0"
@@ -63,6 +64,56 @@ def test_revisions_and_conditions(client: httpx.Client) -> None:
     again = client.put(url, json=examples.MAP)
     assert (again.status_code, again.headers["etag"]) == (201, '"3"')
     client.delete(url)
+
+
+REVERSED = [[x2, y2, x1, y1] for x1, y1, x2, y2 in examples.SEEN]
+
+
+def test_properties_go_with_the_map(client: httpx.Client) -> None:
+    """Put, got, listed; a change of one is a new revision with another tag."""
+    url = "/v1/maps/properties"
+    plain = {"segments": examples.WALLS}
+    tags = []
+    for more in ({}, {"oriented": False}, {"oriented": None, "sigma": None}, {"oriented": True, "sigma": 0.03}):
+        put = client.put(url, json=plain | more)
+        tags.append(put.headers["etag"])
+        told = {"sigma": more.get("sigma"), "oriented": more.get("oriented")}
+        assert {name: put.json()[name] for name in told} == told
+        assert client.get(url).json() == plain | more
+        page = client.get("/v1/maps", params={"limit": 1, "cursor": "propertier"}).json()
+        assert page["maps"] == [put.json()]
+    assert len(set(tags)) == len(tags)
+    assert client.get(url, headers={"if-none-match": tags[-2]}).status_code == 200
+    assert client.get(url, headers={"if-none-match": tags[-1]}).status_code == 304
+    for wrong in ("no", 0, 1, []):
+        refused = client.put(url, json=plain | {"oriented": wrong})
+        assert (refused.status_code, refused.json()["errors"][0]["pointer"]) == (422, "/oriented")
+    client.delete(url)
+
+
+@pytest.mark.parametrize("database", ["sqlite", "postgresql"], indirect=True)
+def test_a_property_counts_unless_the_request_says_otherwise(start_service: Callable[..., Any], database: str) -> None:
+    """Stored or sent, alone or in a batch: a scan that runs the other way fits where directions mean nothing."""
+    client = start_service(database_url=database).client
+    undirected = {"segments": examples.WALLS, "oriented": False}
+    client.put("/v1/maps/undirected", json=undirected).raise_for_status()
+    scan = {"segments": REVERSED, "viewpoint": None}
+    for where in ({"map_id": "undirected"}, undirected, {**undirected, "meta": "a file of its own"}):
+        for options, usable in (({}, True), ({"oriented": None}, True), ({"oriented": True}, False)):
+            one = client.post("/v1/associate", json={"map": where, "scan": scan, "options": options}).json()
+            assert one["usable"] is usable, (where, options)
+            many = client.post("/v1/associate:batch", json={"map": where, "scans": [scan], "options": options}).json()
+            assert many["results"][0]["result"]["usable"] is usable
+    directed = {"segments": examples.WALLS}
+    asked = {"map": directed, "scan": scan, "options": {"oriented": False}}
+    assert client.post("/v1/associate", json=asked).json()["usable"]
+
+
+def test_a_property_counts_for_known_correspondences(client: httpx.Client) -> None:
+    scan = {"segments": REVERSED}
+    for own, option, usable in ((None, {}, False), (False, {}, True), (False, {"oriented": True}, False)):
+        body = {"map": {"segments": examples.WALLS, "oriented": own}, "scan": scan, "options": option}
+        assert client.post("/v1/register", json=body).json()["usable"] is usable, (own, option)
 
 
 def test_a_listing_has_pages(start_service: Callable[..., Any]) -> None:

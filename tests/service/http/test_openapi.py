@@ -12,6 +12,7 @@ import pytest
 
 from service.http.openapi import Contract
 from service.http.problems import KINDS
+from service.schemas import examples
 from service.threads import Threads
 
 
@@ -64,6 +65,8 @@ def test_every_route_is_in_it(document: dict[str, Any]) -> None:
         ("GET", "/v1/maps/{map_id}"),
         ("DELETE", "/v1/maps/{map_id}"),
         ("GET", "/v1/maps"),
+        ("GET", "/v1/maps/{map_id}:check"),
+        ("POST", "/v1/maps/{map_id}:check"),
         ("GET", "/v1/limits"),
         ("GET", "/version"),
         ("GET", "/livez"),
@@ -112,11 +115,73 @@ def test_every_example_is_answered(document: dict[str, Any], client: httpx.Clien
         for example in content.get("application/json", {}).get("examples", {}).values():
             url = path.replace("{map_id}", "hq-3")
             status = client.request(method, url, json=example["value"]).status_code
-            stored = example["value"].get("map", {}).get("map_id")
+            stored = example["value"].get("map", {}).get("map_id") or path.endswith(":check")
             assert status in ((404,) if stored else (200, 201)), (path, status)
             client.delete("/v1/maps/hq-3")
             tried += 1
     assert tried >= 6
+
+
+def parts_of(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    yield schema
+    for one in schema.get("anyOf", []):
+        yield from parts_of(one)
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "edges"),
+    [
+        ("SearchOptions", "max_alternatives", (0, 50)),
+        ("SearchOptions", "confidence", (0.5, 1.0)),
+        ("SearchOptions", "offset_tolerance", (1e-3, 0.4)),
+        ("SearchOptions", "angle_tolerance", (1e-3, 0.35)),
+        ("SearchOptions", "min_overlap", (0.0, 1.0)),
+        ("HardPriorFields", "radius", (0.0, 1e6)),
+        ("HardPriorFields", "angle", (0.0, 4.0)),
+    ],
+)
+def test_the_document_allows_what_the_service_takes_and_no_more(
+    document: dict[str, Any], client: httpx.Client, model: str, name: str, edges: tuple[float, float]
+) -> None:
+    field = document["components"]["schemas"][model]["properties"][name]
+    (bounds,) = (part for part in parts_of(field) if part.get("type") in ("number", "integer"))
+    low = bounds.get("minimum", bounds.get("exclusiveMinimum"))
+    assert (low, bounds["maximum"]) == edges
+
+    def status(value: float) -> int:
+        body = dict(examples.ASSOCIATE)
+        if model == "HardPriorFields":
+            body["prior"] = {"x": 1.0, "y": 0.5, "theta": 1.5, "radius": 3.0, "angle": 1.0, name: value}
+        else:
+            body["options"] = {name: value}
+        return client.post("/v1/associate", json=body).status_code
+
+    beyond = 1 if bounds["type"] == "integer" else 1e-3
+    assert status(low) == (422 if "exclusiveMinimum" in bounds else 200)
+    assert (status(bounds["maximum"]), status(bounds["maximum"] + beyond)) == (200, 422)
+
+
+def test_weights_are_taken_as_the_document_says(document: dict[str, Any], client: httpx.Client) -> None:
+    weights = document["components"]["schemas"]["RegisterRequest"]["properties"]["weights"]
+    (item,) = (part["items"] for part in parts_of(weights) if part.get("type") == "array")
+    zero, some = item["anyOf"]
+    assert zero == {"const": 0}
+    for weight, status in ((0, 200), (some["minimum"], 200), (1.0, 200), (some["maximum"], 200), (1e-101, 422)):
+        answer = client.post("/v1/register", json={**examples.REGISTER, "weights": [1.0, weight]})
+        assert answer.status_code == status, weight
+        if status == 422:
+            assert answer.json()["errors"][0]["pointer"] == "/weights/1"
+
+
+def test_padlocks_are_on_what_asks_for_a_key(document: dict[str, Any], guarded: Any) -> None:
+    """What is open has none; of a service without keys that is everything."""
+    assert "security" not in document
+    assert not any("security" in operation for _, _, operation in operations(document))
+    locked = httpx.get(guarded.url + "/openapi.json").json()
+    assert "security" not in locked
+    for method, path, operation in operations(locked):
+        assert operation.get("security") == ([{"key": []}] if path.startswith("/v1/") else None), (method, path)
+    assert locked["components"]["securitySchemes"] == {"key": {"type": "http", "scheme": "bearer"}}
 
 
 def test_quantities_have_units(document: dict[str, Any]) -> None:

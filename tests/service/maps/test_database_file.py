@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from service.database_url import database_url
-from service.maps import MapStore, Preconditions
+from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import StoreAwayError
 from service.schemas import examples
 from tests.running import RunningService, children_of, until
@@ -23,7 +23,7 @@ def open_store(path: Path, *, may_make: bool = True) -> MapStore:
 
 
 def put(store: MapStore) -> None:
-    store.put("m", b"{}", (1, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+    store.put("m", b"{}", MapOutline(1, (0.0, 0.0, 1.0, 1.0)), Preconditions())
 
 
 def test_it_is_for_its_owner_alone(tmp_path: Path) -> None:

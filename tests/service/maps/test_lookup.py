@@ -13,13 +13,12 @@ import pytest
 from association import InvalidMapError
 from registration import InputError
 from service.database_url import database_url
-from service.maps import CachedMap, IndexCache, MapStore, Preconditions
+from service.maps import CachedMap, IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.errors import BusyStoreError, UnknownMapError
-from service.maps.lookup import OVERHEAD, MapLookup, summary_of
+from service.maps.lookup import OVERHEAD, MapLookup, outline_of
 from service.parsing.parser_process import LARGE, ParserProcess
 from service.schemas import examples
-from service.schemas.parts import InlineMap, StoredMap
-from service.schemas.requests import MapDocument
+from service.schemas.parts import InlineMap, MapDocument, StoredMap
 from service.telemetry.metrics import Metrics
 
 
@@ -32,7 +31,7 @@ class Lookup(MapLookup):
         self.parser = ParserProcess()
         super().__init__(self.cache, self.store, self.parser)
 
-    def look(self, asked: InlineMap | StoredMap, *, oriented: bool) -> tuple[CachedMap, int | None]:
+    def look(self, asked: InlineMap | StoredMap, *, oriented: bool | None) -> tuple[CachedMap, int | None]:
         """Find and index, as for one request."""
         if isinstance(asked, InlineMap):
             return self.indexed(asked, oriented=oriented), None
@@ -40,7 +39,12 @@ class Lookup(MapLookup):
         return self.indexed(found, oriented=oriented), found.record.revision
 
     def put(self, map_id: str, **parts: Any) -> None:
-        self.store.put(map_id, orjson.dumps(parts), (6, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+        self.store.put(
+            map_id,
+            orjson.dumps(parts),
+            MapOutline(6, (0.0, 0.0, 1.0, 1.0), None, parts.get("oriented")),
+            Preconditions(),
+        )
 
 
 @pytest.fixture
@@ -79,6 +83,24 @@ def test_a_map_without_directions_is_another_one_in_the_cache(lookup: Lookup) ->
     assert again is one
     assert lookup.cache.bytes == one.index.nbytes + other.index.nbytes + 2 * OVERHEAD
     assert other.index.undirected is other.index
+
+
+@pytest.mark.parametrize(
+    ("asked", "own", "oriented"),
+    [
+        (None, None, True), (None, True, True), (None, False, False), (True, None, True), (True, False, True),
+        (False, None, False), (False, True, False),
+    ],
+)  # fmt: skip
+def test_the_request_s_option_goes_before_the_map_s_property(
+    lookup: Lookup, asked: bool | None, own: bool | None, oriented: bool
+) -> None:
+    lookup.put("m", segments=examples.WALLS, oriented=own)
+    sent, _ = lookup.look(inline(oriented=own), oriented=asked)
+    stored, _ = lookup.look(StoredMap(map_id="m"), oriented=asked)
+    assert (sent.oriented, stored.oriented) == (oriented, oriented)
+    assert lookup.find("m", oriented=oriented).document is None  # the same place in the cache
+    assert lookup.look(inline(), oriented=oriented)[0] is sent
 
 
 def test_a_stored_map_is_the_one_that_is_stored_now(lookup: Lookup) -> None:
@@ -139,9 +161,9 @@ def document(rows: object) -> MapDocument:
 
 
 def test_what_is_stored_has_a_count_and_bounds() -> None:
-    count, bounds = summary_of(document([[-1.0, 2.0, 3.0, -0.0], [0.0, 0.0, 1.0, 5.0]]))
-    assert (count, bounds) == (2, (-1.0, 0.0, 3.0, 5.0))
-    assert str(bounds[1]) == "0.0"  # not -0.0, which not every database keeps
+    found = outline_of(document([[-1.0, 2.0, 3.0, -0.0], [0.0, 0.0, 1.0, 5.0]]))
+    assert (found.segments, found.bounds) == (2, (-1.0, 0.0, 3.0, 5.0))
+    assert str(found.bounds[1]) == "0.0"  # not -0.0, which not every database keeps
 
 
 @pytest.mark.parametrize("width", [1e5, 1e5 + 0.001])
@@ -151,13 +173,13 @@ def test_a_map_is_at_most_100_km_wide(width: float) -> None:
         [[0.0, 0.0, 0.0, 1.0], [0.0, width - 1.0, 0.0, width]],
     ):
         if width == 1e5:
-            assert summary_of(document(rows))[0] == 2
+            assert outline_of(document(rows)).segments == 2
         else:
             with pytest.raises(InvalidMapError, match="extent"):
-                summary_of(document(rows))
+                outline_of(document(rows))
 
 
 def test_what_could_not_be_searched_is_not_stored() -> None:
     for rows, message in (([], "at least one"), ([[0.0, 0.0, 0.0, 0.0]], "shorter")):
         with pytest.raises(InputError, match=message):
-            summary_of(document(rows))
+            outline_of(document(rows))

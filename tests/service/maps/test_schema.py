@@ -14,12 +14,13 @@ from alembic.migration import MigrationContext
 from sqlalchemy import Column, Engine, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
 
 from service.database_url import database_url
-from service.maps import MapStore, Preconditions, schema
+from service.maps import MapOutline, MapStore, Preconditions, schema
 from service.maps.database import open_engine
 from service.maps.errors import CorruptMapError, StoreAwayError, UnknownMapError
 from service.maps.tables import metadata
 
-BOX = (4, (0.0, 0.0, 1.0, 1.0))
+BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
+ROUGH = b'{"segments":[[0,0,1,0]],"sigma":0.07}'
 # As `create_all` made it before there were migrations.
 OLD = Table(
     "maps",
@@ -49,6 +50,7 @@ def make_old(database: str) -> None:
             an_old_row("kept", 3, b"document", hashlib.sha256(b"document").hexdigest()),
             an_old_row("damaged", 2, b"document", hashlib.sha256(b"another").hexdigest()),
             an_old_row("deleted", 5, None, ""),
+            an_old_row("rough", 1, ROUGH, hashlib.sha256(ROUGH).hexdigest()),
         ):
             connection.execute(OLD.insert().values(**row))
     engine.dispose()
@@ -57,7 +59,11 @@ def make_old(database: str) -> None:
 def check_migrated(store: MapStore) -> None:
     kept = store.load("kept")
     assert (kept.record.revision, kept.document) == (3, b"document")
-    assert [item.bounds for item in store.list(10, "").maps if item.map_id == "kept"] == [(-0.5, 1 / 3, 1e5, 2.0)]
+    assert [item.outline.bounds for item in store.list(10, "").maps if item.map_id == "kept"] == [
+        (-0.5, 1 / 3, 1e5, 2.0)
+    ]
+    told = {item.map_id: (item.outline.sigma, item.outline.oriented) for item in store.list(10, "").maps}
+    assert told == {"damaged": (None, None), "kept": (None, None), "rough": (0.07, None)}
     for name, error in (("damaged", CorruptMapError), ("deleted", UnknownMapError)):
         with pytest.raises(error):
             store.load(name)
@@ -94,7 +100,7 @@ def test_workers_that_start_together(database: str, old: bool) -> None:
     if old:
         make_old(database)
     program = (
-        "import sys; from service.database_url import database_url; from service.maps import MapStore; "
+        "import sys; from service.database_url import database_url; from service.maps import MapOutline, MapStore; "
         "store = MapStore(database_url(sys.argv[1])); sys.stdin.read(1); store.open(); store.close()"
     )
     workers = [
@@ -119,7 +125,7 @@ def test_a_migration_that_fails_leaves_what_was_there(database: str, monkeypatch
         raise RuntimeError("the power is gone")
 
     with monkeypatch.context() as broken:
-        broken.setattr("service.maps.records.columns_of", fail)
+        broken.setattr("alembic.op.add_column", fail)
         with pytest.raises(RuntimeError):
             store.open()
     engine = open_engine(database_url(database))

@@ -14,7 +14,7 @@ import pytest
 from sqlalchemy import Engine, event, text
 
 from service.database_url import database_url
-from service.maps import MapRecord, MapStore, Preconditions
+from service.maps import MapOutline, MapRecord, MapStore, MapSummary, Preconditions
 from service.maps import database as connections
 from service.maps.database import open_engine
 from service.maps.errors import (
@@ -27,7 +27,7 @@ from service.maps.errors import (
     UnknownMapError,
 )
 
-BOX = (4, (0.0, 0.0, 1.0, 1.0))
+BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
 ANY = Preconditions()
 
 
@@ -68,11 +68,11 @@ def on_every(name: str, function: Callable[..., None]) -> Iterator[None]:
 
 def test_a_map_lives_through_its_revisions(store: MapStore) -> None:
     assert store.put("m", b"one", BOX, ANY) == (1, True)
-    assert store.put("m", b"two", (5, (-1.0, 0.1, 1e5, 1 / 3)), ANY) == (2, False)
+    assert store.put("m", b"two", MapOutline(5, (-1.0, 0.1, 1e5, 1 / 3)), ANY) == (2, False)
     assert store.load("m").document == b"two"
     assert store.record("m") == store.load("m").record == MapRecord("m", 2, store.record("m").sha256)
     page = store.list(10, "")
-    assert [(item.map_id, item.revision, item.segments, item.bounds) for item in page.maps] == [
+    assert [(item.map_id, item.revision, item.outline.segments, item.outline.bounds) for item in page.maps] == [
         ("m", 2, 5, (-1.0, 0.1, 1e5, 1 / 3))
     ]
     store.delete("m", ANY)
@@ -83,12 +83,23 @@ def test_a_map_lives_through_its_revisions(store: MapStore) -> None:
     assert store.put("m", b"three", BOX, ANY) == (3, True)
 
 
+def test_a_map_s_properties_are_told_without_reading_it(store: MapStore) -> None:
+    told = [
+        MapOutline(4, (0.0, 0.0, 1.0, 1.0), sigma, oriented)
+        for sigma, oriented in ((None, None), (0.0, False), (1 / 3, True), (-0.0, None))
+    ]
+    for number, outline in enumerate(told):
+        store.put("m", b"x", outline, ANY)
+        assert store.list(10, "").maps == [MapSummary("m", number + 1, outline)]
+        assert store.record("m").oriented is store.load("m").record.oriented is outline.oriented
+
+
 def test_one_map_s_changes_leave_the_others_alone(store: MapStore) -> None:
     for name in ("a", "b", "c"):
         store.put(name, name.encode(), BOX, ANY)
-    store.put("b", b"B", (7, (0.0, 0.0, 9.0, 9.0)), ANY)
+    store.put("b", b"B", MapOutline(7, (0.0, 0.0, 9.0, 9.0)), ANY)
     store.delete("c", ANY)
-    assert [(item.map_id, item.revision, item.segments) for item in store.list(10, "").maps] == [
+    assert [(item.map_id, item.revision, item.outline.segments) for item in store.list(10, "").maps] == [
         ("a", 1, 4),
         ("b", 2, 7),
     ]

@@ -17,7 +17,7 @@ from service.parsing.errors import NotJsonError, ParserEndedError
 from service.parsing.parser_process import ParserProcess
 from service.parsing.reading import read_map, read_model
 from service.schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
-from service.schemas.requests import MapDocument
+from service.schemas.parts import MapDocument
 
 from .bodies import LIMITS, large_map
 

@@ -11,7 +11,8 @@ from service.parsing.errors import NotJsonError
 from service.parsing.reading import parse, read_batch, read_map, read_model, read_stored
 from service.schemas import examples
 from service.schemas.errors import InvalidRequestError, TooManyError
-from service.schemas.requests import AssociateRequest, BatchItem, MapDocument, RegisterRequest, VectorizeRequest
+from service.schemas.parts import MapDocument
+from service.schemas.requests import AssociateRequest, BatchItem, RegisterRequest, VectorizeRequest
 
 from .bodies import LIMITS
 
@@ -52,7 +53,7 @@ def test_what_is_not_json(body: bytes) -> None:
 
 @pytest.mark.parametrize("number", [b"NaN", b"Infinity", b"-Infinity", b"-inf"])
 def test_nan_is_told_what_to_send_instead(number: bytes) -> None:
-    with pytest.raises(NotJsonError, match="a range without a return is null"):
+    with pytest.raises(NotJsonError, match="an unknown range is null"):
         parse(b"[1.0, " + number + b"]", LIMITS)
 
 
@@ -110,7 +111,7 @@ def test_of_a_map_what_was_sent_is_kept_and_no_more() -> None:
     asked, document = read_map(orjson.dumps({"segments": [ROW], "meta": [1]}), LIMITS)
     assert orjson.loads(document) == {"segments": [ROW], "meta": [1]}
     assert (asked.sigma, asked.frame_id) == (None, "map")
-    full = {"segments": [ROW], "sigma": 0.1, "frame_id": "f", "meta": None}
+    full = {"segments": [ROW], "sigma": 0.1, "oriented": False, "frame_id": "f", "meta": None}
     assert orjson.loads(read_map(orjson.dumps(full), LIMITS)[1]) == full
 
 

@@ -69,7 +69,11 @@ def compiled_by_requests() -> list[str]:
     app = create_app(Settings(data_dir=sys.argv[1]))
     with TestClient(app, base_url="http://localhost") as client:
         until(lambda: client.get("/readyz").status_code == 200)
-        for path, bodies in (("/v1/associate", associations()), ("/v1/register", registrations())):
+        client.put("/v1/maps/m", json=examples.MAP)
+        assert client.get("/v1/maps/m:check").status_code == 200
+        samples = {"scans": [asked["scan"] for asked in associations()[:6]]}
+        checks = ("/v1/maps/m:check", [samples, examples.CHECK])
+        for path, bodies in (("/v1/associate", associations()), ("/v1/register", registrations()), checks):
             for body in bodies:
                 answer = client.post(path, json=body)
                 assert answer.status_code == 200, answer.text

@@ -6,7 +6,7 @@ A row of `maps` is looked at before every search, and behind a document of megab
 import sqlalchemy as sa
 from alembic import op
 
-from service.maps.records import Bounds, MapRecord, columns_of
+from service.maps.records import seal
 
 revision = "0002"
 down_revision = "0001"
@@ -34,10 +34,11 @@ def upgrade() -> None:
 
 
 def _seal_rows() -> None:
-    names = ("map_id", "revision", "sha256", "segments", "min_x", "min_y", "max_x", "max_y", "seal", "quarantined")
-    maps = sa.table("maps", *(sa.column(name) for name in names))
+    names = ("map_id", "revision", "sha256", "segments", "min_x", "min_y", "max_x", "max_y")
+    maps = sa.table("maps", *(sa.column(name) for name in (*names, "seal")))
     connection = op.get_bind()
     for row in connection.execute(sa.select(maps)).all():
-        bounds: Bounds = (row.min_x, row.min_y, row.max_x, row.max_y)
-        sealed = columns_of(MapRecord(row.map_id, row.revision, row.sha256), row.segments, bounds)
-        connection.execute(sa.update(maps).where(maps.c.map_id == row.map_id).values(**sealed))
+        # SQLite does not keep the sign of zero.
+        numbers = tuple(value + 0.0 for value in (row.min_x, row.min_y, row.max_x, row.max_y))
+        sealed = seal(row.map_id, row.revision, row.sha256, row.segments, *numbers)
+        connection.execute(sa.update(maps).where(maps.c.map_id == row.map_id).values(seal=sealed))

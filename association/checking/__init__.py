@@ -1,0 +1,22 @@
+"""What is doubtful in a map, by itself and beside sample scans; told to whoever made it, and never held against it.
+
+Everything here works on a `MapIndex` and uses the search as a caller would.
+"""
+
+from .check import check_map
+from .judging import judge_samples
+from .result import Advice, Finding, MapCheck, Place, SampleReport, Size
+from .samples import Sample, try_sample
+
+__all__ = [
+    "Advice",
+    "Finding",
+    "MapCheck",
+    "Place",
+    "Sample",
+    "SampleReport",
+    "Size",
+    "check_map",
+    "judge_samples",
+    "try_sample",
+]

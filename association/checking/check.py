@@ -1,0 +1,69 @@
+"""Checking a map by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..map_index import MapIndex
+from ..options import CancelledError, Deadline
+from .likeness import find_look_alikes, likeness_findings
+from .pieces import beside, drawing_findings, drawn_sigma
+from .result import Advice, Finding, MapCheck, Size
+from .sides import Sides, direction_findings, look_from_walls
+from .tuning import LARGEST, SMALLEST
+
+
+def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bool = True) -> MapCheck:
+    """Look for what is doubtful in a map: its directions, how it was drawn, its size, what of it looks alike.
+
+    Parameters
+    ----------
+    index : MapIndex
+        Built with its directions, whatever they mean.
+    deadline : Deadline, optional
+        When it passes, what was found so far is the answer and ``complete`` is False.
+    oriented : bool
+        Whether the map says that directions mean something.
+
+    Returns
+    -------
+    MapCheck
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    until = deadline or Deadline()
+    size = Size(index.directed, len(index.walls.rows), float(index.walls.longest.sum()), index.diagonal)
+    findings = list(_size_findings(size))
+    advice, pairs = Advice(drawn_sigma(index)), beside(index)
+    if oriented and not findings:  # of another unit walls are too far apart to see one another
+        sides = look_from_walls(index, pairs.both_ways(size.walls), until)
+        findings += direction_findings(index, sides)
+        advice = Advice(advice.sigma, _directed(sides, findings))
+    for found in () if until.passed else drawing_findings(index, pairs):
+        findings.append(found)
+        if until.passed:
+            break
+    means_something = oriented and advice.oriented is not False
+    likeness = find_look_alikes(index, until, oriented=means_something)
+    findings += likeness_findings(index, likeness)
+    if until.cancelled:
+        raise CancelledError
+    return MapCheck(size, tuple(findings), advice, likeness.places, likeness.looked_from, not until.passed)
+
+
+def _directed(sides: Sides, findings: list[Finding]) -> bool | None:
+    """Return what speaks for directions that mean something; None where too little was seen to say."""
+    if sides.meaningless:
+        return False
+    return None if findings or not sides.left.sum() else True
+
+
+def _size_findings(size: Size) -> Iterator[Finding]:
+    if not SMALLEST <= size.diagonal <= LARGEST:
+        yield Finding(
+            "unlikely_size",
+            f"The map is {size.diagonal:.3g} m from corner to corner: is it in metres?",
+        )

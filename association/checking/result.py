@@ -1,0 +1,115 @@
+"""What a map check says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from registration import RigidTransform
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something doubtful: a stable code, a plain sentence, and the indices of the map segments that it is about."""
+
+    code: str
+    message: str
+    segments: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """How much of it there is.
+
+    Attributes
+    ----------
+    segments : int
+        As sent.
+    walls : int
+        What they come to where collinear ones are one.
+    length : float
+        Of the walls together, metres.
+    diagonal : float
+        Of the box around them, metres.
+    """
+
+    segments: int
+    walls: int
+    length: float
+    diagonal: float
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place from which the map shows what it shows elsewhere too.
+
+    Attributes
+    ----------
+    pose : RigidTransform
+        In the map frame.
+    look_alike : RigidTransform
+        Where it shows about the same.
+    """
+
+    pose: RigidTransform
+    look_alike: RigidTransform
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What the map's properties should be; None where nothing speaks for a value.
+
+    Attributes
+    ----------
+    sigma : float or None
+        Standard deviation of its lines normal to themselves, metres.
+    oriented : bool or None
+        Whether directions of its segments mean anything.
+    """
+
+    sigma: float | None = None
+    oriented: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MapCheck:
+    """What is doubtful in a map.
+
+    Attributes
+    ----------
+    size : Size
+    findings : tuple of Finding
+        The weightiest first.
+    advice : Advice
+    places : tuple of Place
+    looked_from : int
+        From how many places it was looked for others that are alike.
+    complete : bool
+        False when the deadline ended it.
+    """
+
+    size: Size
+    findings: tuple[Finding, ...]
+    advice: Advice
+    places: tuple[Place, ...]
+    looked_from: int
+    complete: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SampleReport:
+    """What sample scans say of a map.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+    advice : Advice
+    usable : int
+        Of the scans, as the map is.
+    usable_as_advised : int
+        With the advice taken.
+    """
+
+    findings: tuple[Finding, ...]
+    advice: Advice
+    usable: int
+    usable_as_advised: int

@@ -1,0 +1,160 @@
+"""Searching a sample scan in a map as it is, and as it might be."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from registration import RigidTransform
+
+from ..causes import Cause, Mistake, find_causes, scaled
+from ..context import SearchContext
+from ..explain import explain
+from ..map_index import MapIndex
+from ..null import mirrored
+from ..options import AssociationOptions, Deadline, Scan
+from ..report import report
+from ..result import AssociationResult
+from ..scaling import scale_near_one
+from ..verdict import judge
+from .tuning import (
+    BETTER_SCALED,
+    LEAST_SHARE,
+    SIGMAS,
+)
+
+Way = tuple[bool, float | None]
+"""How a map is taken: whether directions mean something, and the sigma of its lines, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """How a scan fits a map that is taken in one way.
+
+    Attributes
+    ----------
+    usable : bool
+    score : float
+        Nats; 0 where nothing fits.
+    offsets : dict of int to float
+        By map segment, how far what was seen of it is off, metres; empty where too little of the scan fits.
+    """
+
+    usable: bool
+    score: float
+    offsets: Mapping[int, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What came of one scan.
+
+    Attributes
+    ----------
+    result : AssociationResult
+        In the map as it is.
+    trials : dict of Way to Trial
+    mirrored : Trial or None
+        With left and right exchanged, in the map as it is; None where there was no time for it.
+    mistakes : tuple of Mistake
+        Without which it would fit much better.
+    factor : float or None
+        What its lengths are to be multiplied with to fit better; None where they are right.
+    moved : RigidTransform or None
+        From where it was said to be taken to where it was found, in the map frame; None where either is not known.
+    """
+
+    result: AssociationResult
+    trials: Mapping[Way, Trial]
+    mirrored: Trial | None
+    mistakes: tuple[Mistake, ...]
+    factor: float | None
+    moved: RigidTransform | None
+
+
+def try_sample(
+    index: MapIndex, scan: Scan, deadline: Deadline, *, oriented: bool, said: RigidTransform | None = None
+) -> Sample:
+    """Search a scan in a map as it is, and as it might be.
+
+    Parameters
+    ----------
+    index : MapIndex
+        Built with its directions, whatever they mean; its sigma is the map's.
+    scan : Scan
+    deadline : Deadline
+        What it leaves no time for is not tried.
+    oriented : bool
+        Whether the map says that directions mean something.
+    said : RigidTransform, optional
+        Where the scan was taken, as its sender believes, map_from_scan.
+
+    Returns
+    -------
+    Sample
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    began, present = time.monotonic(), (oriented, index.sigma)
+    context = SearchContext.of(index, scan, None, AssociationOptions(oriented=oriented, causes=True), deadline)
+    explanations = explain(context)
+    verdict = judge(context, explanations)
+    result = report(context, explanations, verdict)
+    trials = {present: _trial(result)}
+    for way in _other_ways(present):
+        if not deadline.passed:
+            trials[way] = _trial(_searched(index, scan, way, deadline))
+    other = None if deadline.passed else _trial(_searched(index, mirrored(scan), present, deadline))
+    # As much time as all of this took may go into mistakes.
+    causes = find_causes(context, explanations, verdict, began)
+    factor = _factor(context, max(trial.score for trial in trials.values()), causes)
+    mistakes = tuple(cause.mistake for cause in causes if cause.mistake is not Mistake.SCALE)
+    moved = None if said is None or not result.usable or result.pose is None else result.pose.compose(said.inverse())
+    return Sample(result, trials, other, mistakes, factor, moved)
+
+
+def _other_ways(present: Way) -> Iterator[Way]:
+    for directed in (True, False) if present[0] else (False,):
+        for sigma in (present[1], *SIGMAS):
+            if (directed, sigma) != present:
+                yield directed, sigma
+
+
+def _searched(index: MapIndex, scan: Scan, way: Way, deadline: Deadline) -> AssociationResult:
+    directed, sigma = way
+    place = replace(index if directed else index.undirected, sigma=sigma)
+    context = SearchContext.of(place, scan, None, AssociationOptions(oriented=directed), deadline)
+    explanations = explain(context)
+    return report(context, explanations, judge(context, explanations))
+
+
+def _trial(result: AssociationResult) -> Trial:
+    diagnostics = result.diagnostics
+    if diagnostics is None:
+        return Trial(False, 0.0, {})
+    enough = result.usable or diagnostics.inlier_fraction >= LEAST_SHARE
+    offsets = {pair.map: pair.offset for pair in result.correspondences} if enough else {}
+    return Trial(result.usable, max(0.0, diagnostics.score), offsets)
+
+
+def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> float | None:
+    """Return by what a scan is to be multiplied to score clearly more than it does anyhow, `known` nats.
+
+    Rooms between lines along the middle of walls look too large by as much as the walls are thick, at any scale.
+    """
+    least = BETTER_SCALED * known
+    told = next((cause for cause in causes if cause.mistake is Mistake.SCALE), None)
+    if told is not None:
+        return told.factor if told.score > least else None
+    if not len(context.scan.measured) or context.deadline.passed:
+        return None
+    near = scale_near_one(context)
+    if near is None or context.deadline.passed:
+        return None
+    way = context.options.oriented, context.index.sigma
+    found = _trial(_searched(context.index, scaled(context.scan, near), way, context.deadline))
+    return near if found.score > least else None

@@ -1,0 +1,67 @@
+"""Every threshold of the map check, by stage; each with its unit, and where it comes from.
+
+"Geometry" follows from what is measured, "tables" was looked up in plans and drawn worlds: no finding where they are
+right, one where they were spoilt.
+"""
+
+import math
+
+# --- Pieces -----------------------------------------------------------------------------------------------------------
+
+SHORT = 0.1  # m, tables; a wall shorter than that tells a search nothing
+LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between what meets and what is a slit that somebody drew
+MOST_ENDS = 20_000  # that are looked about from, some 10 microseconds each
+OVERLAP = 0.05  # m, tables; pieces of one line share less than that where they are cut
+PARALLEL = math.sin(math.radians(3.0))  # tables
+SAME_LINE = 0.03  # m, as `MERGE_LATERAL`; lines nearer to each other than that are one
+DOUBLE = 0.3  # m, tables; two faces that look one way, or at each other, are not so near in a building
+DOUBLE_LENGTH = 0.3  # m, and this share of the shorter, tables; that they run beside each other
+DOUBLE_SHARE = 0.5
+MOST_IN_CELL = 64  # walls of one cell that are compared with each other
+MOST_PAIRS = 4_000_000  # memory
+ON_STEP = 1e-6  # m, rounding
+LARGEST_PIXEL, MANY_ENDS = 0.1, 50  # m, and segments, tables; of a map that was traced from a picture
+STEPS = (0.5, 0.25, 0.2, 0.1, 0.05, 0.04, 0.025, 0.02)  # m; rasters that are looked for; finer ones do no harm
+
+# --- Sides ------------------------------------------------------------------------------------------------------------
+
+MOST_LOOKED_FROM = 2000  # walls, the longest; some 0.1 ms each
+SHORTEST_LOOKED_FROM = 0.3  # m, tables
+PLACES_ON_A_WALL = (0.25, 0.5, 0.75)  # of its length
+TURNS = tuple(math.radians(a) for a in (-60.0, -20.0, 20.0, 60.0))  # of the rays, from the wall's normal
+OFF_THE_WALL = 1e-3  # m, geometry
+FOLLOWED = 40.0  # m, tables
+TOO_NEAR = 0.05  # m, geometry; what lies nearer is the same wall once more
+CONTRADICTED = 0.5  # of a wall's rays on one side
+# Of what rays meet. Measured: up to .07 in drawings of plans, .30 in campus plans, .39 in maps that robots made; from
+# .41 on where directions were thrown away.
+MEANINGLESS = 0.4
+MOST = 0.55  # of the length, measured: .42 at most in plans, from .60 on in most of them the other way round
+
+# --- Likeness ---------------------------------------------------------------------------------------------------------
+
+PLACES = 12  # tables
+RAYS = 360
+REACH = 12.0  # m, tables; of the laser that is thought of
+CLEARANCE = 1.5  # m; how far from a wall it stands at most
+SHORTEST_SEEN = 0.15  # m, as the shortest segments of scans
+SIGMA = 0.01  # m
+
+# --- Size -------------------------------------------------------------------------------------------------------------
+
+SMALLEST, LARGEST = 2.0, 3000.0  # m, tables; the diagonal of what robots drive about in
+
+# --- Samples ----------------------------------------------------------------------------------------------------------
+
+SIGMAS = (0.05, 0.1, 0.2)  # m, tables; what is tried beside the map's own: half the thickness of walls, or more
+WIDEST = max(SIGMAS)
+LITTLE = 0.01  # m, tables; what an estimate comes to where walls are right
+BETTER_SCALED = 1.05  # times, tables
+BETTER_SCORE = 1.15  # times, tables
+BETTER_USABLE = 0.15  # of the scans, tables
+MANY = 0.5  # of the scans that tell anything
+SAME_FACTOR = 0.004  # as `LEAST_STRETCH`; how far apart factors are that mean one scale, or from one
+HIDDEN_SCALE = 0.08  # tables; as much the thickness of walls may feign where lines run along their middle
+MOVED_METRES, MOVED_RADIANS = 0.2, math.radians(2.0)  # tables; less than that may be the poses that were sent
+LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match for its walls to say how far they are off
+LEAST_SIGMA, GREATEST_SIGMA = 0.005, 1.0  # m

@@ -1,0 +1,91 @@
+"""/v1/maps/{map_id}:check: what is doubtful in a stored map."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from association.checking import Sample
+
+from ...admission.errors import DeadlinePassedError
+from ...maps.lookup import FoundMap
+from ...parsing.reading import read_model
+from ...schemas import examples
+from ...schemas.checks import CheckAnswer
+from ...schemas.parts import StoredMap
+from ...schemas.requests import CheckRequest
+from ...work.checking import check, check_done, sample
+from ...work.job import Done, Job
+from ..exchange import Exchange, searching
+from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from .maps import MapIdPath
+
+router = APIRouter(tags=["maps"])
+_FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "invalid_request", "read_only")
+
+
+@router.get(
+    "/v1/maps/{map_id}:check",
+    response_model=CheckAnswer,
+    responses=problems(*_FAILS),
+    summary="Check a map",
+)
+async def get_check(
+    request: Request,
+    map_id: MapIdPath,
+    deadline_ms: Annotated[
+        float | None, Query(ge=0.0, le=600_000.0, description="milliseconds; what it leaves no time for is left out")
+    ] = None,
+) -> Response:
+    """Say what is doubtful in a map: its directions, how it was drawn, its size, and what of it looks alike."""
+    exchange = searching(request)
+    job = exchange.job(deadline_ms)
+    return exchange.answer(await exchange.unless_hung_up(_work(exchange, map_id, None, job), job.deadline))
+
+
+@router.post(
+    "/v1/maps/{map_id}:check",
+    response_model=CheckAnswer,
+    responses=problems(*dict.fromkeys((*_FAILS, *READS_BODY))),
+    openapi_extra=takes(CheckRequest, {"two scans": examples.CHECK}),
+    summary="Check a map beside sample scans",
+)
+async def post_check(request: Request, map_id: MapIdPath) -> Response:
+    """Say also whether scans taken there would fit better mirrored, undirected, at another scale, or moved."""
+    exchange = searching(request)
+    asked = await exchange.read(partial(read_model, CheckRequest))
+    job = exchange.job(asked.deadline_ms)
+    return exchange.answer(await exchange.unless_hung_up(_work(exchange, map_id, asked, job), job.deadline))
+
+
+async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Done:
+    """Check the map in one turn at the gate, and try each sample in another."""
+    lookup = exchange.services.lookup
+    async with exchange.looking_up(StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
+        assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
+        checked = await exchange.take_turn(partial(check, lookup, on, asked, job), job.deadline)
+    samples = None
+    if asked is not None:
+        calls = [partial(sample, checked, asked, number, job) for number in range(len(asked.scans))]
+        samples = await _try_all(exchange, calls, job)
+    return await exchange.services.parse_threads.run(partial(check_done, checked, samples, asked, job))
+
+
+async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | None]], job: Job) -> list[Sample | None]:
+    """Try every sample, as many at once as there are cores; those whose turn comes too late are left out."""
+    found: list[Sample | None] = [None] * len(calls)
+    todo = iter(enumerate(calls))
+
+    async def take_turns() -> None:
+        for index, call in todo:
+            try:
+                found[index] = await exchange.take_turn(call, job.deadline)
+            except DeadlinePassedError:
+                return
+
+    await asyncio.gather(*(take_turns() for _ in range(min(exchange.services.gate.slots, len(calls)))))
+    return found

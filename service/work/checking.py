@@ -1,0 +1,165 @@
+"""Checks of maps: what is doubtful in one by itself, and beside sample scans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from association import Scan
+from association.checking import (
+    Advice,
+    Finding,
+    MapCheck,
+    Sample,
+    check_map,
+    judge_samples,
+    try_sample,
+)
+from registration import InputError
+
+from ..admission.errors import DeadlinePassedError
+from ..maps import CachedMap
+from ..maps.lookup import FoundMap, MapLookup, is_oriented
+from ..schemas.errors import Fault, InvalidRequestError
+from ..schemas.requests import CheckRequest
+from .answers import Json, pose_json
+from .inputs import scanned_of, transform_of
+from .job import Done, Job
+
+MOST_INDICES = 1000  # of one finding
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A map that was checked by itself, ready for samples.
+
+    Attributes
+    ----------
+    cached : CachedMap
+        With its directions, whatever they mean.
+    oriented : bool
+        Whether the map says that they mean something.
+    scans : sequence of Scan
+        The samples.
+    found : MapCheck
+    reference : dict
+        Id and revision of the map, as they are answered.
+    """
+
+    cached: CachedMap
+    oriented: bool
+    scans: Sequence[Scan]
+    found: MapCheck
+    reference: Json
+
+
+def check(lookup: MapLookup, on: FoundMap, asked: CheckRequest | None, job: Job) -> Checked:
+    """Index a stored map and check it; with samples read these, too.
+
+    Raises
+    ------
+    StoreError
+        When the map cannot be had.
+    ParserEndedError
+        When it is large and could not be read.
+    InvalidRequestError
+        When one of the samples is not what the libraries take.
+    DeadlinePassedError
+        When the deadline has passed before.
+    CancelledError
+        When the client has gone.
+    """
+    cached = lookup.indexed(on, oriented=True)
+    scans = [_scan_of(asked, number) for number in range(len(asked.scans))] if asked is not None else []
+    job.watch.lap("decode")
+    if job.deadline.passed and not job.deadline.cancelled:
+        raise DeadlinePassedError
+    oriented = is_oriented(None, on.record.oriented)
+    found = check_map(cached.index, job.deadline, oriented=oriented)
+    return Checked(cached, oriented, scans, found, {"map_id": on.record.map_id, "revision": on.record.revision})
+
+
+def sample(checked: Checked, asked: CheckRequest, number: int, job: Job) -> Sample | None:
+    """Try one of the samples in a map; None when there is no time left. Raises `CancelledError`."""
+    if job.deadline.passed and not job.deadline.cancelled:
+        return None
+    pose = None if asked.poses is None else asked.poses[number]
+    said = None if pose is None else transform_of(pose)
+    return try_sample(checked.cached.index, checked.scans[number], job.deadline, oriented=checked.oriented, said=said)
+
+
+def check_done(checked: Checked, samples: Sequence[Sample | None] | None, asked: CheckRequest | None, job: Job) -> Done:
+    """Return the answer of a check; `samples` None where there were none to try."""
+    job.watch.lap("search")
+    found, findings, advice = checked.found, list(checked.found.findings), checked.found.advice
+    complete, told = found.complete, None
+    if samples is not None:
+        tried = [one for one in samples if one is not None]
+        report = judge_samples(tried, sigma=checked.cached.index.sigma, oriented=checked.oriented)
+        findings = [*report.findings, *findings]
+        advice = _first(report.advice, advice)
+        complete = complete and len(tried) == len(samples) and not job.deadline.passed
+        scans = [_sample_json(number, one) for number, one in enumerate(samples)]
+        told = {"usable": report.usable, "usable_as_advised": report.usable_as_advised, "scans": scans}
+    answer = {
+        "findings": [_finding_json(one) for one in findings],
+        "size": {name: getattr(found.size, name) for name in ("segments", "walls", "length", "diagonal")},
+        "advice": {"sigma": advice.sigma, "oriented": advice.oriented},
+        "places": [{"pose": pose_json(one.pose), "look_alike": pose_json(one.look_alike)} for one in found.places],
+        "looked_from": found.looked_from,
+        "complete": complete,
+        "samples": told,
+        "map": checked.reference,
+        "client_ref": None if asked is None else asked.client_ref,
+    }
+    return job.done(answer, map=checked.reference, findings=[one.code for one in findings])
+
+
+def _first(seen: Advice, drawn: Advice) -> Advice:
+    """Return what scans say of a map, and where they say nothing, what its drawing says."""
+    sigma = drawn.sigma if seen.sigma is None else seen.sigma
+    return Advice(sigma, drawn.oriented if seen.oriented is None else seen.oriented)
+
+
+def _finding_json(finding: Finding) -> Json:
+    return {
+        "code": finding.code,
+        "message": finding.message,
+        "segments": list(finding.segments[:MOST_INDICES]),
+        "count": len(finding.segments),
+    }
+
+
+def _sample_json(number: int, one: Sample | None) -> Json:
+    if one is None:
+        return {"index": number, "status": None, "usable": False, "pose": None}
+    result = one.result
+    return {
+        "index": number,
+        "status": str(result.status),
+        "usable": result.usable,
+        "pose": pose_json(result.pose),
+    }
+
+
+def _scan_of(asked: CheckRequest, number: int) -> Scan:
+    with _placed(number):
+        return scanned_of(asked.scans[number]).scan
+
+
+@contextmanager
+def _placed(number: int) -> Iterator[None]:
+    """Say which of the samples it is in which the libraries refuse something."""
+    try:
+        yield
+    except InvalidRequestError as error:
+        faults = [Fault(_moved(fault.pointer, number), fault.message) for fault in error.faults]
+        raise InvalidRequestError(faults) from error
+    except InputError as error:
+        place = "/" + error.argument.replace(".", "/") + ("" if error.index is None else f"/{error.index}")
+        raise InvalidRequestError([Fault(_moved(place, number), error.message)]) from error
+
+
+def _moved(pointer: str, number: int) -> str:
+    return f"/scans/{number}" + pointer.removeprefix("/scan")

@@ -1,0 +1,161 @@
+"""/v1/maps/{map_id}:check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from service.schemas import examples
+from tests.association.checking.drawn import centre_lines, faces, sampled
+
+URL = "/v1/maps/checked:check"
+
+
+@pytest.fixture(autouse=True)
+def _nothing_stays(client: httpx.Client) -> Iterator[None]:
+    yield
+    client.delete("/v1/maps/checked")
+
+
+def put(client: httpx.Client, segments: Any, **more: Any) -> int:
+    document = {"segments": np.asarray(segments).tolist(), **more}
+    answer = client.put("/v1/maps/checked", json=document)
+    answer.raise_for_status()
+    return int(answer.json()["revision"])
+
+
+def scans(count: int) -> list[dict[str, Any]]:
+    """Return samples as a client sends them."""
+    found = []
+    for _, scan in sampled()[:count]:
+        beams = scan.beams
+        assert beams is not None
+        ranges = [r if math.isfinite(r) else 2.0 * beams.range_max for r in beams.ranges.tolist()]
+        increment = float(beams.angles[1] - beams.angles[0])
+        laser = {"angle_min": float(beams.angles[0]), "angle_increment": increment, "ranges": ranges}
+        found.append({"laser": {**laser, "range_max": beams.range_max}})
+    return found
+
+
+def checked(client: httpx.Client, body: dict[str, Any] | None = None) -> dict[str, Any]:
+    answer = client.get(URL) if body is None else client.post(URL, json=body)
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def codes(answer: dict[str, Any]) -> list[str]:
+    return [one["code"] for one in answer["findings"]]
+
+
+def test_a_map_that_is_right(client: httpx.Client) -> None:
+    revision = put(client, examples.WALLS)
+    answer = checked(client)
+    assert (answer["findings"], answer["complete"], answer["samples"]) == ([], True, None)
+    assert answer["map"] == {"map_id": "checked", "revision": revision}
+    assert answer["size"] == {"segments": 6, "walls": 6, "length": 28.0, "diagonal": 10.0}
+    assert answer["advice"] == {"sigma": None, "oriented": True}
+    assert answer["looked_from"] > 0
+    assert answer["timing_ms"].keys() == {"decode", "search", "total"}
+    assert client.head(URL).status_code == 200
+
+
+def test_findings_name_segments(client: httpx.Client) -> None:
+    put(client, [*examples.WALLS, [0.0, 0.0, 0.05, 0.0], [-3.0, -3.0, 2.0, -3.0]])
+    found = {one["code"]: one for one in checked(client)["findings"]}
+    assert found.keys() == {"short_pieces", "overlaps"}
+    assert (found["short_pieces"]["segments"], found["short_pieces"]["count"]) == ([6], 1)
+    assert found["overlaps"]["segments"] == [0, 7]
+    many = [[x, 0.0, x + 0.05, 0.0] for x in np.arange(0.0, 1500.0, 1.0).tolist()]
+    put(client, [*examples.WALLS, *many])
+    short = next(one for one in checked(client)["findings"] if one["code"] == "short_pieces")
+    assert (len(short["segments"]), short["count"]) == (1000, 1500)
+
+
+def test_lines_along_the_middle_of_walls_and_what_to_do_about_them(client: httpx.Client) -> None:
+    """Without a word next to nothing in such a drawing was usable."""
+    put(client, centre_lines())
+    by_itself = checked(client)
+    assert codes(by_itself) == ["mixed_directions"]
+    assert by_itself["advice"] == {"sigma": None, "oriented": False}
+    seen = checked(client, {"scans": scans(6), "client_ref": 7})
+    assert codes(seen) == ["undirected", "mixed_directions"]
+    assert seen["client_ref"] == 7
+    samples, advice = seen["samples"], seen["advice"]
+    assert samples["usable_as_advised"] > samples["usable"] + 1
+    assert [one["index"] for one in samples["scans"]] == list(range(6))
+    assert sum(one["usable"] for one in samples["scans"]) == samples["usable"]
+    assert advice["oriented"] is False
+    put(client, centre_lines(), **advice)
+    again = checked(client, {"scans": scans(6)})
+    assert codes(again) == []
+    bodies = ({"map": {"map_id": "checked"}, "scan": scan} for scan in scans(6))
+    usable = sum(client.post("/v1/associate", json=body).json()["usable"] for body in bodies)
+    assert usable == again["samples"]["usable"]
+    assert usable > samples["usable"] + 1
+
+
+def test_poses_in_another_frame(client: httpx.Client) -> None:
+    put(client, faces())
+    poses: list[dict[str, float] | None] = [
+        {"x": truth.x + 3.0, "y": truth.y, "theta": truth.theta} for truth, _ in sampled()
+    ]
+    answer = checked(client, {"scans": scans(6), "poses": poses})
+    assert "moved" in codes(answer)
+    assert codes(checked(client, {"scans": scans(6), "poses": [None] * 6})) == [
+        code for code in codes(answer) if code != "moved"
+    ]
+
+
+STILL = {"angle_min": 0, "angle_increment": 0.1, "ranges": [1]}
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({}, "/scans"),
+        ({"scans": []}, "/scans"),
+        ({"scans": [{"segments": examples.SEEN}, {"segments": [[0, 0, 1]]}]}, "/scans/1/segments/0"),
+        ({"scans": [{"segments": examples.SEEN}, {"segments": [[0, 0, 0, 0]]}]}, "/scans/1/segments/0"),
+        ({"scans": [{"laser": {**STILL, "angle_increment": 0}}]}, "/scans/0/laser/angle_increment"),
+        ({"scans": [{"segments": examples.SEEN}], "poses": []}, ""),
+        ({"scans": [{"segments": examples.SEEN}], "poses": [{"x": 0, "y": 0, "theta": 90}]}, "/poses/0/theta"),
+        ({"scans": [{"segments": examples.SEEN}], "priors": []}, "/priors"),
+        ({"scans": [{"segments": []}] * 65}, "/scans"),
+    ],
+)  # fmt: skip
+def test_samples_that_are_none(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
+    put(client, examples.WALLS)
+    answer = client.post(URL, json=body)
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["errors"][0]["pointer"] == pointer
+
+
+def test_it_is_a_search_like_any_other(client: httpx.Client) -> None:
+    put(client, examples.WALLS)
+    for call in (
+        client.get(URL, params={"deadline_ms": 0}),
+        client.post(URL, json={"scans": [{"segments": examples.SEEN}], "deadline_ms": 0}),
+    ):
+        assert (call.status_code, call.json()["code"]) == (504, "deadline_exceeded")
+    assert client.get(URL, params={"deadline_ms": "soon"}).status_code == 422
+    for call in (client.get("/v1/maps/nowhere:check"), client.post("/v1/maps/nowhere:check", json=examples.CHECK)):
+        assert (call.status_code, call.json()["code"]) == (404, "unknown_map")
+    assert client.get("/v1/maps/a b:check").status_code == 422
+    assert client.put("/v1/maps/m:check", json=examples.MAP).status_code == 422
+    text = client.get("/metrics").text
+    assert 'route="/v1/maps/{map_id}:check",status="200"' in text
+
+
+def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
+    put(client, faces())
+    answer = checked(client, {"scans": scans(6) * 10, "deadline_ms": 600})
+    assert answer["complete"] is False
+    left_out = [one for one in answer["samples"]["scans"] if one["status"] is None]
+    assert left_out
+    assert all(one["pose"] is None and not one["usable"] for one in left_out)
