@@ -73,8 +73,11 @@ def _best_directions(samples: Sequence[Sample], present: Way) -> bool:
 
     both = [one for one in samples if {(True, WIDEST), (False, WIDEST)} <= one.trials.keys()]
     (usable, score), (usable_otherwise, score_otherwise) = worth(present[0]), worth(not present[0])
-    more = usable_otherwise > usable + BETTER_USABLE * len(samples)
-    better = more or (score_otherwise > BETTER_SCORE * score and usable_otherwise >= usable)
+    clearly = max(1.0, BETTER_USABLE * len(samples))
+    # A score without directions may well come from chance: then clearly fewer scans are usable.
+    better = usable_otherwise > usable + clearly or (
+        score_otherwise > BETTER_SCORE * score and usable_otherwise >= usable - clearly
+    )
     return present[0] is not better
 
 
