@@ -11,7 +11,9 @@ from .errors import (
 from .line_map import ImportedMap, LineMap
 from .maps import read_map
 from .options import ImportOptions
+from .picture import draw_map
 from .report import ImportReport, Note
+from .writing import write_map
 
 __all__ = [
     "FormatError",
@@ -25,5 +27,7 @@ __all__ = [
     "Note",
     "TooLargeError",
     "UnsupportedFormatError",
+    "draw_map",
     "read_map",
+    "write_map",
 ]

@@ -1,12 +1,12 @@
 """How much of a file of somebody else's is read. What goes beyond is refused, never cut."""
 
-MAX_MAP_BYTES = 64 * 2**20  # of a drawing or a picture
+MAX_MAP_BYTES = 32 * 2**20  # of a drawing or a picture
 MAX_YAML_BYTES = 16 * 2**10  # of a map_server description
 MAX_LOG_BYTES = 64 * 2**30  # of a log, which is streamed
 MAX_LINE_BYTES = 2 * 2**20  # of a text log: some 200,000 ranges
 MAX_CELLS = 40_000_000  # of a grid
-MAX_SEGMENTS = 1_000_000  # of a map
-MAX_ENTITIES = 2_000_000  # of a drawing, with what its blocks expand to
+MAX_SEGMENTS = 500_000  # of a map
+MAX_ENTITIES = 500_000  # of a drawing, with what its blocks expand to
 MAX_DEPTH = 64  # of elements in one another
 MAX_BLOCK_DEPTH = 8  # of blocks in one another
 MAX_CURVE_POINTS = 10_000  # of one arc or spline

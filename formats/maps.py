@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
+from .drawings.drawing import Drawing
+from .drawings.dxf import read_dxf
+from .drawings.geojson import read_geojson
+from .drawings.svg import read_svg
+from .drawings.tables import read_csv, read_json
+from .drawings.walls import to_map
 from .errors import UnsupportedFormatError
 from .files import name_of
 from .grids.faces import find_faces
@@ -14,6 +21,14 @@ from .line_map import ImportedMap, LineMap
 from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
+DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
+    ".dxf": read_dxf,
+    ".svg": read_svg,
+    ".geojson": read_geojson,
+    ".json": read_json,
+    ".csv": read_csv,
+}
+
 
 def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTIONS) -> ImportedMap:
     """Read a map of another tool's, or one of our own.
@@ -21,7 +36,8 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     Parameters
     ----------
     path : str or path
-        A ``.yaml`` of map_server, its picture beside it.
+        A ``.yaml`` of map_server, its picture beside it; a drawing in ``.dxf``, ``.svg`` or ``.geojson``; segments in
+        ``.csv``; a map file of our own in ``.json``.
     options : ImportOptions
         What the file does not say.
 
@@ -38,7 +54,13 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     suffix = file.suffix.lower()
     if suffix in (".yaml", ".yml"):
         return _read_map_server(file)
-    raise UnsupportedFormatError("expected .yaml", argument=name_of(file))
+    if suffix in DRAWINGS:
+        notes = Notes()
+        drawing = DRAWINGS[suffix](file, options, notes)
+        line_map = to_map(drawing, options)
+        return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
+    known = ", ".join((".yaml", *DRAWINGS))
+    raise UnsupportedFormatError(f"expected a file that ends in one of {known}", argument=name_of(file))
 
 
 def _read_map_server(file: Path) -> ImportedMap:

@@ -1,0 +1,101 @@
+"""A drawing as all readers give it: polylines in the drawing's own units."""
+
+from __future__ import annotations
+
+import fnmatch
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import MalformedFileError, TooLargeError
+from ..limits import MAX_SEGMENTS
+from ..report import Notes, shown
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Drawing:
+    """Polylines, y pointing up.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, for errors and reports.
+    format : str
+    layers : tuple of str
+        Patterns of the layers that are wanted; empty: all.
+    notes : Notes
+    metres : float or None
+        Per unit of the drawing; None where it does not say.
+    oriented : bool
+        Whether the drawing says that free space lies on the left of its lines.
+    sigma, frame_id, meta
+        As in `LineMap`, where the file says.
+    segments : list of (k, 4)
+        What was drawn so far, units of the drawing.
+    widths : list of float
+        Of each polyline, units of the drawing; 0 where it has none.
+    """
+
+    name: str
+    format: str
+    layers: tuple[str, ...]
+    notes: Notes
+    metres: float | None = None
+    oriented: bool = False
+    sigma: float | None = None
+    frame_id: str = "map"
+    meta: dict[str, str] = field(default_factory=dict)
+    segments: list[Floats] = field(default_factory=list)
+    widths: list[float] = field(default_factory=list)
+    _count: int = 0
+
+    def wants(self, *layers: str) -> bool:
+        """Tell whether lines of a layer, or of one within others, are wanted."""
+        if not self.layers:
+            return True
+        names = [layer.casefold() for layer in layers]
+        return any(fnmatch.fnmatchcase(n, pattern.casefold()) for n in names for pattern in self.layers)
+
+    def add(self, points: ArrayLike, *, closed: bool = False, width: float = 0.0) -> None:
+        """Add a polyline.
+
+        Parameters
+        ----------
+        points : array-like of shape (n, 2)
+            Units of the drawing.
+        closed : bool
+            Whether a line runs from the last point to the first.
+        width : float
+            Units of the drawing.
+
+        Raises
+        ------
+        MalformedFileError
+            When a coordinate is not a finite number.
+        TooLargeError
+            When the drawing has too many lines.
+        """
+        try:
+            p = np.asarray(points, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise MalformedFileError("has a coordinate that is no number", argument=self.name) from error
+        if p.size == 0:
+            return
+        if p.ndim != 2 or p.shape[1] != 2 or not np.isfinite(p).all():
+            raise MalformedFileError("has a coordinate that is no finite number", argument=self.name)
+        if closed and len(p) > 2 and not np.array_equal(p[0], p[-1]):
+            p = np.vstack([p, p[:1]])
+        if len(p) < 2:
+            return
+        self._count += len(p) - 1
+        if self._count > MAX_SEGMENTS:
+            raise TooLargeError(f"expected at most {MAX_SEGMENTS} lines", argument=self.name)
+        self.segments.append(np.hstack([p[:-1], p[1:]]))
+        self.widths.append(width)
+
+    def drop(self, kind: str, count: int = 1) -> None:
+        """Note what is no wall or cannot be read."""
+        self.notes.add_dropped(f"entity_{shown(kind).lower()}", f"{shown(kind)} is not read", count)
