@@ -9,9 +9,12 @@ from .errors import (
     UnsupportedFormatError,
 )
 from .line_map import ImportedMap, LineMap
+from .logs.scan import Log, LoggedScan, LogOptions
 from .maps import read_map
 from .options import ImportOptions
 from .picture import draw_map
+from .poses import StampedPose, pose_message, write_tum
+from .recordings import read_log
 from .report import ImportReport, Note
 from .writing import write_map
 
@@ -23,11 +26,18 @@ __all__ = [
     "IncompleteFileError",
     "InvalidOptionError",
     "LineMap",
+    "Log",
+    "LogOptions",
+    "LoggedScan",
     "MalformedFileError",
     "Note",
+    "StampedPose",
     "TooLargeError",
     "UnsupportedFormatError",
     "draw_map",
+    "pose_message",
+    "read_log",
     "read_map",
     "write_map",
+    "write_tum",
 ]

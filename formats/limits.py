@@ -11,6 +11,7 @@ MAX_DEPTH = 64  # of elements in one another
 MAX_BLOCK_DEPTH = 8  # of blocks in one another
 MAX_CURVE_POINTS = 10_000  # of one arc or spline
 MAX_MESSAGE_BYTES = 64 * 2**20  # of one message of a bag
+MAX_METADATA_BYTES = 256 * 2**10  # of the description of a bag of ROS 2
 MAX_TRANSFORMS = 2_000_000  # of a bag, kept while its scans are read
 MAX_TEXT = 200  # characters of a name taken from a file
 

@@ -14,10 +14,13 @@ from .drawings.tables import read_csv, read_json
 from .drawings.walls import to_map
 from .errors import UnsupportedFormatError
 from .files import name_of
+from .grids.cells import Grid
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
 from .grids.tuning import WALL_SIGMA
 from .line_map import ImportedMap, LineMap
+from .logs.bags import is_bag
+from .logs.ros import read_bag_grid
 from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
@@ -36,8 +39,8 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     Parameters
     ----------
     path : str or path
-        A ``.yaml`` of map_server, its picture beside it; a drawing in ``.dxf``, ``.svg`` or ``.geojson``; segments in
-        ``.csv``; a map file of our own in ``.json``.
+        A ``.yaml`` of map_server, its picture beside it; a bag of ROS with an OccupancyGrid; a drawing in ``.dxf``,
+        ``.svg`` or ``.geojson``; segments in ``.csv``; a map file of our own in ``.json``.
     options : ImportOptions
         What the file does not say.
 
@@ -54,6 +57,8 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     suffix = file.suffix.lower()
     if suffix in (".yaml", ".yml"):
         return _read_map_server(file)
+    if is_bag(file):
+        return _read_bag(file, options)
     if suffix in DRAWINGS:
         notes = Notes()
         drawing = DRAWINGS[suffix](file, options, notes)
@@ -66,9 +71,19 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
 def _read_map_server(file: Path) -> ImportedMap:
     notes = Notes()
     grid, files = read_grid(file, notes)
-    segments = find_faces(grid, notes, files[0])
+    line_map = _from_grid(grid, notes, files[0], "map")
+    return ImportedMap(line_map, notes.report("map_server", files))
+
+
+def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
+    notes = Notes()
+    grid, frame, form = read_bag_grid(file, options.topic, notes)
+    return ImportedMap(_from_grid(grid, notes, name_of(file), frame), notes.report(form, (name_of(file),)))
+
+
+def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
+    segments = find_faces(grid, notes, name)
     notes.add_read("segments", "faces of walls", len(segments))
     sigma = WALL_SIGMA * grid.resolution
     notes.add_assumed("sigma", f"walls are taken to be known to {sigma:.3f} m, half a cell")
-    line_map = LineMap(segments, sigma, meta={"source": files[0], "resolution": f"{grid.resolution:g}"})
-    return ImportedMap(line_map, notes.report("map_server", files))
+    return LineMap(segments, sigma, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})

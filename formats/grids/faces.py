@@ -18,6 +18,7 @@ from .cells import FREE, OCCUPIED, UNKNOWN, Cells, Grid, classify
 from .tuning import (
     BAND_SHARE,
     CONTOUR_SIGMA,
+    CORNER_REACH,
     GREATEST_BAND,
     LEAST_DEPTH,
     LEAST_LENGTH,
@@ -127,13 +128,29 @@ def wall_contours(cells: Cells) -> Iterator[Floats]:
         wall = _borders_on_wall(contour, padded)
         if np.array_equal(contour[0], contour[-1]):
             contour, wall = contour[:-1], wall[:-1]
-            # A contour that is a wall all around has to begin somewhere; others begin behind a gap.
-            start = int(np.argmin(wall))
+            start = sharpest_corner(contour) if wall.all() else int(np.argmin(wall))
             contour, wall = np.roll(contour, -start, axis=0), np.roll(wall, -start)
         places = contour[wall] - 0.5
         for k in range(0, len(places), LONGEST_CONTOUR):
             if len(places) - k >= LEAST_POINTS:
                 yield places[k : k + LONGEST_CONTOUR]
+
+
+def sharpest_corner(contour: Floats) -> int:
+    """Return the point of a closed contour at which a new side begins most clearly.
+
+    A line that began before a corner would keep the points there.
+
+    Parameters
+    ----------
+    contour : (n, 2)
+        Without the first point repeated.
+    """
+    before = np.roll(contour, 1, axis=0) - np.roll(contour, 1 + CORNER_REACH, axis=0)
+    after = np.roll(contour, -CORNER_REACH, axis=0) - contour
+    products = np.einsum("ij,ij->i", before, after)
+    scale = np.hypot(*before.T) * np.hypot(*after.T)
+    return int(np.argmin(np.divide(products, scale, out=np.ones(len(contour)), where=scale > 0.0)))
 
 
 def _borders_on_wall(contour: Floats, padded: Cells) -> Flags:

@@ -29,6 +29,9 @@ GREATEST_BAND = 10
 # Standard deviation of a contour's points about a straight wall: that of a staircase is 0.29.
 CONTOUR_SIGMA = 0.35
 
+# Points on either side that tell how sharp a corner is, where a contour has to begin at one.
+CORNER_REACH = 3
+
 # Least length of a segment, and points of a contour that are worth a try. Shorter pieces are what furnished rooms are
 # told by: with 6 cells 44 % of the scans of freiburg-079 were usable, with 3 cells 61 %.
 LEAST_LENGTH = 3.0
