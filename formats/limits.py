@@ -13,6 +13,7 @@ MAX_CURVE_POINTS = 10_000  # of one arc or spline
 MAX_MESSAGE_BYTES = 64 * 2**20  # of one message of a bag
 MAX_METADATA_BYTES = 256 * 2**10  # of the description of a bag of ROS 2
 MAX_TRANSFORMS = 2_000_000  # of a bag, kept while its scans are read
+MAX_UNITS = 1e13  # coordinates of a drawing
 MAX_TEXT = 200  # characters of a name taken from a file
 
 MIN_RESOLUTION, MAX_RESOLUTION = 1e-3, 10.0  # m

@@ -17,7 +17,6 @@ from .files import name_of
 from .grids.cells import Grid
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
-from .grids.tuning import WALL_SIGMA
 from .line_map import ImportedMap, LineMap
 from .logs.bags import is_bag
 from .logs.ros import read_bag_grid
@@ -84,6 +83,6 @@ def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
 def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
     segments = find_faces(grid, notes, name)
     notes.add_read("segments", "faces of walls", len(segments))
-    sigma = WALL_SIGMA * grid.resolution
-    notes.add_assumed("sigma", f"walls are taken to be known to {sigma:.3f} m, half a cell")
-    return LineMap(segments, sigma, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})
+    # Measured with the logs of two grids: no number that was tried makes more scans usable.
+    notes.add_assumed("sigma", "how well walls are known is left to be estimated for each answer")
+    return LineMap(segments, None, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})

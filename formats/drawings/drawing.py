@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MalformedFileError, TooLargeError
-from ..limits import MAX_SEGMENTS
+from ..limits import MAX_SEGMENTS, MAX_UNITS
 from ..report import Notes, shown
 
 Floats = NDArray[np.float64]
@@ -74,7 +74,7 @@ class Drawing:
         Raises
         ------
         MalformedFileError
-            When a coordinate is not a finite number.
+            When a coordinate is not a finite number, or too large for any unit.
         TooLargeError
             When the drawing has too many lines.
         """
@@ -84,8 +84,8 @@ class Drawing:
             raise MalformedFileError("has a coordinate that is no number", argument=self.name) from error
         if p.size == 0:
             return
-        if p.ndim != 2 or p.shape[1] != 2 or not np.isfinite(p).all():
-            raise MalformedFileError("has a coordinate that is no finite number", argument=self.name)
+        if p.ndim != 2 or p.shape[1] != 2 or not (np.abs(p) <= MAX_UNITS).all():
+            raise MalformedFileError(f"has a coordinate that is no number up to {MAX_UNITS:g}", argument=self.name)
         if closed and len(p) > 2 and not np.array_equal(p[0], p[-1]):
             p = np.vstack([p, p[:1]])
         if len(p) < 2:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -27,6 +28,9 @@ from .drawing import Drawing
 if TYPE_CHECKING:
     from ezdxf.document import Drawing as Document
 
+# It would print every repair of a broken file; they are counted in the report.
+logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+
 # The layer of lines that have free space on their left; the one way in which a DXF says so.
 FREE_LEFT = "FREE_LEFT"
 
@@ -49,7 +53,7 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         When it is no DXF, or expands to too much.
     """
     name = name_of(path)
-    document = _document(read_bounded(path, MAX_MAP_BYTES), name)
+    document = _document(read_bounded(path, MAX_MAP_BYTES), name, notes)
     drawing = Drawing(name, "dxf", options.layers, notes, _metres(document))
     metres = options.metres or drawing.metres or 1.0
     hidden = {layer.dxf.name.casefold() for layer in document.layers if layer.is_off() or layer.is_frozen()}
@@ -74,13 +78,15 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     return drawing
 
 
-def _document(content: bytes, name: str) -> Document:
+def _document(content: bytes, name: str, notes: Notes) -> Document:
     if content[:4] == b"AC10":
         raise UnsupportedFormatError("is a DWG; save it as DXF", argument=name)
     try:
-        document, _auditor = recover.read(io.BytesIO(content))
+        document, auditor = recover.read(io.BytesIO(content))
     except (DXFError, OSError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError) as error:
         raise MalformedFileError("is no DXF", argument=name) from error
+    if auditor.fixes or auditor.errors:
+        notes.add_assumed("repairs", "broken places that were repaired", len(auditor.fixes) + len(auditor.errors))
     return document
 
 
