@@ -9,6 +9,7 @@ MAX_SEGMENTS = 500_000  # of a map
 MAX_ENTITIES = 500_000  # of a drawing, with what its blocks expand to
 MAX_DEPTH = 64  # of elements in one another
 MAX_BLOCK_DEPTH = 8  # of blocks in one another
+MAX_PATH_BYTES = 4 * 2**20  # of all paths of an SVG, some 20 microseconds a number
 MAX_CURVE_POINTS = 10_000  # of one arc or spline
 MAX_MESSAGE_BYTES = 64 * 2**20  # of one message of a bag
 MAX_METADATA_BYTES = 256 * 2**10  # of the description of a bag of ROS 2

@@ -78,23 +78,34 @@ class Drawing:
         TooLargeError
             When the drawing has too many lines.
         """
-        try:
-            p = np.asarray(points, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise MalformedFileError("has a coordinate that is no number", argument=self.name) from error
-        if p.size == 0:
-            return
-        if p.ndim != 2 or p.shape[1] != 2 or not (np.abs(p) <= MAX_UNITS).all():
-            raise MalformedFileError(f"has a coordinate that is no number up to {MAX_UNITS:g}", argument=self.name)
+        p = self._checked(points, 2)
         if closed and len(p) > 2 and not np.array_equal(p[0], p[-1]):
             p = np.vstack([p, p[:1]])
-        if len(p) < 2:
-            return
-        self._count += len(p) - 1
+        if len(p) >= 2:
+            self._keep(np.hstack([p[:-1], p[1:]]), width)
+
+    def add_segments(self, endpoints: ArrayLike) -> None:
+        """Add lines of their own, ``(n, 4)`` units of the drawing; raises as `add` does."""
+        self._keep(self._checked(endpoints, 4), 0.0)
+
+    def _keep(self, endpoints: Floats, width: float) -> None:
+        self._count += len(endpoints)
         if self._count > MAX_SEGMENTS:
             raise TooLargeError(f"expected at most {MAX_SEGMENTS} lines", argument=self.name)
-        self.segments.append(np.hstack([p[:-1], p[1:]]))
-        self.widths.append(width)
+        if len(endpoints):
+            self.segments.append(endpoints)
+            self.widths.append(width)
+
+    def _checked(self, values: ArrayLike, columns: int) -> Floats:
+        try:
+            array = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise MalformedFileError("has a coordinate that is no number", argument=self.name) from error
+        if array.size == 0:
+            return np.zeros((0, columns))
+        if array.ndim != 2 or array.shape[1] != columns or not (np.abs(array) <= MAX_UNITS).all():
+            raise MalformedFileError(f"has a coordinate that is no number up to {MAX_UNITS:g}", argument=self.name)
+        return array
 
     def drop(self, kind: str, count: int = 1) -> None:
         """Note what is no wall or cannot be read."""

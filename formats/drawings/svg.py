@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 from xml.parsers import expat
 
+import numpy as np
 import svgelements
+from numpy.typing import NDArray
 
 from ..errors import FormatError, MalformedFileError, TooLargeError
 from ..files import name_of, read_bounded
-from ..limits import MAX_DEPTH, MAX_ENTITIES, MAX_MAP_BYTES
+from ..limits import MAX_DEPTH, MAX_ENTITIES, MAX_MAP_BYTES, MAX_PATH_BYTES
 from ..options import ImportOptions
 from ..report import Notes
 from .drawing import Drawing
@@ -21,12 +22,14 @@ from .drawing import Drawing
 NAMESPACE = "http://www.w3.org/2000/svg"
 INKSCAPE_LABEL = "http://www.inkscape.org/namespaces/inkscape}label"
 CURVE_CHORDS = 16  # that a curve of a path is drawn with
+CURVE_PLACES = np.arange(1, CURVE_CHORDS + 1) / CURVE_CHORDS
 NOT_DRAWN = {"defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata", "title", "desc", "style", "script"}
 GROUPS = {"g", "a", "switch"}
 
 # Attributes of the root in which our own drawings say what they are.
 METRES, ORIENTED = "data-metres-per-unit", "data-free-space-on-left"
 
+Floats = NDArray[np.float64]
 Matrix = Any
 Points = list[tuple[float, float]]
 
@@ -54,19 +57,23 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     drawing.oriented = root.get(ORIENTED) == "true"
     try:
         drawing.metres = float(root.attrib[METRES]) if METRES in root.attrib else None
-        for element, matrix, layers in _all_drawn(root, drawing):
-            if not drawing.wants(*layers):
-                notes.add_dropped("other_layer", "elements on layers that were not asked for", 1)
-                continue
-            for points, closed in SHAPES[_kind(element)](element):
-                placed = [matrix.point_in_matrix_space(svgelements.Point(*p)) for p in points]
-                drawing.add([(p.x, -p.y) for p in placed], closed=closed)
-            notes.add_read(f"element_{_kind(element)}", f"{_kind(element)} elements", 1)
+        with np.errstate(all="ignore"):  # what is no number is refused where it is added
+            _read_elements(root, drawing)
     except FormatError:
         raise
     except (ArithmeticError, ValueError, TypeError, AttributeError, LookupError) as error:
         raise MalformedFileError("has a broken element", argument=name) from error
     return drawing
+
+
+def _read_elements(root: Element, drawing: Drawing) -> None:
+    for element, matrix, layers in _all_drawn(root, drawing):
+        if not drawing.wants(*layers):
+            drawing.notes.add_dropped("other_layer", "elements on layers that were not asked for", 1)
+            continue
+        for points, closed in SHAPES[_kind(element)](element):
+            drawing.add(_placed(points, matrix), closed=closed)
+        drawing.notes.add_read(f"element_{_kind(element)}", f"{_kind(element)} elements", 1)
 
 
 def parse_xml(content: bytes, name: str) -> Element:
@@ -80,11 +87,13 @@ def parse_xml(content: bytes, name: str) -> Element:
         When elements lie too deep or are too many.
     """
     builder, parser = TreeBuilder(), expat.ParserCreate(namespace_separator="}")
-    depth = count = 0
+    depth = count = path_bytes = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, count
+        nonlocal depth, count, path_bytes
         depth, count = depth + 1, count + 1
+        if (path_bytes := path_bytes + len(attributes.get("d", ""))) > MAX_PATH_BYTES:
+            raise TooLargeError(f"expected at most {MAX_PATH_BYTES} characters of paths", argument=name)
         if depth > MAX_DEPTH or count > MAX_ENTITIES:
             raise TooLargeError(f"expected at most {MAX_ENTITIES} elements, {MAX_DEPTH} in one another", argument=name)
         builder.start(tag, attributes)
@@ -104,6 +113,14 @@ def parse_xml(content: bytes, name: str) -> Element:
         return builder.close()
     except (expat.ExpatError, ParseError, AssertionError) as error:
         raise MalformedFileError("is no XML", argument=name) from error
+
+
+def _placed(points: Points, matrix: Matrix) -> Floats:
+    """Return points in the root's units, y pointing up."""
+    p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    x = matrix.a * p[:, 0] + matrix.c * p[:, 1] + matrix.e
+    y = matrix.b * p[:, 0] + matrix.d * p[:, 1] + matrix.f
+    return np.stack([x, -y], axis=1)
 
 
 def _kind(element: Element) -> str:
@@ -168,8 +185,7 @@ def _path(element: Element) -> Iterator[tuple[Points, bool]]:
             if piece.end is not None:
                 points.append((piece.end.x, piece.end.y))
         else:
-            chords = (piece.point(k / CURVE_CHORDS) for k in range(1, CURVE_CHORDS + 1))
-            points += [(p.x, p.y) for p in chords if math.isfinite(p.x)]
+            points += [(float(x), float(y)) for x, y in piece.npoint(CURVE_PLACES)]
     yield points, False
 
 

@@ -41,8 +41,7 @@ def read_json(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     _take_properties(told, drawing)
     for key in sorted(set(map(str, told)) - OWN_FIELDS):
         notes.add_dropped(f"field_{shown(key)}", f"the field {shown(key)} is not known", 1)
-    for row in rows:
-        drawing.add([row[:2], row[2:]])
+    drawing.add_segments(rows)
     return drawing
 
 
@@ -85,8 +84,7 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         table = np.array([[row[k] for k in wanted] for row in rows[start:]], dtype=np.float64).reshape(-1, 4)
     except (csv.Error, ValueError, LookupError) as error:
         raise MalformedFileError("expected rows of x1, y1, x2, y2", argument=name) from error
-    for row in table:
-        drawing.add(row.reshape(2, 2))
+    drawing.add_segments(table)
     return drawing
 
 

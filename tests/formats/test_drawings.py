@@ -246,6 +246,7 @@ DEEP = '{"type": "GeometryCollection", "geometries": [' * 8 + "]}" * 8
         ("a.svg", "<html/>", MalformedFileError, "expected an svg element"),
         ("a.svg", LAUGHS, MalformedFileError, "declares XML entities"),
         ("a.svg", SVG.format(NESTED_SVG), TooLargeError, "64 in one another"),
+        ("a.svg", SVG.format('<path d="' + "M0 0" * 1_100_000 + '"/>'), TooLargeError, "characters of paths"),
         ("a.svg", SVG.format('<line x1="nan" y1="0" x2="1" y2="1"/>'), MalformedFileError, "no number up to 1e+13"),
         ("a.svg", SVG.format('<line x1="1e" y1="0" x2="1" y2="1"/>'), MalformedFileError, "broken element"),
         ("a.svg", SVG.format("<text/>"), MalformedFileError, "has no lines"),
