@@ -9,6 +9,7 @@ from . import vectorization
 from .drawn import SCANNER
 from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
+from .imports import imports
 from .localization import localization
 from .lookalikes import lookalikes
 from .mistakes import mistakes
@@ -95,6 +96,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "peers": _peers,
     "sums": _sums,
     "worlds": worlds,
+    "imports": imports,
 }
 
 

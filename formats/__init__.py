@@ -1,0 +1,43 @@
+"""Files of other tools in and out: maps, logs, poses. The extra ``linefix[formats]`` brings the libraries."""
+
+from .errors import (
+    FormatError,
+    IncompleteFileError,
+    InvalidOptionError,
+    MalformedFileError,
+    TooLargeError,
+    UnsupportedFormatError,
+)
+from .line_map import ImportedMap, LineMap
+from .logs.scan import Log, LoggedScan, LogOptions
+from .maps import read_map
+from .options import ImportOptions
+from .picture import draw_map
+from .poses import StampedPose, pose_message, write_tum
+from .recordings import read_log
+from .report import ImportReport, Note
+from .writing import write_map
+
+__all__ = [
+    "FormatError",
+    "ImportOptions",
+    "ImportReport",
+    "ImportedMap",
+    "IncompleteFileError",
+    "InvalidOptionError",
+    "LineMap",
+    "Log",
+    "LogOptions",
+    "LoggedScan",
+    "MalformedFileError",
+    "Note",
+    "StampedPose",
+    "TooLargeError",
+    "UnsupportedFormatError",
+    "draw_map",
+    "pose_message",
+    "read_log",
+    "read_map",
+    "write_map",
+    "write_tum",
+]

@@ -1,0 +1,118 @@
+"""Drawings in GeoJSON with coordinates in metres, which the standard has no place for: by an explicit flag."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from ..errors import IncompleteFileError, MalformedFileError
+from ..files import name_of, read_bounded
+from ..limits import MAX_MAP_BYTES
+from ..options import ImportOptions
+from ..report import Notes
+from .drawing import Drawing
+
+OWN = "linefix"  # the member in which our own files say what they are
+
+Lines = Iterator[tuple[Any, bool]]
+
+
+def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
+    """Read the lines and the outlines of areas.
+
+    Parameters
+    ----------
+    path : Path
+    options : ImportOptions
+        `local_metres` has to be set for any file but our own; layers are the properties ``layer`` and ``name``.
+    notes : Notes
+
+    Raises
+    ------
+    FormatError
+        When it is no GeoJSON, or its coordinates are degrees.
+    """
+    name = name_of(path)
+    root = load_json(read_bounded(path, MAX_MAP_BYTES), name)
+    if not isinstance(root, dict) or not isinstance(root.get("type"), str):
+        raise MalformedFileError("is no GeoJSON", argument=name)
+    own = root.get(OWN)
+    told = own if isinstance(own, dict) else {}
+    if not options.local_metres and told.get("metres") is not True:
+        raise IncompleteFileError("has degrees by its standard; say local_metres if it has metres", argument=name)
+    drawing = Drawing(name, "geojson", options.layers, notes, 1.0, told.get("oriented") is True)
+    features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
+    if not isinstance(features, list):
+        raise MalformedFileError("expected features to be a list", argument=name)
+    for feature in features:
+        if not isinstance(feature, dict):
+            raise MalformedFileError("expected every feature to be an object", argument=name)
+        _read_feature(feature, drawing)
+    return drawing
+
+
+def load_json(content: bytes, name: str) -> Any:
+    """Parse JSON.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is none; orjson goes 1,024 levels deep at most.
+    """
+    try:
+        return orjson.loads(content)
+    except orjson.JSONDecodeError as error:
+        raise MalformedFileError("is no JSON", argument=name) from error
+
+
+def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
+    geometry = feature.get("geometry") if feature.get("type") == "Feature" else feature
+    properties = feature.get("properties")
+    named = properties if isinstance(properties, dict) else {}
+    layers = [value for key in ("layer", "name") if isinstance(value := named.get(key), str)]
+    if not drawing.wants(*layers):
+        drawing.notes.add_dropped("other_layer", "features on layers that were not asked for", 1)
+        return
+    if geometry is None:
+        drawing.drop("feature without geometry")
+        return
+    for points, closed in _lines(geometry, drawing):
+        try:
+            pairs = [(p[0], p[1]) for p in points]
+        except (TypeError, LookupError) as error:
+            raise MalformedFileError("has a position that is no [x, y]", argument=drawing.name) from error
+        if not all(type(c) in (int, float) for pair in pairs for c in pair):
+            raise MalformedFileError("has a coordinate that is no number", argument=drawing.name)
+        drawing.add(pairs, closed=closed)
+
+
+def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
+    """Yield the polylines of a geometry, and whether each is closed."""
+    if not isinstance(geometry, dict) or depth > 4:
+        raise MalformedFileError(
+            "has a geometry that is no object, or collections in collections", argument=drawing.name
+        )
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    if kind == "GeometryCollection":
+        for inner in _listed(geometry.get("geometries"), drawing):
+            yield from _lines(inner, drawing, depth + 1)
+    elif kind == "LineString":
+        yield _listed(coordinates, drawing), False
+    elif kind in ("MultiLineString", "Polygon"):
+        yield from ((_listed(line, drawing), kind == "Polygon") for line in _listed(coordinates, drawing))
+    elif kind == "MultiPolygon":
+        for polygon in _listed(coordinates, drawing):
+            yield from ((_listed(ring, drawing), True) for ring in _listed(polygon, drawing))
+    else:
+        drawing.drop(str(kind))
+        return
+    drawing.notes.add_read(f"geometry_{str(kind).lower()}", f"{kind} geometries", 1)
+
+
+def _listed(value: Any, drawing: Drawing) -> list[Any]:
+    if not isinstance(value, list):
+        raise MalformedFileError("expected coordinates in lists", argument=drawing.name)
+    return value

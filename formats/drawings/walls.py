@@ -1,0 +1,130 @@
+"""From a drawing's lines to a map: units, doubles, faces, directions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import InputError, Segments
+
+from ..errors import IncompleteFileError, MalformedFileError
+from ..line_map import LineMap
+from ..options import ImportOptions
+from .drawing import Drawing
+from .inside import Sides, sides_seen
+
+Floats = NDArray[np.float64]
+
+LEAST_LENGTH = 0.01  # m; shorter lines are left out
+SAME = 1e-3  # m; lines whose ends are nearer to one another are one
+
+
+def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
+    """Make a map of a drawing.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        Its notes take what was done.
+    options : ImportOptions
+
+    Raises
+    ------
+    IncompleteFileError
+        When nobody says how long a unit is.
+    MalformedFileError
+        When no wall is left, or one is longer than a map can have.
+    InvalidOptionError
+        When a free place lies on a wall or outside.
+    """
+    metres = options.metres or drawing.metres
+    if metres is None:
+        raise IncompleteFileError("does not say its unit; say units, such as mm or m", argument=drawing.name)
+    if not drawing.segments:
+        raise MalformedFileError("has no lines that could be walls", argument=drawing.name)
+    endpoints = np.vstack(drawing.segments) * metres
+    widths = np.repeat(np.asarray(drawing.widths), [len(s) for s in drawing.segments]) * metres
+    oriented = _means_directions(drawing, options)
+    if drawing.format != "json":  # a map of our own stays as it is: others count its segments
+        endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
+    endpoints, made = _with_faces(endpoints, widths, drawing, options)
+    oriented = oriented or made
+    if options.inside and not made:
+        endpoints, oriented = _directed(endpoints, drawing, options), True
+    if not oriented:
+        drawing.notes.add_assumed("directions", "directions mean nothing, for nobody says where free space is")
+    drawing.notes.add_read("segments", "faces of walls" if oriented else "lines", len(endpoints))
+    meta = drawing.meta or {"source": drawing.name}
+    return LineMap(_segments(endpoints, drawing), drawing.sigma, oriented, drawing.frame_id, meta)
+
+
+def _means_directions(drawing: Drawing, options: ImportOptions) -> bool:
+    if options.directions is not None:
+        return options.directions == "drawn"
+    return drawing.oriented and not options.inside
+
+
+def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing: Drawing) -> tuple[Floats, Floats]:
+    lengths = np.hypot(*(endpoints[:, 2:] - endpoints[:, :2]).T)
+    long = lengths >= LEAST_LENGTH
+    if not long.all():
+        drawing.notes.add_dropped("short", f"lines shorter than {LEAST_LENGTH:g} m", int((~long).sum()))
+    endpoints, widths = endpoints[long], widths[long]
+    if len(endpoints) == 0:
+        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: is the unit right?", argument=drawing.name)
+    keys = np.rint(endpoints / SAME)
+    if not oriented:
+        backward = (keys[:, 0] > keys[:, 2]) | ((keys[:, 0] == keys[:, 2]) & (keys[:, 1] > keys[:, 3]))
+        keys[backward] = keys[backward][:, [2, 3, 0, 1]]
+    _, first = np.unique(keys, axis=0, return_index=True)
+    if len(first) < len(endpoints):
+        drawing.notes.add_merged("doubles", "lines drawn more than once", len(endpoints) - len(first))
+    first.sort()
+    return endpoints[first], widths[first]
+
+
+def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: ImportOptions) -> tuple[Floats, bool]:
+    """Return both faces of walls drawn by their centre line, free space on the left, and whether they were so drawn."""
+    if options.drawn == "faces":
+        return endpoints, False
+    if options.thickness is not None:
+        thickness = np.full(len(endpoints), options.thickness)
+    else:
+        thickness = widths
+        found = int((widths > 0.0).sum())
+        drawing.notes.add_assumed(
+            "thickness",
+            f"{found} of {len(widths)} lines have a width; the others are taken for walls without thickness",
+        )
+    span = endpoints[:, 2:] - endpoints[:, :2]
+    normals = np.stack([-span[:, 1], span[:, 0]], axis=1) / np.hypot(span[:, 0], span[:, 1])[:, None]
+    aside = np.tile(normals * (0.5 * thickness)[:, None], 2)
+    drawing.notes.add_merged("faces", "centre lines made into two faces", len(endpoints))
+    return np.vstack([endpoints + aside, (endpoints - aside)[:, [2, 3, 0, 1]]]), True
+
+
+def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Floats:
+    """Return lines with free space on the left; in both directions where it is on both sides, or nobody can tell."""
+    seen = sides_seen(endpoints, options.inside)
+    backward = endpoints[:, [2, 3, 0, 1]]
+    counts = {side: int((seen == side).sum()) for side in Sides}
+    drawing.notes.add_assumed(
+        "inside", "directions found from the free places", counts[Sides.LEFT] + counts[Sides.RIGHT]
+    )
+    if counts[Sides.BOTH]:
+        drawing.notes.add_assumed(
+            "both_sides", "lines with free space on both sides: both directions", counts[Sides.BOTH]
+        )
+    if counts[Sides.NEITHER]:
+        drawing.notes.add_assumed(
+            "not_reached", "lines that no free place reaches: both directions", counts[Sides.NEITHER]
+        )
+    left, right = seen != Sides.RIGHT, seen != Sides.LEFT
+    return np.vstack([endpoints[left], backward[right]])
+
+
+def _segments(endpoints: Floats, drawing: Drawing) -> Segments:
+    try:
+        return Segments.from_array(endpoints, argument="line")
+    except InputError as error:
+        raise MalformedFileError(f"a line {error.message}: is the unit right?", argument=drawing.name) from error

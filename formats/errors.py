@@ -1,0 +1,37 @@
+"""What this package refuses, each in one line that names the file.
+
+::
+
+    FormatError (InputError)
+    ├── UnsupportedFormatError   no format that is read here, or one that needs another version
+    ├── MalformedFileError       the file is not what its name or its beginning says
+    ├── TooLargeError            more bytes, cells, entities, messages or levels than are read
+    ├── IncompleteFileError      something is missing: the unit of a drawing, the picture of a grid, a topic
+    └── InvalidOptionError       an option out of its range
+"""
+
+from registration import InputError
+
+
+class FormatError(InputError):
+    """Root of this package's errors; `argument` is the file's name, or the option's."""
+
+
+class UnsupportedFormatError(FormatError):
+    """The file has a format that is not read or written here."""
+
+
+class MalformedFileError(FormatError):
+    """The file cannot be read as what it claims to be."""
+
+
+class TooLargeError(FormatError):
+    """The file holds more than is read."""
+
+
+class IncompleteFileError(FormatError):
+    """The file leaves out something that only its owner knows."""
+
+
+class InvalidOptionError(FormatError):
+    """An option is out of its range."""

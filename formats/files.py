@@ -1,0 +1,57 @@
+"""Files of other people, read whole within a bound."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .errors import IncompleteFileError, MalformedFileError, TooLargeError
+from .report import shown
+
+
+def name_of(path: Path) -> str:
+    """Return what errors and reports call a file."""
+    return shown(path.name)
+
+
+def read_bounded(path: Path, limit: int) -> bytes:
+    """Return what a file holds.
+
+    Parameters
+    ----------
+    path : Path
+    limit : int
+        Bytes.
+
+    Raises
+    ------
+    IncompleteFileError
+        When there is no such file.
+    MalformedFileError
+        When it cannot be read.
+    TooLargeError
+        When it is longer than the limit.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(limit + 1)
+    except FileNotFoundError as error:
+        raise IncompleteFileError("there is no such file", argument=name_of(path)) from error
+    except OSError as error:
+        raise MalformedFileError(f"cannot be read: {error.strerror}", argument=name_of(path)) from error
+    if len(content) > limit:
+        raise TooLargeError(f"expected at most {limit} bytes", argument=name_of(path))
+    return content
+
+
+def text_of(content: bytes, name: str) -> str:
+    """Decode UTF-8, with or without a byte-order mark.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is something else.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MalformedFileError("expected text in UTF-8", argument=name) from error

@@ -1,0 +1,1 @@
+"""Occupancy grids: pictures of map_server and messages of ROS, to faces of walls."""

@@ -1,0 +1,206 @@
+"""Maps of ROS's map_server: a description in YAML beside a picture."""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path, PureWindowsPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from registration import RigidTransform
+
+from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError
+from ..files import name_of, read_bounded, text_of
+from ..limits import (
+    MAX_CELLS,
+    MAX_MAP_BYTES,
+    MAX_ORIGIN,
+    MAX_RESOLUTION,
+    MAX_YAML_BYTES,
+    MIN_RESOLUTION,
+)
+from ..report import Notes, shown
+from .cells import Grid
+
+PICTURES = ("PPM", "PNG", "BMP")  # what Pillow may take a picture for
+MODES = ("trinary", "scale", "raw")
+RAW_UNKNOWN = 100  # in mode raw: the greatest value that is an occupancy in percent
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What the YAML says; names as there.
+
+    Attributes
+    ----------
+    image : str
+        Name of the picture, without folders.
+    resolution : float
+        Metres.
+    origin : RigidTransform
+        map_from_grid.
+    negate : bool
+    occupied_thresh, free_thresh : float
+        Occupancy, 0 to 1.
+    mode : str
+    """
+
+    image: str
+    resolution: float
+    origin: RigidTransform
+    negate: bool
+    occupied_thresh: float
+    free_thresh: float
+    mode: str
+
+
+def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
+    """Read a grid and tell the names of its files.
+
+    Parameters
+    ----------
+    path : Path
+        Of the YAML; the picture is looked for beside it, whatever folder the YAML names.
+    notes : Notes
+
+    Raises
+    ------
+    FormatError
+        When either file is missing, too large or not what it should be.
+    """
+    told = read_description(path, notes)
+    picture = path.parent / told.image
+    pixels, alpha = read_picture(picture)
+    grid = Grid(
+        _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map
+        told.resolution,
+        told.origin,
+        told.occupied_thresh,
+        told.free_thresh,
+    )
+    return grid, (name_of(path), name_of(picture))
+
+
+def read_description(path: Path, notes: Notes) -> Description:
+    """Read the YAML.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is no YAML, or a value is out of range.
+    IncompleteFileError
+        When `image`, `resolution` or `origin` is missing.
+    """
+    name = name_of(path)
+    text = text_of(read_bounded(path, MAX_YAML_BYTES), name)
+    try:
+        values = YAML(typ="safe", pure=True).load(text)
+    except (YAMLError, RecursionError, ValueError) as error:
+        raise MalformedFileError("is no YAML", argument=name) from error
+    if not isinstance(values, dict):
+        raise MalformedFileError("expected a YAML mapping with image, resolution and origin", argument=name)
+    missing = [key for key in ("image", "resolution", "origin") if key not in values]
+    if missing:
+        raise IncompleteFileError(f"does not say {' and '.join(missing)}", argument=name)
+    mode = values.get("mode", "trinary")
+    if mode not in MODES:
+        raise UnsupportedFormatError(f"expected a mode of {', '.join(MODES)}", argument=name)
+    for key, assumed in (("negate", "0"), ("occupied_thresh", "0.65"), ("free_thresh", "0.196")):
+        if key not in values:
+            notes.add_assumed(key, f"{key} is {assumed}, for the file does not say")
+    return Description(
+        _image(values["image"], name),
+        _number(values, "resolution", name, MIN_RESOLUTION, MAX_RESOLUTION),
+        _origin(values["origin"], name),
+        bool(_number(values, "negate", name, 0, 1, 0.0)),
+        _number(values, "occupied_thresh", name, 0.0, 1.0, 0.65),
+        _number(values, "free_thresh", name, 0.0, 1.0, 0.196),
+        mode,
+    )
+
+
+def _image(value: Any, name: str) -> str:
+    image = PureWindowsPath(value).name if isinstance(value, str) else ""
+    if not image or "\0" in image:
+        raise MalformedFileError("expected image to be a file's name", argument=name)
+    return image
+
+
+def _number(
+    values: dict[Any, Any], key: str, name: str, low: float, high: float, default: float | None = None
+) -> float:
+    value = values.get(key, default)
+    if not isinstance(value, int | float) or not low <= value <= high:
+        raise MalformedFileError(f"expected {key} to be a number from {low:g} to {high:g}", argument=name)
+    return float(value)
+
+
+def _origin(value: Any, name: str) -> RigidTransform:
+    numbers = isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
+    if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in value):
+        raise MalformedFileError(f"expected origin to be [x, y, yaw], at most {MAX_ORIGIN:g}", argument=name)
+    return RigidTransform(*map(float, value))
+
+
+def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    """Read a picture.
+
+    Returns
+    -------
+    (rows, columns) float32
+        0 black to 1 white, the mean of the colours; row 0 on top.
+    (rows, columns) float32 or None
+        0 transparent to 1 opaque, where the picture says.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is no picture.
+    TooLargeError
+        When it has too many pixels.
+    """
+    name = name_of(path)
+    content = read_bounded(path, MAX_MAP_BYTES)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
+                if picture.width * picture.height > MAX_CELLS:
+                    raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name)
+                return _pixels(picture)
+    except FormatError:
+        raise
+    except Image.DecompressionBombError as error:
+        raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name) from error
+    except UnidentifiedImageError as error:
+        raise MalformedFileError("is no picture in PGM, PNG or BMP", argument=name) from error
+    except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
+        raise MalformedFileError(f"is a broken picture: {shown(str(error))}", argument=name) from error
+
+
+def _pixels(picture: Image.Image) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    if picture.mode in ("I", "I;16", "I;16B"):
+        return np.asarray(picture, dtype=np.float32) / np.float32(65535), None
+    if picture.mode in ("1", "L"):
+        return np.asarray(picture.convert("L"), dtype=np.float32) / np.float32(255), None
+    values = np.asarray(picture.convert("RGBA"), dtype=np.float32) / np.float32(255)
+    opaque = bool((values[..., 3] == 1.0).all())
+    return values[..., :3].mean(axis=2, dtype=np.float32), None if opaque else values[..., 3]
+
+
+def _occupancy(
+    pixels: NDArray[np.float32], alpha: NDArray[np.float32] | None, told: Description
+) -> NDArray[np.float32]:
+    if told.mode == "raw":
+        value = np.rint(pixels * 255)
+        return np.where(value <= RAW_UNKNOWN, value / np.float32(RAW_UNKNOWN), np.float32(np.nan))
+    occupancy = pixels if told.negate else np.float32(1) - pixels
+    return occupancy if alpha is None else np.where(alpha == 1.0, occupancy, np.float32(np.nan))

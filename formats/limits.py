@@ -1,0 +1,21 @@
+"""How much of a file of somebody else's is read. What goes beyond is refused, never cut."""
+
+MAX_MAP_BYTES = 32 * 2**20  # of a drawing or a picture
+MAX_YAML_BYTES = 16 * 2**10  # of a map_server description
+MAX_LOG_BYTES = 64 * 2**30  # of a log, which is streamed
+MAX_LINE_BYTES = 2 * 2**20  # of a text log: some 200,000 ranges
+MAX_CELLS = 40_000_000  # of a grid
+MAX_SEGMENTS = 500_000  # of a map
+MAX_ENTITIES = 500_000  # of a drawing, with what its blocks expand to
+MAX_DEPTH = 64  # of elements in one another
+MAX_BLOCK_DEPTH = 8  # of blocks in one another
+MAX_PATH_BYTES = 4 * 2**20  # of all paths of an SVG, some 20 microseconds a number
+MAX_CURVE_POINTS = 10_000  # of one arc or spline
+MAX_MESSAGE_BYTES = 64 * 2**20  # of one message of a bag
+MAX_METADATA_BYTES = 256 * 2**10  # of the description of a bag of ROS 2
+MAX_TRANSFORMS = 2_000_000  # of a bag, kept while its scans are read
+MAX_UNITS = 1e13  # coordinates of a drawing
+MAX_TEXT = 200  # characters of a name taken from a file
+
+MIN_RESOLUTION, MAX_RESOLUTION = 1e-3, 10.0  # m
+MAX_ORIGIN = 1e6  # m

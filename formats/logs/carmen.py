@@ -1,0 +1,147 @@
+"""Logs of CARMEN: one message a line, as the public logs of Radish and Freiburg have them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from registration import InputError, RigidTransform
+from vectorization import LaserScan
+
+from ..errors import IncompleteFileError, TooLargeError
+from ..files import name_of
+from ..limits import MAX_LINE_BYTES
+from ..report import Notes
+from .scan import Log, LoggedScan, LogOptions
+
+KINDS = ("FLASER", "RLASER", "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASER2")
+MESSAGES = {"ODOM", "TRUEPOS", "PARAM", "SYNC", "NMEAGGA", "NMEARMC", *KINDS}
+NO_RETURN = 80.0  # m; what the range finders of these logs read, or more, where nothing came back
+
+
+@dataclass(frozen=True, slots=True)
+class _Angles:
+    first: float  # radians
+    step: float
+    range_max: float  # metres
+
+
+def read_carmen(path: Path, options: LogOptions) -> Log:
+    """Open a log; poses are those of the laser, in the frame of odometry.
+
+    Raises
+    ------
+    IncompleteFileError
+        When there is no such file; while iterating, when no scan is in it, or none that is whole.
+    TooLargeError
+        While iterating, when a line is too long.
+    """
+    if not path.is_file():
+        raise IncompleteFileError("there is no such file", argument=name_of(path))
+    return Log("carmen", name_of(path), partial(_scans, path, options))
+
+
+def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
+    name = name_of(path)
+    wanted = options.topic
+    for number, words in _messages(path, notes):
+        kind = words[0]
+        if kind not in KINDS or (wanted is not None and kind != wanted):
+            notes.add_dropped(f"message_{kind.lower()}", f"{kind} messages", 1)
+            continue
+        # The first kind of scan in the log is taken, so that a rear laser is not mixed with the front one.
+        if wanted is None:
+            wanted = kind
+            notes.add_assumed("topic", f"scans are those of {kind}, the first kind in the log")
+        try:
+            scan = READERS[kind](words, kind)
+        except InputError as error:
+            notes.add_dropped("broken_scan", f"scans that are none, such as: {error.message}", 1)
+            continue
+        except (ValueError, LookupError, OverflowError):
+            notes.add_dropped("broken_line", f"broken lines, the last of them {number}", 1)
+            continue
+        notes.add_read("scans", f"{kind} scans", 1)
+        yield scan
+    if "scans" not in notes.read:
+        raise IncompleteFileError(f"has no {wanted or 'scan'} of CARMEN", argument=name)
+
+
+def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:
+    with path.open("rb") as file:
+        number = 0
+        while line := file.readline(MAX_LINE_BYTES + 1):
+            number += 1
+            if len(line) > MAX_LINE_BYTES:
+                raise TooLargeError(f"line {number}: expected at most {MAX_LINE_BYTES} bytes", argument=name_of(path))
+            words = line.decode("ascii", "replace").split()
+            if not words or words[0].startswith("#"):
+                continue
+            if words[0] in MESSAGES:
+                yield number, words
+            else:
+                notes.add_dropped("other_lines", "lines that are no message of CARMEN", 1)
+
+
+def _simple(words: list[str], kind: str) -> LoggedScan:
+    """``FLASER n r1 .. rn x y theta odom_x odom_y odom_theta time host logger_time``, half a turn from the right."""
+    n = _count(words[1])
+    ranges = [float(w) for w in words[2 : 2 + n]]
+    rest = words[2 + n :]
+    laser, robot = _pose(rest[0:3]), _pose(rest[3:6])
+    # 180 beams are one degree apart and leave the last end out, 181 have one at either end.
+    step = math.pi / (n if n % 2 == 0 else max(1, n - 1))
+    angles = _Angles(-0.5 * math.pi, step, NO_RETURN)
+    return _logged(kind, rest[6], ranges, angles, laser, robot)
+
+
+def _full(words: list[str], kind: str) -> LoggedScan:
+    """``ROBOTLASER1 type start fov step max accuracy mode n r.. m remission.. laser(3) robot(3) (5) time ..``."""
+    angles = _Angles(float(words[2]), float(words[4]), float(words[5]))
+    n = _count(words[8])
+    ranges = [float(w) for w in words[9 : 9 + n]]
+    rest = words[9 + n :]
+    rest = rest[1 + _count(rest[0]) :]
+    if kind.startswith("RAW"):
+        return _logged(kind, rest[0], ranges, angles, None, None)
+    return _logged(kind, rest[11], ranges, angles, _pose(rest[0:3]), _pose(rest[3:6]))
+
+
+def _logged(
+    kind: str,
+    time: str,
+    ranges: list[float],
+    angles: _Angles,
+    laser: RigidTransform | None,
+    robot: RigidTransform | None,
+) -> LoggedScan:
+    mount = robot.inverse().compose(laser) if robot is not None and laser is not None else None
+    # At the greatest range nothing came back: it has to lie above what counts as a return.
+    scan = LaserScan(angles.first, angles.step, ranges, 0.0, math.nextafter(angles.range_max, 0.0))
+    stamp = round(float(time) * 1e9)
+    return LoggedScan(stamp, kind, kind, scan, 0.0, laser, "odom" if laser else "", mount)
+
+
+def _count(word: str) -> int:
+    n = int(word)
+    if n < 0:
+        raise ValueError("a negative count")
+    return n
+
+
+def _pose(words: list[str]) -> RigidTransform:
+    x, y, theta = (float(w) for w in words)
+    return RigidTransform(x, y, theta)
+
+
+READERS: dict[str, Callable[[list[str], str], LoggedScan]] = {
+    "FLASER": _simple,
+    "RLASER": _simple,
+    "ROBOTLASER1": _full,
+    "ROBOTLASER2": _full,
+    "RAWLASER1": _full,
+    "RAWLASER2": _full,
+}

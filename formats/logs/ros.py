@@ -1,0 +1,163 @@
+"""Scans and grids of ROS bags."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Connection
+
+from registration import InputError, RigidTransform
+from vectorization import LaserScan
+
+from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
+from ..files import name_of
+from ..grids.cells import Grid
+from ..limits import MAX_CELLS, MAX_RESOLUTION, MIN_RESOLUTION
+from ..report import Notes, shown
+from .bags import GRID, ODOMETRY, OLD_TRANSFORMS, SCAN, TRANSFORMS, Bag, opened
+from .scan import Log, LoggedScan, LogOptions
+from .transforms import Transforms, matrix_of, planar, stamp_of
+
+STATIC = "tf_static"
+BASES = ("base_link", "base_footprint")
+ODOM = "odom"
+
+
+def read_bag(path: Path, options: LogOptions) -> Log:
+    """Open the scans of a bag; poses come from tf, or from odometry where that has no way to the sensor.
+
+    Raises
+    ------
+    FormatError
+        When it is no bag; while iterating, when it is broken or has no scans.
+    """
+    with opened(path) as bag:
+        form = bag.format
+    return Log(form, name_of(path), partial(_scans, path, options))
+
+
+def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
+    with opened(path) as bag:
+        wanted = _chosen(bag, SCAN, options.topic, notes)
+        frames = _transforms(bag, notes)
+        for connection, message in bag.messages(wanted):
+            try:
+                scan = _scan(connection.topic, message, frames, options)
+            except InputError as error:
+                notes.add_dropped("broken_scan", f"scans that are none, such as: {error.message}", 1)
+                continue
+            if scan.pose is None:
+                notes.add_dropped("no_pose", "scans whose pose the log does not say (they are kept)", 1)
+            notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
+            yield scan
+
+
+def _chosen(bag: Bag, kind: str, topic: str | None, notes: Notes) -> list[Connection]:
+    """Return the connections of one topic.
+
+    Raises
+    ------
+    IncompleteFileError
+        When there is none.
+    """
+    short = kind.rpartition("/")[2]
+    found = bag.connections(kind)
+    counts: dict[str, int] = {}
+    for connection in found:
+        counts[connection.topic] = counts.get(connection.topic, 0) + connection.msgcount
+    if topic is None and len(counts) > 1:
+        topic = max(sorted(counts), key=lambda t: counts[t])
+        others = ", ".join(shown(t) for t in sorted(counts) if t != topic)
+        notes.add_assumed("topic", f"{short} of {shown(topic)}, which has most; not of {shown(others)}")
+    if not counts or (topic is not None and topic not in counts):
+        raise IncompleteFileError(f"has no {short}" + (f" on {shown(topic)}" if topic else ""), argument=bag.name)
+    return [c for c in found if topic is None or c.topic == topic]
+
+
+def _transforms(bag: Bag, notes: Notes) -> Transforms:
+    frames = Transforms(bag.name)
+    moving = set()
+    for connection, message in bag.messages(bag.connections(TRANSFORMS, OLD_TRANSFORMS)):
+        static = connection.topic.strip("/") == STATIC
+        for one in message.transforms:
+            matrix = matrix_of(one.transform.translation, one.transform.rotation)
+            frames.add(one.header.frame_id, one.child_frame_id, stamp_of(one.header), matrix, static=static)
+            moving.add(one.child_frame_id.strip("/"))
+        notes.add_read("transforms", "messages of tf", 1)
+    for _connection, message in bag.messages(bag.connections(ODOMETRY)):
+        child = message.child_frame_id.strip("/") or BASES[0]
+        if child not in moving:
+            pose = message.pose.pose
+            matrix = matrix_of(pose.position, pose.orientation)
+            frames.add(message.header.frame_id or ODOM, child, stamp_of(message.header), matrix, static=False)
+            notes.add_read("odometry", "messages of odometry", 1)
+    return frames
+
+
+def _scan(topic: str, message: Any, frames: Transforms, options: LogOptions) -> LoggedScan:
+    ranges = np.asarray(message.ranges, dtype=np.float64)
+    laser = LaserScan(
+        float(message.angle_min),
+        float(message.angle_increment),
+        ranges,
+        float(message.range_min),
+        float(message.range_max),
+    )
+    stamp, frame = stamp_of(message.header), str(message.header.frame_id)
+    above = frames.above(frame)
+    outer = (options.pose_frame or (ODOM if ODOM in above else above[-1])).strip("/")
+    base = next((b for b in BASES if b in above), None)
+    known = frames.lookup(outer, frame, stamp) if len(above) > 1 else None
+    mounted = frames.lookup(base, frame, stamp) if base else None
+    pose, flipped = planar(known) if known is not None else (None, False)
+    mount, upside_down = planar(mounted) if mounted is not None else (None, flipped)
+    return LoggedScan(
+        stamp, topic, shown(frame), laser, float(message.time_increment), pose, outer if pose else "", mount,
+        flipped or upside_down,
+    )  # fmt: skip
+
+
+def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, str, str]:
+    """Read the last grid of a bag.
+
+    Returns
+    -------
+    Grid
+    str
+        The frame that it is in.
+    str
+        The format of the bag.
+
+    Raises
+    ------
+    FormatError
+        When the bag is broken, or has no grid.
+    """
+    with opened(path) as bag:
+        last: Any = None
+        for _connection, message in bag.messages(_chosen(bag, GRID, topic, notes)):
+            last = message
+            notes.add_read("grids", "grids, of which the last is taken", 1)
+        if last is None:
+            raise IncompleteFileError("has no OccupancyGrid", argument=bag.name)
+        return _grid(last, bag.name), shown(str(last.header.frame_id)) or "map", bag.format
+
+
+def _grid(message: Any, name: str) -> Grid:
+    width, height = int(message.info.width), int(message.info.height)
+    resolution = float(np.float32(message.info.resolution))
+    if width * height > MAX_CELLS:
+        raise TooLargeError(f"expected at most {MAX_CELLS} cells", argument=name)
+    if width * height != len(message.data) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+        raise MalformedFileError("has a grid whose cells do not fit its size or resolution", argument=name)
+    values = np.asarray(message.data, dtype=np.int8).reshape(height, width).astype(np.float32)
+    occupancy = np.where((values >= 0) & (values <= 100), values / np.float32(100), np.float32(np.nan))
+    try:
+        origin, _ = planar(matrix_of(message.info.origin.position, message.info.origin.orientation))
+    except ValueError as error:
+        raise MalformedFileError("has a grid without an origin", argument=name) from error
+    return Grid(occupancy, round(resolution, 7), RigidTransform(origin.x, origin.y, origin.theta))

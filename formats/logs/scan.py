@@ -1,0 +1,84 @@
+"""A scan as a log has it, and what one may say of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from registration import RigidTransform
+from vectorization import LaserScan
+
+from ..report import ImportReport, Notes
+
+
+@dataclass(frozen=True, slots=True)
+class LogOptions:
+    """What to take of a log.
+
+    Attributes
+    ----------
+    topic : str or None
+        Of the scans; None: the one with most of them. In a CARMEN log the kind of message, such as ``FLASER``.
+    pose_frame : str or None
+        Frame that the poses are wanted in; None: ``odom`` where the log has it, else the outermost.
+    """
+
+    topic: str | None = None
+    pose_frame: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoggedScan:
+    """One scan.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Of the first beam, nanoseconds since the log's epoch.
+    topic, frame_id : str
+    laser : LaserScan
+        In the sensor's frame; seen from below where `flipped`.
+    time_increment : float
+        From beam to beam, seconds; 0 where nobody says.
+    pose : RigidTransform or None
+        pose_frame_from_sensor at that time as odometry has it; None: not known.
+    pose_frame : str
+    mount : RigidTransform or None
+        base_from_sensor; None: not known.
+    flipped : bool
+        Whether the sensor is mounted upside down: y becomes -y in its data before `pose` or `mount` apply.
+    """
+
+    stamp_ns: int
+    topic: str
+    frame_id: str
+    laser: LaserScan = field(repr=False)
+    time_increment: float = 0.0
+    pose: RigidTransform | None = None
+    pose_frame: str = ""
+    mount: RigidTransform | None = None
+    flipped: bool = False
+
+    @property
+    def stamp(self) -> float:
+        """Seconds since the log's epoch."""
+        return self.stamp_ns * 1e-9
+
+
+class Log:
+    """The scans of a log, read anew by each iteration; a long log is never held whole."""
+
+    def __init__(self, format: str, name: str, scans: Callable[[Notes], Iterator[LoggedScan]]) -> None:
+        self.format = format
+        self.name = name
+        self._scans = scans
+        self._notes = Notes()
+
+    def __iter__(self) -> Iterator[LoggedScan]:
+        self._notes = Notes()
+        return self._scans(self._notes)
+
+    @property
+    def report(self) -> ImportReport:
+        """What the last iteration read so far."""
+        return self._notes.report(self.format, (self.name,))

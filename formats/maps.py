@@ -1,0 +1,88 @@
+"""Reading a map: which reader, by the file's name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from .drawings.drawing import Drawing
+from .drawings.dxf import read_dxf
+from .drawings.geojson import read_geojson
+from .drawings.svg import read_svg
+from .drawings.tables import read_csv, read_json
+from .drawings.walls import to_map
+from .errors import UnsupportedFormatError
+from .files import name_of
+from .grids.cells import Grid
+from .grids.faces import find_faces
+from .grids.map_server import read_grid
+from .line_map import ImportedMap, LineMap
+from .logs.bags import is_bag
+from .logs.ros import read_bag_grid
+from .options import DEFAULT_OPTIONS, ImportOptions
+from .report import Notes
+
+DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
+    ".dxf": read_dxf,
+    ".svg": read_svg,
+    ".geojson": read_geojson,
+    ".json": read_json,
+    ".csv": read_csv,
+}
+
+
+def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTIONS) -> ImportedMap:
+    """Read a map of another tool's, or one of our own.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.yaml`` of map_server, its picture beside it; a bag of ROS with an OccupancyGrid; a drawing in ``.dxf``,
+        ``.svg`` or ``.geojson``; segments in ``.csv``; a map file of our own in ``.json``.
+    options : ImportOptions
+        What the file does not say.
+
+    Returns
+    -------
+    ImportedMap
+
+    Raises
+    ------
+    FormatError
+        When the file cannot be read, in one line that names it.
+    """
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if suffix in (".yaml", ".yml"):
+        return _read_map_server(file)
+    if is_bag(file):
+        return _read_bag(file, options)
+    if suffix in DRAWINGS:
+        notes = Notes()
+        drawing = DRAWINGS[suffix](file, options, notes)
+        line_map = to_map(drawing, options)
+        return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
+    known = ", ".join((".yaml", *DRAWINGS))
+    raise UnsupportedFormatError(f"expected a file that ends in one of {known}", argument=name_of(file))
+
+
+def _read_map_server(file: Path) -> ImportedMap:
+    notes = Notes()
+    grid, files = read_grid(file, notes)
+    line_map = _from_grid(grid, notes, files[0], "map")
+    return ImportedMap(line_map, notes.report("map_server", files))
+
+
+def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
+    notes = Notes()
+    grid, frame, form = read_bag_grid(file, options.topic, notes)
+    return ImportedMap(_from_grid(grid, notes, name_of(file), frame), notes.report(form, (name_of(file),)))
+
+
+def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
+    segments = find_faces(grid, notes, name)
+    notes.add_read("segments", "faces of walls", len(segments))
+    # Measured with the logs of two grids: no number that was tried makes more scans usable.
+    notes.add_assumed("sigma", "how well walls are known is left to be estimated for each answer")
+    return LineMap(segments, None, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})

@@ -1,0 +1,89 @@
+"""What the owner of a file may say of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from registration.limits import MAX_COORDINATE
+
+from .errors import InvalidOptionError
+
+Drawn = Literal["faces", "centres"]
+Directions = Literal["drawn", "none"]
+
+UNITS = {
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "dm": 0.1,
+    "m": 1.0,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "yd": 0.9144,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ImportOptions:
+    """What a file does not say; nothing of it is needed for a grid.
+
+    Attributes
+    ----------
+    units : str, float or None
+        Of a drawing: ``mm``, ``cm``, ``dm``, ``m``, ``km``, ``in``, ``ft``, ``yd``, or metres per unit; None: as the
+        file says.
+    layers : tuple of str
+        Patterns such as ``*WALL*``, without regard to case; empty: all layers that are drawn.
+    drawn : "faces" or "centres"
+        Whether the lines of a drawing are the faces of walls, or run in their middle.
+    thickness : float or None
+        Of walls that are drawn by their centre line, metres, 0 to 10; None: as the drawing says, else 0.
+    inside : tuple of (x, y)
+        Free places, metres in the map frame: directions are found from there.
+    directions : "drawn", "none" or None
+        What the directions of lines are worth: free space lies on the left of each, or nothing. None: found from
+        `inside` where given, else as the file says.
+    local_metres : bool
+        Whether the coordinates of a GeoJSON file are metres; else they are degrees, and are refused.
+    topic : str or None
+        Of the grid in a bag; None: the only one.
+
+    Raises
+    ------
+    InvalidOptionError
+        When a value is out of its range.
+    """
+
+    units: str | float | None = None
+    layers: tuple[str, ...] = ()
+    drawn: Drawn = "faces"
+    thickness: float | None = None
+    inside: tuple[tuple[float, float], ...] = ()
+    directions: Directions | None = None
+    local_metres: bool = False
+    topic: str | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.units, str) and self.units not in UNITS:
+            raise InvalidOptionError(f"expected one of {', '.join(UNITS)}, or metres per unit", argument="units")
+        if isinstance(self.units, int | float) and not 1e-6 <= self.units <= 1e4:
+            raise InvalidOptionError(f"expected 1e-6 to 1e4 metres per unit, got {self.units!r}", argument="units")
+        if self.drawn not in ("faces", "centres"):
+            raise InvalidOptionError("expected faces or centres", argument="drawn")
+        if self.directions not in (None, "drawn", "none"):
+            raise InvalidOptionError("expected drawn or none", argument="directions")
+        if self.thickness is not None and not 0.0 <= self.thickness <= 10.0:
+            raise InvalidOptionError(f"expected from 0 to 10 m, got {self.thickness!r}", argument="thickness")
+        for place in self.inside:
+            if not (len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)):
+                raise InvalidOptionError("expected two numbers, metres", argument="inside")
+
+    @property
+    def metres(self) -> float | None:
+        """Metres per unit, None where the file says."""
+        return UNITS[self.units] if isinstance(self.units, str) else self.units
+
+
+DEFAULT_OPTIONS = ImportOptions()

@@ -1,0 +1,68 @@
+"""A picture of a map with its directions.
+
+Pillow draws it, for it reads the grids anyway; matplotlib is none of the dependencies.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from registration import RigidTransform
+
+from .errors import UnsupportedFormatError
+from .line_map import LineMap
+
+SIZE = 1600  # pixels of the longer edge
+MARGIN = 20  # pixels
+TICK = 10.0  # pixels; towards the free side
+MARK = 5.0  # pixels; of a pose
+WALL, FREE_SIDE, PATH, PAPER = (20, 20, 20), (30, 140, 60), (200, 40, 40), (255, 255, 255)
+
+
+def draw_map(map: LineMap, path: str | os.PathLike[str], poses: Iterable[RigidTransform] = ()) -> None:
+    """Draw a map as PNG: walls in black, a green tick on the free side of each, poses in red.
+
+    Parameters
+    ----------
+    map : LineMap
+        Without ticks where its directions mean nothing.
+    path : str or path
+        Ends in ``.png``.
+    poses : iterable of RigidTransform
+        map_from_scan; drawn as dots that point where they look.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        When the name ends in anything else.
+    """
+    if not os.fspath(path).lower().endswith(".png"):
+        raise UnsupportedFormatError("expected a name that ends in .png", argument="picture")
+    corners = map.segments.endpoints.reshape(-1, 2) if len(map.segments) else np.zeros((1, 2))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    scale = (SIZE - 2 * MARGIN) / max(float((high - low).max()), 1.0)
+    width, height = (max(1, math.ceil(float(v) * scale)) + 2 * MARGIN for v in high - low)
+    picture = Image.new("RGB", (width, height), PAPER)
+    draw = ImageDraw.Draw(picture)
+
+    def place(x: float, y: float) -> tuple[float, float]:
+        return MARGIN + (x - float(low[0])) * scale, height - MARGIN - (y - float(low[1])) * scale
+
+    for (x1, y1, x2, y2), (mx, my), (nx, ny) in zip(
+        map.segments.endpoints, map.segments.midpoints, map.segments.normals, strict=True
+    ):
+        draw.line([place(x1, y1), place(x2, y2)], fill=WALL, width=2)
+        if map.oriented:
+            x, y = place(mx, my)
+            draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=FREE_SIDE, width=2)
+    for pose in poses:
+        x, y = place(pose.x, pose.y)
+        tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
+        draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=PATH)
+        draw.line([(x, y), tip], fill=PATH, width=1)
+    picture.save(path, format="PNG")

@@ -1,0 +1,192 @@
+"""Grids of map_server: pictures drawn by Pillow, walls where they were drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from formats import FormatError, ImportedMap, IncompleteFileError, MalformedFileError, TooLargeError, read_map
+from registration import wrap_angle
+
+FREE, UNKNOWN, WALL = 254, 205, 0
+YAML = "image: {image}\nresolution: 0.05\norigin: [{origin}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+
+Pixels = NDArray[np.uint8]
+
+
+def l_room() -> Pixels:
+    """A room of 4 m by 3 m whose upper right quarter (2 m by 1 m) is cut off; walls of one cell; y up, row 0 lowest."""
+    grid = np.full((80, 100), UNKNOWN, dtype=np.uint8)
+    grid[9:71, 9:91] = WALL
+    grid[10:70, 10:90] = FREE
+    grid[49:71, 49:91] = UNKNOWN
+    grid[49, 49:91] = WALL
+    grid[49:71, 49] = WALL
+    return grid
+
+
+def write(folder: Path, up: Pixels, yaml: str = YAML, origin: str = "0, 0, 0", name: str = "map.pgm") -> Path:
+    Image.fromarray(up[::-1]).save(folder / name)
+    path = folder / "map.yaml"
+    path.write_text(yaml.format(image=name, origin=origin))
+    return path
+
+
+def walls(imported: ImportedMap) -> set[tuple[int, float, float]]:
+    """Direction in whole degrees, signed offset to 5 mm and length to half a metre, of the long walls."""
+    s = imported.map.segments
+    angles = np.rint(np.degrees(np.arctan2(s.directions[:, 1], s.directions[:, 0]))).astype(int) % 360
+    rounded = zip(angles, np.round(s.offsets / 0.005) * 0.005, s.lengths, strict=True)
+    return {(int(a), round(float(o), 3), round(2 * float(n)) / 2) for a, o, n in rounded if n > 0.5}
+
+
+# Walls lie in the middle of their cell: the cell from 0.45 to 0.50 m at 0.475. Free space on the left: the lower wall
+# runs along +x, its normal is +y and its offset +0.475; the upper one runs along -x at y = 3.525, offset -3.525.
+L_ROOM = {
+    (0, 0.475, 4.0),
+    (90, -4.525, 2.0),
+    (180, -2.475, 2.0),
+    (90, -2.475, 1.0),
+    (180, -3.525, 2.0),
+    (270, 0.475, 3.0),
+}
+
+
+@pytest.mark.parametrize("name", ["map.pgm", "map.png", "map.bmp"])
+def test_walls_lie_in_the_middle_of_their_cells_with_free_space_on_the_left(tmp_path: Path, name: str) -> None:
+    imported = read_map(write(tmp_path, l_room(), name=name))
+    assert walls(imported) == L_ROOM
+    assert imported.map.oriented
+    assert imported.map.sigma is None
+
+
+def test_the_origin_moves_and_turns_the_map(tmp_path: Path) -> None:
+    straight = read_map(write(tmp_path, l_room())).map.segments
+    turned = read_map(write(tmp_path, l_room(), origin="10, -20, 0.5")).map.segments
+    c, s = math.cos(0.5), math.sin(0.5)
+    x, y = straight.midpoints.T
+    np.testing.assert_allclose(turned.midpoints, np.stack([10 + c * x - s * y, -20 + s * x + c * y], axis=1))
+    gain = np.arctan2(turned.directions[:, 1], turned.directions[:, 0])
+    gain -= np.arctan2(straight.directions[:, 1], straight.directions[:, 0])
+    np.testing.assert_allclose([wrap_angle(g - 0.5) for g in gain], 0.0, atol=1e-9)
+
+
+def test_what_borders_on_the_unknown_is_no_wall(tmp_path: Path) -> None:
+    grid = l_room()
+    grid[9, :] = UNKNOWN  # the lower wall was never seen
+    assert walls(read_map(write(tmp_path, grid))) == {wall for wall in L_ROOM if wall[0] != 0}
+
+
+def inverted(up: Pixels) -> Pixels:
+    return np.asarray(255 - up, dtype=np.uint8)
+
+
+def percent(up: Pixels) -> Pixels:
+    """As map_saver writes mode raw: occupancy in percent, 255 unknown."""
+    return np.choose(np.searchsorted([WALL, UNKNOWN, FREE], up), [np.uint8(100), np.uint8(255), np.uint8(0)])
+
+
+def coloured(up: Pixels) -> Pixels:
+    """Unknown is transparent; free and occupied are light and dark greens."""
+    rgba = np.stack([up // 2, up, up // 2, np.where(up == UNKNOWN, 0, 255)], axis=2)
+    rgba[up == FREE, :3] = [240, 255, 240]
+    return rgba.astype(np.uint8)
+
+
+def grey(up: Pixels) -> Pixels:
+    """As the public intel grid: 255 free, 230 unknown, walls no darker than 127, thresholds that fit none of it."""
+    return np.choose(np.searchsorted([WALL, UNKNOWN, FREE], up), [np.uint8(127), np.uint8(230), np.uint8(255)])
+
+
+@pytest.mark.parametrize(
+    ("drawn", "change"),
+    [
+        (inverted, ("negate: 0", "negate: 1")),
+        (percent, ("negate: 0", "negate: 0\nmode: raw")),
+        (coloured, ("negate: 0", "negate: 0\nmode: scale")),
+        (grey, ("negate: 0", "negate: 0")),
+    ],
+)
+def test_other_ways_to_draw_it_give_the_same_walls(
+    tmp_path: Path, drawn: Callable[[Pixels], Pixels], change: tuple[str, str]
+) -> None:
+    path = write(tmp_path, drawn(l_room()), YAML.replace(*change), name="map.png")
+    imported = read_map(path)
+    assert walls(imported) == L_ROOM
+    assert ("thresholds" in {n.code for n in imported.report.assumed}) == (drawn is grey)
+
+
+def test_thick_walls_of_scattered_returns_lie_a_third_of_their_band_behind_its_front(tmp_path: Path) -> None:
+    grid = np.full((80, 100), UNKNOWN, dtype=np.uint8)
+    grid[4:76, 4:96] = WALL
+    grid[10:70, 10:90] = FREE
+    imported = read_map(write(tmp_path, grid))
+    # Six cells: the surface lies two cells, 0.1 m, behind the border at 0.5 m.
+    assert walls(imported) == {(0, 0.4, 4.0), (90, -4.6, 3.0), (180, -3.6, 4.0), (270, 0.4, 3.0)}
+
+
+def test_the_report_counts_what_it_read(tmp_path: Path) -> None:
+    report = read_map(write(tmp_path, l_room())).report
+    assert report.format == "map_server"
+    assert report.files == ("map.yaml", "map.pgm")
+    counts = {note.code: note.count for note in report.read}
+    assert counts["free_cells"] == 80 * 60 - 41 * 21
+    assert counts["occupied_cells"] == 2 * 82 + 2 * 60  # each wall as long as that of the room that it was cut from
+    assert counts["segments"] == 6
+
+
+@pytest.mark.parametrize(
+    ("yaml", "kind", "message"),
+    [
+        ("image: [", MalformedFileError, "is no YAML"),
+        ("- 1", MalformedFileError, "expected a YAML mapping"),
+        ("!!python/object/apply:os.system ['true']", MalformedFileError, "is no YAML"),
+        ("image: map.pgm\norigin: [0, 0, 0]", IncompleteFileError, "does not say resolution"),
+        (YAML.replace("0.05", "-1"), MalformedFileError, "expected resolution to be a number from 0.001 to 10"),
+        (YAML.replace("0.05", ".nan"), MalformedFileError, "expected resolution"),
+        (YAML.replace("[{origin}]", "[0, .inf, 0]"), MalformedFileError, "expected origin"),
+        (YAML.replace("{image}", "nothing.pgm"), IncompleteFileError, "nothing.pgm: there is no such file"),
+        (YAML.replace("{image}", "map.yaml"), MalformedFileError, "is no picture"),
+        ("[" * 3_000, MalformedFileError, "is no YAML"),
+        ("#" * 17_000, TooLargeError, "at most 16384 bytes"),
+    ],
+)
+def test_bad_descriptions_are_refused_in_one_line(
+    tmp_path: Path, yaml: str, kind: type[FormatError], message: str
+) -> None:
+    path = write(tmp_path, l_room())
+    path.write_text(yaml.replace("{image}", "map.pgm").replace("{origin}", "0, 0, 0"))
+    with pytest.raises(kind) as caught:
+        read_map(path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_picture_is_looked_for_beside_its_description_alone(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    Image.fromarray(l_room()).save(tmp_path / "map.pgm")
+    (inner / "map.yaml").write_text(YAML.format(image="../map.pgm", origin="0, 0, 0"))
+    with pytest.raises(IncompleteFileError, match="no such file"):
+        read_map(inner / "map.yaml")
+
+
+def test_pictures_too_large_or_cut_off_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, l_room())
+    (tmp_path / "map.pgm").write_bytes(b"P5 7000 7000 255\n")
+    with pytest.raises(TooLargeError, match="at most 40000000 pixels"):
+        read_map(path)
+    (tmp_path / "map.pgm").write_bytes(b"P5 70 70 255\n" + bytes(100))
+    with pytest.raises(MalformedFileError, match="broken picture"):
+        read_map(path)
+
+
+def test_a_picture_without_walls_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MalformedFileError, match="no wall found"):
+        read_map(write(tmp_path, np.full((50, 50), FREE, dtype=np.uint8)))

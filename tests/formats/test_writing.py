@@ -1,0 +1,57 @@
+"""What is written is read back as it was; pictures show walls and their free sides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from formats import LineMap, UnsupportedFormatError, draw_map, read_map, write_map
+from registration import RigidTransform, Segments
+
+
+@pytest.mark.parametrize("oriented", [True, False])
+@pytest.mark.parametrize("suffix", ["json", "geojson", "svg", "csv", "dxf"])
+def test_a_map_comes_back_to_the_bit(tmp_path: Path, suffix: str, oriented: bool) -> None:
+    corners = [[1.5, 2.5, 4.25, 0.75], [0.1, 1 / 3, -7e3, 2e3]]
+    written = LineMap(Segments.from_array(corners), 0.04, oriented, "hall", {"source": "drawn"})
+    path = tmp_path / f"map.{suffix}"
+    write_map(written, path)
+    again = read_map(path).map
+    assert again.segments.endpoints.tolist() == corners
+    assert again.oriented is oriented
+    if suffix == "json":
+        assert (again.sigma, again.frame_id, again.meta) == (0.04, "hall", {"source": "drawn"})
+
+
+def test_names_in_a_map_cannot_break_out_of_an_svg(tmp_path: Path) -> None:
+    path = tmp_path / "map.svg"
+    write_map(LineMap(Segments.from_array([[0, 0, 1, 0]]), frame_id='"><script>alert(1)</script>'), path)
+    assert b"<script" not in path.read_bytes()
+    assert len(read_map(path).map.segments) == 1
+
+
+def test_other_formats_are_not_written(tmp_path: Path) -> None:
+    one = LineMap(Segments.from_array([[0, 0, 1, 0]]))
+    with pytest.raises(UnsupportedFormatError, match="ends in one of"):
+        write_map(one, tmp_path / "map.dwg")
+    with pytest.raises(UnsupportedFormatError, match=r"\.png"):
+        draw_map(one, tmp_path / "map.jpg")
+
+
+def test_a_picture_shows_walls_free_sides_and_poses(tmp_path: Path) -> None:
+    room = Segments.from_array([[0, 0, 2, 0], [2, 0, 2, 2], [2, 2, 0, 2], [0, 2, 0, 0]])
+    draw_map(LineMap(room), tmp_path / "a.png", [RigidTransform(1.0, 1.0, 0.0)])
+    pixels = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+    assert pixels.shape == (1600, 1600, 3)
+    green = (pixels[..., 1] > 100) & (pixels[..., 0] < 100)
+    rows, columns = np.nonzero(green)
+    # Ticks point into the room, 20 pixels from the border; none lies outside of its walls.
+    assert rows.min() >= 20
+    assert rows.max() <= 1580
+    assert ((np.abs(rows - 800) < 5) | (np.abs(columns - 800) < 5)).all()
+    assert tuple(pixels[800, 800]) == (200, 40, 40)
+    draw_map(LineMap(room, oriented=False), tmp_path / "b.png")
+    assert not (np.asarray(Image.open(tmp_path / "b.png"))[..., 1].astype(int) == 140).any()
