@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import httpx
 import numpy as np
 import orjson
 
-from tests.running import RunningService
+from tests.running import JSON, PATIENCE, RunningService, until
+
+POST = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 
 
-def store_hard_map(running: RunningService) -> None:
-    """Store a map for `searched_for`, and have it indexed: the search is all that is left to do."""
+def store_hard_map(running: RunningService, key: str = "", workers: int = 1) -> None:
+    """Store a map for `searched_for`, and have every worker index it: the search is all that is left to do."""
+    headers = {**JSON, "authorization": f"Bearer {key}"} if key else JSON
     rng = np.random.default_rng(1)
     begins, angles = rng.uniform(0.0, 300.0, (30_000, 2)), rng.uniform(0.0, np.pi, 30_000)
     walls = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
     body = orjson.dumps({"segments": walls}, option=orjson.OPT_SERIALIZE_NUMPY)
-    assert running.client.put("/v1/maps/hard", content=body).status_code == 201
-    assert running.client.post("/v1/associate", content=searched_for(2.0)).status_code == 200
+    assert running.client.put("/v1/maps/hard", content=body, headers=headers).status_code == 201
+    url, brief = running.url + "/v1/associate", searched_for(0.1)
+
+    def is_indexed() -> bool:
+        # Over a new connection: any worker may take it. One that still indexes when the time is over says so.
+        status = httpx.post(url, content=brief, headers=headers, timeout=PATIENCE).status_code
+        assert status in (200, 504)
+        return status == 200 and running.count("linefix_map_cache_misses_total") >= workers
+
+    until(is_indexed)
 
 
 def searched_for(seconds: float = 4.0) -> bytes:
@@ -26,6 +41,17 @@ def searched_for(seconds: float = 4.0) -> bytes:
     options = {"exhaustive": True, "deadline_ms": round(1e3 * seconds)}
     body = {"map": {"map_id": "hard"}, "scan": {"segments": seen}, "options": options}
     return orjson.dumps(body, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+@contextmanager
+def searching(running: RunningService) -> Iterator[None]:
+    """Have the hard map searched for as long as the block takes; then whoever asked for that hangs up."""
+    body = searched_for(30.0)
+    with running.connection() as connection:
+        connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(body) + body)
+        until(lambda: running.count("linefix_searches_running") == 1.0)
+        yield
+        assert running.count("linefix_searches_running") == 1.0
 
 
 def searched_briefly() -> bytes:

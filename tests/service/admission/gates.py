@@ -15,6 +15,7 @@ from service.admission.gate import SearchGate
 from service.admission.ticket import Ticket
 
 T = TypeVar("T")
+PATIENCE = 30.0  # s for what has to come about
 
 
 def soon() -> Deadline:
@@ -22,11 +23,10 @@ def soon() -> Deadline:
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    for _ in range(2000):
-        if condition():
-            return
+    give_up = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < give_up, "did not come about"
         await asyncio.sleep(0.001)
-    raise AssertionError("did not come about")
 
 
 class BlockedGate(SearchGate):

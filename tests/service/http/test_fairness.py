@@ -9,12 +9,14 @@ from collections.abc import Callable
 import httpx
 
 from tests.running import RunningService
-from tests.service.searches import searched_briefly
+from tests.service.searches import searched_briefly, searched_for, store_hard_map
 
 
 def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., RunningService]) -> None:
     running = start_service(keys="flood,robot", searches=1, queue=8)
-    body = searched_briefly()
+    store_hard_map(running, "robot")
+    # As long as its deadline, and so long that to send the next one takes little beside it.
+    body = searched_for(0.1)
     answers: Counter[tuple[str, int]] = Counter()
     waits: set[str | None] = set()
     lock, begun, enough = threading.Lock(), threading.Event(), threading.Event()
@@ -31,7 +33,7 @@ def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Runn
                     if answer.status_code == 429:
                         assert answer.json()["code"] == "rate_limited"
                         waits.add(answer.headers.get("retry-after"))
-                    if answers["flood", 200] + answers["robot", 200] >= 300:
+                    if answers["flood", 200] + answers["robot", 200] >= 60:
                         enough.set()
                 if answer.status_code != 200:
                     enough.wait(0.03)  # these clients share a processor with the service

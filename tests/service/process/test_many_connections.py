@@ -78,7 +78,7 @@ def test_an_address_keeps_its_connections_beside_another_s_flood(start_service: 
 def test_where_all_are_at_work_a_new_one_is_told_so(start_service: Callable[..., RunningService]) -> None:
     running = start_service(max_connections=8, queue=16, searches=1)
     store_hard_map(running)
-    large, small = searched_for(), orjson.dumps({**examples.ASSOCIATE, "options": {}})
+    large, small = searched_for(30.0), orjson.dumps({**examples.ASSOCIATE, "options": {}})
     with ExitStack() as stack:
         stack.enter_context(connect(running, "127.0.0.2")).sendall(post(large))
         until(lambda: running.count("linefix_searches_running") == 1.0)

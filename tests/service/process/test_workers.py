@@ -137,7 +137,7 @@ def test_all_drain_and_end_together(start_service: Callable[..., RunningService]
     service = start_service(workers=2, searches=2)
     until(lambda: ready(service) == 2)
     answers: list[int] = []
-    store_hard_map(service)
+    store_hard_map(service, workers=2)
     body = searched_for()
 
     def ask() -> None:
