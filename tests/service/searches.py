@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import httpx
 import numpy as np
 import orjson
 
-from tests.running import JSON, PATIENCE, RunningService, until
+from tests.running import JSON, RunningService, client_of, until
 
 POST = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 
@@ -22,11 +21,12 @@ def store_hard_map(running: RunningService, key: str = "", workers: int = 1) -> 
     walls = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
     body = orjson.dumps({"segments": walls}, option=orjson.OPT_SERIALIZE_NUMPY)
     assert running.client.put("/v1/maps/hard", content=body, headers=headers).status_code == 201
-    url, brief = running.url + "/v1/associate", searched_for(0.1)
+    brief = searched_for(0.1)
 
     def is_indexed() -> bool:
         # Over a new connection: any worker may take it. One that still indexes when the time is over says so.
-        status = httpx.post(url, content=brief, headers=headers, timeout=PATIENCE).status_code
+        with client_of(running.url) as client:
+            status = client.post("/v1/associate", content=brief, headers=headers).status_code
         assert status in (200, 504)
         return status == 200 and running.count("linefix_map_cache_misses_total") >= workers
 
