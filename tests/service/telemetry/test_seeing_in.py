@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import httpx
@@ -52,8 +51,8 @@ def test_the_dashboard_shows_all_that_is_counted(client: httpx.Client) -> None:
     assert not forgotten
 
 
-def test_the_log_names_request_map_and_verdict(start_service: Callable[..., RunningService]) -> None:
-    running = start_service()
+def test_the_log_names_request_map_and_verdict(service: RunningService) -> None:
+    running = service
     stored = {**examples.ASSOCIATE, "map": {"map_id": "hq-3"}}
     running.client.put("/v1/maps/hq-3", json=examples.MAP)
     running.client.post("/v1/associate", json=stored, headers={"x-request-id": "robot-7"})
@@ -62,6 +61,7 @@ def test_the_log_names_request_map_and_verdict(start_service: Callable[..., Runn
     running.client.post("/v1/associate:batch", json=batch, headers={"x-request-id": "batch"})
     running.client.post("/v1/associate", json={}, headers={"x-request-id": "wrong"})
     until(lambda: '"request_id":"wrong"' in running.log())  # a line is written after its answer is sent
+    running.client.delete("/v1/maps/hq-3")
     lines = [json.loads(line) for line in running.log().splitlines()]
     by_id = {line["request_id"]: line for line in lines if line["message"] == "request"}
     for line in by_id.values():
