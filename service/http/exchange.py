@@ -124,13 +124,16 @@ class Exchange:
             account.take(len(found.document or b""))
             yield found
 
-    async def search(self, call: Callable[[], T], deadline: Deadline) -> T:
+    async def search(self, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True) -> T:
         """Run a search when its turn comes; give up when the client does."""
-        return await self.unless_hung_up(self.take_turn(call, deadline), deadline)
+        return await self.unless_hung_up(self.take_turn(call, deadline, heeds), deadline)
 
-    async def take_turn(self, call: Callable[[], T], deadline: Deadline) -> T:
-        """Run a part of this request when its turn comes; what was let in once is not sent away later."""
-        return await self.services.gate.run(call, deadline, self._ticket)
+    async def take_turn(self, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True) -> T:
+        """Run a part of this request when its turn comes; what was let in once is not sent away later.
+
+        What does not heed the deadline is waited for until then and no longer: see `SearchGate.run`.
+        """
+        return await self.services.gate.run(call, deadline, self._ticket, heeds)
 
     async def unless_hung_up(self, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
         """Wait for work, or cancel it when the client is gone first.

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from association import InvalidMapError, MapIndex
+from association import Deadline, InvalidMapError, MapIndex
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
@@ -72,28 +72,30 @@ class MapLookup:
         stored = self._store.load(map_id)
         return FoundMap(stored.record, stored.document)
 
-    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool) -> CachedMap:
+    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool, deadline: Deadline) -> CachedMap:
         """Return a map ready to be searched.
 
-        Whether its directions count makes it another index, with a place of its own in the cache.
+        Whether its directions count makes it another index, with a place of its own in the cache. Where another
+        request indexes the same map, that is waited for until the deadline.
 
         Runs off the event loop.
 
         Raises
         ------
         StoreError
-            When a stored map has left the cache since it was found, and cannot be had again.
+            When a stored map has left the cache since it was found, and cannot be had again; when the index that
+            another builds is not there in time.
         ParserEndedError
             When the process that parses a large one ends meanwhile.
         InvalidSegmentsError, InvalidMapError
             When the map of the request cannot be searched.
         """
         if isinstance(asked, FoundMap):
-            return self._cache.get((asked.record, oriented), partial(self._read, asked, oriented))
+            return self._cache.get((asked.record, oriented), partial(self._read, asked, oriented), deadline)
         # Robots send the same map with every scan: what is in it names it.
         digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
         key = digest, asked.sigma, asked.frame_id, oriented
-        return self._cache.get(key, lambda: self._index(asked, oriented))
+        return self._cache.get(key, lambda: self._index(asked, oriented), deadline)
 
     def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
         document = found.document

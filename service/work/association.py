@@ -52,26 +52,27 @@ class Associator:
 
     def answer(self, asked: AssociateRequest, on: InlineMap | FoundMap, job: Job) -> Done:
         """Find one scan in one map; raises what `target` and `find` raise."""
-        target = self.target(on, asked.options)
+        target = self.target(on, asked.options, job.deadline)
         job.watch.lap("decode")
+        job.searching.set()
         found = self.find(target, asked, asked.options, job.deadline)
         job.watch.lap("search")
         answer = {**found, "map": target.reference, "client_ref": asked.client_ref}
         return job.done(answer, map=target.reference, verdict=found["status"], usable=found["usable"])
 
-    def target(self, on: InlineMap | FoundMap, options: SearchOptions) -> Target:
-        """Return a map, indexed.
+    def target(self, on: InlineMap | FoundMap, options: SearchOptions, deadline: Deadline) -> Target:
+        """Return a map, indexed; one that is begun is finished, whenever the deadline passes.
 
         Raises
         ------
         StoreError
-            When it is stored, and cannot be had.
+            When it is stored, and cannot be had, or another indexes it and is not done in time.
         ParserEndedError
             When it is large and could not be read.
         InputError
             When it cannot be searched.
         """
-        cached = self.lookup.indexed(on, oriented=options.oriented)
+        cached = self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
         if isinstance(on, FoundMap):
             return Target(cached, {"map_id": on.record.map_id, "revision": on.record.revision})
         return Target(cached, None)

@@ -45,7 +45,8 @@ async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchIt
     """Index the map in one turn at the gate, and search for each scan in another."""
     associator = exchange.services.associator
     async with exchange.looking_up(asked.map, asked.options, job.deadline) as on:
-        target = await exchange.take_turn(partial(associator.target, on, asked.options), job.deadline)
+        index = partial(associator.target, on, asked.options, job.deadline)
+        target = await exchange.take_turn(index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
     calls = [partial(associator.find_for_batch, target, item, asked.options, job.deadline) for item in items]
     results = await _answer_all(exchange, calls, job)

@@ -38,15 +38,23 @@ class BlockedGate(SearchGate):
         self.asked: list[asyncio.Future[Any]] = []
 
     def ask(
-        self, function: Callable[[], T], holder: Holder = None, deadline: Deadline | None = None
+        self,
+        function: Callable[[], T],
+        holder: Holder = None,
+        deadline: Deadline | None = None,
+        heeds: Callable[[], bool] = lambda: True,
     ) -> asyncio.Future[T]:
         """Ask for a turn, as a request does that has not had any."""
-        return self.ask_with(Ticket(holder), function, deadline)
+        return self.ask_with(Ticket(holder), function, deadline, heeds)
 
     def ask_with(
-        self, ticket: Ticket, function: Callable[[], T], deadline: Deadline | None = None
+        self,
+        ticket: Ticket,
+        function: Callable[[], T],
+        deadline: Deadline | None = None,
+        heeds: Callable[[], bool] = lambda: True,
     ) -> asyncio.Future[T]:
-        asked = asyncio.ensure_future(self.run(function, deadline or soon(), ticket))
+        asked = asyncio.ensure_future(self.run(function, deadline or soon(), ticket, heeds))
         self.asked.append(asked)
         return asked
 

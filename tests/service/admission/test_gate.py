@@ -106,6 +106,35 @@ def test_a_deadline_passes_in_the_queue() -> None:
     in_loop(scenario)
 
 
+def test_what_does_not_heed_the_deadline_is_waited_for_until_then() -> None:
+    """It goes on and keeps its slot; what heeds the deadline has its answer waited for."""
+
+    async def scenario() -> None:
+        async with gate_of(2, 0) as gate:
+            begun, heeding = time.monotonic(), threading.Event()
+            soon_over = Deadline(at=begun + 0.1)
+            deaf = gate.ask(gate.release.wait, deadline=soon_over, heeds=heeding.is_set)
+            hearing = gate.ask(gate.release.wait, deadline=soon_over)
+            with pytest.raises(DeadlinePassedError):
+                await deaf
+            assert time.monotonic() - begun >= 0.1
+            await asyncio.sleep(0.1)
+            assert (gate.running, hearing.done()) == (2, False)
+            gate.release.set()
+            assert await hearing
+            await until(lambda: gate.running == 0)
+            # By then it may have come to what heeds.
+            gate.release.clear()
+            heeding.set()
+            late = gate.ask(gate.release.wait, deadline=Deadline(at=time.monotonic() + 0.1), heeds=heeding.is_set)
+            await asyncio.sleep(0.2)
+            assert not late.done()
+            gate.release.set()
+            assert await late
+
+    in_loop(scenario)
+
+
 def test_without_a_deadline_a_turn_is_waited_for() -> None:
     async def scenario() -> None:
         async with gate_of(1, 1) as gate:
