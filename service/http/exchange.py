@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine
-from contextlib import asynccontextmanager
+from contextlib import AbstractContextManager, asynccontextmanager
 from functools import partial
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ from starlette.responses import Response
 
 from association import Deadline
 
+from ..admission.budget import ByteAccount
 from ..admission.errors import DeadlinePassedError
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap
@@ -155,6 +156,10 @@ class Exchange:
                 deadline.cancel()
                 task.cancel()
             gone.cancel()
+
+    def holding_answers(self) -> AbstractContextManager[ByteAccount]:
+        """Give an account for answers that come one after the other, until they are sent as one."""
+        return self.services.answers.account(self._ticket.holder)
 
     def answer(self, done: Done) -> Response:
         """Return what came of the work as a response."""
