@@ -24,10 +24,11 @@ def store_hard_map(running: RunningService, key: str = "", workers: int = 1) -> 
     brief = searched_for(0.1)
 
     def is_indexed() -> bool:
-        # Over a new connection: any worker may take it. One that still indexes when the time is over says so.
+        # Over a new connection: any worker may take it. One that still indexes when the time is over says so, and
+        # has no place for another as long as it does.
         with client_of(running.url) as client:
             status = client.post("/v1/associate", content=brief, headers=headers).status_code
-        assert status in (200, 504)
+        assert status in (200, 429, 503, 504)
         return status == 200 and running.count("linefix_map_cache_misses_total") >= workers
 
     until(is_indexed)
