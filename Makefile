@@ -2,6 +2,8 @@
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 VENV ?= .venv
 BIN := $(VENV)/bin
+# Where the environment forbids bytecode, each service that a test starts would compile its source anew.
+export PYTHONDONTWRITEBYTECODE =
 export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
@@ -38,7 +40,7 @@ JOBS ?= 2
 # Kernels first: the processes would compile the same ones side by side.
 unit: $(VENV)/.ready
 	$(BIN)/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
-	$(BIN)/python -m pytest -m "not long" -n $(JOBS) --dist loadfile
+	$(BIN)/python -m pytest -m "not long" -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000, or as ARGS="--port 8001" says
 	$(BIN)/python -m service $(ARGS)

@@ -92,6 +92,11 @@ def one_cell() -> bytes:
     return encoded({"map": {"segments": ends}, "scan": {"segments": rng.uniform(-2.0, 2.0, (200, 4))}})
 
 
+def large_map() -> bytes:
+    """Return a map of some 8 MB; it is stored as ``siege`` before each attack."""
+    return encoded({"segments": np.random.default_rng(0).uniform(0.0, 1e3, (110_000, 4))})
+
+
 def attacks() -> dict[str, tuple[int, Script]]:
     """Return each attack: how many connections at once do what, again and again."""
     chunked = b"GET /livez HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n"
@@ -99,7 +104,7 @@ def attacks() -> dict[str, tuple[int, Script]]:
     many = b'{"options": {"include": [%b]}}' % b",".join([b'"a"'] * 1_900_000)
     unknown = b"{%b}" % b",".join(b'"%x":1' % number for number in range(45_000))
     packed = gzip.compress(b'{"map": ' + b" " * 30_000_000 + b"1}", 9)
-    large = encoded({"segments": np.random.default_rng(0).uniform(0.0, 1e3, (110_000, 4))})
+    large = large_map()
     put = (
         b"PUT /v1/maps/siege HTTP/1.1\r\nHost: localhost\r\n" + KEY + b"Content-Length: %d\r\n\r\n" % len(large) + large
     )
@@ -182,6 +187,7 @@ def main() -> None:
     args = parser.parse_args()
     for name in args.only or attacks():
         with loaded_service() as service:
+            assert service.call("PUT", "/v1/maps/siege", large_map()) == 201
             capacity = goodput(without_pause(service.port, service.requests(), service.cores, 5.0), 5.0)
             print_rows(name, besieged(service, name, args.seconds, capacity))
             assert service.call("PUT", "/v1/maps/after", examples.MAP) == 201

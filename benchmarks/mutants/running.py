@@ -205,7 +205,6 @@ class Runner:
                 os.dup2(log.fileno(), 2)
             generate = [phase for phase in hypothesis.Phase if phase not in (hypothesis.Phase.shrink,)]
             hypothesis.settings.register_profile("mutants", phases=generate, database=None, derandomize=True)
-            hypothesis.settings.load_profile("mutants")
             usual = [
                 "-q",
                 "-W",
@@ -217,6 +216,7 @@ class Runner:
                 "-m",
                 f"not {SKIPPED}",
                 "--tb=line",
+                "--hypothesis-profile=mutants",
             ]
             pytest.main([*usual, *(["-x"] if stop else []), *suite.tests], plugins=[watcher])
         except BaseException:

@@ -79,19 +79,28 @@ class SearchGate:
         if self.full:
             self._require_share(holder)
 
-    async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket) -> T:
+    async def run(
+        self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool] = lambda: True
+    ) -> T:
         """Run a function when its turn comes.
 
         A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns, so that there
         are never more running than slots. Cancel the deadline to make it return soon. A further turn of a request that
         had one is waited for however long the queue is.
 
+        Parameters
+        ----------
+        heeds : callable
+            Tells whether the function looks at the deadline by now, and returns soon after it. As long as it does not,
+            as while it indexes a map, it is waited for until the deadline and no longer: it goes on, and keeps its
+            slot, for whoever asks next.
+
         Raises
         ------
         QueueFullError, ShareUsedError
             When the queue is full, or the place went to somebody who has fewer.
         DeadlinePassedError
-            When the deadline passes before the turn comes.
+            When the deadline passes before the turn comes, or before the function heeds it.
         CancelledError
             When everything is told to give up.
         """
@@ -107,13 +116,21 @@ class SearchGate:
             raise
         self._deadlines[work] = deadline
         work.add_done_callback(lambda done: self._finish(done, ticket.holder, begun))
+        return await self._outcome(work, deadline, heeds)
+
+    async def _outcome(self, work: asyncio.Future[T], deadline: Deadline, heeds: Callable[[], bool]) -> T:
+        """Wait for what runs, as long as it is waited for."""
         if self._over is None:
-            self._over = loop.create_future()
+            self._over = work.get_loop().create_future()
         either: set[asyncio.Future[Any]] = {work, self._over}
-        await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+        ended, _ = await asyncio.wait(either, timeout=_left(deadline), return_when=asyncio.FIRST_COMPLETED)
+        if not ended and heeds():
+            await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
         if work.done():
             return work.result()
-        raise CancelledError
+        if self._over.done():
+            raise CancelledError
+        raise DeadlinePassedError
 
     def cancel_all(self) -> None:
         """Tell everything that runs to give up, and soon wait no longer for what does not hear, as indexing a map."""
@@ -151,9 +168,8 @@ class SearchGate:
         if not ticket.admitted:
             self._make_room(holder)
         turn = self._queue.join(holder, fixed=ticket.admitted)
-        left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
         try:
-            await asyncio.wait({turn}, timeout=left)
+            await asyncio.wait({turn}, timeout=_left(deadline))
         except asyncio.CancelledError:
             self._give_up(holder, turn)
             raise
@@ -193,3 +209,8 @@ class SearchGate:
             self.running -= 1
         else:
             following.set_result(None)
+
+
+def _left(deadline: Deadline) -> float | None:
+    """Return the seconds until a deadline, None where it has no time."""
+    return None if deadline.at is None else max(0.0, deadline.at - time.monotonic())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine
-from contextlib import asynccontextmanager
+from contextlib import AbstractContextManager, asynccontextmanager
 from functools import partial
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ from starlette.responses import Response
 
 from association import Deadline
 
+from ..admission.budget import ByteAccount
 from ..admission.errors import DeadlinePassedError
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap
@@ -124,13 +125,16 @@ class Exchange:
             account.take(len(found.document or b""))
             yield found
 
-    async def search(self, call: Callable[[], T], deadline: Deadline) -> T:
+    async def search(self, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True) -> T:
         """Run a search when its turn comes; give up when the client does."""
-        return await self.unless_hung_up(self.take_turn(call, deadline), deadline)
+        return await self.unless_hung_up(self.take_turn(call, deadline, heeds), deadline)
 
-    async def take_turn(self, call: Callable[[], T], deadline: Deadline) -> T:
-        """Run a part of this request when its turn comes; what was let in once is not sent away later."""
-        return await self.services.gate.run(call, deadline, self._ticket)
+    async def take_turn(self, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True) -> T:
+        """Run a part of this request when its turn comes; what was let in once is not sent away later.
+
+        What does not heed the deadline is waited for until then and no longer: see `SearchGate.run`.
+        """
+        return await self.services.gate.run(call, deadline, self._ticket, heeds)
 
     async def unless_hung_up(self, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
         """Wait for work, or cancel it when the client is gone first.
@@ -152,6 +156,10 @@ class Exchange:
                 deadline.cancel()
                 task.cancel()
             gone.cancel()
+
+    def holding_answers(self) -> AbstractContextManager[ByteAccount]:
+        """Give an account for answers that come one after the other, until they are sent as one."""
+        return self.services.answers.account(self._ticket.holder)
 
     def answer(self, done: Done) -> Response:
         """Return what came of the work as a response."""

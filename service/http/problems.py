@@ -86,7 +86,12 @@ TABLE = (
         ),
     ),
     Kind("read_only", 503, "The store cannot be written", (maps.ReadOnlyStoreError,)),
-    Kind("deadline_exceeded", 504, "The deadline passed before the search started", (admission.DeadlinePassedError,)),
+    Kind(
+        "deadline_exceeded",
+        504,
+        "The deadline passed before the search started",
+        (admission.DeadlinePassedError, maps.IndexNotReadyError),
+    ),
     Kind("storage_full", 507, "The store is full", (maps.StoreFullError,)),
 )
 KINDS: Mapping[str, Kind] = MappingProxyType({kind.code: kind for kind in TABLE})

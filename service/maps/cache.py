@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..telemetry.metrics import Metrics
+from .errors import IndexNotReadyError
 
 if TYPE_CHECKING:  # the store comes without what computes
-    from association import MapIndex
+    from association import Deadline, MapIndex
+
+LOOK_SECONDS = 0.05  # after which who waits for another's index looks whether its own client is still there
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +55,14 @@ class IndexCache:
         with self._lock:
             return key in self._ready
 
-    def get(self, key: Hashable, build: Callable[[], CachedMap]) -> CachedMap:
-        """Return the map of a key, built by this caller or by the one that asked first."""
+    def get(self, key: Hashable, build: Callable[[], CachedMap], deadline: Deadline) -> CachedMap:
+        """Return the map of a key, built by this caller or by the one that asked first.
+
+        Raises
+        ------
+        IndexNotReadyError
+            When the deadline passes, or is cancelled, while the one that asked first still builds it.
+        """
         with self._lock:
             found = self._ready.get(key)
             if found is not None:
@@ -64,7 +74,7 @@ class IndexCache:
             if promise is None:
                 promise = self._building[key] = Future()
         if not mine:
-            return promise.result()
+            return _awaited(promise, deadline)
         self._metrics.cache_misses.inc()
         return self._build(key, promise, build)
 
@@ -98,3 +108,13 @@ class IndexCache:
         while self._ready and self.bytes > most:
             _, dropped = self._ready.popitem(last=False)
             self.bytes -= dropped.bytes
+
+
+def _awaited(promise: Future[CachedMap], deadline: Deadline) -> CachedMap:
+    """Return what another builds, if that is there in time; whoever waits here holds a slot."""
+    while not deadline.passed:
+        left = LOOK_SECONDS if deadline.at is None else deadline.at - time.monotonic()
+        done, _ = wait([promise], max(0.0, min(LOOK_SECONDS, left)))
+        if done:
+            return promise.result()
+    raise IndexNotReadyError

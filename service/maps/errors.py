@@ -9,7 +9,8 @@
     ├── StoreFullError         the disk is full
     ├── ReadOnlyStoreError     nothing can be written
     ├── BusyStoreError         others write for too long
-    └── StoreAwayError         the database does not answer, or cannot be used
+    ├── StoreAwayError         the database does not answer, or cannot be used
+    └── IndexNotReadyError     another request indexes the map, and is not done in time
 """
 
 from __future__ import annotations
@@ -74,3 +75,10 @@ class StoreAwayError(StoreError):
 
     def __init__(self, message: str = "the database does not answer") -> None:
         super().__init__(message)
+
+
+class IndexNotReadyError(StoreError):
+    """Another request indexes the map, and is not done in time."""
+
+    def __init__(self) -> None:
+        super().__init__("the map is being indexed for another request; ask again")

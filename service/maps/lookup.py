@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from association import InvalidMapError, MapIndex
+from association import Deadline, InvalidMapError, MapIndex
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
@@ -73,18 +73,19 @@ class MapLookup:
         stored = self._store.load(map_id)
         return FoundMap(stored.record, stored.document)
 
-    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None) -> CachedMap:
+    def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
         """Return a map ready to be searched.
 
         Whether its directions count makes it another index, with a place of its own in the cache; `oriented` None is as
-        the map itself says.
+        the map itself says. Where another request indexes the same map, that is waited for until the deadline.
 
         Runs off the event loop.
 
         Raises
         ------
         StoreError
-            When a stored map has left the cache since it was found, and cannot be had again.
+            When a stored map has left the cache since it was found, and cannot be had again; when the index that
+            another builds is not there in time.
         ParserEndedError
             When the process that parses a large one ends meanwhile.
         InvalidSegmentsError, InvalidMapError
@@ -92,12 +93,12 @@ class MapLookup:
         """
         if isinstance(asked, FoundMap):
             directed = is_oriented(oriented, asked.record.oriented)
-            return self._cache.get((asked.record, directed), partial(self._read, asked, directed))
+            return self._cache.get((asked.record, directed), partial(self._read, asked, directed), deadline)
         # Robots send the same map with every scan: what is in it names it.
         digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
         directed = is_oriented(oriented, asked.oriented)
         key = digest, asked.sigma, asked.frame_id, directed
-        return self._cache.get(key, lambda: self._index(asked, directed))
+        return self._cache.get(key, lambda: self._index(asked, directed), deadline)
 
     def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
         document = found.document

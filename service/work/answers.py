@@ -11,6 +11,8 @@ from association import Alternative, AssociationResult, Correspondence, Hinge
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
 
+from ..schemas.encoding import encode_list
+
 Json = dict[str, Any]
 
 
@@ -62,10 +64,10 @@ def registration_json(result: RegistrationResult, pairs: NDArray[np.intp]) -> Js
         "pose": pose_json(result.pose),
         "covariance": matrix_json(result.covariance),
         "unobservable": direction_json(result.unobservable),
-        "residuals": [
+        "residuals": encode_list(
             {"scan": scan, "map": on, "offset": offset, "angle": angle, "weight": weight}
             for (scan, on), offset, angle, weight in zip(pairs.tolist(), *columns, strict=True)
-        ],
+        ),
         "diagnostics": diagnostics_json(result.diagnostics),
     }
 

@@ -70,11 +70,12 @@ def check(lookup: MapLookup, on: FoundMap, asked: CheckRequest | None, job: Job)
     CancelledError
         When the client has gone.
     """
-    cached = lookup.indexed(on, oriented=True)
+    cached = lookup.indexed(on, oriented=True, deadline=job.deadline)
     scans = [_scan_of(asked, number) for number in range(len(asked.scans))] if asked is not None else []
     job.watch.lap("decode")
     if job.deadline.passed and not job.deadline.cancelled:
         raise DeadlinePassedError
+    job.searching.set()
     oriented = is_oriented(None, on.record.oriented)
     found = check_map(cached.index, job.deadline, oriented=oriented)
     return Checked(cached, oriented, scans, found, {"map_id": on.record.map_id, "revision": on.record.revision})

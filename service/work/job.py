@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from threading import Event
 from typing import Any
 
 from association import Deadline
@@ -61,11 +62,14 @@ class Job:
     watch : Stopwatch
         Since the body had arrived.
     deadline : Deadline
+    searching : Event
+        Set once what goes on looks at the deadline.
     """
 
     request_id: str
     watch: Stopwatch
     deadline: Deadline
+    searching: Event = field(default_factory=Event)
 
     def done(self, answer: dict[str, Any], **noted: object) -> Done:
         """Return an answer as JSON, with the request's id and its times.

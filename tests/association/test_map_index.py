@@ -207,9 +207,9 @@ def test_memory_is_capped_whatever_the_extent() -> None:
 
 def test_a_heap_of_equal_pieces_is_indexed_in_bounded_time() -> None:
     """Where thousands begin in one place a look at all others would go with the square of their number."""
-    begun = time.monotonic()
+    begun = time.thread_time()  # what others take of the processor does not count
     index_of(np.tile(ROOM, (5000, 1)))
-    assert time.monotonic() - begun < 10.0  # by the square: more than a minute
+    assert time.thread_time() - begun < 10.0  # by the square: more than a minute
 
 
 @pytest.mark.parametrize(

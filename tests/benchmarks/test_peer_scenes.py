@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 
 from benchmarks.peers.scenes import DRAWN_LEVELS, GUESS, KINDS, SHORTEST, SIZES, Cell, drawn_cell, polygons
 
+cell_of = functools.cache(drawn_cell)  # drawn once for all tests that look at it
 CELLS = [(kind, size, level) for kind in KINDS for size in SIZES for level in DRAWN_LEVELS]
 
 
 @pytest.fixture(params=CELLS, ids=lambda c: f"{c[0]}-{c[1]}-{c[2].name}")
 def drawn(request: pytest.FixtureRequest) -> tuple[Cell, tuple[str, int, object]]:
     kind, size, level = request.param
-    return drawn_cell(kind, size, level, 8, seed=3), request.param
+    return cell_of(kind, size, level, 8, seed=3), request.param
 
 
 def test_a_map_has_about_the_wanted_size(drawn) -> None:

@@ -16,6 +16,7 @@ import httpx
 import pytest
 
 from service.schemas import examples
+from tests.running import client_of
 
 CALLERS = 4
 
@@ -34,7 +35,7 @@ class Caller(threading.Thread):
         while True:
             number += 1
             name = f"{self._name}-{number}"
-            with httpx.Client(base_url=self._url, timeout=30.0, headers={"x-request-id": name}) as client:
+            with client_of(self._url, **{"x-request-id": name}) as client:
                 try:
                     if number % 5:
                         answer = client.post("/v1/associate", json=examples.ASSOCIATE)

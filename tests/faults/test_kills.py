@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from service.schemas import examples
-from tests.running import JSON
+from tests.running import client_of
 
 WRITERS = 3
 MAPS_EACH = 3
@@ -37,7 +37,7 @@ class Writer:
     def work(self, url: str) -> None:
         """Write until the service is gone."""
         try:
-            with httpx.Client(base_url=url, timeout=30.0, headers=JSON) as client:
+            with client_of(url) as client:
                 while True:
                     self.write(client)
         except httpx.TransportError:

@@ -14,7 +14,7 @@ import pytest
 
 from service.schemas import examples
 from service.work.warmup import room_ranges
-from tests.running import JSON, until
+from tests.running import client_of, until
 
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 LASER = {"angle_min": -np.pi, "angle_increment": np.pi / 180.0, "range_max": 30.0, "ranges": room_ranges(TURN).tolist()}
@@ -63,7 +63,7 @@ def test_the_same_answer_to_the_bit(
 
     def ask(turn: int) -> list[tuple[str, bytes]]:
         # A new connection each time: any worker may take it.
-        with httpx.Client(base_url=services[turn % len(services)].url, timeout=60.0, headers=JSON) as client:
+        with client_of(services[turn % len(services)].url) as client:
             return list(asked(client))
 
     with ThreadPoolExecutor(4) as threads:

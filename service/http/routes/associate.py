@@ -30,4 +30,4 @@ async def post_associate(request: Request) -> Response:
     job = exchange.job(asked.options.deadline_ms)
     async with exchange.looking_up(asked.map, job.deadline, oriented=asked.options.oriented) as on:
         work = partial(exchange.services.associator.answer, asked, on, job)
-        return exchange.answer(await exchange.search(work, job.deadline))
+        return exchange.answer(await exchange.search(work, job.deadline, job.searching.is_set))

@@ -6,17 +6,18 @@ import asyncio
 import logging
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
 from association import CancelledError
 
+from ...admission.budget import ByteAccount
 from ...parsing.reading import read_batch
 from ...schemas import examples
+from ...schemas.encoding import encode
 from ...schemas.replies import BatchAnswer
 from ...schemas.requests import BatchItem, BatchRequest
-from ...work.association import batch_done
+from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
 from ..exchange import Exchange, searching
 from ..problems import INTERNAL, problem_of
@@ -45,43 +46,60 @@ async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchIt
     """Index the map in one turn at the gate, and search for each scan in another."""
     associator = exchange.services.associator
     async with exchange.looking_up(asked.map, job.deadline, oriented=asked.options.oriented) as on:
-        target = await exchange.take_turn(partial(associator.target, on, asked.options), job.deadline)
+        index = partial(associator.target, on, asked.options, job.deadline)
+        target = await exchange.take_turn(index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
-    calls = [partial(associator.find_for_batch, target, item, asked.options, job.deadline) for item in items]
-    results = await _answer_all(exchange, calls, job)
-    job.watch.lap("search")
-    return await exchange.services.parse_threads.run(partial(batch_done, asked, target, results, job))
+    calls = [
+        partial(associator.find_for_batch, target, index, item, asked.options, job.deadline)
+        for index, item in enumerate(items)
+    ]
+    with exchange.holding_answers() as account:
+        results = await _answer_all(exchange, calls, job, account)
+        job.watch.lap("search")
+        return await exchange.services.parse_threads.run(partial(batch_done, asked, target, results, job))
 
 
 async def _answer_all(
-    exchange: Exchange, calls: Sequence[Callable[[], dict[str, Any]]], job: Job
-) -> list[dict[str, Any]]:
-    """Search for every scan, as many at once as there are cores; others' requests get their turns in between."""
-    results: list[dict[str, Any]] = [{} for _ in calls]
+    exchange: Exchange, calls: Sequence[Callable[[], BatchResult]], job: Job, account: ByteAccount
+) -> list[BatchResult]:
+    """Search for every scan, as many at once as there are cores; others' requests get their turns in between.
+
+    What is found counts as held. When that is too much, the rest is not searched for.
+    """
+    results: dict[int, BatchResult] = {}
     todo = iter(enumerate(calls))
 
     async def take_turns() -> None:
         for index, call in todo:
             try:
                 found = await exchange.take_turn(call, job.deadline)
-                results[index] = {"index": index, "status_code": 200, "result": found}
             except CancelledError:
                 raise
             except Exception as error:
-                results[index] = _refused(index, error, job.request_id)
+                found = _refused(index, error, job.request_id)
+            account.take(len(found.body))
+            results[index] = found
 
-    await asyncio.gather(*(take_turns() for _ in range(min(exchange.services.gate.slots, len(results)))))
-    return results
+    turns = [asyncio.ensure_future(take_turns()) for _ in range(min(exchange.services.gate.slots, len(calls)))]
+    try:
+        await asyncio.gather(*turns)
+    except BaseException:
+        job.deadline.cancel()
+        for turn in turns:
+            turn.cancel()
+        raise
+    return [results[index] for index in range(len(calls))]
 
 
-def _refused(index: int, error: Exception, request_id: str) -> dict[str, Any]:
+def _refused(index: int, error: Exception, request_id: str) -> BatchResult:
     """Return the item of a scan that has no answer."""
     problem = problem_of(error)
     if problem is None:
         logger.error("a defect", exc_info=error, extra={"request_id": request_id})
         problem = INTERNAL
     moved = problem.as_json(request_id, partial(_in_batch, index))
-    return {"index": index, "status_code": problem.kind.status, "problem": moved}
+    status = problem.kind.status
+    return BatchResult(str(status), encode({"index": index, "status_code": status, "problem": moved}))
 
 
 def _in_batch(index: int, pointer: str) -> str:

@@ -67,7 +67,8 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
     lookup = exchange.services.lookup
     async with exchange.looking_up(StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
-        checked = await exchange.take_turn(partial(check, lookup, on, asked, job), job.deadline)
+        work = partial(check, lookup, on, asked, job)
+        checked = await exchange.take_turn(work, job.deadline, job.searching.is_set)
     samples = None
     if asked is not None:
         calls = [partial(sample, checked, asked, number, job) for number in range(len(asked.scans))]

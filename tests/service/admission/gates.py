@@ -15,6 +15,7 @@ from service.admission.gate import SearchGate
 from service.admission.ticket import Ticket
 
 T = TypeVar("T")
+PATIENCE = 30.0  # s for what has to come about
 
 
 def soon() -> Deadline:
@@ -22,11 +23,10 @@ def soon() -> Deadline:
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    for _ in range(2000):
-        if condition():
-            return
+    give_up = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < give_up, "did not come about"
         await asyncio.sleep(0.001)
-    raise AssertionError("did not come about")
 
 
 class BlockedGate(SearchGate):
@@ -38,15 +38,23 @@ class BlockedGate(SearchGate):
         self.asked: list[asyncio.Future[Any]] = []
 
     def ask(
-        self, function: Callable[[], T], holder: Holder = None, deadline: Deadline | None = None
+        self,
+        function: Callable[[], T],
+        holder: Holder = None,
+        deadline: Deadline | None = None,
+        heeds: Callable[[], bool] = lambda: True,
     ) -> asyncio.Future[T]:
         """Ask for a turn, as a request does that has not had any."""
-        return self.ask_with(Ticket(holder), function, deadline)
+        return self.ask_with(Ticket(holder), function, deadline, heeds)
 
     def ask_with(
-        self, ticket: Ticket, function: Callable[[], T], deadline: Deadline | None = None
+        self,
+        ticket: Ticket,
+        function: Callable[[], T],
+        deadline: Deadline | None = None,
+        heeds: Callable[[], bool] = lambda: True,
     ) -> asyncio.Future[T]:
-        asked = asyncio.ensure_future(self.run(function, deadline or soon(), ticket))
+        asked = asyncio.ensure_future(self.run(function, deadline or soon(), ticket, heeds))
         self.asked.append(asked)
         return asked
 

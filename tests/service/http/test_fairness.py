@@ -6,21 +6,19 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 
-import httpx
-
-from tests.running import RunningService
-from tests.service.searches import searched_briefly
+from tests.running import RunningService, client_of
+from tests.service.searches import searched_a_while, searched_briefly
 
 
 def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., RunningService]) -> None:
     running = start_service(keys="flood,robot", searches=1, queue=8)
-    body = searched_briefly()
+    body = searched_a_while()
     answers: Counter[tuple[str, int]] = Counter()
     waits: set[str | None] = set()
     lock, begun, enough = threading.Lock(), threading.Event(), threading.Event()
 
     def ask(key: str) -> None:
-        with httpx.Client(base_url=running.url, headers={"authorization": f"Bearer {key}"}, timeout=60) as client:
+        with client_of(running.url, authorization=f"Bearer {key}") as client:
             while not enough.is_set():
                 answer = client.post("/v1/associate", content=body)
                 with lock:
@@ -31,7 +29,7 @@ def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., Runn
                     if answer.status_code == 429:
                         assert answer.json()["code"] == "rate_limited"
                         waits.add(answer.headers.get("retry-after"))
-                    if answers["flood", 200] + answers["robot", 200] >= 300:
+                    if answers["flood", 200] + answers["robot", 200] >= 30:
                         enough.set()
                 if answer.status_code != 200:
                     enough.wait(0.03)  # these clients share a processor with the service
@@ -55,8 +53,8 @@ def test_a_key_alone_has_all_of_the_service(start_service: Callable[..., Running
     answers: list[int] = []
 
     def ask() -> None:
-        headers = {"authorization": "Bearer one"}
-        answers.append(httpx.post(running.url + "/v1/associate", content=body, headers=headers, timeout=60).status_code)
+        with client_of(running.url, authorization="Bearer one") as client:
+            answers.append(client.post("/v1/associate", content=body).status_code)
 
     threads = [threading.Thread(target=ask) for _ in range(10)]
     for thread in threads:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-import socket
-import threading
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import httpx
@@ -16,8 +13,8 @@ import orjson
 import pytest
 
 from service.schemas import examples
-from tests.running import JSON, RunningService, until
-from tests.service.searches import searched_for, store_hard_map
+from tests.running import RunningService, until
+from tests.service.searches import POST, searching, store_hard_map
 
 
 def test_probes_and_version(client: httpx.Client) -> None:
@@ -52,30 +49,22 @@ def test_metrics_count(client: httpx.Client) -> None:
 RUNNING, WAITING = "linefix_searches_running", "linefix_searches_waiting"
 
 
-def ask(running: RunningService, body: bytes) -> httpx.Response:
-    return httpx.post(running.url + "/v1/associate", content=body, headers=JSON, timeout=60)
-
-
 def refused(running: RunningService) -> bytes:
     """Return what a request is told whose body has not come."""
     answer = b""
     with running.connection() as connection:
         connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n")
-        connection.settimeout(0.2)
-        with suppress(TimeoutError):
-            while part := connection.recv(4096):
-                answer += part
+        while not answer.endswith(b"}"):
+            part = connection.recv(4096)
+            assert part, answer
+            answer += part
     return answer
 
 
 def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable[..., RunningService]) -> None:
     running = start_service(searches=1, queue=0)
     store_hard_map(running)
-    busy = threading.Thread(target=ask, args=(running, searched_for()))
-    busy.start()
-    try:
-        # Between parsing and searching there is a place for a moment.
-        until(lambda: refused(running).startswith(b"HTTP/1.1 503") or not busy.is_alive())
+    with searching(running):
         answer = refused(running)
         assert answer.startswith(b"HTTP/1.1 503")
         assert b"retry-after: 1\r\n" in answer
@@ -92,8 +81,7 @@ def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable
             assert answers.count(b"HTTP/1.1 503") == 3
         assert running.client.get("/readyz").status_code == 200
         assert running.client.put("/v1/maps/m", json=examples.MAP).status_code == 201
-    finally:
-        busy.join()
+    until(lambda: running.count(RUNNING) == 0.0)
     assert running.client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
     counted = 'linefix_http_requests_total{method="POST",route="/v1/register",status="503"}'
     until(lambda: running.count(counted) == 3.0)
@@ -103,19 +91,14 @@ def test_too_many_are_told_to_come_back_before_they_send(start_service: Callable
 def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., RunningService]) -> None:
     running = start_service(searches=1, queue=1)
     store_hard_map(running)
-    busy = threading.Thread(target=ask, args=(running, searched_for()))
-    busy.start()
-    until(lambda: running.count(RUNNING) == 1.0)
     body = orjson.dumps(examples.ASSOCIATE)
-    head = "POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
-    head += f"Content-Length: {len(body)}\r\n\r\n"
-    with socket.create_connection(("127.0.0.1", running.port), timeout=20) as connection:
-        connection.sendall(head.encode() + body)
-        until(lambda: running.count(WAITING) == 1.0 or not busy.is_alive())
-    until(lambda: running.count(WAITING) == 0.0)
-    # The one before it still runs: the place came free because its client left.
-    assert busy.is_alive()
-    busy.join()
+    with searching(running):
+        with running.connection() as connection:
+            connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(body) + body)
+            until(lambda: running.count(WAITING) == 1.0)
+        # The one before it still runs: the place came free because its client left.
+        until(lambda: running.count(WAITING) == 0.0)
+    until(lambda: running.count(RUNNING) == 0.0)
     assert "a defect" not in running.log()
 
 

@@ -93,4 +93,4 @@ def test_without_its_file_the_service_is_not_ready(start_service: Callable[..., 
     assert len(children_of(running.process.pid)) > 0
     path.with_name("away").rename(path)
     assert running.client.get("/v1/maps/m").json() == examples.MAP
-    assert running.client.get("/readyz").status_code == 200
+    until(lambda: running.client.get("/readyz").status_code == 200)

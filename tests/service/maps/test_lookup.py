@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 import pytest
 
-from association import InvalidMapError
+from association import Deadline, InvalidMapError
 from registration import InputError
 from service.database_url import database_url
 from service.maps import CachedMap, IndexCache, MapOutline, MapStore, Preconditions
@@ -34,9 +34,9 @@ class Lookup(MapLookup):
     def look(self, asked: InlineMap | StoredMap, *, oriented: bool | None) -> tuple[CachedMap, int | None]:
         """Find and index, as for one request."""
         if isinstance(asked, InlineMap):
-            return self.indexed(asked, oriented=oriented), None
+            return self.indexed(asked, oriented=oriented, deadline=Deadline()), None
         found = self.find(asked.map_id, oriented=oriented)
-        return self.indexed(found, oriented=oriented), found.record.revision
+        return self.indexed(found, oriented=oriented, deadline=Deadline()), found.record.revision
 
     def put(self, map_id: str, **parts: Any) -> None:
         self.store.put(
@@ -137,11 +137,11 @@ def test_a_map_that_changes_while_its_search_waits_is_not_taken_for_what_it_was(
     found = lookup.find("m", oriented=True)
     assert found.document is None
     lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
-    assert lookup.indexed(found, oriented=True).frame_id == "map"  # read again
+    assert lookup.indexed(found, oriented=True, deadline=Deadline()).frame_id == "map"  # read again
     lookup.cache.make_room(lookup.cache.bytes + 10_000_000)
     lookup.put("m", segments=examples.WALLS, frame_id="other")
     with pytest.raises(BusyStoreError):
-        lookup.indexed(found, oriented=True)
+        lookup.indexed(found, oriented=True, deadline=Deadline())
 
 
 def test_a_large_map_is_read_by_the_other_process(lookup: Lookup) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import resource
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 
 import httpx
@@ -14,6 +14,7 @@ import pytest
 
 from service.schemas import examples
 from tests.running import RunningService, until
+from tests.running import running as start_running
 from tests.service.parsing.bodies import large_map
 from tests.service.searches import searched_for, store_hard_map
 
@@ -30,14 +31,16 @@ def post(body: bytes) -> bytes:
     return HEAD + b"Content-Length: %d\r\n\r\n" % len(body) + body
 
 
-@pytest.fixture
-def few_descriptors(start_service: Callable[..., RunningService]) -> RunningService:
+@pytest.fixture(scope="module")
+def few_descriptors(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (256, before[1]))
-    try:
-        return start_service()
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    with ExitStack() as stack:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (256, before[1]))
+        try:
+            started = stack.enter_context(start_running(tmp_path_factory.mktemp("few")))
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, before)
+        yield started
 
 
 def connect(running: RunningService, address: str = "127.0.0.1") -> socket.socket:
@@ -78,7 +81,7 @@ def test_an_address_keeps_its_connections_beside_another_s_flood(start_service: 
 def test_where_all_are_at_work_a_new_one_is_told_so(start_service: Callable[..., RunningService]) -> None:
     running = start_service(max_connections=8, queue=16, searches=1)
     store_hard_map(running)
-    large, small = searched_for(), orjson.dumps({**examples.ASSOCIATE, "options": {}})
+    large, small = searched_for(30.0), orjson.dumps({**examples.ASSOCIATE, "options": {}})
     with ExitStack() as stack:
         stack.enter_context(connect(running, "127.0.0.2")).sendall(post(large))
         until(lambda: running.count("linefix_searches_running") == 1.0)

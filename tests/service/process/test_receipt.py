@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import socket
 import time
 from collections.abc import Iterator
@@ -14,18 +15,21 @@ import pytest
 
 from service.process.listening import listen
 from service.settings import Settings
-from tests.running import RunningService, running
+from tests.running import RunningService, running, until
 
 
 @pytest.fixture(scope="module")
 def impatient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     folder = tmp_path_factory.mktemp("impatient")
-    with running(folder, request_timeout=1.0, max_body_bytes=20_000_000) as service:
+    with running(folder, request_timeout=2.0, max_body_bytes=20_000_000) as service:
         yield service
 
 
 def trickle(service: RunningService, pieces: list[bytes]) -> tuple[bytes, float]:
-    """Send a piece every 0.1 s until the service ends the connection; return its answer and how long it took."""
+    """Send a piece every 0.1 s until the service ends the connection; return its answer and how long it took.
+
+    A service that does not end it before the last piece has been sent is a failure, however fast the machine is.
+    """
     begun = time.monotonic()
     answer = b""
     with service.connection(timeout=0.1) as connection:
@@ -36,6 +40,8 @@ def trickle(service: RunningService, pieces: list[bytes]) -> tuple[bytes, float]
                 while part := connection.recv(4096):
                     answer += part
                 break
+        else:
+            pytest.fail("was never ended")
     return answer, time.monotonic() - begun
 
 
@@ -46,7 +52,7 @@ SLOW: dict[str, tuple[list[bytes], bytes]] = {
     "a head": ([HEAD] + [b"X-A: a\r\n"] * 100, b""),
     "a body": ([HEAD + b"\r\n"] + [b" "] * 100, b"408"),
     # One limit for both.
-    "a head, then a body": ([HEAD] + [b"X-A: a\r\n"] * 7 + [b"\r\n"] + [b" "] * 100, b"408"),
+    "a head, then a body": ([HEAD] + [b"X-A: a\r\n"] * 5 + [b"\r\n"] + [b" "] * 100, b"408"),
     "a body that nobody wants": (
         [HEAD.replace(b"/v1/associate", b"/nothing") + b"\r\n"] + [b" "] * 100,
         b"404",
@@ -61,20 +67,22 @@ def test_slow_clients_are_closed(impatient: RunningService) -> None:
         for name, (_, status) in SLOW.items():
             answer, seconds = found[name].result()
             assert answer[9:12] == status, name
-            # The limit is a second; with all the pieces it would be ten.
-            assert 0.9 < seconds < 6.0, name
+            # The limit is two seconds; with all the pieces it would be ten.
+            assert seconds > 1.9, name
 
 
 def test_who_does_not_read_the_answer_is_closed(impatient: RunningService) -> None:
     segments = [[float(i % 1000), 0.125, float(i % 1000) + 0.1234567890123, 0.1234567890123] for i in range(150_000)]
-    assert impatient.client.put("/v1/maps/large", json={"segments": segments}).status_code == 201
+    body = gzip.compress(orjson.dumps({"segments": segments}), 1)  # small: it has to arrive in time
+    packed = {"content-encoding": "gzip"}
+    assert impatient.client.put("/v1/maps/large", content=body, headers=packed).status_code == 201
     with socket.socket() as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.connect(("127.0.0.1", impatient.port))
         connection.sendall(b"GET /v1/maps/large HTTP/1.1\r\nHost: localhost\r\n\r\n")
         connection.settimeout(20)
-        time.sleep(3.0)
-        received = 0
+        received = len(connection.recv(12))
+        until(lambda: impatient.count("linefix_connections") == 1.0)  # that which asks
         with suppress(ConnectionError):
             while part := connection.recv(1 << 20):
                 received += len(part)

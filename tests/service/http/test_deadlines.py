@@ -1,0 +1,55 @@
+"""Deadlines over HTTP: who asks is told in time, also where what was begun takes longer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from typing import Any
+
+import numpy as np
+import orjson
+import pytest
+
+from tests.running import RunningService, until
+
+RUNNING, BEGUN = "linefix_searches_running", "linefix_map_cache_misses_total"
+SEEN = {"segments": [[0.0, 1.0, 2.0, 1.0]]}
+
+
+def slow_to_index(walls: int) -> bytes:
+    """Return a map that takes seconds to be indexed where directions mean nothing."""
+    rng = np.random.default_rng(3)
+    begins, angles = rng.uniform(0.0, 500.0, (walls, 2)), rng.uniform(0.0, np.pi, walls)
+    segments = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+    return orjson.dumps({"segments": segments.round(4)}, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+@pytest.mark.parametrize("path", ["/v1/associate", "/v1/associate:batch"])
+def test_an_index_that_is_not_done_in_time_is_504_and_goes_on(
+    start_service: Callable[..., RunningService], path: str
+) -> None:
+    """The answer came when the map was indexed, seconds after the deadline; who asked for the same map waited, too."""
+    running = start_service(searches=2)
+    slow = slow_to_index(100_000)
+    sought: dict[str, Any] = {"scan": SEEN} if path == "/v1/associate" else {"scans": [SEEN]}
+    tries = count(1)
+
+    def ask(map_id: str, deadline_ms: float) -> int:
+        body = {"map": {"map_id": map_id}, **sought, "options": {"oriented": False, "deadline_ms": deadline_ms}}
+        return running.client.post(path, json=body).status_code
+
+    def both_are_told_while_it_is_indexed() -> bool:
+        """Where the map is not even read by then, or is indexed already, try again with another, and more time."""
+        number = next(tries)
+        brief = 300.0 * 2.0 ** (number % 5 - 1)
+        map_id = f"slow-{number}"
+        running.client.put(f"/v1/maps/{map_id}", content=slow).raise_for_status()
+        told = [(ask(map_id, deadline_ms), running.count(RUNNING) >= 1.0) for deadline_ms in (brief, 200.0)]
+        assert {status for status, _ in told} <= {200, 504}
+        until(lambda: ask(map_id, 30_000.0) == 200, patience=240.0)
+        assert running.count(BEGUN) == number  # once, for all of them
+        until(lambda: running.count(RUNNING) == 0.0)
+        return told == [(504, True), (504, True)]
+
+    until(both_are_told_while_it_is_indexed)
+    assert "a defect" not in running.log()
