@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,6 +143,26 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
         _explanation(scored, place, merit, value, windowed=windowed)
         for place, merit, value in zip(order, scored.merits[order].tolist(), values[order].tolist(), strict=True)
     ]
+
+
+def score_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[Ranked]:
+    """Match and score explanations anew, refined from where they are; in their order, with what beams and prior say.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    scored = _score(context, np.concatenate([one.estimate for one in explanations]))
+    again = []
+    for place, one in enumerate(explanations):
+        merit = scored.merits[place]
+        merit["read"], merit["passed"] = one.read, one.passed
+        score = float(merit["score"]) + one.score - one.by_segments
+        merit["score"] = score
+        found = _explanation(scored, place, merit.item(), score + one.value - one.score, windowed=False)
+        again.append(replace(found, inside=one.inside))
+    return again
 
 
 def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, windowed: bool) -> Ranked:

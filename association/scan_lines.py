@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import Records
+from registration.layout import Floats, Records
 
 from .kernels.scans import collinear_segments, describe_lines, join_segments
 from .layout import GATES, LINE_PARTS, MODEL, POINT, VARIANCES, Integers, Measured, as_records, record
@@ -87,12 +87,16 @@ def _joined(given: Measured, lateral: float, cosine: float, *, counted: bool) ->
 def _measured(lines: Records) -> Measured:
     """Return lines as segments to be joined further."""
 
-    def points(x: str, y: str) -> Records:
-        return as_records(POINT, np.stack([lines[x], lines[y]], axis=1))
+    def fixed(array: Floats) -> Floats:
+        # As what was sent is: for a kernel an array that may be written to is another type.
+        array.setflags(write=False)
+        return array
 
-    numbers = (np.ascontiguousarray(lines[name]) for name in ("length", "spread", "points"))
-    lengths, spreads, counts = numbers
-    sigma = np.sqrt(lines["variance"] * counts)
+    def points(x: str, y: str) -> Records:
+        return as_records(POINT, fixed(np.stack([lines[x], lines[y]], axis=1)))
+
+    lengths, spreads, counts = (fixed(lines[name].copy()) for name in ("length", "spread", "points"))
+    sigma = fixed(np.sqrt(lines["variance"] * counts))
     return Measured(
         points("dx", "dy"), points("x", "y"), lengths, points("centroid_x", "centroid_y"), spreads, sigma, counts
     )

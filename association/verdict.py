@@ -11,6 +11,7 @@ from .context import SearchContext
 from .explain import Answer, Explanations
 from .families import is_degenerate, is_thin, place_on_family
 from .features import Features, features_of, twin_share, with_null
+from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
 from .null import null_of
 from .ranking import Ranked
@@ -126,6 +127,8 @@ class _Chances:
         explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))
         likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
         decidable = not is_degenerate(answer.settled) and not is_thin(answer.settled)
+        if likely and decidable and _logistic(careful) * share >= _bar(context):
+            share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             # Only what would be usable has to stand up to the mirrored scan, which costs another search.
             features = with_null(features, answer.best, null_of(context, answer.best))

@@ -153,6 +153,11 @@ class MeasuredSegments:
     spreads: Floats = field(repr=False)
     counted: bool = True
 
+    def __post_init__(self) -> None:
+        # For a kernel an array that may be written to is another type, and each type is compiled anew.
+        for name in ("sigma", "points", "centroids", "spreads"):
+            object.__setattr__(self, name, _frozen(np.ascontiguousarray(getattr(self, name)).view()))
+
     @classmethod
     def from_segments(
         cls,

@@ -20,6 +20,19 @@ ROOM = np.array(
         [-4.0, 3.0, -4.0, -3.0],
     ]
 )
+# As another, but symmetric about an axis: seen from there, the mirrored scan is found as well.
+SYMMETRIC_ROOM = np.array(
+    [
+        [-4.0, -3.0, 4.0, -3.0],
+        [4.0, -3.0, 4.0, 3.0],
+        [4.0, 3.0, 1.0, 3.0],
+        [1.0, 3.0, 1.0, 1.5],
+        [1.0, 1.5, -1.0, 1.5],
+        [-1.0, 1.5, -1.0, 3.0],
+        [-1.0, 3.0, -4.0, 3.0],
+        [-4.0, 3.0, -4.0, -3.0],
+    ]
+)
 
 
 def warm_up() -> None:
@@ -48,6 +61,9 @@ def warm_up() -> None:
         (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
     ):
         associate(index, scan, prior, how, Deadline())
+    symmetric = Segments.from_array(SYMMETRIC_ROOM)
+    alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
+    associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
     check_map(index)
     one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
     for scan in (beams, one_wall):

@@ -13,8 +13,14 @@ from service.work.warmup import warm_up
 from tests.running import until
 
 LASER = {"angle_min": -math.pi, "angle_increment": math.tau / 8, "ranges": [4.0, None, 3.0, 3.5, 4.0, 3.0, 3.0, 3.5]}
+WALLS = examples.WALLS
 SEGMENTS = examples.ASSOCIATE["scan"]["segments"]
 AT = {"x": 1, "y": 0.5, "theta": 1}
+
+
+def around(walls: list[list[float]]) -> list[list[float]]:
+    """Return points on walls, in the order in which they are listed: a corner is cut, a wall seen twice."""
+    return [[a + k / 40.0 * (c - a), b + k / 40.0 * (d - b)] for a, b, c, d in [*walls, walls[0]] for k in range(40)]
 
 
 def associations() -> list[dict[str, Any]]:
@@ -31,6 +37,7 @@ def associations() -> list[dict[str, Any]]:
         {"segments": []},
         {"laser": LASER, "sigma": None},
         {"points": [[3.0 * math.cos(k / 9.0), 3.0] for k in range(40)], "viewpoint": None},
+        {"points": around(WALLS)},
     ]
     asked: list[dict[str, Any]] = [{"scan": scan} for scan in scans]
     asked += [{"prior": {**AT, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}]
