@@ -4,7 +4,8 @@ Each room imports only from those below it; import-linter holds them to that (`p
 
 ::
 
-    cli                    the subcommands
+    commands/              the command line
+    cli                    starts the service
     process/               the process that serves: server, workers, protocol at the socket, how it ends
     app                    puts the parts of one application together
     http/                  routes, problems, bodies, the log of requests

@@ -1,4 +1,4 @@
-"""The command line: ``linefix serve`` and ``python -m service``."""
+"""``linefix serve`` and ``python -m service``."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 logger = logging.getLogger("linefix")
-USAGE = "usage: linefix serve [--host HOST] [--port PORT] [...]\nlinefix serve --help lists every setting."
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
 # this when they are loaded, so before anything imports numpy.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # What a disk may be mended of while the service runs, and says that it is not ready.
 AILING_DISK = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
-KERNELS = "LINEFIX_KERNELS"  # read by registration.compiling, which is not loaded here for its name
+# Read by registration.compiling and by service.commands, which are not loaded here for these names.
+NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
 
 
 def serve(arguments: Sequence[str]) -> int:
@@ -43,7 +43,7 @@ def unknown_settings() -> list[str]:
     """Return what looks like a setting in the environment and is none."""
     from .settings import Settings
 
-    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields} | {KERNELS}
+    known = {f"LINEFIX_{name.upper()}" for name in Settings.model_fields} | {*NO_SETTINGS}
     return sorted(name for name in os.environ if name.upper().startswith("LINEFIX_") and name.upper() not in known)
 
 
@@ -86,15 +86,3 @@ def cannot_keep_maps(settings: Settings) -> str | None:
         if error.errno not in AILING_DISK:
             return f"no maps can be kept in {kept.parent}: {error.strerror}"
     return None
-
-
-def main() -> None:
-    """Run the subcommand that is named."""
-    name, *rest = sys.argv[1:] or [""]
-    if name in ("-h", "--help"):
-        print(USAGE)
-        sys.exit(0)
-    if name != "serve":
-        print(USAGE, file=sys.stderr)
-        sys.exit(2)
-    sys.exit(serve(rest))

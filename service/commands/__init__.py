@@ -1,0 +1,10 @@
+"""The command line ``linefix``: one module a command, each of which works in the process or asks a server.
+
+::
+
+    entry                          runs a command, and turns what goes wrong into one line and an exit code
+    program                        all commands, put together
+    locate, register, vectorize    the commands
+    service, in_process, remote    who answers: this process, or a server
+    inputs, printing               files to requests, answers to people
+"""

@@ -1,0 +1,117 @@
+"""Answers of this process: the functions that the HTTP routes call, without HTTP."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cached_property
+
+import orjson
+from pydantic import ValidationError
+
+from registration.compiling import cache_directory
+
+from ..http.problems import problem_of
+from ..maps import IndexCache, MapStore
+from ..maps.lookup import FoundMap, MapLookup
+from ..parsing.errors import ParserEndedError
+from ..parsing.parser_process import ParserProcess
+from ..parsing.reading import read_model
+from ..schemas.parts import InlineMap, StoredMap
+from ..schemas.requests import AssociateRequest, RegisterRequest, VectorizeRequest
+from ..settings import Settings
+from ..telemetry.metrics import Metrics
+from ..work.association import Associator
+from ..work.compiling import compile_kernels
+from ..work.job import Done, Job, Stopwatch
+from ..work.registration import answer_registration
+from ..work.vectorization import answer_vectorization
+from .errors import WrongUseError, error_of
+from .service import Json, Question
+
+
+class InProcess:
+    """Answers as the service does, with its limits and its store of maps.
+
+    Raises
+    ------
+    WrongUseError
+        When a setting in the environment is wrong.
+    """
+
+    def __init__(self) -> None:
+        try:
+            self._settings = Settings()
+        except ValidationError as error:
+            wrong = error.errors()[0]
+            name = ".".join(str(part) for part in wrong["loc"])
+            raise WrongUseError(f"LINEFIX_{name.upper()} in the environment: {wrong['msg']}") from None
+        self._metrics = Metrics()
+        self._parser = ParserProcess()
+        self._limits = self._settings.limits()
+
+    def close(self) -> None:
+        """Give back what was opened."""
+        self._parser.close()
+        if "_store" in self.__dict__:
+            self._store.close()
+
+    def ask(self, question: Question, body: Json) -> Json:
+        """Return the answer of ``POST /v1/<question>``."""
+        self._compile()
+        with _refusing():
+            answer: Json = orjson.loads(self._done(question, orjson.dumps(body)).body)
+            return answer
+
+    def _compile(self) -> None:
+        """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB."""
+        if cache_directory("association").exists():  # what few kernels may be missing is compiled when it is needed
+            return
+        print("linefix: compiling, which takes a minute; what comes of it is kept for the next time", file=sys.stderr)
+        with suppress(ParserEndedError):  # if that process ends early this one compiles what it needs
+            self._parser.call(compile_kernels)
+        self._parser.close()
+
+    def _done(self, question: Question, data: bytes) -> Done:
+        watch = Stopwatch()
+        if question == "register":
+            return answer_registration(read_model(RegisterRequest, data, self._limits), self._job(watch))
+        if question == "vectorize":
+            return answer_vectorization(read_model(VectorizeRequest, data, self._limits), self._job(watch))
+        asked = read_model(AssociateRequest, data, self._limits)
+        on = self._found(asked.map, asked.options.oriented)
+        return self._associator.answer(asked, on, self._job(watch, asked.options.deadline_ms))
+
+    def _job(self, watch: Stopwatch, deadline_ms: float | None = None) -> Job:
+        return Job(secrets.token_hex(16), watch, watch.deadline(deadline_ms, self._settings.max_deadline_ms))
+
+    def _found(self, asked: InlineMap | StoredMap, oriented: bool | None) -> InlineMap | FoundMap:
+        return asked if isinstance(asked, InlineMap) else self._lookup.find(asked.map_id, oriented=oriented)
+
+    @cached_property
+    def _store(self) -> MapStore:
+        """The store that a service with these settings has; opened when first asked."""
+        return MapStore(self._settings.url)
+
+    @cached_property
+    def _lookup(self) -> MapLookup:
+        return MapLookup(IndexCache(self._settings.cache_bytes, self._metrics), self._store, self._parser)
+
+    @cached_property
+    def _associator(self) -> Associator:
+        return Associator(self._lookup, self._metrics)
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Turn what the service would answer as a problem into an error of the command line."""
+    try:
+        yield
+    except Exception as error:
+        problem = problem_of(error)
+        if problem is None:
+            raise
+        faults = [{"pointer": fault.pointer, "message": fault.message} for fault in problem.faults]
+        raise error_of(problem.kind.status, problem.detail, faults) from error

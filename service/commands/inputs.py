@@ -1,0 +1,132 @@
+"""Files of the command line to parts of requests."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from registration import InputError
+
+from ..parsing.errors import NotJsonError
+from ..parsing.reading import parse
+from ..schemas.errors import TooManyError
+from ..schemas.limits import Limits
+from .errors import RefusedError, WrongUseError
+from .service import Json
+
+if TYPE_CHECKING:
+    from formats import LineMap
+
+STDIN = "-"
+MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's business
+_ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
+_MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
+_FORMS = ("laser", "points", "segments")
+
+
+def read_json(name: str) -> Any:
+    """Return what a file of JSON holds; ``-`` reads it from stdin.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file, or it cannot be read.
+    RefusedError
+        When it is not JSON.
+    """
+    try:
+        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
+    except OSError as error:
+        raise WrongUseError(f"{name}: {error.strerror}") from None
+    try:
+        return parse(data, _ANY)
+    except (NotJsonError, TooManyError) as error:
+        raise RefusedError(f"{name}: not JSON: {error}") from None
+
+
+def read_scan(name: str) -> Json:
+    """Return a scan; the bare fields of a LaserScan message get their `laser` around them.
+
+    Raises
+    ------
+    WrongUseError, RefusedError
+        As `read_json`, and when it is no object.
+    """
+    told = read_json(name)
+    if not isinstance(told, dict):
+        raise RefusedError(f"{name}: expected an object with one of {', '.join(_FORMS)}")
+    if "ranges" in told and not any(form in told for form in _FORMS):
+        return {"laser": told}
+    return told
+
+
+def read_map_or_id(name: str) -> Json:
+    """Return the map of a request: that of a file, or the id of a stored one where there is no such file.
+
+    Raises
+    ------
+    WrongUseError
+        When it is neither.
+    RefusedError
+        When the file is not taken.
+    """
+    if not Path(name).exists() and _MAP_ID.fullmatch(name) and not Path(name).suffix:
+        return {"map_id": name}
+    return read_map_file(name)
+
+
+def read_map_file(name: str) -> Json:
+    """Return the map of a file: JSON as it is, what other tools write as read by `formats`.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file.
+    RefusedError
+        When it is not taken.
+    """
+    path = Path(name)
+    if not path.exists():
+        raise WrongUseError(f"{name}: there is no such file")
+    if path.suffix.lower() != ".json":
+        with needing_formats(f"reading {path.name}"):
+            from formats import read_map
+
+            return document_of(read_map(path).map)
+    told = read_json(name)
+    if isinstance(told, list):
+        return {"segments": told}
+    if not isinstance(told, dict):
+        raise RefusedError(f'{name}: expected {{"segments": [[x1, y1, x2, y2], ...]}}')
+    return told
+
+
+def document_of(line_map: LineMap) -> Json:
+    """Return a map as the contract has it."""
+    return {
+        "segments": line_map.segments.endpoints.tolist(),
+        "sigma": line_map.sigma,
+        "oriented": line_map.oriented,
+        "frame_id": line_map.frame_id,
+        "meta": line_map.meta,
+    }
+
+
+@contextmanager
+def needing_formats(what: str) -> Iterator[None]:
+    """Say in one line where the extra ``[formats]`` is missing, or refuses a file.
+
+    Raises
+    ------
+    RefusedError
+    """
+    try:
+        yield
+    except ModuleNotFoundError:
+        raise RefusedError(f'{what} needs more packages: pip install "linefix[formats]"') from None
+    except InputError as error:
+        raise RefusedError(str(error)) from None

@@ -1,0 +1,27 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Server = Annotated[
+    str | None,
+    typer.Option("--server", metavar="URL", help="Ask the service there; a key is read from LINEFIX_KEY."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the whole answer as JSON.")]
+MapArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="MAP",
+        help="A map file: json, or what linefix map import reads; or the id of a stored map.",
+    ),
+]
+ScanArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCAN",
+        help="A scan as JSON: segments, points or laser, or the fields of a LaserScan message; - reads it from stdin.",
+    ),
+]

@@ -1,0 +1,83 @@
+"""Answers for people and for programs."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import orjson
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from .service import Json
+
+
+def print_json(answer: Any) -> None:
+    """Print one document in one line."""
+    sys.stdout.write(orjson.dumps(answer).decode() + "\n")
+
+
+def console() -> Console:
+    """Return where people read; nothing in what is printed there is taken for markup."""
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+
+
+def plain(text: object) -> Text:
+    """Return what a file or a server said, without what a terminal would obey."""
+    return Text("".join(letter if letter.isprintable() else "?" for letter in str(text)))
+
+
+def print_rows(rows: Sequence[tuple[str, str]]) -> None:
+    """Print names and what they are, one a line."""
+    width = max((len(name) for name, _ in rows), default=0) + 2
+    where = console()
+    for name, value in rows:
+        where.print(plain(name.ljust(width) + value))
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Print a table; numbers stand on the right."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for number, name in enumerate(columns):
+        right = all(isinstance(row[number], int | float) for row in rows)
+        table.add_column(name, justify="right" if right else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(plain(shown(cell)) for cell in row))
+    console().print(table)
+
+
+def shown(value: object) -> str:
+    """Return a cell's text; what is not there is a dash."""
+    if value is None:
+        return "-"
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
+
+
+def verdict_rows(answer: Json) -> list[tuple[str, str]]:
+    """Return what a person wants to know of a pose that was found, or was not."""
+    usable = "usable" if answer["usable"] else "not usable"
+    told = f"{answer['status']}, {usable}"
+    if "probability" in answer:
+        told += f", probability {answer['probability']:.4f}"
+    rows = [("verdict", told), ("pose", pose_text(answer["pose"]))]
+    covariance = answer["covariance"]
+    if covariance is not None:
+        x, y, theta = (math.sqrt(max(0.0, covariance[k][k])) for k in range(3))
+        rows.append(("sigma", f"x {x:.4f} m, y {y:.4f} m, theta {math.degrees(theta):.3f} degrees"))
+    if answer["unobservable"] is not None:
+        dx, dy = answer["unobservable"]
+        rows.append(("free along", f"({dx:.3f}, {dy:.3f})"))
+    for name in ("reasons", "warnings"):
+        rows += [(name.rstrip("s"), f"{one['code']}: {one['message']}") for one in answer.get(name, [])]
+    return rows
+
+
+def pose_text(pose: Json | None) -> str:
+    """Return a pose for people."""
+    if pose is None:
+        return "none"
+    x, y, theta = pose["x"], pose["y"], pose["theta"]
+    return f"x {x:.3f} m, y {y:.3f} m, theta {theta:.4f} rad ({math.degrees(theta):.1f} degrees)"

@@ -1,0 +1,69 @@
+"""All commands, put together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+from typer.main import get_command
+
+from ..cli import serve
+from ..version import VERSION
+from .errors import WrongUseError
+from .locate import locate
+from .register import register
+from .vectorize import vectorize
+
+# Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
+app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
+for command in (locate, register, vectorize):
+    app.command()(command)
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        print(f"linefix {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def linefix(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Tell a robot where it is, from a map and a scan.
+
+    Exit codes: 0 done, whatever the verdict; 2 wrong use; 3 refused input; 4 no server.
+    """
+
+
+@app.command(
+    "serve",
+    add_help_option=False,
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+)
+def run_service(context: typer.Context) -> None:
+    """Start the service; linefix serve --help lists every setting."""
+    raise typer.Exit(serve(context.args))
+
+
+def call(arguments: list[str]) -> int:
+    """Run the command that the arguments name; return its exit code.
+
+    Raises
+    ------
+    CommandError
+        When it cannot be done.
+    """
+    try:
+        code = get_command(app).main(arguments or ["--help"], prog_name="linefix", standalone_mode=False)
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+    except TyperException as error:
+        context = getattr(error, "ctx", None)
+        path = "linefix" if context is None else context.command_path
+        wrong = " ".join(error.format_message().split()).rstrip(".")
+        raise WrongUseError(f"{wrong}; {path} --help says how") from None
+    return code if isinstance(code, int) else 0

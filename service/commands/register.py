@@ -1,0 +1,40 @@
+"""``linefix register``: the pose where it is known which segments belong together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from .inputs import read_json, read_map_file, read_scan
+from .options import AsJson, ScanArgument, Server
+from .printing import print_json, print_rows, verdict_rows
+from .service import Json, answering
+
+
+def register(
+    on: Annotated[str, typer.Argument(metavar="MAP", help="A map file.")],
+    scan: ScanArgument,
+    pairs: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="JSON: [[scan index, map index], ...]; without it i belongs to i."),
+    ] = None,
+    undirected: Annotated[bool, typer.Option("--undirected", help="Directions of segments mean nothing.")] = False,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the pose from known correspondences; the answer is that of /v1/register."""
+    body: Json = {"map": read_map_file(on), "scan": read_scan(scan)}
+    if pairs is not None:
+        body["correspondences"] = read_json(pairs)
+    if undirected:
+        body["options"] = {"oriented": False}
+    with answering(server) as service:
+        answer = service.ask("register", body)
+    if as_json:
+        print_json(answer)
+        return
+    found = answer["diagnostics"]
+    chi2 = "none" if found["chi2"] is None else f"{found['chi2']:.2f}"
+    fit = f"{found['n']} pairs, chi2 {chi2} at {found['dof']} degrees of freedom"
+    print_rows([*verdict_rows(answer), ("fit", fit)])

@@ -1,0 +1,55 @@
+"""``linefix vectorize``: ranges or points to segments."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import orjson
+import typer
+
+from .inputs import read_scan
+from .options import AsJson, ScanArgument, Server
+from .printing import print_json, print_rows, print_table
+from .service import Json, answering
+
+TAKEN = ("laser", "points", "viewpoint")  # of a scan; its frame and stamp make no difference to its segments
+
+
+def vectorize(
+    scan: ScanArgument,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the segments as a scan for locate.")] = None,
+    sigma: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Of single ranges; estimated where not given.")
+    ] = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Cut ranges or points into segments; the answer is that of /v1/vectorize."""
+    told = read_scan(scan)
+    asked: Json = {name: told[name] for name in TAKEN if name in told}
+    sigma = told.get("sigma") if sigma is None else sigma
+    if sigma is not None:
+        asked["options"] = {"sigma": sigma}
+    with answering(server) as service:
+        answer = service.ask("vectorize", asked)
+    if out is not None:
+        out.write_bytes(orjson.dumps(_scan_of(told, answer)) + b"\n")
+    if as_json:
+        print_json(answer)
+        return
+    columns = ("", "x1", "y1", "x2", "y2", "length", "points")
+    rows = [
+        (number, *segment, math.hypot(segment[2] - segment[0], segment[3] - segment[1]), points)
+        for number, (segment, points) in enumerate(zip(answer["segments"], answer["points"], strict=True))
+    ]
+    print_table(columns, rows)
+    print_rows([("sigma", f"{answer['sigma']:.4f} m")])
+
+
+def _scan_of(told: Json, answer: Json) -> Json:
+    """Return the segments as a scan, with what was said of it."""
+    kept: Json = {name: told[name] for name in ("frame_id", "stamp", "viewpoint") if name in told}
+    found = {name: answer[name] for name in ("segments", "points", "centroids", "spreads")}
+    return {**kept, **found, "sigma": answer["sigmas"]}

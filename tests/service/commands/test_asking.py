@@ -1,0 +1,121 @@
+"""linefix locate, register, vectorize: as a user runs them, in the process and against a server."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.running import RunningService, free_port
+
+ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+SEEN = [
+    [-1.01, 0.99, -0.99, -4.98],
+    [-1.00, -4.99, 0.98, -5.01],
+    [1.01, -2.99, 3.98, -3.01],
+    [4.01, -2.98, 3.99, 0.98],
+]
+POINTS = [[0.05 * k, 1.0] for k in range(60)]
+PER_REQUEST = ("request_id", "timing_ms")
+
+
+def linefix(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a folder; whatever happens, nobody reads a traceback."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    root = Path(__file__).parents[3]
+    clean |= {"LINEFIX_DATA_DIR": str(folder / "data"), "PYTHONPATH": str(root), **environment}
+    command = [sys.executable, "-c", "from service.commands.entry import main; main()", *arguments]
+    ended = subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True, timeout=300, check=False)
+    assert "Traceback" not in ended.stderr
+    return ended
+
+
+def refused(ended: subprocess.CompletedProcess[str], code: int) -> str:
+    """Return the one line that a command ended with."""
+    (line,) = [line for line in ended.stderr.splitlines() if "compiling" not in line]
+    assert (ended.returncode, ended.stdout) == (code, "")
+    assert line.startswith("linefix: ")
+    return line
+
+
+def lasting(answer: Any) -> dict[str, Any]:
+    return {name: value for name, value in answer.items() if name not in PER_REQUEST}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "room.json").write_text(json.dumps({"segments": ROOM}))
+    (tmp_path / "scan.json").write_text(json.dumps({"segments": SEEN, "sigma": 0.02}))
+    (tmp_path / "pairs.json").write_text(json.dumps([[0, 0], [1, 1], [2, 3], [3, 4]]))
+    (tmp_path / "points.json").write_text(json.dumps({"points": POINTS, "frame_id": "front"}))
+    return tmp_path
+
+
+def test_locate_answers_as_the_route_does_without_a_server_and_with_one(folder: Path, service: RunningService) -> None:
+    body = {"map": {"segments": ROOM}, "scan": {"segments": SEEN, "sigma": 0.02}}
+    expected = lasting(service.client.post("/v1/associate", json=body).json())
+    for where in ([], ["--server", service.url]):
+        ended = linefix(folder, "locate", "room.json", "scan.json", "--json", *where)
+        assert ended.returncode == 0
+        assert lasting(json.loads(ended.stdout)) == expected
+
+
+def test_locate_tells_people_the_verdict(folder: Path) -> None:
+    ended = linefix(folder, "locate", "room.json", "scan.json")
+    assert ended.returncode == 0
+    assert "ok, usable" in ended.stdout
+    assert "x 0.998 m, y 1.002 m" in ended.stdout
+
+
+def test_a_verdict_that_is_no_answer_is_done_all_the_same(folder: Path) -> None:
+    (folder / "scan.json").write_text('{"segments": []}')
+    ended = linefix(folder, "locate", "room.json", "scan.json", "--json")
+    assert (ended.returncode, json.loads(ended.stdout)["status"]) == (0, "no_match")
+
+
+def test_register_takes_pairs(folder: Path) -> None:
+    ended = linefix(folder, "register", "room.json", "scan.json", "--pairs", "pairs.json", "--json")
+    answer = json.loads(ended.stdout)
+    assert (answer["status"], answer["diagnostics"]["n"]) == ("ok", 4)
+
+
+def test_what_vectorize_writes_is_a_scan(folder: Path) -> None:
+    assert linefix(folder, "vectorize", "points.json", "--out", "found.json").returncode == 0
+    found = json.loads((folder / "found.json").read_text())
+    assert (len(found["segments"]), found["points"], found["frame_id"]) == (1, [60], "front")
+    assert linefix(folder, "locate", "room.json", "found.json").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("locate", "room.json"), 2, "linefix locate --help"),
+        (("lokate",), 2, "locate"),
+        (("locate", "nowhere.json", "scan.json"), 2, "nowhere.json"),
+        (("locate", "room.json", "broken.json"), 3, "broken.json: not JSON"),
+        (("locate", "room.json", "short.json"), 3, "/scan/segments/0"),
+        (("locate", "room.json", "scan.json", "--server", "localhost"), 2, "--server"),
+        (("locate", "room.json", "scan.json", "--server", f"http://127.0.0.1:{free_port()}"), 4, "linefix serve"),
+    ],
+    ids=["no scan", "no command", "no file", "no JSON", "no segment", "no URL", "no server"],
+)
+def test_what_is_not_done_is_told_in_one_line(folder: Path, arguments: tuple[str, ...], code: int, said: str) -> None:
+    (folder / "broken.json").write_text('{"segments": 3')
+    (folder / "short.json").write_text('{"segments": [[1, 2, 3]]}')
+    assert said in refused(linefix(folder, *arguments), code)
+
+
+def test_a_key_comes_from_the_environment(folder: Path, guarded: RunningService) -> None:
+    asked = ("locate", "room.json", "scan.json", "--server", guarded.url)
+    assert "LINEFIX_KEY" in refused(linefix(folder, *asked), 4)
+    assert linefix(folder, *asked, LINEFIX_KEY="sesame").returncode == 0
+
+
+def test_version(folder: Path) -> None:
+    ended = linefix(folder, "--version")
+    assert (ended.returncode, ended.stdout.split()[0]) == (0, "linefix")
