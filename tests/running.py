@@ -16,7 +16,6 @@ from pathlib import Path
 import httpx
 
 START_SECONDS = 150.0  # the first start may have to compile every kernel
-STOP_SECONDS = 15.0
 JSON = {"content-type": "application/json"}
 PATIENCE = 60.0  # s for what has to come about
 
@@ -42,6 +41,13 @@ class RunningService:
         """Return several of them as they were at one time."""
         told = dict(row.rsplit(" ", 1) for row in self.client.get("/metrics").text.splitlines() if row)
         return tuple(float(told.get(line, 0.0)) for line in lines)
+
+    def ended(self) -> int:
+        """Wait until it has ended; return its exit status."""
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"does not end: {self.log()}") from None
 
     def memory_mb(self) -> float:
         """Return what the service and its processes hold now, MB."""
@@ -104,7 +110,7 @@ def stop(service: RunningService) -> None:
     if service.process.poll() is None:
         service.process.send_signal(signal.SIGTERM)
         try:
-            service.process.wait(STOP_SECONDS)
+            service.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             service.process.kill()
             service.process.wait()

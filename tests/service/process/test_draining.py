@@ -36,7 +36,7 @@ def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -
     assert (drained.status_code, drained.json()["detail"]) == (503, "the service is going down")
     assert running.client.get("/livez").status_code == 200
     running.process.send_signal(signal.SIGTERM)  # told again: it ends no sooner
-    assert running.process.wait(15) == 0
+    assert running.ended() == 0
     assert 1.0 <= time.monotonic() - begun < 10.0
     busy.join()
     assert answers == [200]
@@ -49,7 +49,7 @@ def test_a_second_ctrl_c_cuts_the_draining_short(start_service: Callable[..., Ru
     running.process.send_signal(signal.SIGINT)
     until(lambda: running.client.get("/readyz").status_code == 503)
     running.process.send_signal(signal.SIGINT)
-    assert running.process.wait(15) == 0
+    assert running.ended() == 0
     assert time.monotonic() - begun < 5.0
 
 
@@ -61,7 +61,7 @@ def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., Runnin
     begun = time.monotonic()
     for pid in family_of(running.process.pid):
         os.kill(pid, signal.SIGHUP)  # as a terminal does: to all of them
-    assert running.process.wait(15) == 0
+    assert running.ended() == 0
     assert time.monotonic() - begun > 0.9
     assert "Traceback" not in running.log()
     assert set(Path("/dev/shm").glob("linefix-*")) == kept

@@ -154,7 +154,7 @@ def test_all_drain_and_end_together(start_service: Callable[..., RunningService]
     until(lambda: service.count("linefix_searches_running") == 1.0)
     pids = workers_of(service)
     service.process.send_signal(signal.SIGTERM)
-    assert service.process.wait(15) == 0
+    assert service.ended() == 0
     busy.join()
     assert answers == [200]
     assert not any(is_running(pid) for pid in pids)
