@@ -11,6 +11,7 @@ import numpy as np
 from association import HardPrior, Status, tuning
 from association.context import SearchContext
 from association.explain import Answer, Explanations
+from association.loosening import loose_twin_share
 from association.null import Null, null_of
 from association.ranking import Ranked
 from registration.observability import MAX_DEVIATION
@@ -151,11 +152,14 @@ def judge(
     chances = _chances(context, explanations, models, usual_deviation)
     likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
-        careful = logistic(
-            logit(cautious_of(context, models), features(context, answer, rivals, null_of(context, best)))
-        )
-        twins = evidence(answer, rivals, tuning.TWIN_TEMPERATURE)
-        chances = replace(chances, careful=careful / (1.0 + twins), asked=True)
+        share = 1.0 / (1.0 + evidence(answer, rivals, tuning.TWIN_TEMPERATURE))
+        less = min(1.0, loose_twin_share(context, answer, rivals) / share)
+        chances = replace(chances, right=less * chances.right, careful=less * chances.careful)
+        if chances.careful >= bar_of(context):
+            numbers = features(context, answer, rivals, null_of(context, best))
+            careful = logistic(logit(cautious_of(context, models), numbers))
+            chances = replace(chances, careful=less * share * careful, asked=True)
+        likely = likely and chances.right >= tuning.USABLE_PROBABILITY
     status = Status.OK if likely and chances.careful >= bar_of(context) else Status.AMBIGUOUS
     if free:
         status = Status.DEGENERATE

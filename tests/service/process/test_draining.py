@@ -57,7 +57,11 @@ def test_a_second_ctrl_c_cuts_the_draining_short(start_service: Callable[..., Ru
 def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., RunningService], workers: int) -> None:
     """It ended at once, without its last answers, and left its counts in shared memory."""
     kept = set(Path("/dev/shm").glob("linefix-*"))
-    running = start_service(drain_seconds=1.0, workers=workers, searches=2)
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may have been told to outlive it
+    try:
+        running = start_service(drain_seconds=1.0, workers=workers, searches=2)
+    finally:
+        signal.signal(signal.SIGHUP, before)
     begun = time.monotonic()
     for pid in family_of(running.process.pid):
         os.kill(pid, signal.SIGHUP)  # as a terminal does: to all of them
