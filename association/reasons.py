@@ -24,6 +24,8 @@ class Standing:
         Whether little speaks for this map at all.
     thin : bool
         Whether few walls fix the pose, and one of them alone decides.
+    twin : bool
+        Whether another explanation alone makes the answer too uncertain.
     """
 
     status: Status
@@ -31,6 +33,7 @@ class Standing:
     contradicted: bool
     elsewhere: bool
     thin: bool
+    twin: bool
 
 
 SENTENCES: Mapping[str, str] = {
@@ -79,6 +82,7 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
         codes.append("free_direction")
     elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
         codes += ["too_little"] if standing.thin else []
+        codes += ["twin"] if standing.twin else []
         codes += [code for code in _weighed(features, cautious) if code not in codes]
     return tuple(Reason(code, SENTENCES[code]) for code in codes)
 

@@ -66,7 +66,9 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     answer, rivals, complete = explanations.answer, explanations.rivals, explanations.search.complete
     if answer is None:
         why = reasons_of(
-            Standing(Status.NO_MATCH, complete, bool(explanations.ranked), elsewhere=True, thin=False), None, None
+            Standing(Status.NO_MATCH, complete, bool(explanations.ranked), elsewhere=True, thin=False, twin=False),
+            None,
+            None,
         )
         return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked), why)
     best = answer.best
@@ -79,8 +81,14 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         # It was inside before it was registered: the window is narrower than what the scan says.
         contradicted = contradicted or status is not Status.NO_MATCH
     usable = status is Status.OK and complete and not contradicted
-    elsewhere, thin = chances.explained < ELSEWHERE_PROBABILITY, is_thin(answer.settled)
-    standing = Standing(status, complete, contradicted, elsewhere=elsewhere, thin=thin)
+    standing = Standing(
+        status,
+        complete,
+        contradicted,
+        elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
+        thin=is_thin(answer.settled),
+        twin=chances.share < USABLE_PROBABILITY,
+    )
     return Verdict(
         status=status,
         probability=min(chances.right, CONTRADICTED) if contradicted else chances.right,
@@ -105,6 +113,8 @@ class _Chances:
         The same where other buildings are reckoned with.
     explained : float
         That this or a twin of it is right, wherever along a free direction, other buildings reckoned with.
+    share : float
+        Of the answer among the explanations that are about as good; it is in `right` and `careful`.
     features : Features
         What these come from, with the null where it was needed.
     cautious : Model
@@ -114,6 +124,7 @@ class _Chances:
     right: float
     careful: float
     explained: float
+    share: float
     features: Features
     cautious: Model
 
@@ -133,7 +144,7 @@ class _Chances:
             # Only what would be usable has to stand up to the mirrored scan, which costs another search.
             features = with_null(features, answer.best, null_of(context, answer.best))
             careful = cautious.logit(features)
-        return cls(_logistic(right) * share, _logistic(careful) * share, explained, features, cautious)
+        return cls(_logistic(right) * share, _logistic(careful) * share, explained, share, features, cautious)
 
 
 def _logistic(logit: float) -> float:

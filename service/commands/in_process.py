@@ -11,8 +11,6 @@ from functools import cached_property
 import orjson
 from pydantic import ValidationError
 
-from registration.compiling import cache_directory
-
 from ..http.problems import problem_of
 from ..maps import IndexCache, MapStore
 from ..maps.lookup import FoundMap, MapLookup
@@ -24,7 +22,7 @@ from ..schemas.requests import AssociateRequest, RegisterRequest, VectorizeReque
 from ..settings import Settings
 from ..telemetry.metrics import Metrics
 from ..work.association import Associator
-from ..work.compiling import compile_kernels
+from ..work.compiling import compile_kernels, is_compiled
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
 from ..work.vectorization import answer_vectorization
@@ -67,7 +65,7 @@ class InProcess:
 
     def _compile(self) -> None:
         """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB."""
-        if cache_directory("association").exists():  # what few kernels may be missing is compiled when it is needed
+        if is_compiled():
             return
         print("linefix: compiling, which takes a minute; what comes of it is kept for the next time", file=sys.stderr)
         with suppress(ParserEndedError):  # if that process ends early this one compiles what it needs

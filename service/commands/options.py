@@ -15,7 +15,7 @@ MapArgument = Annotated[
     str,
     typer.Argument(
         metavar="MAP",
-        help="A map file: json, or what linefix map import reads; or the id of a stored map.",
+        help="A map file: json, yaml of map_server, dxf, svg, geojson or csv; or the id of a stored map.",
     ),
 ]
 ScanArgument = Annotated[

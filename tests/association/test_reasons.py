@@ -48,9 +48,10 @@ def codes_of(
     contradicted: bool = False,
     strange: bool = False,
     thin: bool = False,
+    twin: bool = False,
 ) -> list[str]:
     """Return the codes of an answer of which these reasons take so many nats."""
-    standing = Standing(status, complete, contradicted, elsewhere=strange, thin=thin)
+    standing = Standing(status, complete, contradicted, elsewhere=strange, thin=thin, twin=twin)
     features = USUAL_ONE._replace(**{ONE_OF[code]: nats for code, nats in taken.items()})
     told = reasons_of(standing, features, MODEL)
     assert all(reason.message == SENTENCES[reason.code] for reason in told)
@@ -77,7 +78,7 @@ def test_several_features_of_a_reason_count_together() -> None:
     assert set(names) == set(Features._fields) - {"constant"}
     model = as_model({"lead": [-1.0], "solitude": [-1.0], "share": [-1.0]})
     features = USUAL_ONE._replace(lead=0.8, solitude=0.8, share=1.2)
-    told = reasons_of(Standing(Status.AMBIGUOUS, True, False, False, False), features, model)
+    told = reasons_of(Standing(Status.AMBIGUOUS, True, False, False, False, False), features, model)
     assert [reason.code for reason in told] == ["twin", "unexplained"]
 
 
@@ -89,6 +90,7 @@ def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:
     assert everything == ["prior_contradicted", "search_incomplete", "elsewhere", "too_little", "twin"]
     assert codes_of(thin=True, taken={"unexplained": 3.0}) == ["too_little", "unexplained"]
     assert codes_of(strange=True, taken={"elsewhere": 9.0}) == ["elsewhere"]
+    assert codes_of(twin=True, taken={"unexplained": 3.0}) == ["twin", "unexplained"], "whatever the models make of it"
 
 
 @pytest.mark.parametrize("status", [Status.OK, Status.NO_MATCH])
@@ -106,7 +108,7 @@ def test_a_free_direction_is_told_instead_of_what_is_weighed() -> None:
 
 
 def test_without_an_answer_there_is_nothing_to_weigh() -> None:
-    told = reasons_of(Standing(Status.NO_MATCH, True, False, elsewhere=True, thin=False), None, None)
+    told = reasons_of(Standing(Status.NO_MATCH, True, False, elsewhere=True, thin=False, twin=False), None, None)
     assert [reason.code for reason in told] == ["elsewhere"]
 
 
