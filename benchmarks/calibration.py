@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +27,7 @@ from association.features import Features
 from association.models import FILE, FITTED_ON, MODELS, USUAL, Curve, Model, as_document
 from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
 
-from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collect
+from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
 from .reliability import print_bins
 from .table import print_table
 
@@ -261,19 +260,6 @@ def usual_of(examples: Sequence[Example], before: Features, form: str) -> Featur
     return Features(**medians) if form == SEGMENTS else before._replace(**{name: medians[name] for name in BEAMS})
 
 
-def examples_of(form: str, stride: int, keep: Path | None) -> list[Example]:
-    """Search all cases of a form, or read what an earlier run kept of them in the folder `keep`."""
-    path = None if keep is None else keep / f"{form}.pickle"
-    if path is not None and path.exists():
-        kept: list[Example] = pickle.loads(path.read_bytes())
-        return kept
-    examples = collect(cases(form, stride))
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(pickle.dumps(examples))
-    return examples
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stride", type=int, default=1, help="take one in so many queries")
@@ -283,7 +269,8 @@ def main() -> None:
     args = parser.parse_args()
     models, fitted_on, usual = dict(MODELS), dict(FITTED_ON), USUAL
     for form in (args.form,) if args.form else TASKS:
-        examples = examples_of(form, args.stride, args.keep)
+        path = None if args.keep is None else args.keep / f"{form}.pickle"
+        examples = collected(path, cases(form, args.stride))
         fitted = report(form, TASKS[form], examples)
         models |= fitted
         usual = usual_of(examples, usual, form)

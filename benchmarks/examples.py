@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from .collection import Collection, MapKey, Query, fold
 from .outcomes import OPTIONS, offset, other_map, progress
 from .queries import floor_plans, logs
 from .ranges import Log
-from .worlds.cases import in_map, kept_for_report, questions
+from .worlds.cases import in_map, questions
 from .worlds.outcomes import share_read
 from .worlds.tables import TOLD
 
@@ -176,9 +178,9 @@ def _case(collection: Collection, query: Query, scan: Scan, index: MapIndex, gro
     )  # fmt: skip
 
 
-def world_cases(form: str, stride: int) -> Iterator[Case]:
-    """Yield scans of those drawn worlds that may be fitted on, in all conditions."""
-    worlds = [name for name in FAMILIES if not kept_for_report(name)]
+def world_cases(form: str, stride: int, *, kept_for_report: bool = False) -> Iterator[Case]:
+    """Yield scans of those drawn worlds that may be fitted on, or of those that may not, in all conditions."""
+    worlds = [name for name, family in FAMILIES.items() if family.held_out == kept_for_report]
     conditions = [name for name in CONDITIONS if name not in LEFT_OUT]
     for n, world in enumerate(worlds):
         for condition in conditions:
@@ -200,3 +202,15 @@ def _told_by(case: DrawnCase) -> Callable[[RigidTransform], bool]:
 def collect(found: Iterator[Case]) -> list[Example]:
     """Search everything."""
     return [example for example in (case.example() for case in found) if example is not None]
+
+
+def collected(path: Path | None, found: Iterator[Case]) -> list[Example]:
+    """Search everything, or read what an earlier run kept in a file."""
+    if path is not None and path.exists():
+        kept: list[Example] = pickle.loads(path.read_bytes())
+        return kept
+    examples = collect(found)
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pickle.dumps(examples))
+    return examples
