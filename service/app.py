@@ -77,7 +77,7 @@ def _services(settings: Settings, part: Part) -> Services:
     metrics = Metrics()
     gate = SearchGate(part.share(settings.searches), part.share(settings.queue))
     budget = _budget(settings, part, settings.max_bodies_bytes)
-    store = MapStore(settings.url, may_make=not part.replaces)
+    store = MapStore(settings.url, may_make=not part.replaces, most_bytes=settings.max_stored_bytes)
     cache = IndexCache(part.share(settings.cache_bytes), metrics)
     parser = ParserProcess()
     lookup = MapLookup(cache, store, parser)

@@ -91,7 +91,7 @@ class InProcess:
     @cached_property
     def _store(self) -> MapStore:
         """The store that a service with these settings has; opened when first asked."""
-        return MapStore(self._settings.url)
+        return MapStore(self._settings.url, most_bytes=self._settings.max_stored_bytes)
 
     @cached_property
     def _lookup(self) -> MapLookup:

@@ -6,7 +6,7 @@
     ├── UnknownMapError        nothing is stored under the id
     ├── CorruptMapError        what is stored is damaged
     ├── RevisionConflictError  the map is not as the writer demands
-    ├── StoreFullError         the disk is full
+    ├── StoreFullError         there is no room for it
     ├── ReadOnlyStoreError     nothing can be written
     ├── BusyStoreError         others write for too long
     ├── StoreAwayError         the database does not answer, or cannot be used
@@ -50,10 +50,10 @@ class RevisionConflictError(StoreError):
 
 
 class StoreFullError(StoreError):
-    """The disk is full."""
+    """The disk is full, or the maps take all that they may."""
 
-    def __init__(self) -> None:
-        super().__init__("the disk that holds the maps is full")
+    def __init__(self, message: str = "the disk that holds the maps is full") -> None:
+        super().__init__(message)
 
 
 class ReadOnlyStoreError(StoreError):

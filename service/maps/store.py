@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
-from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, insert, select, update
+from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from ..database_file import file_of
 from .database import DatabaseFile, open_engine
-from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, UnknownMapError
+from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, StoreFullError, UnknownMapError
 from .failures import damaged, failures_as_store_errors
 from .preconditions import Preconditions
 from .records import (
@@ -33,6 +33,8 @@ from .tables import documents, maps
 T = TypeVar("T")
 logger = logging.getLogger("linefix")
 
+BYTES_OF_ID = 500  # that an id takes beside its map, about
+
 
 class MapStore:
     """Keeps maps in a database; safe to use from several threads and processes.
@@ -42,6 +44,9 @@ class MapStore:
     url : URL
     may_make : bool
         Whether the file of a database of SQLite's is made where there is none.
+    most_bytes : int or None
+        That all maps together may take; None for as many as the disk has. Writers at the same time may go beyond it,
+        each by the map that it writes.
 
     Raises
     ------
@@ -49,11 +54,12 @@ class MapStore:
         From every method: when the database is full, read-only, busy, damaged or away.
     """
 
-    def __init__(self, url: URL, *, may_make: bool = True) -> None:
+    def __init__(self, url: URL, *, may_make: bool = True, most_bytes: int | None = None) -> None:
         path = file_of(url)
         self._file = None if path is None else DatabaseFile(path, may_make=may_make)
         self._engine: Engine = open_engine(url)
         self._writer = self._engine.execution_options(writes=True)
+        self._most_bytes = most_bytes
         self._opened = False
 
     def open(self) -> None:
@@ -86,6 +92,7 @@ class MapStore:
             row = _locked(connection, map_id)
             last, exists = _last(connection, map_id, row)
             demands.check(last if exists else None)
+            self._require_room(connection, map_id, len(document))
             record = MapRecord(map_id, last + 1, digest(document), outline.oriented)
             if row is None:
                 # Not an upsert: of two first writers one has to fail here, and look again.
@@ -100,6 +107,10 @@ class MapStore:
             if _trusted(back) != record or not _matches(back, record):
                 raise CorruptMapError
         return record.revision, not exists
+
+    def _require_room(self, connection: Connection, map_id: str, size: int) -> None:
+        if self._most_bytes is not None and _taken(connection, map_id) + BYTES_OF_ID + size > self._most_bytes:
+            raise StoreFullError(f"all maps together may take {self._most_bytes} bytes, and with this one take more")
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
         """Forget a map; the number of its last revision is kept."""
@@ -177,6 +188,13 @@ class MapStore:
             # A connection made while nothing could be written stays so when the disk, or the server, is mended.
             self._engine.dispose()
             return write()
+
+
+def _taken(connection: Connection, map_id: str) -> int:
+    """Return the bytes that all maps but one take; an id that was used once goes on taking some."""
+    others = select(func.count()).select_from(maps).where(maps.c.map_id != map_id)
+    written = select(func.sum(func.length(documents.c.document))).where(documents.c.map_id != map_id)
+    return BYTES_OF_ID * (connection.scalar(others) or 0) + int(connection.scalar(written) or 0)
 
 
 def _whole(connection: Connection, map_id: str) -> Row[Any]:

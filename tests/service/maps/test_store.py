@@ -285,6 +285,26 @@ def test_a_damaged_map_can_be_deleted(store: MapStore, database: str) -> None:
         store.load("m")
 
 
+def test_all_maps_together_take_no_more_than_they_may(database: str) -> None:
+    store = MapStore(database_url(database), most_bytes=10_000)
+    try:
+        store.put("a", bytes(5_000), BOX, ANY)
+        with pytest.raises(StoreFullError, match="10000 bytes"):
+            store.put("b", bytes(5_000), BOX, ANY)
+        store.put("b", bytes(3_000), BOX, ANY)
+        store.put("a", bytes(6_000), BOX, ANY)  # in the place of what it takes itself
+        with pytest.raises(StoreFullError):
+            store.put("a", bytes(6_001), BOX, ANY)
+        assert len(store.load("a").document) == 6_000
+        store.delete("a", ANY)
+        store.put("b", bytes(9_000), BOX, ANY)
+        for number in range(3):  # ids take room, too, also of maps that are gone
+            with pytest.raises(StoreFullError):
+                store.put(f"c{number}", b"", BOX, ANY)
+    finally:
+        store.close()
+
+
 def test_a_full_store_leaves_what_was_there(tmp_path: Path) -> None:
     def fill(connection: Any, _: object) -> None:
         connection.execute("PRAGMA max_page_count=12")
