@@ -17,6 +17,7 @@ from .parts import parts
 from .peers import peers, versions
 from .queries import DATA, data_found
 from .ranges import ranges
+from .request import request
 from .sums import sums
 from .table import Row, machine, print_rows
 from .worlds import worlds
@@ -94,6 +95,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "parts": _parts,
     "mistakes": _mistakes,
     "peers": _peers,
+    "request": request,
     "sums": _sums,
     "worlds": worlds,
     "imports": imports,

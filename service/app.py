@@ -15,6 +15,7 @@ from .admission.budget import ByteBudget
 from .admission.connections import ConnectionLimit, most_connections
 from .admission.entrance import Entrance
 from .admission.gate import SearchGate
+from .admission.key_file import KeyFile
 from .admission.keys import Keyring
 from .admission.origins import Origins
 from .admission.readiness import Readiness
@@ -41,6 +42,7 @@ from .work.compiling import compile_kernels, is_compiled
 from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
+KEYS_SECONDS = 1.0  # between looks whether keys have changed
 
 
 def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
@@ -60,13 +62,15 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
+        telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services
-    app.state.contract = Contract(partial(describe, app, guarded=bool(settings.keys)), services.parse_threads)
-    # A path of a map's check looks like that of a map, too: it comes first.
-    for module in (register, associate, batch, vectorize, check, maps, operations, pages):
-        app.include_router(module.router)
+    app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
+    # In the order in which they are tried: robots come most often, and the path of a map's check is also one of a map.
+    # An included router would be one more layer for each of them.
+    for module in (associate, register, batch, vectorize, check, maps, operations, pages):
+        app.router.routes.extend(module.router.routes)
     handle_errors(app)
     app.add_middleware(Reception, services=services)
     return app
@@ -82,8 +86,9 @@ def _services(settings: Settings, part: Part) -> Services:
     parser = ParserProcess()
     lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
+    keyring = _keyring(settings)
     connections = ConnectionLimit(most_connections(part.share(settings.max_connections)))
-    origins = Origins(settings.hosts, guarded=bool(settings.keys))
+    origins = Origins(settings.hosts, guarded=settings.guarded)
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
     metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)
@@ -96,11 +101,12 @@ def _services(settings: Settings, part: Part) -> Services:
         metrics=metrics,
         refusals=RefusalTally(metrics),
         readiness=readiness,
-        entrance=Entrance(gate, Keyring(settings.keys), origins, settings.max_body_bytes),
+        entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
         gate=gate,
+        keyring=keyring,
         connections=connections,
         answers=_budget(settings, part, settings.max_answers_bytes),
-        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout, guarded=bool(settings.keys)),
+        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout, guarded=settings.guarded),
         parser=parser,
         store=store,
         probe=StoreProbe(store),
@@ -109,7 +115,19 @@ def _services(settings: Settings, part: Part) -> Services:
         associator=Associator(lookup, metrics),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
+        key_threads=Threads(1, "keys"),
     )
+
+
+def _keyring(settings: Settings) -> Keyring:
+    """Return who is let in."""
+    file = None if settings.keys_file is None else KeyFile(settings.keys_file)
+    if settings.issuer is None:
+        return Keyring(settings.keys, file)
+    # Imported where there is an issuer: cryptography takes some megabytes.
+    from .admission.tokens import Tokens
+
+    return Keyring(settings.keys, file, Tokens(settings.issuer))
 
 
 def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
@@ -121,6 +139,7 @@ def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
 async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterator[dict[str, Services]]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
+    following = asyncio.create_task(_follow_keys(services))
     if part.replaces:
         await getting_ready
     try:
@@ -128,6 +147,7 @@ async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterat
     finally:
         getting_ready.cancel()
         refreshing.cancel()
+        following.cancel()
         services.close()
 
 
@@ -145,10 +165,21 @@ async def _get_ready(services: Services) -> None:
         with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
             await threads.run(partial(parser.call, compile_kernels))
         parser.close()
-    await asyncio.gather(threads.run(warm_up), threads.run(parser.start))
+    keys = services.key_threads.run(services.keyring.refresh)
+    await asyncio.gather(threads.run(warm_up), threads.run(parser.start), keys)
     # What was made until now lives as long as the process: the garbage collector need not look through it again.
     gc.collect()
     gc.freeze()
     services.readiness.warm = True
     services.metrics.refresh()
     logger.info("ready")
+
+
+async def _follow_keys(services: Services) -> None:
+    """Take up keys that come, and forget those that go, without a restart."""
+    while True:
+        await asyncio.sleep(KEYS_SECONDS)
+        try:
+            await services.key_threads.run(services.keyring.refresh)
+        except Exception:
+            logger.exception("a defect")  # the keys stay as they were

@@ -9,11 +9,14 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_validator
 from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
+from .admission.issuer import ALGORITHMS, Issuer
+from .admission.key_file import KeyFileError, read_keys
 from .database_url import database_url
 from .schemas.limits import Limits
 
@@ -25,6 +28,11 @@ _METAVARS = {
     "data_dir": "DIRECTORY",
     "database_url": "URL",
     "keys": "KEY,...",
+    "keys_file": "PATH",
+    "jwt_issuer": "ISSUER",
+    "jwt_audience": "AUDIENCE",
+    "jwt_keys": "PATH-OR-URL",
+    "jwt_algorithms": "NAME,...",
     "hosts": "NAME,...",
     "log_level": "LEVEL",
 }
@@ -71,6 +79,16 @@ class Settings(BaseSettings):
         description="postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory",
     )
     keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys, comma separated")
+    keys_file: Path | None = Field(
+        None, description="keys with roles, as digests; a file, or a directory of them; read again when it changes"
+    )
+    jwt_issuer: str | None = Field(None, description="whose JSON Web Tokens are taken beside keys")
+    jwt_audience: str | None = Field(None, description="for whom these tokens have to be")
+    jwt_keys: str | None = Field(None, description="path, or https URL, of that issuer's JSON Web Key Set")
+    jwt_algorithms: Annotated[tuple[str, ...], NoDecode] = Field(
+        ("RS256", "ES256", "EdDSA"), description="of their signatures, comma separated"
+    )
+    jwt_leeway: Finite = Field(30.0, ge=0.0, le=600.0, description="seconds that the issuer's clock may differ")
     hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         (), description="without keys: names under which the service is asked for, comma separated"
     )
@@ -115,7 +133,7 @@ class Settings(BaseSettings):
     )
     log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
 
-    @field_validator("keys", "hosts", mode="before")
+    @field_validator("keys", "hosts", "jwt_algorithms", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         items = value.split(",") if isinstance(value, str) else value
@@ -138,6 +156,18 @@ class Settings(BaseSettings):
         if value is not None:
             database_url(value.get_secret_value())
         return value
+
+    @property
+    def guarded(self) -> bool:
+        """Whether it asks for keys."""
+        return bool(self.keys) or self.keys_file is not None or self.jwt_issuer is not None
+
+    @property
+    def issuer(self) -> Issuer | None:
+        """Whose tokens are taken."""
+        if self.jwt_issuer is None or self.jwt_audience is None or self.jwt_keys is None:
+            return None
+        return Issuer(self.jwt_issuer, self.jwt_audience, self.jwt_keys, self.jwt_algorithms, self.jwt_leeway)
 
     @property
     def url(self) -> URL:
@@ -186,14 +216,33 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     except ValidationError as error:
         wrong = (f"{'.'.join(str(part) for part in item['loc'])}: {item['msg']}" for item in error.errors())
         raise SettingsError("; ".join(wrong)) from error
-    if not settings.keys and not settings.allow_anonymous and not is_loopback(settings.host):
+    if not settings.guarded and not settings.allow_anonymous and not is_loopback(settings.host):
         raise SettingsError(
             f"refusing to listen on {settings.host} without keys: set LINEFIX_KEYS, or LINEFIX_ALLOW_ANONYMOUS=1 to "
             "let anyone who reaches the port use the service"
         )
+    _require_usable_keys(settings)
     if settings.workers > settings.searches:
         raise SettingsError(f"workers: at most as many as searches, of which there are {settings.searches}")
     return settings
+
+
+def _require_usable_keys(settings: Settings) -> None:
+    """Refuse keys that could not be checked later: a start is when somebody looks."""
+    if settings.keys_file is not None:
+        try:
+            read_keys(settings.keys_file)
+        except KeyFileError as error:
+            raise SettingsError(f"keys_file: {error}") from None
+    said = [value is not None for value in (settings.jwt_issuer, settings.jwt_audience, settings.jwt_keys)]
+    if any(said) and not all(said):
+        raise SettingsError("jwt_issuer, jwt_audience, jwt_keys: all three or none")
+    unknown = set(settings.jwt_algorithms) - set(ALGORITHMS)
+    if unknown or not settings.jwt_algorithms:
+        raise SettingsError(f"jwt_algorithms: some of {', '.join(ALGORITHMS)}")
+    where = urlsplit(settings.jwt_keys or "")
+    if where.scheme and where.scheme != "https" and not (where.scheme == "http" and is_loopback(where.hostname or "")):
+        raise SettingsError("jwt_keys: a path, or a URL that begins with https")
 
 
 def _add_argument(parser: argparse.ArgumentParser, *names: str, **how: Any) -> None:

@@ -6,17 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..schemas.errors import BodyTooLargeError
+from .errors import ForeignMapError, MissingRoleError
 from .gate import SearchGate
+from .grants import GUARDED, Asked, Grant, asked_of
 from .keys import Keyring
 from .origins import Origins
 from .ticket import Ticket
-
-SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize"))
-"""Paths whose POST needs a turn at the gate."""
-MAPS, CHECK = "/v1/maps/", ":check"
-"""How the path of a map's check begins and ends, which needs one to be read, too."""
-GUARDED = "/v1/"
-"""What asks for a key begins so; probes and pages stay open."""
 
 Head = Mapping[str, Any]
 """What ASGI calls a scope: method, path, headers, client."""
@@ -25,11 +20,8 @@ Headers = Sequence[tuple[bytes, bytes]]
 
 def search_of(method: str, path: str) -> str | None:
     """Return the route of a request that needs a turn at the gate, a map's id left out; None where it needs none."""
-    if method == "POST" and path in SEARCHING:
-        return path
-    if method in ("GET", "HEAD", "POST") and path.startswith(MAPS) and path.endswith(CHECK):
-        return MAPS + "{map_id}" + CHECK
-    return None
+    access = asked_of(method, path).access
+    return access.path if access is not None and access.searches else None
 
 
 class Entrance:
@@ -63,6 +55,8 @@ class Entrance:
             When it may come from a web page that somebody looks at, and the service has no keys.
         MissingKeyError, UnknownKeyError
             When the path asks for a key.
+        MissingRoleError, ForeignMapError
+            When this key is not for that, or there is no such map for it.
         BodyTooLargeError
             When the body is too long by what the head says of it.
         QueueFullError, ShareUsedError
@@ -70,15 +64,32 @@ class Entrance:
         """
         method, path, headers = head["method"], head["path"], head["headers"]
         self._origins.require(headers)
-        holder = self._keyring.holder(headers, head.get("client")) if path.startswith(GUARDED) else None
+        if not path.startswith(GUARDED):
+            grant, searches = Grant(), False
+        else:
+            asked = asked_of(method, path)
+            grant = self._keyring.grant(headers, head.get("client"))
+            _require(grant, asked)
+            searches = asked.access is not None and asked.access.searches
         if method in ("POST", "PUT"):
             self._check_length(headers)
-        if search_of(method, path) is None:
-            return Ticket(holder)
-        self._gate.require_place(holder)
-        return Ticket(holder, self._gate)
+        if not searches:
+            return Ticket(grant.holder, maps=grant.maps)
+        self._gate.require_place(grant.holder)
+        return Ticket(grant.holder, self._gate, grant.maps)
 
     def _check_length(self, headers: Headers) -> None:
         for name, value in headers:
             if name == b"content-length" and value.isdigit() and int(value) > self._max_body_bytes:
                 raise BodyTooLargeError(self._max_body_bytes)
+
+
+def _require(grant: Grant, asked: Asked) -> None:
+    """Raise where a caller may not ask for this."""
+    access = asked.access
+    # What is no route of the table may be one that nobody thought of there.
+    allowed = grant.is_whole if access is None else access.role is None or access.role in grant.roles
+    if not allowed:
+        raise MissingRoleError
+    if asked.map_id is not None and not grant.sees(asked.map_id):
+        raise ForeignMapError

@@ -5,6 +5,8 @@
     AdmissionError
     ├── MissingKeyError      no key, and the service has keys
     ├── UnknownKeyError      a key that is none of the service's
+    ├── MissingRoleError     a key that is not for this
+    ├── ForeignMapError      a map that there is not for this key
     ├── ForeignHostError     under a name that nobody has said to be the service's
     ├── ForeignOriginError   sent by the page of another site
     ├── NotReadyError        the service does not serve yet, or no longer
@@ -35,6 +37,20 @@ class UnknownKeyError(AdmissionError):
 
     def __init__(self) -> None:
         super().__init__("this key is not known here")
+
+
+class MissingRoleError(AdmissionError):
+    """A key that is not for what is asked."""
+
+    def __init__(self) -> None:
+        super().__init__("this key is not for that")
+
+
+class ForeignMapError(AdmissionError):
+    """A map that there is not for this key: whether there is one for others is not told."""
+
+    def __init__(self) -> None:
+        super().__init__("no map is stored under this id")
 
 
 class ForeignHostError(AdmissionError):

@@ -1,35 +1,67 @@
-"""Bearer keys."""
+"""Who asks: by a key, by a token, or by an address where the service has neither."""
 
 from __future__ import annotations
 
 import hashlib
 import hmac
 import ipaddress
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import Protocol
 
 from pydantic import SecretStr
 
 from .errors import MissingKeyError, UnknownKeyError
 from .fair_queue import Holder
+from .grants import Grant
 
 Client = tuple[str, int] | None
 
 
+class KeySource(Protocol):
+    """Keys that may change while the service runs: those of a file."""
+
+    @property
+    def grants(self) -> Mapping[bytes, Grant]:
+        """What each may do, by its digest."""
+
+    def refresh(self) -> None:
+        """Look for changes; off the event loop."""
+
+
+class TokenSource(Protocol):
+    """What checks tokens."""
+
+    def grant(self, token: bytes) -> Grant:
+        """Return what a token may do; raises `UnknownKeyError` where it is none."""
+
+    def refresh(self) -> None:
+        """Look for new keys of the issuer; off the event loop."""
+
+
 class Keyring:
-    """The keys that are known, as digests.
+    """The keys that are known, as digests, and the issuer whose tokens are.
 
     Parameters
     ----------
     keys : sequence of SecretStr
-        None at all: whoever comes is let in.
+        That may do everything.
+    file : KeySource, or None
+    tokens : TokenSource, or None
+        With none of the three whoever comes is let in.
     """
 
-    def __init__(self, keys: Sequence[SecretStr]) -> None:
-        self._digests = [_digest(key.get_secret_value().encode()) for key in keys]
+    def __init__(
+        self, keys: Sequence[SecretStr], file: KeySource | None = None, tokens: TokenSource | None = None
+    ) -> None:
+        digests = (digest_of(key.get_secret_value().encode()) for key in keys)
+        self._whole = {digest: Grant(digest) for digest in digests}
+        self._file = file
+        self._tokens = tokens
+        self._guarded = bool(keys) or file is not None or tokens is not None
 
-    def holder(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Holder:
-        """Return whose key a request carries; where the service has no keys, from which address it comes.
+    def grant(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Grant:
+        """Return what a request may do; where the service has no keys, everything, for the address it comes from.
 
         Parameters
         ----------
@@ -41,26 +73,38 @@ class Keyring:
         Raises
         ------
         MissingKeyError
-            When it carries none, or more than one.
+            When it carries no key, or more than one.
         UnknownKeyError
             When it carries one that is not known.
         """
-        if not self._digests:
-            return address_of(client)
+        if not self._guarded:
+            return Grant(address_of(client))
         sent = [value for name, value in headers if name == b"authorization"]
         if len(sent) != 1:
             raise MissingKeyError
         scheme, _, key = sent[0].partition(b" ")
-        if scheme.lower() != b"bearer" or not key.strip():
+        key = key.strip()
+        if scheme.lower() != b"bearer" or not key:
             raise MissingKeyError
         # Digests of one length, all of them compared: the time taken tells nothing of the keys.
-        digest = _digest(key.strip())
-        if not sum(hmac.compare_digest(digest, known) for known in self._digests):
-            raise UnknownKeyError
-        return digest
+        digest = digest_of(key)
+        known: list[Grant] = [*self._whole.values(), *(self._file.grants.values() if self._file else ())]
+        found = [grant for grant in known if hmac.compare_digest(digest, grant.holder or b"")]
+        if found:
+            return found[0]
+        if self._tokens is not None and key.count(b".") == 2:
+            return self._tokens.grant(key)
+        raise UnknownKeyError
+
+    def refresh(self) -> None:
+        """Look for keys that came or went; off the event loop."""
+        for source in (self._file, self._tokens):
+            if source is not None:
+                source.refresh()
 
 
-def _digest(key: bytes) -> bytes:
+def digest_of(key: bytes) -> bytes:
+    """Return what is kept of a key."""
     return hashlib.sha256(key).digest()
 
 

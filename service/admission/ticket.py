@@ -29,6 +29,8 @@ class Ticket:
         Whose key it came with, or from which address.
     gate : Expecting, or None
         Where it is on its way to; None for what does not search.
+    maps : str
+        How the ids of the maps begin that there are for it.
 
     Attributes
     ----------
@@ -36,10 +38,11 @@ class Ticket:
         Whether it has had a turn: what was let in once is not sent away later.
     """
 
-    __slots__ = ("_announced", "_gate", "admitted", "holder")
+    __slots__ = ("_announced", "_gate", "admitted", "holder", "maps")
 
-    def __init__(self, holder: Holder = None, gate: Expecting | None = None) -> None:
+    def __init__(self, holder: Holder = None, gate: Expecting | None = None, maps: str = "") -> None:
         self.holder = holder
+        self.maps = maps
         self.admitted = False
         self._gate = gate
         self._announced = False

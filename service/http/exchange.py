@@ -15,7 +15,7 @@ from starlette.responses import Response
 from association import Deadline
 
 from ..admission.budget import ByteAccount
-from ..admission.errors import DeadlinePassedError
+from ..admission.errors import DeadlinePassedError, ForeignMapError
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap
 from ..parsing.parser_process import LARGE
@@ -62,6 +62,11 @@ class Exchange:
         self._watch = Stopwatch()
         self.services: Services = services_of(request.scope)
 
+    @property
+    def maps(self) -> str:
+        """How the ids of the maps begin that there are for this caller."""
+        return self._ticket.maps
+
     def note(self, **fields: object) -> None:
         """Have something more in the log's line of this request."""
         self._state.noted.update(fields)
@@ -104,6 +109,8 @@ class Exchange:
 
         Raises
         ------
+        ForeignMapError
+            When there is no such map for this caller.
         StoreError
             When it cannot be had.
         TooMuchHeldError, ShareHeldError
@@ -114,6 +121,8 @@ class Exchange:
         if isinstance(asked, InlineMap):
             yield asked
             return
+        if not asked.map_id.startswith(self.maps):
+            raise ForeignMapError
         left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
         find = partial(self.services.lookup.find, asked.map_id, oriented=oriented)
         try:

@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from ..admission.entrance import GUARDED
+from ..admission.grants import GUARDED
 from ..schemas import parts, replies, requests
 from ..schemas.encoding import encode
 from ..threads import Threads

@@ -10,6 +10,7 @@ from ..admission.budget import ByteBudget
 from ..admission.connections import ConnectionLimit
 from ..admission.entrance import Entrance
 from ..admission.gate import SearchGate
+from ..admission.keys import Keyring
 from ..admission.readiness import Readiness
 from ..maps import MapStore
 from ..maps.lookup import MapLookup
@@ -38,6 +39,7 @@ class Services:
     readiness : Readiness
     entrance : Entrance
     gate : SearchGate
+    keyring : Keyring
     connections : ConnectionLimit
     bodies : BodyReceiver
     answers : ByteBudget
@@ -50,7 +52,7 @@ class Services:
     documents : ByteBudget
         Bytes of stored maps that wait to be indexed.
     associator : Associator
-    parse_threads, store_threads : Threads
+    parse_threads, store_threads, key_threads : Threads
     """
 
     settings: Settings
@@ -59,6 +61,7 @@ class Services:
     readiness: Readiness
     entrance: Entrance
     gate: SearchGate
+    keyring: Keyring
     connections: ConnectionLimit
     bodies: BodyReceiver
     answers: ByteBudget
@@ -70,6 +73,7 @@ class Services:
     associator: Associator
     parse_threads: Threads
     store_threads: Threads
+    key_threads: Threads
 
     def close(self) -> None:
         """Give up what still runs and give everything back."""
@@ -77,7 +81,7 @@ class Services:
         self.gate.cancel_all()
         self.gate.close()
         self.parser.close()
-        for threads in (self.parse_threads, self.store_threads, self.probe):
+        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.probe):
             threads.close()
         self.store.close()
 

@@ -18,15 +18,21 @@ BUSY_SECONDS = 5.0
 SAFE_WAL = (3, 51, 3)
 
 
-def open_engine(url: URL) -> Engine:
+def open_engine(url: URL, *, keeps_statements: bool = False) -> Engine:
     """Return an engine; nothing is opened yet.
 
     A file of SQLite's is opened where there is one, and never made: see `DatabaseFile`.
+
+    Parameters
+    ----------
+    url : URL
+    keeps_statements : bool
+        Whether SQLite keeps its statements prepared: not where they are given documents. A statement that is kept keeps
+        what it was last given, 15 MB for each and every connection.
     """
     if url.get_backend_name() == "sqlite":
         # No bound on connections: each is used by one thread, whose number is bounded elsewhere.
-        # A statement that is kept keeps what it was last given, a document of 15 MB for each and every connection.
-        waits = {"timeout": BUSY_SECONDS, "cached_statements": 0}
+        waits = {"timeout": BUSY_SECONDS, "cached_statements": 16 if keeps_statements else 0}
         path = file_of(url)
         if path is not None:
             url = url.set(database=path.as_uri()).update_query_dict({"mode": "rw", "uri": "true"})

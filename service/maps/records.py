@@ -86,9 +86,10 @@ def digest(document: object) -> str:
 
 NOTHING = MapOutline(0, (0.0, 0.0, 0.0, 0.0))
 """Of a map that was deleted."""
-_SEALED = (
+SEALED = (
     "map_id", "revision", "sha256", "segments", "min_x", "min_y", "max_x", "max_y", "sigma", "oriented",
 )  # fmt: skip
+"""Columns that the seal of a row is made of, in this order."""
 
 
 def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
@@ -100,12 +101,12 @@ def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
     numbers = tuple(value + 0.0 for value in outline.bounds)
     sigma = None if outline.sigma is None else outline.sigma + 0.0
     what = (record.map_id, record.revision, record.sha256, outline.segments, *numbers, sigma, outline.oriented)
-    return dict(zip(_SEALED, what, strict=True)) | {"seal": seal(*what), "quarantined": False}
+    return dict(zip(SEALED, what, strict=True)) | {"seal": seal(*what), "quarantined": False}
 
 
 def is_sealed(row: Row[Any]) -> bool:
     """Tell whether a row of `maps` is as it was written."""
-    return bool(row.seal == seal(*(getattr(row, name) for name in _SEALED)))
+    return bool(row.seal == seal(*(getattr(row, name) for name in SEALED)))
 
 
 def seal(*what: object) -> str:

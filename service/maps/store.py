@@ -15,6 +15,7 @@ from .database import DatabaseFile, open_engine
 from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, StoreFullError, UnknownMapError
 from .failures import damaged, failures_as_store_errors
 from .preconditions import Preconditions
+from .record_reader import RecordReader
 from .records import (
     ABSENT,
     NOTHING,
@@ -31,6 +32,7 @@ from .schema import upgrade
 from .tables import documents, maps
 
 T = TypeVar("T")
+BEYOND = "\x7f"  # every letter that an id may have comes before it
 logger = logging.getLogger("linefix")
 
 BYTES_OF_ID = 500  # that an id takes beside its map, about
@@ -60,6 +62,7 @@ class MapStore:
         self._engine: Engine = open_engine(url)
         self._writer = self._engine.execution_options(writes=True)
         self._most_bytes = most_bytes
+        self._reader = RecordReader(open_engine(url, keeps_statements=True))
         self._opened = False
 
     def open(self) -> None:
@@ -67,13 +70,14 @@ class MapStore:
         if self._file is not None:
             if self._opened and not self._file.is_the_same:
                 # Connections to a file that was moved away go on with it: what they write nobody would find again.
-                self._engine.dispose()
+                self.close()
             self._file.require()
         upgrade(self._engine, self._writer)
         self._opened = True
 
     def close(self) -> None:
         """Close all connections."""
+        self._reader.close()
         self._engine.dispose()
 
     def put(self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions) -> tuple[int, bool]:
@@ -127,6 +131,10 @@ class MapStore:
 
     def record(self, map_id: str) -> MapRecord:
         """Return what identifies the present content; cheap, asked before every use of a cached index."""
+        self._require_open()
+        found = self._reader.read(map_id)
+        if found is not None:
+            return found
         with self._reading() as connection:
             return _trusted(_row(connection, map_id, select(maps)))
 
@@ -140,9 +148,11 @@ class MapStore:
             raise CorruptMapError
         return StoredMap(record, row.document)
 
-    def list(self, limit: int, after: str) -> MapPage:
-        """Return up to `limit` maps with an id beyond `after`, in the order of their ids' bytes."""
+    def list(self, limit: int, after: str, prefix: str = "") -> MapPage:
+        """Return up to `limit` maps with an id beyond `after` that begins so, in the order of their ids' bytes."""
         query = select(maps).where(maps.c.map_id > after, maps.c.sha256 != ABSENT)
+        if prefix:
+            query = query.where(maps.c.map_id.between(prefix, prefix + BEYOND))
         with self._reading() as connection:
             rows = connection.execute(query.order_by(maps.c.map_id).limit(limit + 1)).all()
         page = rows[:limit]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import orjson
 
+_PLAIN = frozenset((bool, int, str, type(None)))
 BLOCK = 2000  # items of a long list that are objects at one time
 
 
@@ -23,13 +24,21 @@ def require_finite(value: Any) -> None:
         if not math.isfinite(value):
             raise NotFiniteError("an answer holds a number that is not finite")
     elif isinstance(value, dict):
-        for item in value.values():
-            require_finite(item)
+        _require_all_finite(value.values())
     elif isinstance(value, list | tuple):
-        for item in value:
-            require_finite(item)
+        _require_all_finite(value)
     elif isinstance(value, np.ndarray) and value.dtype.kind == "f" and not np.isfinite(value).all():
         raise NotFiniteError("an answer holds an array that is not finite")
+
+
+def _require_all_finite(values: Iterable[Any]) -> None:
+    # Most of what is in an answer is a number or a name: these are looked at here, without a call for each.
+    for value in values:
+        if type(value) is float:
+            if not math.isfinite(value):
+                raise NotFiniteError("an answer holds a number that is not finite")
+        elif type(value) not in _PLAIN:
+            require_finite(value)
 
 
 def encode(answer: Any) -> bytes:

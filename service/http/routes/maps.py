@@ -114,8 +114,9 @@ async def list_maps(
     ] = "",
 ) -> Response:
     """List what is stored, by id."""
-    services = Exchange(request).services
-    page = await ask_store(services, partial(services.store.list, limit, cursor))
+    exchange = Exchange(request)
+    services = exchange.services
+    page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.maps))
     items = [_told(item.map_id, item.revision, item.outline) for item in page.maps]
     return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 

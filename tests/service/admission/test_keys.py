@@ -16,12 +16,12 @@ def sent(*values: bytes) -> list[tuple[bytes, bytes]]:
 
 
 def test_each_key_is_a_holder_of_its_own() -> None:
-    sesame, opened = RING.holder(sent(b"Bearer sesame")), RING.holder(sent(b"Bearer open"))
+    sesame, opened = RING.grant(sent(b"Bearer sesame")).holder, RING.grant(sent(b"Bearer open")).holder
     assert sesame is not None
     assert opened is not None
     assert sesame != opened
     for same in (b"bearer sesame", b"BEARER   sesame  "):
-        assert RING.holder(sent(same)) == sesame
+        assert RING.grant(sent(same)).holder == sesame
     # Nobody can tell the key from what is kept of it.
     assert b"sesame" not in sesame
 
@@ -43,19 +43,19 @@ def test_each_key_is_a_holder_of_its_own() -> None:
 )
 def test_no_key(values: tuple[bytes, ...]) -> None:
     with pytest.raises(MissingKeyError):
-        RING.holder(sent(*values))
+        RING.grant(sent(*values))
 
 
 @pytest.mark.parametrize("value", [b"Bearer sesam", b"Bearer sesame2", b"Bearer SESAME", b"Bearer sesame open"])
 def test_a_key_that_is_none(value: bytes) -> None:
     with pytest.raises(UnknownKeyError):
-        RING.holder(sent(value))
+        RING.grant(sent(value))
 
 
 def test_without_keys_whoever_comes_is_known_by_the_address() -> None:
     for values in ((), (b"Bearer sesame",), (b"x", b"y")):
-        assert Keyring([]).holder(sent(*values), ("192.0.2.7", 5)) == bytes((192, 0, 2, 7))
-        assert Keyring([]).holder(sent(*values)) is None
+        assert Keyring([]).grant(sent(*values), ("192.0.2.7", 5)).holder == bytes((192, 0, 2, 7))
+        assert Keyring([]).grant(sent(*values)).holder is None
 
 
 def test_a_client_has_one_address_whatever_the_port() -> None:

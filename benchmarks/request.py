@@ -1,0 +1,213 @@
+"""What a request costs beside its search: ``python -m benchmarks request``.
+
+Processor time by part, what a client sees that asks one request after the other, and requests per second, all beside a
+bare route of the same server that answers a constant. The turns of what is compared alternate.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+
+import httpx
+import numpy as np
+import orjson
+
+from association import Deadline
+from examples.running import running_service
+from service.database_url import database_url
+from service.maps import IndexCache, MapOutline, MapStore, Preconditions
+from service.maps.lookup import MapLookup
+from service.parsing.parser_process import ParserProcess
+from service.parsing.reading import read_model
+from service.schemas.encoding import encode
+from service.schemas.requests import AssociateRequest
+from service.settings import Settings
+from service.telemetry.metrics import Metrics
+from service.work.association import Associator
+
+from .open_loop import request_of, without_pause
+from .table import Row, at_most, print_rows, print_table
+
+ROUNDS = 15
+BESIDE_MS, CLIENT_MS = 0.7, 1.3  # goals: of the processor, and as a client sees it
+BARE = """
+import sys, uvicorn
+ANSWER = b'{"status":"ok"}'
+HEADERS = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(ANSWER))]
+async def answer(scope, receive, send):
+    await send({"type": "http.response.start", "status": 200, "headers": HEADERS})
+    await send({"type": "http.response.body", "body": ANSWER})
+uvicorn.run(answer, port=int(sys.argv[1]), access_log=False, log_level="warning", loop="uvloop", lifespan="off")
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A process that serves, and a request that it is asked again and again."""
+
+    port: int
+    pid: int
+    request: bytes
+
+    def cost(self, seconds: float) -> tuple[float, float]:
+        """Return the processor time of one request, and how long a client waits for it, milliseconds."""
+        before = _processor_seconds(self.pid)
+        answered = without_pause(self.port, [self.request], 1, seconds)
+        spent = _processor_seconds(self.pid) - before
+        assert all(answer.status == 200 for answer in answered)
+        return 1e3 * spent / len(answered), 1e3 * median(answer.seconds for answer in answered)
+
+    def rate(self, connections: int, seconds: float) -> float:
+        """Return how many requests are answered in a second of one core's time."""
+        before = _processor_seconds(self.pid)
+        answered = without_pause(self.port, [self.request], connections, seconds)
+        return len(answered) / (_processor_seconds(self.pid) - before)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A stored map, a request that names it, and one that brings nothing to search for, as they are sent."""
+
+    map: bytes
+    request: bytes
+    nothing: bytes
+
+
+def request(quick: int) -> list[Row]:
+    """Measure, and print the tables."""
+    seconds, rounds = 1.0, max(3, ROUNDS // quick)
+    asked = asked_of(np.random.default_rng(0))
+    with ExitStack() as stack:
+        url, pid = stack.enter_context(running_service(searches=2))
+        port = int(url.rsplit(":", 1)[1])
+        httpx.put(f"{url}/v1/maps/m", content=asked.map, timeout=60).raise_for_status()
+        servers = {
+            "a bare route": stack.enter_context(bare()),
+            "a probe (/livez)": Served(port, pid, request_of("/livez")),
+            "a stored map, no walls seen": Served(port, pid, request_of("/v1/associate", asked.nothing)),
+            "a stored map, 25 walls seen": Served(port, pid, request_of("/v1/associate", asked.request)),
+        }
+        parts = stack.enter_context(parts_of(asked))
+        costs: dict[str, list[tuple[float, float]]] = {name: [] for name in servers}
+        spent: dict[str, list[float]] = {name: [] for name in parts}
+        for server in servers.values():
+            server.cost(seconds)
+        for _ in range(rounds):
+            for name, server in servers.items():
+                costs[name].append(server.cost(seconds))
+            for name, call in parts.items():
+                spent[name].append(_thread_ms(call))
+        rates = {(name, many): server.rate(many, 3.0) for many in (1, 2, 4) for name, server in servers.items()}
+    cost = {name: (median(one for one, _ in got), median(seen for _, seen in got)) for name, got in costs.items()}
+    each = {name: median(times) for name, times in spent.items()}
+    bare_ms, _ = cost["a bare route"]
+    print_table(
+        "A request: processor time of the service, and what a client sees that asks one after the other",
+        ("request", "processor ms", "client ms", "times a bare route"),
+        [(name, f"{one:.3f}", f"{seen:.3f}", f"{one / bare_ms:.1f}") for name, (one, seen) in cost.items()],
+    )
+    print_table(
+        "Requests a second of one core's time",
+        ("connections", *servers),
+        [(str(many), *(f"{rates[name, many]:.0f}" for name in servers)) for many in (1, 2, 4)],
+    )
+    return _by_part(cost, each)
+
+
+def _by_part(cost: dict[str, tuple[float, float]], each: dict[str, float]) -> list[Row]:
+    """Print what a request for a stored map costs beside its search, by part."""
+    whole, seen = cost["a stored map, no walls seen"]
+    layers, _ = cost["a probe (/livez)"]
+    # What stands for a search where there is nothing to search for is no part; 25 walls are read and written besides.
+    more = each["parsing and checking"] + each["encoding"] - each.pop("an empty search")
+    shown = {"server, framework, admission, log (a probe)": layers} | each
+    beside = whole + more
+    shown["hand-over between threads, and what is left"] = beside - sum(shown.values())
+    print_table(
+        "By part, beside the search",
+        ("part", "processor ms", "share"),
+        [(name, f"{ms:.3f}", f"{100 * ms / beside:.0f} %") for name, ms in {**shown, "together": beside}.items()],
+    )
+    rows = [
+        at_most("beside its search, processor ms", beside, BESIDE_MS),
+        at_most("beside its search, times a bare route", beside / cost["a bare route"][0]),
+        at_most("as a client sees it, its search left out, ms", seen + more, CLIENT_MS),
+    ]
+    print_rows("A request for a stored map", rows)
+    return rows
+
+
+def asked_of(rng: np.random.Generator) -> Asked:
+    """Return a room of 25 walls, and all of them as a robot in its middle sees them."""
+    angles = np.sort(rng.uniform(-np.pi, np.pi, 25))
+    corners = rng.uniform(3.0, 8.0, 25)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    walls = np.hstack([corners, np.roll(corners, -1, axis=0)])
+    seen = (walls + rng.normal(0.0, 0.005, walls.shape)).tolist()
+    return Asked(orjson.dumps({"segments": walls.tolist()}), _request_for(seen), _request_for([]))
+
+
+def _request_for(segments: list[list[float]]) -> bytes:
+    return orjson.dumps({"map": {"map_id": "m"}, "scan": {"segments": segments, "sigma": 0.02}})
+
+
+@contextmanager
+def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
+    """Give what is done for the request, one part after the other, as functions to be called again and again."""
+    limits, deadline = Settings().limits(), Deadline()
+    with TemporaryDirectory() as folder:
+        store = MapStore(database_url(f"sqlite:///{folder}/maps.sqlite3"))
+        store.put("m", asked.map, MapOutline(1, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+        lookup = MapLookup(IndexCache(100_000_000, Metrics()), store, ParserProcess())
+        associator = Associator(lookup, Metrics())
+        wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
+        target = associator.target(lookup.find("m", oriented=None), wanted.options, deadline)
+        answer = associator.find(target, wanted, wanted.options, deadline)
+        yield {
+            "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),
+            "look-up of the map": partial(lookup.find, "m", oriented=None),
+            "encoding": partial(encode, answer),
+            "an empty search": partial(associator.find, target, empty, empty.options, deadline),
+        }
+        store.close()
+
+
+@contextmanager
+def bare() -> Iterator[Served]:
+    """Give a route of the same server that answers a constant, without application."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    with subprocess.Popen([sys.executable, "-c", BARE, str(port)]) as process:
+        try:
+            for _ in range(600):
+                with socket.socket() as probe:
+                    if probe.connect_ex(("127.0.0.1", port)) == 0:
+                        break
+                time.sleep(0.05)
+            yield Served(port, process.pid, request_of("/"))
+        finally:
+            process.terminate()
+
+
+def _thread_ms(call: Callable[[], object], count: int = 100) -> float:
+    before = time.thread_time()
+    for _ in range(count):
+        call()
+    return 1e3 * (time.thread_time() - before) / count
+
+
+def _processor_seconds(pid: int) -> float:
+    """Return what all threads of a process have had of the processors."""
+    folder = Path(f"/proc/{pid}/task")
+    return 1e-9 * sum(int((folder / task / "schedstat").read_text().split()[0]) for task in os.listdir(folder))

@@ -1,0 +1,131 @@
+"""Keys in a file: their digests alone, what each may do, and which maps it sees.
+
+::
+
+    [[key]]
+    name = "robots"
+    sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"
+    roles = ["associate"]
+    maps = "hq-"          # how the ids of its maps begin; left out: all of them
+
+`linefix key robots` makes a key and these lines.
+"""
+
+from __future__ import annotations
+
+import logging
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+
+from .grants import EVERY_ROLE, Grant, Role
+
+logger = logging.getLogger("linefix")
+Digest = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+
+
+class KeyFileError(Exception):
+    """The file cannot be used; the message says why, and repeats nothing of it."""
+
+
+class Key(BaseModel):
+    """A key, by its digest."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(min_length=1, max_length=64)
+    sha256: Digest
+    roles: frozenset[Role] = Field(EVERY_ROLE, min_length=1)
+    maps: str = Field("", max_length=128, pattern="^[A-Za-z0-9._-]*$")
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    key: tuple[Key, ...] = ()
+
+
+def read_keys(path: Path) -> dict[bytes, Grant]:
+    """Return the digests of a file's keys, with what each may do; of a directory all of its files together.
+
+    Raises
+    ------
+    KeyFileError
+        When a file cannot be read, is no TOML, or not as described above; when it names a key twice.
+    """
+    keys = [key for file in _files(path) for key in _read(file)]
+    found = {bytes.fromhex(key.sha256): key for key in keys}
+    if len(found) < len(keys):
+        raise KeyFileError(f"{path}: a key stands there twice")
+    return {digest: Grant(digest, key.roles, key.maps) for digest, key in found.items()}
+
+
+class KeyFile:
+    """The keys of a file as it is now.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file, or of a directory of them, as secrets are mounted.
+
+    Raises
+    ------
+    KeyFileError
+        When it cannot be used to begin with.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._seen = _state(path)
+        self.grants = read_keys(path)
+
+    def refresh(self) -> None:
+        """Read it again where it has changed; what cannot be used leaves the keys as they were, and is logged."""
+        state = _state(self._path)
+        if state == self._seen:
+            return
+        self._seen = state
+        try:
+            self.grants = read_keys(self._path)
+        except KeyFileError as error:
+            logger.error("the keys stay as they were: %s", error)
+        else:
+            logger.info("keys read", extra={"keys": len(self.grants)})
+
+
+def parse_keys(text: str) -> tuple[Key, ...]:
+    """Return the keys that a file's text describes; raises `ValueError` where it is not as it has to be."""
+    return _File.model_validate(tomllib.loads(text)).key
+
+
+def _files(path: Path) -> list[Path]:
+    try:
+        if not path.is_dir():
+            return [path]
+        return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
+    except OSError as error:
+        raise KeyFileError(f"{path}: {error.strerror}") from None
+
+
+def _read(file: Path) -> tuple[Key, ...]:
+    try:
+        return parse_keys(file.read_text())
+    except OSError as error:
+        raise KeyFileError(f"{file}: {error.strerror}") from None
+    except ValidationError as error:
+        # Whoever wrote a key in the place of its digest does not want to see it in a log.
+        where = "; ".join(".".join(map(str, fault["loc"])) + ": " + fault["msg"] for fault in error.errors())
+        raise KeyFileError(f"{file}: {where}") from None
+    except ValueError:
+        raise KeyFileError(f"{file}: no TOML, or not UTF-8") from None
+
+
+def _state(path: Path) -> object:
+    """Return what tells one content from another without reading it."""
+    try:
+        stats = [file.stat() for file in _files(path)]
+    except (KeyFileError, OSError):
+        return None
+    return [(stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in stats]

@@ -1,0 +1,141 @@
+"""Looking a map up on connections that are kept."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import psycopg
+import pytest
+from sqlalchemy import Engine, event
+
+from service.database_url import database_url
+from service.maps import MapOutline, MapStore, Preconditions
+from service.maps import database as connections
+from service.maps.errors import BusyStoreError, UnknownMapError
+
+BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
+ANY = Preconditions()
+# Another process does what it is told, line by line, on the same database.
+OTHER = """
+import sys
+from service.database_url import database_url
+from service.maps import MapOutline, MapStore, Preconditions
+store = MapStore(database_url(sys.argv[1]))
+for line in sys.stdin:
+    if line.strip() == "put":
+        store.put("m", b"{}", MapOutline(4, (0.0, 0.0, 1.0, 1.0)), Preconditions())
+    else:
+        store.delete("m", Preconditions())
+    print("done", flush=True)
+store.close()
+"""
+
+
+class Other:
+    """A second process on the database."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+
+    def does(self, what: str) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        print(what, file=self._process.stdin, flush=True)
+        assert self._process.stdout.readline() == "done\n"
+
+
+@pytest.fixture
+def other(database: str) -> Iterator[Other]:
+    command = [sys.executable, "-c", OTHER, database]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        yield Other(process)
+
+
+@contextmanager
+def statements() -> Iterator[list[str]]:
+    """What goes through the toolkit meanwhile."""
+    seen: list[str] = []
+
+    def note(*arguments: object) -> None:
+        seen.append(str(arguments[2]))
+
+    event.listen(Engine, "before_cursor_execute", note)
+    yield seen
+    event.remove(Engine, "before_cursor_execute", note)
+
+
+def test_what_another_process_does_is_seen_at_once(store: MapStore, other: Other) -> None:
+    for revision in (1, 2, 3):
+        other.does("put")
+        assert store.record("m").revision == revision
+    other.does("delete")
+    with pytest.raises(UnknownMapError):
+        store.record("m")
+    other.does("put")
+    assert store.record("m").revision == 4
+
+
+def test_a_map_that_is_there_costs_one_statement_beside_the_toolkit(store: MapStore) -> None:
+    store.put("m", b"{}", BOX, ANY)
+    with statements() as seen:
+        for _ in range(3):
+            assert store.record("m").revision == 1
+    assert seen == []
+
+
+def test_it_holds_no_lock(store: MapStore, other: Other) -> None:
+    for _ in range(3):
+        other.does("put")
+        store.record("m")
+
+
+def test_threads_do_not_wait_for_each_other(store: MapStore) -> None:
+    store.put("m", b"{}", BOX, ANY)
+    with ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(store.record, ["m"] * 400))
+    assert {record.revision for record in found} == {1}
+
+
+def test_a_connection_that_is_lost_is_made_anew(store: MapStore, database: str) -> None:
+    if database.startswith("sqlite"):
+        pytest.skip("PostgreSQL only")
+    store.put("m", b"{}", BOX, ANY)
+    store.record("m")
+    with psycopg.connect(database, autocommit=True) as connection:
+        connection.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
+            " WHERE pid <> pg_backend_pid() AND query LIKE '%quarantined FROM maps WHERE map_id%'"
+        )
+    for _ in range(2):
+        assert store.record("m").revision == 1
+
+
+def test_it_waits_for_a_writer_as_the_store_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "BUSY_SECONDS", 0.05)
+    path = tmp_path / "maps.sqlite3"
+    with closing(MapStore(database_url(f"sqlite:///{path}"))) as store, closing(sqlite3.connect(path)) as writer:
+        store.put("m", b"{}", BOX, ANY)
+        assert store.record("m").revision == 1
+        writer.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(BusyStoreError):
+            store.record("m")
+        writer.rollback()
+        assert store.record("m").revision == 1
+
+
+def test_a_file_in_the_place_of_another_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "maps.sqlite3"
+    with closing(MapStore(database_url(f"sqlite:///{path}"))) as store:
+        store.put("m", b"{}", BOX, ANY)
+        assert store.record("m").revision == 1
+        path.rename(tmp_path / "away")
+        with closing(MapStore(database_url(f"sqlite:///{path}"))) as another:
+            for _ in range(3):
+                another.put("m", b"{}", BOX, ANY)
+        assert store.record("m").revision == 3
