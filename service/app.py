@@ -23,7 +23,7 @@ from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
-from .http.routes import associate, batch, check, maps, operations, pages, register, vectorize
+from .http.routes import associate, batch, check, importing, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
@@ -65,7 +65,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     app.state.services = services
     app.state.contract = Contract(partial(describe, app, guarded=bool(settings.keys)), services.parse_threads)
     # A path of a map's check looks like that of a map, too: it comes first.
-    for module in (register, associate, batch, vectorize, check, maps, operations, pages):
+    for module in (register, associate, batch, vectorize, check, importing, maps, operations, pages):
         app.include_router(module.router)
     handle_errors(app)
     app.add_middleware(Reception, services=services)
@@ -107,6 +107,7 @@ def _services(settings: Settings, part: Part) -> Services:
         lookup=lookup,
         documents=_budget(settings, part, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
+        imports=asyncio.Semaphore(1),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
     )

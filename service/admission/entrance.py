@@ -11,7 +11,7 @@ from .keys import Keyring
 from .origins import Origins
 from .ticket import Ticket
 
-SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize"))
+SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize", "/v1/maps:import"))
 """Paths whose POST needs a turn at the gate."""
 MAPS, CHECK = "/v1/maps/", ":check"
 """How the path of a map's check begins and ends, which needs one to be read, too."""

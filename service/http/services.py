@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asyncio import Semaphore
 from dataclasses import dataclass
 
 from starlette.types import Scope
@@ -50,6 +51,8 @@ class Services:
     documents : ByteBudget
         Bytes of stored maps that wait to be indexed.
     associator : Associator
+    imports : Semaphore
+        Of which one is free as long as no map of another tool is read.
     parse_threads, store_threads : Threads
     """
 
@@ -68,6 +71,7 @@ class Services:
     lookup: MapLookup
     documents: ByteBudget
     associator: Associator
+    imports: Semaphore
     parse_threads: Threads
     store_threads: Threads
 
