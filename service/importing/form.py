@@ -49,9 +49,10 @@ def read_form(content: bytes, content_type: str) -> Form:
     try:
         parser = MultipartParser(boundary, parts.callbacks())
         parser.write(content)
-        parser.finalize()
     except (FormParserError, ValueError):
-        raise _refused("is no multipart/form-data as Content-Type says") from None
+        parts.whole = False
+    if not parts.whole:
+        raise _refused("is no multipart/form-data as Content-Type says")
     for disposition, data in parts.found:
         _take(form, disposition, data)
     return form
@@ -62,6 +63,7 @@ class _Parts:
 
     def __init__(self) -> None:
         self.found: list[tuple[bytes, bytearray]] = []
+        self.whole = False
         self._name, self._value = bytearray(), bytearray()
         self._disposition, self._data = b"", bytearray()
 
@@ -74,6 +76,7 @@ class _Parts:
             "on_header_field": self.header_field,
             "on_header_value": self.header_value,
             "on_header_end": self.header_end,
+            "on_end": self.end,
         }
 
     def part_begin(self) -> None:
@@ -103,6 +106,10 @@ class _Parts:
     def part_end(self) -> None:
         """Keep a part."""
         self.found.append((self._disposition, self._data))
+
+    def end(self) -> None:
+        """Note that the last boundary was there."""
+        self.whole = True
 
 
 def _take(form: Form, disposition: bytes, data: bytearray) -> None:

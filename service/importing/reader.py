@@ -33,7 +33,7 @@ def main(told: str, folder: str) -> None:
     bounds = Bounds(**asked["bounds"])
     _bind(bounds)
     try:
-        lines = _read(sys.stdin.buffer.read(), asked["content_type"], Path(folder), bounds)
+        lines = read_files(sys.stdin.buffer.read(), asked["content_type"], Path(folder), bounds)
     except InvalidRequestError as error:
         lines = [{"invalid": [asdict(fault) for fault in error.faults]}]
     except ModuleNotFoundError:
@@ -62,7 +62,7 @@ def _bind(bounds: Bounds) -> None:
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE)
 
 
-def _read(content: bytes, content_type: str, folder: Path, bounds: Bounds) -> list[dict[str, Any]]:
+def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) -> list[dict[str, Any]]:
     """Return a report and a map, or an error for which there is another status than 422.
 
     Raises
