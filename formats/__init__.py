@@ -10,7 +10,7 @@ from .errors import (
 )
 from .line_map import ImportedMap, LineMap
 from .logs.scan import Log, LoggedScan, LogOptions
-from .maps import read_map
+from .maps import MAP_SUFFIXES, read_map
 from .options import ImportOptions
 from .picture import draw_map
 from .poses import StampedPose, pose_message, write_tum
@@ -19,6 +19,7 @@ from .report import ImportReport, Note
 from .writing import write_map
 
 __all__ = [
+    "MAP_SUFFIXES",
     "FormatError",
     "ImportOptions",
     "ImportReport",

@@ -18,6 +18,7 @@ from .grids.cells import Grid
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
 from .line_map import ImportedMap, LineMap
+from .logs.bags import SUFFIXES as BAG_SUFFIXES
 from .logs.bags import is_bag
 from .logs.ros import read_bag_grid
 from .options import DEFAULT_OPTIONS, ImportOptions
@@ -30,6 +31,8 @@ DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
     ".json": read_json,
     ".csv": read_csv,
 }
+MAP_SUFFIXES = (".yaml", ".yml", *DRAWINGS, *BAG_SUFFIXES)
+"""Of files that `read_map` reads; beside a ``.yaml`` lies its picture."""
 
 
 def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTIONS) -> ImportedMap:
@@ -63,8 +66,9 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
         drawing = DRAWINGS[suffix](file, options, notes)
         line_map = to_map(drawing, options)
         return ImportedMap(line_map, notes.report(drawing.format, (drawing.name,)))
-    known = ", ".join((".yaml", *DRAWINGS))
-    raise UnsupportedFormatError(f"expected a file that ends in one of {known}", argument=name_of(file))
+    raise UnsupportedFormatError(
+        f"expected a file that ends in one of {', '.join(MAP_SUFFIXES)}", argument=name_of(file)
+    )
 
 
 def _read_map_server(file: Path) -> ImportedMap:

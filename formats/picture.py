@@ -21,11 +21,17 @@ SIZE = 1600  # pixels of the longer edge
 MARGIN = 20  # pixels
 TICK = 10.0  # pixels; towards the free side
 MARK = 5.0  # pixels; of a pose
-WALL, FREE_SIDE, PATH, PAPER = (20, 20, 20), (30, 140, 60), (200, 40, 40), (255, 255, 255)
+WALL, FREE_SIDE, PAPER = (20, 20, 20), (30, 140, 60), (255, 255, 255)
+PATH, DOUBTFUL = (200, 40, 40), (150, 150, 150)
 
 
-def draw_map(map: LineMap, path: str | os.PathLike[str], poses: Iterable[RigidTransform] = ()) -> None:
-    """Draw a map as PNG: walls in black, a green tick on the free side of each, poses in red.
+def draw_map(
+    map: LineMap,
+    path: str | os.PathLike[str],
+    poses: Iterable[RigidTransform] = (),
+    doubtful: Iterable[RigidTransform] = (),
+) -> None:
+    """Draw a map as PNG: walls in black, a green tick on the free side of each, poses in red, doubtful ones in grey.
 
     Parameters
     ----------
@@ -33,7 +39,7 @@ def draw_map(map: LineMap, path: str | os.PathLike[str], poses: Iterable[RigidTr
         Without ticks where its directions mean nothing.
     path : str or path
         Ends in ``.png``.
-    poses : iterable of RigidTransform
+    poses, doubtful : iterable of RigidTransform
         map_from_scan; drawn as dots that point where they look.
 
     Raises
@@ -60,9 +66,9 @@ def draw_map(map: LineMap, path: str | os.PathLike[str], poses: Iterable[RigidTr
         if map.oriented:
             x, y = place(mx, my)
             draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=FREE_SIDE, width=2)
-    for pose in poses:
+    for pose, colour in [*((pose, DOUBTFUL) for pose in doubtful), *((pose, PATH) for pose in poses)]:
         x, y = place(pose.x, pose.y)
         tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
-        draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=PATH)
-        draw.line([(x, y), tip], fill=PATH, width=1)
+        draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=colour)
+        draw.line([(x, y), tip], fill=colour, width=1)
     picture.save(path, format="PNG")

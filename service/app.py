@@ -24,7 +24,7 @@ from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
-from .http.routes import associate, batch, check, maps, operations, pages, register, vectorize
+from .http.routes import associate, batch, check, importing, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
@@ -67,9 +67,9 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     )
     app.state.services = services
     app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
-    # In the order in which they are tried: robots come most often, and the path of a map's check is also one of a map.
-    # An included router would be one more layer for each of them.
-    for module in (associate, register, batch, vectorize, check, maps, operations, pages):
+    # In the order in which they are tried: robots come most often, and the paths of a map's check and of an import are
+    # also those of a map. An included router would be one more layer for each of them.
+    for module in (associate, register, batch, vectorize, check, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
     handle_errors(app)
     app.add_middleware(Reception, services=services)
@@ -113,6 +113,7 @@ def _services(settings: Settings, part: Part) -> Services:
         lookup=lookup,
         documents=_budget(settings, part, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
+        imports=asyncio.Semaphore(1),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
         key_threads=Threads(1, "keys"),

@@ -106,6 +106,9 @@ class Settings(BaseSettings):
         64_000_000, ge=1_000, description="of large answers that wait to be read; of one key half of that"
     )
     max_stored_bytes: int = Field(4_000_000_000, ge=1_000, description="of all stored maps together")
+    max_import_bytes: int = Field(
+        1_000_000_000, ge=400_000_000, description="of memory to read one map of another tool; one is read at a time"
+    )
     max_connections: int = Field(
         512, ge=8, le=100_000, description="open at once, of one address half of that; fewer where descriptors are few"
     )

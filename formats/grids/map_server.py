@@ -178,7 +178,7 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
                 return _pixels(picture)
     except FormatError:
         raise
-    except Image.DecompressionBombError as error:
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name) from error
     except UnidentifiedImageError as error:
         raise MalformedFileError("is no picture in PGM, PNG or BMP", argument=name) from error

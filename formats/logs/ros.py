@@ -33,11 +33,12 @@ def read_bag(path: Path, options: LogOptions) -> Log:
     Raises
     ------
     FormatError
-        When it is no bag; while iterating, when it is broken or has no scans.
+        When it is no bag, or has no scans; while iterating, when it is broken.
     """
     with opened(path) as bag:
         form = bag.format
-    return Log(form, name_of(path), partial(_scans, path, options))
+        count = sum(c.msgcount for c in _chosen(bag, SCAN, options.topic, Notes()))
+    return Log(form, name_of(path), partial(_scans, path, options), count)
 
 
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:

@@ -66,11 +66,21 @@ class LoggedScan:
 
 
 class Log:
-    """The scans of a log, read anew by each iteration; a long log is never held whole."""
+    """The scans of a log, read anew by each iteration; a long log is never held whole.
 
-    def __init__(self, format: str, name: str, scans: Callable[[Notes], Iterator[LoggedScan]]) -> None:
+    Attributes
+    ----------
+    format, name : str
+    count : int or None
+        How many messages of scans there are, where the log says.
+    """
+
+    def __init__(
+        self, format: str, name: str, scans: Callable[[Notes], Iterator[LoggedScan]], count: int | None = None
+    ) -> None:
         self.format = format
         self.name = name
+        self.count = count
         self._scans = scans
         self._notes = Notes()
 

@@ -5,12 +5,14 @@
     CommandError
     ├── WrongUseError   exit code 2: the command cannot be meant so
     ├── RefusedError    exit code 3: a file, or what is in it, is not taken
+    │   └── NoSuchMapError   what is named is neither a file nor a stored map
     └── NoServerError   exit code 4: nobody there who would answer
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 BUSY = (401, 403, 408, 429)  # of 4xx those that are no word about what was sent
@@ -34,26 +36,72 @@ class RefusedError(CommandError):
     exit_code = 3
 
 
+class NoSuchMapError(RefusedError):
+    """What is named is neither a file nor a stored map.
+
+    Parameters
+    ----------
+    name : str
+        As it was given.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"{name}: no such file, and no map is stored under this id; linefix map list names those")
+
+
 class NoServerError(CommandError):
     """Nobody is there who would answer."""
 
     exit_code = 4
 
 
-def error_of(status: int, detail: str, faults: Sequence[Mapping[str, Any]]) -> CommandError:
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What was asked for, as the user knows it.
+
+    Attributes
+    ----------
+    map_id : str or None
+        Of the stored map that it is about.
+    files : tuple of str
+        Names of the files that were sent.
+    """
+
+    map_id: str | None = None
+    files: tuple[str, ...] = ()
+
+    def place(self, pointer: str) -> str:
+        """Return what the user calls a place in the request."""
+        if not self.files:
+            return pointer
+        first, _, rest = pointer.removeprefix("/").partition("/")
+        if first == "files":
+            return self.files[int(rest)] if rest.isdecimal() and int(rest) < len(self.files) else self.files[0]
+        return f"--{first.replace('_', '-')}" if first else self.files[0]
+
+
+NOTHING = Asked()
+
+
+def error_of(
+    status: int, code: str, detail: str, faults: Sequence[Mapping[str, Any]], asked: Asked = NOTHING
+) -> CommandError:
     """Return the error that a problem of the service stands for.
 
     Parameters
     ----------
-    status : int
+    status, code : int, str
         As over HTTP.
     detail : str
     faults : sequence of mapping
         ``pointer`` and ``message`` of each place that is wrong; the first is shown, the others are counted.
+    asked : Asked
     """
-    message = detail
+    if code == "unknown_map" and asked.map_id is not None:
+        return NoSuchMapError(asked.map_id)
+    message = ": ".join((*asked.files[:1], detail))
     if faults:
-        message = f"{faults[0]['pointer']}: {faults[0]['message']}"
+        message = f"{asked.place(faults[0]['pointer'])}: {faults[0]['message']}"
         if len(faults) > 1:
             message += f" (and {len(faults) - 1} more)"
     if 400 <= status < 500 and status not in BUSY:

@@ -4,30 +4,41 @@ from __future__ import annotations
 
 import secrets
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from functools import cached_property
+from pathlib import Path
 
 import orjson
 from pydantic import ValidationError
 
 from ..http.problems import problem_of
-from ..maps import IndexCache, MapStore
-from ..maps.lookup import FoundMap, MapLookup
+from ..importing.bounded import ReadMap
+from ..importing.fields import Fields, options_of
+from ..maps import IndexCache, MapStore, Preconditions
+from ..maps.lookup import FoundMap, MapLookup, outline_of
 from ..parsing.errors import ParserEndedError
 from ..parsing.parser_process import ParserProcess
+from ..parsing.reading import read_map as read_document
 from ..parsing.reading import read_model
 from ..schemas.parts import InlineMap, StoredMap
-from ..schemas.requests import AssociateRequest, RegisterRequest, VectorizeRequest
+from ..schemas.requests import AssociateRequest, CheckRequest, RegisterRequest, VectorizeRequest
 from ..settings import Settings
 from ..telemetry.metrics import Metrics
+from ..work.answers import outline_json
 from ..work.association import Associator
+from ..work.checking import check, check_done, sample
 from ..work.compiling import compile_kernels, is_compiled
+from ..work.importing import answer_import
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
 from ..work.vectorization import answer_vectorization
-from .errors import WrongUseError, error_of
-from .service import Json, Question
+from .errors import NOTHING, Asked, CommandError, WrongUseError, error_of
+from .inputs import document_of, needing_formats
+from .service import Json, Question, id_of
+
+MAPS_AT_ONCE = 1000
 
 
 class InProcess:
@@ -59,9 +70,62 @@ class InProcess:
     def ask(self, question: Question, body: Json) -> Json:
         """Return the answer of ``POST /v1/<question>``."""
         self._compile()
+        with _refusing(Asked(id_of(body.get("map")))):
+            return _json(self._done(question, orjson.dumps(body)))
+
+    def import_map(self, files: Sequence[Path], fields: Fields) -> Json:
+        """Return the answer of ``POST /v1/maps:import``; what is one's own is read in this process."""
+        self._compile()
+        asked, watch = Asked(files=tuple(file.name for file in files)), Stopwatch()
+        with _refusing(asked), needing_formats(f"reading {files[0].name}", asked):
+            from formats import read_map
+
+            imported = read_map(files[0], options_of(fields))
+            read = ReadMap(orjson.dumps(document_of(imported.map)), asdict(imported.report))
+            watch.lap("read")
+            line_map = read_model(InlineMap, read.map, self._limits)
+            return _json(answer_import(self._lookup, line_map, read, self._job(watch)))
+
+    def check(self, on: Json, samples: Json | None) -> Json:
+        """Return the answer of ``/v1/maps/{map_id}:check``, also for a map that is not stored."""
+        self._compile()
+        map_id = id_of(on)
+        with _refusing(Asked(map_id=map_id)):
+            asked = None if samples is None else read_model(CheckRequest, orjson.dumps(samples), self._limits)
+            watch = Stopwatch()
+            job = self._job(watch, None if asked is None else asked.deadline_ms)
+            line_map = None if map_id else read_model(InlineMap, orjson.dumps(on), self._limits)
+            checked = check(self._lookup, line_map or self._lookup.find(str(map_id), oriented=True), asked, job)
+            tried = None if asked is None else [sample(checked, asked, k, job) for k in range(len(asked.scans))]
+            return _json(check_done(checked, tried, asked, job))
+
+    def put(self, map_id: str, document: Json) -> Json:
+        """Store a map where a service with these settings would."""
         with _refusing():
-            answer: Json = orjson.loads(self._done(question, orjson.dumps(body)).body)
-            return answer
+            asked, kept = read_document(orjson.dumps(document), self._limits)
+            outline = outline_of(asked)
+            revision, _ = self._store.put(map_id, kept, outline, Preconditions())
+            return outline_json(map_id, revision, outline)
+
+    def get(self, map_id: str) -> Json:
+        """Return a stored map."""
+        with _refusing(Asked(map_id)):
+            document: Json = orjson.loads(self._store.load(map_id).document)
+            return document
+
+    def maps(self) -> Iterator[Json]:
+        """Give what is told of each stored map, by id."""
+        after: str | None = ""
+        while after is not None:
+            with _refusing():
+                page = self._store.list(MAPS_AT_ONCE, after)
+            yield from (outline_json(one.map_id, one.revision, one.outline) for one in page.maps)
+            after = page.next
+
+    def remove(self, map_id: str) -> None:
+        """Forget a stored map."""
+        with _refusing(Asked(map_id)):
+            self._store.delete(map_id, Preconditions())
 
     def _compile(self) -> None:
         """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB."""
@@ -102,14 +166,21 @@ class InProcess:
         return Associator(self._lookup, self._metrics)
 
 
+def _json(done: Done) -> Json:
+    answer: Json = orjson.loads(done.body)
+    return answer
+
+
 @contextmanager
-def _refusing() -> Iterator[None]:
+def _refusing(asked: Asked = NOTHING) -> Iterator[None]:
     """Turn what the service would answer as a problem into an error of the command line."""
     try:
         yield
+    except CommandError:
+        raise
     except Exception as error:
         problem = problem_of(error)
         if problem is None:
             raise
         faults = [{"pointer": fault.pointer, "message": fault.message} for fault in problem.faults]
-        raise error_of(problem.kind.status, problem.detail, faults) from error
+        raise error_of(problem.kind.status, problem.kind.code, problem.detail, faults, asked) from error

@@ -9,14 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from registration import InputError
+from registration import InputError, Segments
 
 from ..parsing.errors import NotJsonError
 from ..parsing.reading import parse
 from ..schemas.errors import TooManyError
 from ..schemas.limits import Limits
-from .errors import RefusedError, WrongUseError
-from .service import Json
+from .errors import NOTHING, Asked, RefusedError, WrongUseError
+from .service import Json, answering
 
 if TYPE_CHECKING:
     from formats import LineMap
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 STDIN = "-"
 MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's business
 _ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
-_MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
+MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
 _FORMS = ("laser", "points", "segments")
 
 
@@ -74,9 +74,24 @@ def read_map_or_id(name: str) -> Json:
     RefusedError
         When the file is not taken.
     """
-    if not Path(name).exists() and _MAP_ID.fullmatch(name) and not Path(name).suffix:
+    if not Path(name).exists() and MAP_ID.fullmatch(name) and not Path(name).suffix:
         return {"map_id": name}
     return read_map_file(name)
+
+
+def document_at(name: str, server: str | None) -> Json:
+    """Return a map itself: that of a file, or a stored one.
+
+    Raises
+    ------
+    WrongUseError, RefusedError
+        When there is none, or it is not taken.
+    """
+    on = read_map_or_id(name)
+    if "map_id" not in on:
+        return on
+    with answering(server) as service:
+        return service.get(on["map_id"])
 
 
 def read_map_file(name: str) -> Json:
@@ -116,8 +131,22 @@ def document_of(line_map: LineMap) -> Json:
     }
 
 
+def line_map_of(document: Json) -> LineMap:
+    """Return a map as `formats` has it.
+
+    Raises
+    ------
+    InputError
+        When its segments are none.
+    """
+    from formats import LineMap
+
+    segments = Segments.from_array(document.get("segments", []), argument="segments")
+    return LineMap(segments, document.get("sigma"), document.get("oriented") is not False)
+
+
 @contextmanager
-def needing_formats(what: str) -> Iterator[None]:
+def needing_formats(what: str, asked: Asked = NOTHING) -> Iterator[None]:
     """Say in one line where the extra ``[formats]`` is missing, or refuses a file.
 
     Raises
@@ -129,4 +158,6 @@ def needing_formats(what: str) -> Iterator[None]:
     except ModuleNotFoundError:
         raise RefusedError(f'{what} needs more packages: pip install "linefix[formats]"') from None
     except InputError as error:
+        if asked.files and error.argument == "inside":
+            raise RefusedError(f"--point: {error.message}") from None
         raise RefusedError(str(error)) from None

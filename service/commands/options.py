@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -25,3 +26,4 @@ ScanArgument = Annotated[
         help="A scan as JSON: segments, points or laser, or the fields of a LaserScan message; - reads it from stdin.",
     ),
 ]
+Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it there, as png.")]

@@ -38,6 +38,11 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
         where.print(plain(name.ljust(width) + value))
 
 
+def noted(note: Json) -> str:
+    """Return what an import or a log said of itself."""
+    return f"{note['message']} ({note['count']})" if note["count"] else str(note["message"])
+
+
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     """Print a table; numbers stand on the right."""
     table = Table(box=None, pad_edge=False, header_style="bold")

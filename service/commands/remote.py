@@ -7,17 +7,21 @@ from __future__ import annotations
 
 import http.client
 import re
+import secrets
 import socket
 import urllib.error
 import urllib.parse
 import urllib.request
+from collections.abc import Iterator, Sequence
 from email.message import Message
+from pathlib import Path
 from typing import IO
 
 import orjson
 
-from .errors import NoServerError, WrongUseError, error_of
-from .service import KEY, Json, Question
+from ..importing.fields import Fields
+from .errors import NOTHING, Asked, NoServerError, WrongUseError, error_of
+from .service import KEY, Json, Question, id_of
 
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
 _HEADER = re.compile(r"[!-~]+")
@@ -54,7 +58,44 @@ class RemoteService:
 
     def ask(self, question: Question, body: Json) -> Json:
         """Return the answer of ``POST /v1/<question>``."""
-        return self._json(self._send("POST", f"/v1/{question}", orjson.dumps(body)))
+        asked = Asked(map_id=id_of(body.get("map")))
+        return self._json(self._send("POST", f"/v1/{question}", orjson.dumps(body), asked))
+
+    def import_map(self, files: Sequence[Path], fields: Fields) -> Json:
+        """Return the answer of ``POST /v1/maps:import``."""
+        boundary = secrets.token_hex(16)
+        asked = Asked(files=tuple(file.name for file in files))
+        content = _form(files, fields, boundary.encode())
+        media_type = f"multipart/form-data; boundary={boundary}"
+        return self._json(self._send("POST", "/v1/maps:import", content, asked, media_type))
+
+    def check(self, on: Json, samples: Json | None) -> Json:
+        """Return the answer of ``/v1/maps/{map_id}:check``, which is for stored maps."""
+        map_id = id_of(on)
+        if map_id is None:
+            raise WrongUseError("a server checks stored maps: linefix map put it first, or leave --server out")
+        method, body = ("GET", None) if samples is None else ("POST", orjson.dumps(samples))
+        return self._json(self._send(method, f"/v1/maps/{map_id}:check", body, Asked(map_id)))
+
+    def put(self, map_id: str, document: Json) -> Json:
+        """Store a map."""
+        return self._json(self._send("PUT", f"/v1/maps/{map_id}", orjson.dumps(document)))
+
+    def get(self, map_id: str) -> Json:
+        """Return a stored map."""
+        return self._json(self._send("GET", f"/v1/maps/{map_id}", asked=Asked(map_id)))
+
+    def maps(self) -> Iterator[Json]:
+        """Give what is told of each stored map, page by page."""
+        cursor: str | None = ""
+        while cursor is not None:
+            page = self._json(self._send("GET", f"/v1/maps?cursor={cursor}"))
+            yield from page["maps"]
+            cursor = page["next"]
+
+    def remove(self, map_id: str) -> None:
+        """Forget a stored map."""
+        self._send("DELETE", f"/v1/maps/{map_id}", asked=Asked(map_id))
 
     def _json(self, content: bytes) -> Json:
         try:
@@ -65,10 +106,17 @@ class RemoteService:
             raise NoServerError(f"what answers at {self._url} is no Linefix; check the URL")
         return answer
 
-    def _send(self, method: str, path: str, body: bytes | None = None) -> bytes:
+    def _send(
+        self,
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        asked: Asked = NOTHING,
+        media_type: str = "application/json",
+    ) -> bytes:
         headers = dict(self._headers)
         if body is not None:
-            headers["Content-Type"] = "application/json"
+            headers["Content-Type"] = media_type
         request = urllib.request.Request(self._url + path, body, headers, method=method)
         try:
             with self._opener.open(request, timeout=SECONDS) as response:
@@ -76,7 +124,7 @@ class RemoteService:
                 return content
         except urllib.error.HTTPError as error:
             with error:
-                raise self._refusal(error.code, error.read()) from None
+                raise self._refusal(error.code, error.read(), asked) from None
         except (OSError, http.client.HTTPException) as error:
             reason = error.reason if isinstance(error, urllib.error.URLError) else error
             said = reason.strerror if isinstance(reason, OSError) and reason.strerror else reason
@@ -86,12 +134,26 @@ class RemoteService:
                 f"no server answers at {self._url}: {said}; start one with linefix serve, or leave --server out"
             ) from None
 
-    def _refusal(self, status: int, content: bytes) -> Exception:
+    def _refusal(self, status: int, content: bytes, asked: Asked) -> Exception:
         problem = self._json(content)
         if status in (401, 403):
             return NoServerError(f"{self._url} asks for a key: set {KEY} in the environment to one that it knows")
         faults = problem.get("errors") or []
-        return error_of(status, f"{self._url}: {problem.get('detail')}", faults)
+        return error_of(status, str(problem.get("code")), f"{self._url}: {problem.get('detail')}", faults, asked)
+
+
+def _form(files: Sequence[Path], fields: Fields, boundary: bytes) -> bytes:
+    """Return files and fields as multipart/form-data (RFC 7578)."""
+    parts = [(f'name="{name}"', value.encode()) for name, values in fields.items() for value in values]
+    parts += [(f'name="file"; filename="{_quoted(file.name)}"', file.read_bytes()) for file in files]
+    whole = bytearray()
+    for told, content in parts:
+        whole += b"--%b\r\nContent-Disposition: form-data; %b\r\n\r\n%b\r\n" % (boundary, told.encode(), content)
+    return bytes(whole + b"--%b--\r\n" % boundary)
+
+
+def _quoted(name: str) -> str:
+    return name.replace('"', "%22").replace("\r", "%0D").replace("\n", "%0A")
 
 
 class _NoRedirects(urllib.request.HTTPRedirectHandler):

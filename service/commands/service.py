@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Literal, Protocol
+
+from ..importing.fields import Fields
 
 Json = dict[str, Any]
 Question = Literal["associate", "register", "vectorize"]
@@ -21,6 +24,35 @@ class Service(Protocol):
     def ask(self, question: Question, body: Json) -> Json:
         """Return the answer of ``POST /v1/<question>``."""
         ...
+
+    def import_map(self, files: Sequence[Path], fields: Fields) -> Json:
+        """Return the answer of ``POST /v1/maps:import``; the first file is the map, the others are those it names."""
+        ...
+
+    def check(self, on: Json, samples: Json | None) -> Json:
+        """Return the answer of ``/v1/maps/{map_id}:check``; `on` is the map of a request."""
+        ...
+
+    def put(self, map_id: str, document: Json) -> Json:
+        """Store a map; return the answer of ``PUT``."""
+        ...
+
+    def get(self, map_id: str) -> Json:
+        """Return a stored map."""
+        ...
+
+    def maps(self) -> Iterator[Json]:
+        """Give what is told of each stored map, by id."""
+        ...
+
+    def remove(self, map_id: str) -> None:
+        """Forget a stored map."""
+        ...
+
+
+def id_of(on: object) -> str | None:
+    """Return the id of a request's map, None where the map itself is there."""
+    return on.get("map_id") if isinstance(on, dict) else None
 
 
 @contextmanager

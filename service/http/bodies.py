@@ -14,6 +14,8 @@ from ..admission.fair_queue import Holder
 from ..schemas.errors import BodyTooLargeError
 from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
+JSON, FORM = "application/json", "multipart/form-data"
+
 
 @dataclass(frozen=True, slots=True)
 class Body:
@@ -55,7 +57,9 @@ class BodyReceiver:
         self._guarded = guarded
 
     @asynccontextmanager
-    async def receiving(self, request: Request, arrived: float, holder: Holder = None) -> AsyncIterator[Body]:
+    async def receiving(
+        self, request: Request, arrived: float, holder: Holder = None, *, form: bool = False
+    ) -> AsyncIterator[Body]:
         """Receive a body whole; its bytes count as held until the block ends.
 
         Parameters
@@ -65,11 +69,13 @@ class BodyReceiver:
             When its first byte came, by the event loop's clock, seconds.
         holder : Holder
             Who sends it.
+        form : bool
+            Whether it is to be a form with files; else it is to be JSON.
 
         Raises
         ------
         MediaTypeError, EncodingError
-            When it is no JSON by its head.
+            When it is something else by its head.
         BodyTooLargeError
             When it is larger than allowed.
         TooMuchHeldError, ShareHeldError
@@ -78,8 +84,8 @@ class BodyReceiver:
             When it does not come in time.
         """
         if not self._guarded and request.method == "POST" and "content-type" not in request.headers:
-            raise MediaTypeError
-        gzipped = _is_gzip(request)
+            raise MediaTypeError(FORM if form else JSON)
+        gzipped = _is_gzip(request, form=form)
         with self._budget.account(holder) as account:
             data = bytearray()
             try:
@@ -94,15 +100,18 @@ class BodyReceiver:
             yield Body(data, gzipped, account)
 
 
-def _is_gzip(request: Request) -> bool:
-    """Tell whether a body is gzip; refuse what is not JSON by its head."""
-    media_type = request.headers.get("content-type", "application/json").split(";")[0].strip().lower()
-    if media_type != "application/json" and not (
-        media_type.startswith("application/") and media_type.endswith("+json")
-    ):
-        raise MediaTypeError
+def _is_gzip(request: Request, *, form: bool) -> bool:
+    """Tell whether a body is gzip; refuse what by its head is not what is taken."""
+    told = request.headers.get("content-type", FORM if form else JSON)
+    media_type = told.split(";")[0].strip().lower()
+    if media_type != FORM if form else not _is_json(media_type):
+        raise MediaTypeError(FORM if form else JSON)
     encodings = [part.strip().lower() for part in request.headers.get("content-encoding", "").split(",")]
     encodings = [part for part in encodings if part not in ("", "identity")]
     if encodings not in ([], ["gzip"], ["x-gzip"]):
         raise EncodingError
     return bool(encodings)
+
+
+def _is_json(media_type: str) -> bool:
+    return media_type == JSON or (media_type.startswith("application/") and media_type.endswith("+json"))

@@ -6,7 +6,7 @@
     ├── NotHttpError           not HTTP at all
     ├── NotFoundError          no such path
     ├── MethodNotAllowedError  the path takes other methods
-    ├── MediaTypeError         the body is no JSON by its head
+    ├── MediaTypeError         the body is not of the media type that is taken
     ├── EncodingError          the body is packed in a way that is not taken
     ├── BodyTooSlowError       the body did not come in time
     └── RefusedError           anything else that the framework refuses
@@ -50,10 +50,15 @@ class MethodNotAllowedError(HttpError):
 
 
 class MediaTypeError(HttpError):
-    """The body is no JSON by its head."""
+    """The body is not of the media type that is taken, by its head.
 
-    def __init__(self) -> None:
-        super().__init__("the body has to be application/json")
+    Parameters
+    ----------
+    taken : str
+    """
+
+    def __init__(self, taken: str) -> None:
+        super().__init__(f"the body has to be {taken}")
 
 
 class EncodingError(HttpError):

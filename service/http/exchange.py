@@ -78,21 +78,29 @@ class Exchange:
         counts from the moment when the body is there.
         """
         services = self.services
-        limits, max_bytes = services.settings.limits(), services.settings.max_body_bytes
-        async with services.bodies.receiving(self._request, self._state.arrived, self._ticket.holder) as body:
-            self._watch = Stopwatch()
-            data = body.data
-            if body.gzipped:
-                packed = len(data)
-                data = await services.parse_threads.run(partial(unpack, data, max_bytes, body.account.take))
-                body.data.clear()
-                body.account.give_back(packed)
+        limits = services.settings.limits()
+        async with self.received() as data:
             if len(data) <= SMALL:
                 return reader(data, limits)
             if len(data) <= LARGE:
                 return await services.parse_threads.run(partial(reader, data, limits))
             call = partial(services.parser.call, reader, data, limits)
             return await self.search(call, self.job().deadline)
+
+    @asynccontextmanager
+    async def received(self, *, form: bool = False) -> AsyncIterator[bytearray]:
+        """Receive the body, JSON or a form with files, and unpack it; its bytes count as held until the block ends."""
+        services = self.services
+        receiving = services.bodies.receiving(self._request, self._state.arrived, self._ticket.holder, form=form)
+        async with receiving as body:
+            self._watch = Stopwatch()
+            data = body.data
+            if body.gzipped:
+                packed, max_bytes = len(data), services.settings.max_body_bytes
+                data = await services.parse_threads.run(partial(unpack, data, max_bytes, body.account.take))
+                body.data.clear()
+                body.account.give_back(packed)
+            yield data
 
     def job(self, deadline_ms: float | None = None) -> Job:
         """Return what is to be done for this request; without a deadline of its own it has the service's."""

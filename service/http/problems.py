@@ -16,6 +16,7 @@ from association import CancelledError
 from registration import InputError
 
 from ..admission import errors as admission
+from ..importing import errors as importing
 from ..maps import errors as maps
 from ..parsing import errors as parsing
 from ..schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
@@ -72,8 +73,15 @@ TABLE = (
     Kind("request_timeout", 408, "The body came too slowly", (http.BodyTooSlowError,)),
     Kind("map_corrupt", 409, "The stored map is damaged", (maps.CorruptMapError,)),
     Kind("revision_conflict", 412, "The map is not as demanded", (maps.RevisionConflictError,)),
-    Kind("too_large", 413, "The request is over a limit", (TooManyError, BodyTooLargeError)),
-    Kind("unsupported_media_type", 415, "The media type is not supported", (http.MediaTypeError, http.EncodingError)),
+    Kind(
+        "too_large", 413, "The request is over a limit", (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
+    ),
+    Kind(
+        "unsupported_media_type",
+        415,
+        "The media type is not supported",
+        (http.MediaTypeError, http.EncodingError, importing.FormatsMissingError, importing.UnknownFormatError),
+    ),
     Kind("invalid_request", 422, "The request is wrong", (InvalidRequestError, InputError, http.RefusedError)),
     Kind("rate_limited", 429, "This key has used its share", (admission.ShareUsedError, admission.ShareHeldError)),
     Kind("internal", 500, "A defect of the service"),
@@ -88,6 +96,7 @@ TABLE = (
             admission.TooMuchHeldError,
             maps.BusyStoreError,
             parsing.ParserEndedError,
+            importing.NoRoomError,
         ),
     ),
     Kind("read_only", 503, "The store cannot be written", (maps.ReadOnlyStoreError,)),
@@ -95,7 +104,7 @@ TABLE = (
         "deadline_exceeded",
         504,
         "The deadline passed before the search started",
-        (admission.DeadlinePassedError, maps.IndexNotReadyError),
+        (admission.DeadlinePassedError, maps.IndexNotReadyError, importing.TooLateError),
     ),
     Kind("storage_full", 507, "The store is full", (maps.StoreFullError,)),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asyncio import Semaphore
 from dataclasses import dataclass
 
 from starlette.types import Scope
@@ -52,6 +53,8 @@ class Services:
     documents : ByteBudget
         Bytes of stored maps that wait to be indexed.
     associator : Associator
+    imports : Semaphore
+        Of which one is free as long as no map of another tool is read.
     parse_threads, store_threads, key_threads : Threads
     """
 
@@ -71,6 +74,7 @@ class Services:
     lookup: MapLookup
     documents: ByteBudget
     associator: Associator
+    imports: Semaphore
     parse_threads: Threads
     store_threads: Threads
     key_threads: Threads

@@ -59,8 +59,8 @@ class SamplesAnswer(Answer):
     scans: list[SampleAnswer]
 
 
-class CheckAnswer(Answer):
-    """What is doubtful in a map."""
+class MapCheckAnswer(Answer):
+    """What is doubtful in a map by itself."""
 
     findings: list[FindingAnswer] = Field(description="the weightiest first")
     size: SizeAnswer
@@ -68,6 +68,11 @@ class CheckAnswer(Answer):
     places: list[PlaceAnswer] = Field(description="from which it looks like elsewhere")
     looked_from: Index = Field(description="places, to see whether the map looks alike elsewhere")
     complete: bool = Field(description="false where the deadline left something out")
+
+
+class CheckAnswer(MapCheckAnswer):
+    """What is doubtful in a map, also beside sample scans."""
+
     samples: SamplesAnswer | None = Field(description="null where no scans were sent")
     map: MapReference
     client_ref: Any = Field(description="as sent")

@@ -11,6 +11,7 @@ from association import Alternative, AssociationResult, Correspondence, Hinge
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
 
+from ..maps import MapOutline
 from ..schemas.encoding import encode_list
 
 Json = dict[str, Any]
@@ -166,4 +167,16 @@ def vectorization_json(found: Vectorization) -> Json:
         "sigma": found.sigma,
         "sigmas": measured.sigma.tolist(),
         "rms": found.rms.tolist(),
+    }
+
+
+def outline_json(map_id: str, revision: int, outline: MapOutline) -> Json:
+    """Return what is told of a stored map without its content."""
+    return {
+        "map_id": map_id,
+        "revision": revision,
+        "segments": outline.segments,
+        "bounds": outline.bounds,
+        "sigma": outline.sigma,
+        "oriented": outline.oriented,
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from association import Scan
 from association.checking import (
@@ -22,6 +22,7 @@ from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup, is_oriented
 from ..schemas.errors import Fault, InvalidRequestError
+from ..schemas.parts import InlineMap
 from ..schemas.requests import CheckRequest
 from .answers import Json, pose_json
 from .inputs import scanned_of, transform_of
@@ -43,19 +44,19 @@ class Checked:
     scans : sequence of Scan
         The samples.
     found : MapCheck
-    reference : dict
-        Id and revision of the map, as they are answered.
+    reference : dict or None
+        Id and revision of the map, as they are answered; None where it is not stored.
     """
 
     cached: CachedMap
     oriented: bool
     scans: Sequence[Scan]
     found: MapCheck
-    reference: Json
+    reference: Json | None
 
 
-def check(lookup: MapLookup, on: FoundMap, asked: CheckRequest | None, job: Job) -> Checked:
-    """Index a stored map and check it; with samples read these, too.
+def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | None, job: Job) -> Checked:
+    """Index a map and check it; with samples read these, too.
 
     Raises
     ------
@@ -76,9 +77,13 @@ def check(lookup: MapLookup, on: FoundMap, asked: CheckRequest | None, job: Job)
     if job.deadline.passed and not job.deadline.cancelled:
         raise DeadlinePassedError
     job.searching.set()
-    oriented = is_oriented(None, on.record.oriented)
+    if isinstance(on, FoundMap):
+        own, reference = on.record.oriented, {"map_id": on.record.map_id, "revision": on.record.revision}
+    else:
+        own, reference = on.oriented, None
+    oriented = is_oriented(None, own)
     found = check_map(cached.index, job.deadline, oriented=oriented)
-    return Checked(cached, oriented, scans, found, {"map_id": on.record.map_id, "revision": on.record.revision})
+    return Checked(cached, oriented, scans, found, reference)
 
 
 def sample(checked: Checked, asked: CheckRequest, number: int, job: Job) -> Sample | None:
@@ -104,17 +109,24 @@ def check_done(checked: Checked, samples: Sequence[Sample | None] | None, asked:
         scans = [_sample_json(number, one) for number, one in enumerate(samples)]
         told = {"usable": report.usable, "usable_as_advised": report.usable_as_advised, "scans": scans}
     answer = {
-        "findings": [_finding_json(one) for one in findings],
-        "size": {name: getattr(found.size, name) for name in ("segments", "walls", "length", "diagonal")},
-        "advice": {"sigma": advice.sigma, "oriented": advice.oriented},
-        "places": [{"pose": pose_json(one.pose), "look_alike": pose_json(one.look_alike)} for one in found.places],
-        "looked_from": found.looked_from,
-        "complete": complete,
+        **check_json(replace(found, findings=tuple(findings), advice=advice, complete=complete)),
         "samples": told,
         "map": checked.reference,
         "client_ref": None if asked is None else asked.client_ref,
     }
     return job.done(answer, map=checked.reference, findings=[one.code for one in findings])
+
+
+def check_json(found: MapCheck) -> Json:
+    """Return what was found of a map by itself."""
+    return {
+        "findings": [_finding_json(one) for one in found.findings],
+        "size": {name: getattr(found.size, name) for name in ("segments", "walls", "length", "diagonal")},
+        "advice": {"sigma": found.advice.sigma, "oriented": found.advice.oriented},
+        "places": [{"pose": pose_json(one.pose), "look_alike": pose_json(one.look_alike)} for one in found.places],
+        "looked_from": found.looked_from,
+        "complete": found.complete,
+    }
 
 
 def _first(seen: Advice, drawn: Advice) -> Advice:

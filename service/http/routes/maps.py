@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from ...maps import MapOutline
 from ...maps.lookup import outline_of
 from ...parsing.reading import read_map
 from ...schemas import examples
 from ...schemas.encoding import encode
 from ...schemas.parts import MapDocument
 from ...schemas.replies import MapList, MapSummaryAnswer
+from ...work.answers import outline_json
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..exchange import Exchange, ask_store
 from ..sending import json_response
@@ -25,18 +25,6 @@ MapIdPath = Annotated[
 ]
 STORE = ("overloaded", "read_only", "not_ready")
 ETAG: dict[str, Any] = {**REQUEST_ID, "ETag": {"description": "the revision in quotes", "schema": {"type": "string"}}}
-
-
-def _told(map_id: str, revision: int, outline: MapOutline) -> dict[str, Any]:
-    """Return a map without its content, as JSON."""
-    return {
-        "map_id": map_id,
-        "revision": revision,
-        "segments": outline.segments,
-        "bounds": outline.bounds,
-        "sigma": outline.sigma,
-        "oriented": outline.oriented,
-    }
 
 
 def _conditional(*names: str) -> list[dict[str, Any]]:
@@ -74,7 +62,7 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     revision, created = await ask_store(services, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
-    answer = encode(_told(map_id, revision, outline))
+    answer = encode(outline_json(map_id, revision, outline))
     return json_response(answer, 201 if created else 200, {"ETag": etag(revision)})
 
 
@@ -117,7 +105,7 @@ async def list_maps(
     exchange = Exchange(request)
     services = exchange.services
     page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.maps))
-    items = [_told(item.map_id, item.revision, item.outline) for item in page.maps]
+    items = [outline_json(item.map_id, item.revision, item.outline) for item in page.maps]
     return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 

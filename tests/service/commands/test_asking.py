@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.running import RunningService, free_port
+
+from .running import Linefix, refused
 
 ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
 SEEN = [
@@ -22,25 +21,6 @@ SEEN = [
 ]
 POINTS = [[0.05 * k, 1.0] for k in range(60)]
 PER_REQUEST = ("request_id", "timing_ms")
-
-
-def linefix(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run the command line in a folder; whatever happens, nobody reads a traceback."""
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
-    root = Path(__file__).parents[3]
-    clean |= {"LINEFIX_DATA_DIR": str(folder / "data"), "PYTHONPATH": str(root), **environment}
-    command = [sys.executable, "-c", "from service.commands.entry import main; main()", *arguments]
-    ended = subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True, timeout=300, check=False)
-    assert "Traceback" not in ended.stderr
-    return ended
-
-
-def refused(ended: subprocess.CompletedProcess[str], code: int) -> str:
-    """Return the one line that a command ended with."""
-    (line,) = [line for line in ended.stderr.splitlines() if "compiling" not in line]
-    assert (ended.returncode, ended.stdout) == (code, "")
-    assert line.startswith("linefix: ")
-    return line
 
 
 def lasting(answer: Any) -> dict[str, Any]:
@@ -56,39 +36,41 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_locate_answers_as_the_route_does_without_a_server_and_with_one(folder: Path, service: RunningService) -> None:
+def test_locate_answers_as_the_route_does_without_a_server_and_with_one(
+    linefix: Linefix, folder: Path, service: RunningService
+) -> None:
     body = {"map": {"segments": ROOM}, "scan": {"segments": SEEN, "sigma": 0.02}}
     expected = lasting(service.client.post("/v1/associate", json=body).json())
     for where in ([], ["--server", service.url]):
-        ended = linefix(folder, "locate", "room.json", "scan.json", "--json", *where)
-        assert ended.returncode == 0
-        assert lasting(json.loads(ended.stdout)) == expected
+        ended = linefix("locate", "room.json", "scan.json", "--json", *where)
+        assert ended.code == 0
+        assert lasting(json.loads(ended.out)) == expected
 
 
-def test_locate_tells_people_the_verdict(folder: Path) -> None:
-    ended = linefix(folder, "locate", "room.json", "scan.json")
-    assert ended.returncode == 0
-    assert "ok, usable" in ended.stdout
-    assert "x 0.998 m, y 1.002 m" in ended.stdout
+def test_locate_tells_people_the_verdict(linefix: Linefix, folder: Path) -> None:
+    ended = linefix("locate", "room.json", "scan.json")
+    assert ended.code == 0
+    assert "ok, usable" in ended.out
+    assert "x 0.998 m, y 1.002 m" in ended.out
 
 
-def test_a_verdict_that_is_no_answer_is_done_all_the_same(folder: Path) -> None:
+def test_a_verdict_that_is_no_answer_is_done_all_the_same(linefix: Linefix, folder: Path) -> None:
     (folder / "scan.json").write_text('{"segments": []}')
-    ended = linefix(folder, "locate", "room.json", "scan.json", "--json")
-    assert (ended.returncode, json.loads(ended.stdout)["status"]) == (0, "no_match")
+    ended = linefix("locate", "room.json", "scan.json", "--json")
+    assert (ended.code, json.loads(ended.out)["status"]) == (0, "no_match")
 
 
-def test_register_takes_pairs(folder: Path) -> None:
-    ended = linefix(folder, "register", "room.json", "scan.json", "--pairs", "pairs.json", "--json")
-    answer = json.loads(ended.stdout)
+def test_register_takes_pairs(linefix: Linefix, folder: Path) -> None:
+    ended = linefix("register", "room.json", "scan.json", "--pairs", "pairs.json", "--json")
+    answer = json.loads(ended.out)
     assert (answer["status"], answer["diagnostics"]["n"]) == ("ok", 4)
 
 
-def test_what_vectorize_writes_is_a_scan(folder: Path) -> None:
-    assert linefix(folder, "vectorize", "points.json", "--out", "found.json").returncode == 0
+def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None:
+    assert linefix("vectorize", "points.json", "--out", "found.json").code == 0
     found = json.loads((folder / "found.json").read_text())
     assert (len(found["segments"]), found["points"], found["frame_id"]) == (1, [60], "front")
-    assert linefix(folder, "locate", "room.json", "found.json").returncode == 0
+    assert linefix("locate", "room.json", "found.json").code == 0
 
 
 @pytest.mark.parametrize(
@@ -104,18 +86,20 @@ def test_what_vectorize_writes_is_a_scan(folder: Path) -> None:
     ],
     ids=["no scan", "no command", "no file", "no JSON", "no segment", "no URL", "no server"],
 )
-def test_what_is_not_done_is_told_in_one_line(folder: Path, arguments: tuple[str, ...], code: int, said: str) -> None:
+def test_what_is_not_done_is_told_in_one_line(
+    linefix: Linefix, folder: Path, arguments: tuple[str, ...], code: int, said: str
+) -> None:
     (folder / "broken.json").write_text('{"segments": 3')
     (folder / "short.json").write_text('{"segments": [[1, 2, 3]]}')
-    assert said in refused(linefix(folder, *arguments), code)
+    assert said in refused(linefix(*arguments), code)
 
 
-def test_a_key_comes_from_the_environment(folder: Path, guarded: RunningService) -> None:
+def test_a_key_comes_from_the_environment(linefix: Linefix, folder: Path, guarded: RunningService) -> None:
     asked = ("locate", "room.json", "scan.json", "--server", guarded.url)
-    assert "LINEFIX_KEY" in refused(linefix(folder, *asked), 4)
-    assert linefix(folder, *asked, LINEFIX_KEY="sesame").returncode == 0
+    assert "LINEFIX_KEY" in refused(linefix(*asked), 4)
+    assert linefix(*asked, LINEFIX_KEY="sesame").code == 0
 
 
-def test_version(folder: Path) -> None:
-    ended = linefix(folder, "--version")
-    assert (ended.returncode, ended.stdout.split()[0]) == (0, "linefix")
+def test_version(linefix: Linefix, folder: Path) -> None:
+    ended = linefix("--version")
+    assert (ended.code, ended.out.split()[0]) == (0, "linefix")

@@ -18,6 +18,7 @@ EVERY_CALL = [
     ("PUT", "/v1/maps/m"),
     ("DELETE", "/v1/maps/m"),
     ("POST", "/v1/associate"),
+    ("POST", "/v1/maps:import"),
     ("GET", "/metrics"),
     ("GET", "/docs"),
     ("GET", "/"),

@@ -67,6 +67,7 @@ def test_every_route_is_in_it(document: dict[str, Any]) -> None:
         ("GET", "/v1/maps"),
         ("GET", "/v1/maps/{map_id}:check"),
         ("POST", "/v1/maps/{map_id}:check"),
+        ("POST", "/v1/maps:import"),
         ("GET", "/v1/limits"),
         ("GET", "/version"),
         ("GET", "/livez"),

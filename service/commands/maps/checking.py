@@ -1,0 +1,58 @@
+"""``linefix map check``: what is doubtful in a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..inputs import read_map_or_id, read_scan
+from ..logs import Topic, opened, scans_of, spread
+from ..options import AsJson, MapArgument, Server
+from ..printing import print_json, print_rows
+from ..service import Json, answering
+
+SAMPLES = 20  # of a log: from all over the building they tell more than many from one room
+
+
+def check(
+    on: MapArgument,
+    scan: Annotated[
+        list[str] | None, typer.Option(metavar="FILE", help="A scan taken there, as JSON; several times.")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option(metavar="FILE", help=f"A bag or a CARMEN log; {SAMPLES} of its scans are taken.")
+    ] = None,
+    topic: Topic = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what is doubtful in a map; beside scans taken there, also whether they fit better mirrored, scaled, moved."""
+    samples = [read_scan(name) for name in scan or []]
+    if log is not None:
+        samples += [one.scan for one in spread(list(scans_of(opened(log, topic))), SAMPLES)]
+    with answering(server) as service:
+        answer = service.check(read_map_or_id(on), {"scans": samples} if samples else None)
+    if as_json:
+        print_json(answer)
+    else:
+        print_rows(check_rows(answer))
+
+
+def check_rows(found: Json) -> list[tuple[str, str]]:
+    """Return for people what was found in a map."""
+    size = found["size"]
+    rows = [("size", f"{size['walls']} walls, {size['length']:.1f} m, {size['diagonal']:.1f} m across")]
+    rows += [("finding", f"{one['code']}: {one['message']}") for one in found["findings"]]
+    if not found["findings"]:
+        rows.append(("finding", "none"))
+    advice = {name: value for name, value in found["advice"].items() if value is not None}
+    rows += [("advice", f'put it with "{name}": {str(value).lower()}') for name, value in advice.items()]
+    samples = found.get("samples")
+    if samples is not None:
+        count = len(samples["scans"])
+        rows.append(("scans", f"{samples['usable']} of {count} usable, {samples['usable_as_advised']} as advised"))
+    if not found["complete"]:
+        rows.append(("note", "the time was over before everything was looked at"))
+    return rows

@@ -1,0 +1,120 @@
+"""``linefix map import``: the map of another tool to a map file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...importing.fields import Fields
+from ..errors import WrongUseError
+from ..inputs import line_map_of, needing_formats
+from ..options import AsJson, Picture, Server
+from ..printing import noted, print_json, print_rows
+from ..service import Json, answering
+from .checking import check_rows
+from .files import write_document
+
+IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
+
+
+def import_map(
+    file: Annotated[
+        Path,
+        typer.Argument(help="yaml of map_server, dxf, svg, geojson, csv, json, or a bag with an OccupancyGrid."),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the map there: json, dxf, svg, geojson or csv.")
+    ] = None,
+    picture: Picture = None,
+    units: Annotated[
+        str | None, typer.Option(help="Of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
+    ] = None,
+    layers: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN", help="Layers of a drawing, such as *WALL*; several times.")
+    ] = None,
+    point: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="A free place, metres: directions of walls are found from there."),
+    ] = None,
+    drawn: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="What lines are of walls: faces (default) or centres.")
+    ] = None,
+    thickness: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Of walls that are drawn by their centre line.")
+    ] = None,
+    directions: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="drawn: free space lies on the left of each line; or none.")
+    ] = None,
+    local_metres: Annotated[
+        bool, typer.Option("--local-metres", help="The coordinates of a GeoJSON are metres.")
+    ] = False,
+    topic: Annotated[str | None, typer.Option(help="Of the grid in a bag.")] = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Read a map of another tool, say what was made of it and what is doubtful in it, and write it as a map file."""
+    said = {
+        "units": units,
+        "drawn": drawn,
+        "thickness": thickness,
+        "directions": directions,
+        "local_metres": "true" if local_metres else None,
+        "topic": topic,
+    }
+    fields: dict[str, list[str]] = {name: [str(value)] for name, value in said.items() if value is not None}
+    fields |= {"layers": layers} if layers else {}
+    fields |= {"point": [f"{point[0]} {point[1]}"]} if point else {}
+    answer = imported(file, fields, server)
+    if out is not None:
+        write_document(answer["map"], out)
+    if picture is not None:
+        with needing_formats("drawing a picture"):
+            from formats import draw_map
+
+            draw_map(line_map_of(answer["map"]), picture)
+    if as_json:
+        print_json(answer)
+    else:
+        print_rows([*report_rows(answer), *check_rows(answer["check"])])
+
+
+def imported(file: Path, fields: Fields, server: str | None) -> Json:
+    """Return what ``/v1/maps:import`` answers to a file.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file.
+    """
+    if not file.exists():
+        raise WrongUseError(f"{file}: there is no such file")
+    files = [file] if server is None else _with_what_it_names(file)
+    with answering(server) as service:
+        return service.import_map(files, fields)
+
+
+def _with_what_it_names(file: Path) -> list[Path]:
+    """Return the files to send: a bag's folder whole, and beside a yaml its picture."""
+    if file.is_dir():
+        return sorted(path for path in file.iterdir() if path.is_file())
+    if file.suffix.lower() not in (".yaml", ".yml"):
+        return [file]
+    named = IMAGE.search(file.read_text(encoding="utf-8", errors="replace"))
+    picture = file.with_name(named[1]) if named else file
+    return [file, picture] if named and picture.is_file() else [file]
+
+
+def report_rows(answer: Json) -> list[tuple[str, str]]:
+    """Return for people what was made of the files."""
+    report, line_map = answer["report"], answer["map"]
+    directed = "free space on the left" if line_map["oriented"] else "directions mean nothing"
+    rows = [
+        ("from", f"{', '.join(report['files'])} ({report['format']})"),
+        ("map", f"{len(line_map['segments'])} segments, {directed}"),
+    ]
+    for kind in ("read", "merged", "dropped", "assumed"):
+        rows += [(kind, noted(note)) for note in report[kind]]
+    return rows

@@ -1,0 +1,152 @@
+"""``linefix replay``: the scans of a log, one after the other."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from itertools import islice
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Annotated, TextIO
+
+import orjson
+import typer
+from rich.console import Console
+from rich.progress import track
+
+from registration import RigidTransform
+
+from .inputs import document_at, line_map_of, needing_formats, read_map_or_id
+from .logs import ReplayedScan, Topic, opened, scans_of
+from .options import AsJson, Server
+from .printing import noted, plain, print_json, print_rows, print_table
+from .service import Json, Service, answering
+from .tracking import Tracker
+
+if TYPE_CHECKING:
+    from formats import Log, StampedPose
+
+
+class Mode(StrEnum):
+    """Where to look."""
+
+    TRACK = "track"
+    GLOBAL = "global"
+
+
+@dataclass(slots=True)
+class Tally:
+    """What came of the scans so far."""
+
+    verdicts: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+    times: list[float] = field(default_factory=list)  # ms
+    usable: list[StampedPose] = field(default_factory=list)
+    others: list[RigidTransform] = field(default_factory=list)
+
+    def take(self, stamp_ns: int, answer: Json) -> None:
+        """Count an answer, and keep its pose."""
+        from formats import StampedPose
+
+        self.verdicts[answer["status"] + (", usable" if answer["usable"] else ", not usable")] += 1
+        self.reasons.update(one["code"] for one in answer["reasons"][:1])
+        self.times.append(answer["timing_ms"]["total"])
+        found = answer["pose"]
+        if found is not None:
+            pose = RigidTransform(found["x"], found["y"], found["theta"])
+            if answer["usable"]:
+                self.usable.append(StampedPose(stamp_ns, pose, answer["covariance"]))
+            else:
+                self.others.append(pose)
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or 2, an mcap, or a log of CARMEN.")],
+    on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
+    topic: Topic = None,
+    mode: Annotated[
+        Mode, typer.Option(help="track: by odometry from the last usable pose, once there is one; global: each anew.")
+    ] = Mode.TRACK,
+    every: Annotated[int, typer.Option(metavar="N", min=1, help="Take each Nth scan.")] = 1,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the usable poses there, as TUM.")] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw map and poses there, as png: usable ones red, others grey."),
+    ] = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Locate the scans of a log one after the other; poses are those of the laser. With --json one line a scan."""
+    told, source = read_map_or_id(on), opened(log, topic)
+    tally = Tally()
+    with answering(server) as service:
+        scans = _shown(islice(scans_of(source), 0, None, every), source, every)
+        for one, answer in located(service, told, scans, mode):
+            tally.take(one.stamp_ns, answer)
+            if as_json:
+                print_json(_line(one, answer))
+    if out is not None:
+        from formats import write_tum
+
+        write_tum(tally.usable, out)
+    if picture is not None:
+        _draw(document_at(on, server), tally, picture)
+    _tell_log(source, sys.stderr if as_json else sys.stdout)
+    if not as_json:
+        _tell(tally)
+
+
+def located(
+    service: Service, on: Json, scans: Iterator[ReplayedScan], mode: Mode
+) -> Iterator[tuple[ReplayedScan, Json]]:
+    """Give each scan with the answer to it; in mode track the prior comes from the answers before and odometry."""
+    tracker = Tracker() if mode is Mode.TRACK else None
+    packed = orjson.Fragment(orjson.dumps(on)) if "map_id" not in on else on
+    for one in scans:
+        body: Json = {"map": packed, "scan": one.scan, "options": {"include": [], "max_alternatives": 0}}
+        prior = None if tracker is None else tracker.prior(one.odometry)
+        if prior is not None:
+            body["prior"] = prior
+        answer = service.ask("associate", body)
+        if tracker is not None:
+            tracker.learn(answer, one.odometry)
+        yield one, answer
+
+
+def _shown(scans: Iterator[ReplayedScan], log: Log, every: int) -> Iterator[ReplayedScan]:
+    """Give the scans on, and show how far it is, on a terminal."""
+    total = None if log.count is None else -(-log.count // every)
+    where = Console(stderr=True)
+    yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
+
+
+def _line(one: ReplayedScan, answer: Json) -> Json:
+    names = ("status", "usable", "probability", "pose", "reasons", "timing_ms")
+    return {"stamp": one.scan["stamp"], **{name: answer[name] for name in names}}
+
+
+def _draw(document: Json, tally: Tally, picture: Path) -> None:
+    with needing_formats("drawing a picture"):
+        from formats import draw_map
+
+        draw_map(line_map_of(document), picture, [one.pose for one in tally.usable], tally.others)
+
+
+def _tell_log(log: Log, where: TextIO) -> None:
+    """Say what was taken of the log and what was not."""
+    for kind in ("assumed", "dropped"):
+        for note in getattr(log.report, kind):
+            print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)
+
+
+def _tell(tally: Tally) -> None:
+    count = max(1, len(tally.times))
+    table = [(verdict, number, f"{100.0 * number / count:.1f} %") for verdict, number in tally.verdicts.most_common()]
+    print_table(("verdict", "scans", "share"), table)
+    if tally.reasons:
+        print_table(("why not usable", "scans"), tally.reasons.most_common())
+    if tally.times:
+        print_rows([("time", f"{median(tally.times):.1f} ms a scan in the median, {max(tally.times):.1f} ms at most")])

@@ -1,0 +1,9 @@
+"""Maps of other tools that come over HTTP, read in a process of their own that can take only so much.
+
+::
+
+    bounded    starts that process, waits for it, and ends it when the time is over
+    reader     what runs in it: from a form to a map and a report
+    form       multipart/form-data to files and fields
+    fields     fields to what `formats` may be told of a file
+"""

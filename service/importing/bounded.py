@@ -1,0 +1,138 @@
+"""Starts the process that reads a map of another tool, waits for it, and ends it when the time is over."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import orjson
+
+from association import CancelledError, Deadline
+
+from ..schemas.errors import Fault, InvalidRequestError
+from .bounds import Bounds
+from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
+
+READER = "service.importing.reader"
+LOOK_SECONDS = 0.05  # how often it is looked whether somebody still waits
+SECRETS = ("LINEFIX_KEYS", "LINEFIX_KEY", "LINEFIX_DATABASE_URL")
+SHARED_MEMORY = Path("/dev/shm")  # may be written to in a container whose root may not
+
+
+class ReaderFailedError(Exception):
+    """A defect: the process that reads ended by an exception; the message is the name of its kind."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadMap:
+    """What came of the files.
+
+    Attributes
+    ----------
+    map : bytes
+        A map file of our own, JSON; not checked yet.
+    report : dict
+        What was read, merged, dropped and assumed.
+    """
+
+    map: bytes
+    report: dict[str, Any]
+
+
+def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline) -> ReadMap:
+    """Read the map in a form; takes a while.
+
+    Parameters
+    ----------
+    content : bytearray
+        multipart/form-data.
+    content_type : str
+        With its boundary.
+    bounds : Bounds
+    deadline : Deadline
+
+    Raises
+    ------
+    ImportingError, InvalidRequestError
+        When it is not read.
+    CancelledError
+        When nobody waits for it any longer.
+    """
+    told = orjson.dumps({"bounds": asdict(bounds), "content_type": content_type}).decode()
+    with _folder() as folder:
+        status, said, failure = _ended([sys.executable, "-m", READER, told, folder], content, deadline)
+    if status == 1:
+        raise ReaderFailedError(failure.decode("ascii", "replace")[:100])
+    if status in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise FileTooLargeError(f"reading it takes more than {bounds.cpu_seconds} s of a processor, or too much memory")
+    if status != 0:
+        raise InvalidRequestError([Fault("/files", "ends the process that reads it: it is broken")])
+    head, _, line_map = said.partition(b"\n")
+    return ReadMap(line_map, _report(orjson.loads(head)))
+
+
+def _report(told: dict[str, Any]) -> dict[str, Any]:
+    match told:
+        case {"report": dict(report)}:
+            return report
+        case {"missing": _}:
+            raise FormatsMissingError
+        case {"unknown": str(why)}:
+            raise UnknownFormatError(why)
+        case {"too_large": str(why)}:
+            raise FileTooLargeError(why)
+        case {"invalid": list(faults)}:
+            raise InvalidRequestError([Fault(**fault) for fault in faults])
+    raise ReaderFailedError("an answer that is none")
+
+
+def _ended(command: list[str], content: bytearray, deadline: Deadline) -> tuple[int, bytes, bytes]:
+    """Run a process to its end; return its status and what it wrote."""
+    clean = {name: value for name, value in os.environ.items() if name.upper() not in SECRETS}
+    pipe = subprocess.PIPE
+    # In a group of its own, so that Ctrl-C is for the service, which then ends this.
+    with subprocess.Popen(command, env=clean, process_group=0, stdin=pipe, stdout=pipe, stderr=pipe) as process:
+        # Written by a thread of its own: `communicate` does not go on with what it was given after a timeout.
+        feeding = threading.Thread(target=_feed, args=(process.stdin, content))
+        process.stdin = None
+        feeding.start()
+        try:
+            while True:
+                with suppress(subprocess.TimeoutExpired):
+                    said, failure = process.communicate(timeout=LOOK_SECONDS)
+                    return process.returncode, said, failure
+                if deadline.cancelled:
+                    raise CancelledError
+                if deadline.passed:
+                    raise TooLateError
+        finally:
+            process.kill()
+            feeding.join()
+
+
+def _feed(pipe: IO[bytes], content: bytearray) -> None:
+    with suppress(OSError), pipe:  # whoever was to read it may have ended
+        pipe.write(content)
+
+
+@contextmanager
+def _folder() -> Iterator[str]:
+    """Give a folder for the files, which goes with all that is in it."""
+    try:
+        place = tempfile.gettempdir()
+    except FileNotFoundError:  # none can be written to
+        place = str(SHARED_MEMORY)
+    try:
+        with tempfile.TemporaryDirectory(prefix="linefix-", dir=place, ignore_cleanup_errors=True) as folder:
+            yield folder
+    except OSError as error:
+        raise NoRoomError from error

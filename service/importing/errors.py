@@ -1,0 +1,46 @@
+"""Why a file of another tool is not read; what is wrong with one is an `InvalidRequestError`.
+
+::
+
+    ImportingError
+    ├── FormatsMissingError    the extra [formats] is not installed
+    ├── UnknownFormatError     none of the files has a format that is read
+    ├── FileTooLargeError      a file holds more, or takes more to be read, than is allowed
+    ├── TooLateError           the deadline passed meanwhile
+    └── NoRoomError            no room for the files, or for the process that reads them
+"""
+
+from __future__ import annotations
+
+
+class ImportingError(Exception):
+    """A file of another tool is not read."""
+
+
+class FormatsMissingError(ImportingError):
+    """The extra ``[formats]`` is not installed."""
+
+    def __init__(self) -> None:
+        super().__init__('this service reads no files of other tools: pip install "linefix[formats]"')
+
+
+class UnknownFormatError(ImportingError):
+    """None of the files has a format that is read."""
+
+
+class FileTooLargeError(ImportingError):
+    """A file holds more, or takes more to be read, than is allowed."""
+
+
+class TooLateError(ImportingError):
+    """The deadline passed meanwhile."""
+
+    def __init__(self) -> None:
+        super().__init__("the deadline passed while the file was read")
+
+
+class NoRoomError(ImportingError):
+    """No room for the files, or for the process that reads them."""
+
+    def __init__(self) -> None:
+        super().__init__("there is no room to read files now")

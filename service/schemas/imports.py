@@ -1,0 +1,74 @@
+"""What an import takes and answers; documents both, is never built while answering."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from .checks import MapCheckAnswer
+from .replies import Index, Milliseconds, Row4
+from .strict import Answer
+
+
+class NoteAnswer(Answer):
+    """One thing that an import did."""
+
+    code: str
+    message: str
+    count: Index = Field(description="cells, entities, segments that it is about; 0 where nothing is counted")
+
+
+class ReportAnswer(Answer):
+    """What was made of the files."""
+
+    format: str = Field(description="such as map_server, dxf, rosbag2")
+    files: list[str]
+    read: list[NoteAnswer]
+    merged: list[NoteAnswer] = Field(description="what became one")
+    dropped: list[NoteAnswer] = Field(description="what was left out, and why")
+    assumed: list[NoteAnswer] = Field(description="what nobody said")
+
+
+class ImportedMapAnswer(Answer):
+    """A map, as it may be stored or sent with a request."""
+
+    segments: list[Row4] = Field(description="metres; free space on the left where `oriented`")
+    sigma: float | None
+    oriented: bool
+    frame_id: str
+    meta: Any
+
+
+class ImportAnswer(Answer):
+    """A map of another tool."""
+
+    map: ImportedMapAnswer
+    report: ReportAnswer
+    check: MapCheckAnswer
+    request_id: str
+    timing_ms: Milliseconds = Field(description="read, check and total, milliseconds")
+
+
+FORM: dict[str, Any] = {
+    "type": "object",
+    "required": ["file"],
+    "additionalProperties": False,
+    "properties": {
+        "file": {
+            "type": "array",
+            "minItems": 1,
+            "items": {"type": "string", "format": "binary"},
+            "description": "the map and what it names: a yaml and its picture; told from fields by its filename",
+        },
+        "units": {"type": "string", "description": "of a drawing: mm, cm, dm, m, km, in, ft, yd, or metres per unit"},
+        "layers": {"type": "string", "description": "patterns such as *WALL*, comma separated"},
+        "point": {"type": "string", "description": "a free place, `x y` in metres; may be there several times"},
+        "drawn": {"enum": ["faces", "centres"], "description": "what the lines of a drawing are of walls"},
+        "thickness": {"type": "string", "description": "of walls drawn by their centre line, metres"},
+        "directions": {"enum": ["drawn", "none"], "description": "whether free space lies on the left of the lines"},
+        "local_metres": {"enum": ["true", "false"], "description": "whether a GeoJSON has metres"},
+        "topic": {"type": "string", "description": "of the grid in a bag"},
+    },
+}
+"""The schema of the form; everything in a form is text."""

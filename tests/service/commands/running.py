@@ -1,0 +1,52 @@
+"""The command line, run in this process: to start another for each command takes seconds."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from service.commands.entry import run
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What came of a command."""
+
+    code: int
+    out: str
+    err: str
+
+
+class Linefix:
+    """Runs commands in a folder, with a store of its own; whatever happens, nobody reads a traceback."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+        monkeypatch.chdir(folder)
+        for name in [name for name in os.environ if name.startswith("LINEFIX_")]:
+            monkeypatch.delenv(name)
+        monkeypatch.setenv("LINEFIX_DATA_DIR", str(folder / "data"))
+        monkeypatch.setenv("COLUMNS", "200")
+        self._monkeypatch = monkeypatch
+
+    def __call__(self, *arguments: str, **environment: str) -> Ended:
+        self._capsys.readouterr()
+        with self._monkeypatch.context() as patched:
+            for name, value in environment.items():
+                patched.setenv(name, value)
+            code = run(list(arguments))
+        told = self._capsys.readouterr()
+        assert "Traceback" not in told.err
+        assert "defect" not in told.err
+        return Ended(code, told.out, told.err)
+
+
+def refused(ended: Ended, code: int) -> str:
+    """Return the one line that a command ended with."""
+    (line,) = [line for line in ended.err.splitlines() if "compiling" not in line]
+    assert (ended.code, ended.out) == (code, "")
+    assert line.startswith("linefix: ")
+    return line

@@ -1,0 +1,104 @@
+"""POST /v1/maps:import: files of other tools, also hostile ones, over HTTP."""
+
+from __future__ import annotations
+
+import gzip
+import io
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+from ezdxf.filemanagement import new
+from PIL import Image
+
+from formats import read_map
+from tests.running import RunningService
+from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
+
+URL = "/v1/maps:import"
+LAUGHS = (
+    b'<!DOCTYPE svg [<!ENTITY a "ha">'
+    + b"".join(b'<!ENTITY %c "%b">' % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9))
+    + b']><svg xmlns="http://www.w3.org/2000/svg"><text>&j;</text></svg>'
+)
+
+
+def send(client: httpx.Client, files: dict[str, bytes], *fields: tuple[str, str], **headers: str) -> httpx.Response:
+    return client.post(URL, content=bytes(form(files, *fields)), headers={"content-type": TYPE, **headers})
+
+
+def refused(answer: httpx.Response, status: int, code: str) -> str:
+    """Return the message, or the first place and its message."""
+    problem: dict[str, Any] = answer.json()
+    assert (answer.status_code, problem["code"]) == (status, code), answer.text
+    assert len(answer.content) <= 8192
+    first = (problem.get("errors") or [{"pointer": "", "message": problem["detail"]}])[0]
+    return f"{first['pointer']}: {first['message']}"
+
+
+def dxf_in_feet() -> bytes:
+    document = new(units=0)
+    corners = [(0, 0), (40, 0), (40, 20), (20, 20), (20, 30), (0, 30)]
+    document.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": "A-WALL"})
+    document.modelspace().add_line((5, 5), (9, 5), dxfattribs={"layer": "A-FURN"})
+    text = io.StringIO()
+    document.write(text)
+    return text.getvalue().encode()
+
+
+def test_a_grid_becomes_a_map_that_can_be_put(client: httpx.Client, tmp_path: Path) -> None:
+    files = room_grid()
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    before = client.get("/v1/maps").json()
+    answer = send(client, files)
+    assert answer.status_code == 200, answer.text
+    found = answer.json()
+    expected = read_map(tmp_path / "room.yaml")
+    assert np.array_equal(found["map"]["segments"], expected.map.segments.endpoints)
+    assert (found["map"]["oriented"], found["map"]["frame_id"]) == (True, "map")
+    assert (found["report"]["format"], found["report"]["files"]) == ("map_server", ["room.yaml", "room.pgm"])
+    assert [note["code"] for note in found["report"]["read"]] == [note.code for note in expected.report.read]
+    assert found["check"]["size"]["segments"] == len(expected.map.segments)
+    assert client.get("/v1/maps").json() == before
+    assert client.put("/v1/maps/imported", json=found["map"]).status_code == 201
+    client.delete("/v1/maps/imported")
+
+
+def test_fields_say_what_a_drawing_does_not(client: httpx.Client) -> None:
+    files = {"plan.dxf": dxf_in_feet()}
+    assert refused(send(client, files), 422, "invalid_request").startswith("/files/0: does not say its unit")
+    answer = send(client, files, ("units", "ft"), ("layers", "*wall*"), ("point", "1 1"))
+    assert answer.status_code == 200, answer.text
+    found = answer.json()
+    lengths = np.hypot(*np.diff(np.reshape(found["map"]["segments"], (-1, 2, 2)), axis=1)[:, 0].T)
+    assert found["map"]["oriented"]
+    assert sorted(np.round(lengths / 0.3048).tolist()) == [10, 10, 20, 20, 30, 40]
+
+
+def test_a_bomb_of_xml(client: httpx.Client) -> None:
+    answer = send(client, {"laughs.svg": LAUGHS}, ("units", "m"))
+    assert refused(answer, 422, "invalid_request").startswith("/files/0: declares XML entities")
+
+
+def test_a_format_that_is_not_read(client: httpx.Client) -> None:
+    assert "ends in one of .yaml" in refused(send(client, {"a.dwg": b"AC1032"}), 415, "unsupported_media_type")
+
+
+def test_a_picture_of_a_hundred_million_pixels(client: httpx.Client) -> None:
+    """100 KB that unpack to 100 MB."""
+    bomb = encoded(Image.new("L", (10_000, 10_000), 254), "PNG")
+    assert len(bomb) < 200_000
+    assert "pixels" in refused(send(client, {"a.yaml": YAML % b"a.png", "a.png": bomb}), 413, "too_large")
+
+
+def test_a_body_is_held_to_what_every_body_is(client: httpx.Client, guarded: RunningService) -> None:
+    packed = gzip.compress(form({"a.csv": b"0" * 40_000_000}))
+    told = {"content-type": TYPE}
+    answer = client.post(URL, content=packed, headers={**told, "content-encoding": "gzip"})
+    assert "bytes, unpacked" in refused(answer, 413, "too_large")
+    assert "multipart/form-data" in refused(client.post(URL, content=b"{}"), 415, "unsupported_media_type")
+    assert guarded.client.post(URL, content=bytes(form({})), headers=told).status_code == 401
+    assert client.get(URL).status_code == 405
+    assert client.get("/livez").status_code == 200
