@@ -23,7 +23,7 @@ from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
-from .http.routes import associate, batch, check, maps, operations, pages, register, vectorize
+from .http.routes import analyze, associate, batch, check, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
@@ -64,8 +64,8 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     )
     app.state.services = services
     app.state.contract = Contract(partial(describe, app, guarded=bool(settings.keys)), services.parse_threads)
-    # A path of a map's check looks like that of a map, too: it comes first.
-    for module in (register, associate, batch, vectorize, check, maps, operations, pages):
+    # The paths of what is done with a map look like that of a map, too: they come first.
+    for module in (register, associate, batch, vectorize, check, analyze, maps, operations, pages):
         app.include_router(module.router)
     handle_errors(app)
     app.add_middleware(Reception, services=services)

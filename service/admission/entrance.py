@@ -11,10 +11,10 @@ from .keys import Keyring
 from .origins import Origins
 from .ticket import Ticket
 
-SEARCHING = frozenset(("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize"))
+SEARCHING = frozenset(("/v1/analyze", "/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize"))
 """Paths whose POST needs a turn at the gate."""
-MAPS, CHECK = "/v1/maps/", ":check"
-"""How the path of a map's check begins and ends, which needs one to be read, too."""
+MAPS, CHECK, ANALYZE = "/v1/maps/", ":check", ":analyze"
+"""How the paths of a map's check and analysis begin and end, which need one to be read, too."""
 GUARDED = "/v1/"
 """What asks for a key begins so; probes and pages stay open."""
 
@@ -29,6 +29,8 @@ def search_of(method: str, path: str) -> str | None:
         return path
     if method in ("GET", "HEAD", "POST") and path.startswith(MAPS) and path.endswith(CHECK):
         return MAPS + "{map_id}" + CHECK
+    if method == "POST" and path.startswith(MAPS) and path.endswith(ANALYZE):
+        return MAPS + "{map_id}" + ANALYZE
     return None
 
 

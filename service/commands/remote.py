@@ -17,7 +17,7 @@ from typing import IO
 import orjson
 
 from .errors import NoServerError, WrongUseError, error_of
-from .service import KEY, Json, Question
+from .service import KEY, Json, Progress, Question
 
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
 _HEADER = re.compile(r"[!-~]+")
@@ -55,6 +55,10 @@ class RemoteService:
     def ask(self, question: Question, body: Json) -> Json:
         """Return the answer of ``POST /v1/<question>``."""
         return self._json(self._send("POST", f"/v1/{question}", orjson.dumps(body)))
+
+    def analyze(self, body: Json, progress: Progress) -> Json:
+        """Return the answer of ``POST /v1/analyze``; nothing is known of its progress."""
+        return self._json(self._send("POST", "/v1/analyze", orjson.dumps(body)))
 
     def _json(self, content: bytes) -> Json:
         try:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal, Protocol
 
 Json = dict[str, Any]
 Question = Literal["associate", "register", "vectorize"]
+Progress = Callable[[int, int], None]
 KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a machine
 
 
@@ -20,6 +21,10 @@ class Service(Protocol):
 
     def ask(self, question: Question, body: Json) -> Json:
         """Return the answer of ``POST /v1/<question>``."""
+        ...
+
+    def analyze(self, body: Json, progress: Progress) -> Json:
+        """Return the answer of ``POST /v1/analyze``; `progress` is told how many poses are done, of how many."""
         ...
 
 
