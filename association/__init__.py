@@ -24,8 +24,10 @@ from .result import (
     Status,
 )
 from .search import associate
+from .words import AS_WELL, sentence_of
 
 __all__ = [
+    "AS_WELL",
     "Alternative",
     "AssociationDiagnostics",
     "AssociationError",
@@ -48,4 +50,5 @@ __all__ = [
     "SoftPrior",
     "Status",
     "associate",
+    "sentence_of",
 ]

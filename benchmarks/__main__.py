@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 
 from . import vectorization
+from .analysis import analysis
 from .drawn import SCANNER
 from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
@@ -62,6 +63,12 @@ def _ranges(quick: int) -> list[Row]:
     return rows
 
 
+def _analyze(quick: int) -> list[Row]:
+    rows = analysis(quick)
+    print_rows("Analysis of maps beside the logs", rows)
+    return rows
+
+
 def _mistakes(quick: int) -> list[Row]:
     rows = mistakes(quick)
     print_rows("Time for causes", rows)
@@ -92,6 +99,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "growth": _growth,
     "vectorization": _vectorization,
     "ranges": _ranges,
+    "analyze": _analyze,
     "parts": _parts,
     "mistakes": _mistakes,
     "peers": _peers,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from association import AS_WELL
 from registration import RigidTransform, wrap_angle
 
 Answer = dict[str, Any]
 NEAR = 0.1  # m from the truth, within which a pose is the right one
-AS_WELL = 5.0  # nats below the best score, within which another pose explains a scan about as well
 
 
 def equals(answer: Answer) -> list[dict[str, Any]]:
@@ -19,19 +19,9 @@ def equals(answer: Answer) -> list[dict[str, Any]]:
 
 
 def verdict_in_words(answer: Answer) -> str:
-    """Say what the answer means for a robot, in one sentence."""
-    status = answer["status"]
-    if status == "no_match":
-        return "nothing in this map explains the scan"
-    if status == "degenerate":
-        dx, dy = answer["unobservable"]
-        here, others = answer["pose"]["theta"], equals(answer)
-        round_too = any(abs(wrap_angle(other["pose"]["theta"] - here)) > 0.5 * math.pi for other in others)
-        return f"unknown along ({dx:.2f}, {dy:.2f}){', and which way round' if round_too else ', fixed across it'}"
-    if status == "ambiguous":
-        count = len(equals(answer))
-        return f"{count} other {'place explains' if count == 1 else 'places explain'} the scan about as well"
-    return f"here, with a chance of {100 * answer['probability']:.1f} %"
+    """Say what the answer means for a robot, in the service's own words."""
+    sentence: str = answer["sentence"]
+    return sentence
 
 
 def pose_in_words(pose: dict[str, float] | RigidTransform | None) -> str:

@@ -12,7 +12,7 @@ from .line_map import ImportedMap, LineMap
 from .logs.scan import Log, LoggedScan, LogOptions
 from .maps import MAP_SUFFIXES, read_map
 from .options import ImportOptions
-from .picture import draw_map
+from .picture import PlaceMark, draw_map
 from .poses import StampedPose, pose_message, write_tum
 from .recordings import read_log
 from .report import ImportReport, Note
@@ -32,6 +32,7 @@ __all__ = [
     "LoggedScan",
     "MalformedFileError",
     "Note",
+    "PlaceMark",
     "StampedPose",
     "TooLargeError",
     "UnsupportedFormatError",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -25,13 +26,26 @@ WALL, FREE_SIDE, PAPER = (20, 20, 20), (30, 140, 60), (255, 255, 255)
 PATH, DOUBTFUL = (200, 40, 40), (150, 150, 150)
 
 
+@dataclass(frozen=True, slots=True)
+class PlaceMark:
+    """A square that is painted under the walls: its middle and side, metres in the map frame, and its colour."""
+
+    x: float
+    y: float
+    side: float
+    colour: tuple[int, int, int]
+
+
 def draw_map(
     map: LineMap,
     path: str | os.PathLike[str],
     poses: Iterable[RigidTransform] = (),
     doubtful: Iterable[RigidTransform] = (),
+    marks: Iterable[PlaceMark] = (),
 ) -> None:
     """Draw a map as PNG: walls in black, a green tick on the free side of each, poses in red, doubtful ones in grey.
+
+    Marks are painted below all that.
 
     Parameters
     ----------
@@ -41,6 +55,8 @@ def draw_map(
         Ends in ``.png``.
     poses, doubtful : iterable of RigidTransform
         map_from_scan; drawn as dots that point where they look.
+    marks : iterable of PlaceMark
+        A later one covers those before.
 
     Raises
     ------
@@ -59,6 +75,10 @@ def draw_map(
     def place(x: float, y: float) -> tuple[float, float]:
         return MARGIN + (x - float(low[0])) * scale, height - MARGIN - (y - float(low[1])) * scale
 
+    for mark in marks:
+        left, top = place(mark.x - 0.5 * mark.side, mark.y + 0.5 * mark.side)
+        right, bottom = place(mark.x + 0.5 * mark.side, mark.y - 0.5 * mark.side)
+        draw.rectangle([left, top, right - 1, bottom - 1], fill=mark.colour)
     for (x1, y1, x2, y2), (mx, my), (nx, ny) in zip(
         map.segments.endpoints, map.segments.midpoints, map.segments.normals, strict=True
     ):

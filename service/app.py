@@ -24,7 +24,7 @@ from .http.openapi import Contract, describe
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
-from .http.routes import associate, batch, check, importing, maps, operations, pages, register, vectorize
+from .http.routes import analyze, associate, batch, check, importing, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
@@ -67,9 +67,9 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     )
     app.state.services = services
     app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
-    # In the order in which they are tried: robots come most often, and the paths of a map's check and of an import are
-    # also those of a map. An included router would be one more layer for each of them.
-    for module in (associate, register, batch, vectorize, check, importing, maps, operations, pages):
+    # In the order in which they are tried: robots come most often, and the paths of what is done with a map are also
+    # those of a map. An included router would be one more layer for each of them.
+    for module in (associate, register, batch, vectorize, check, analyze, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
     handle_errors(app)
     app.add_middleware(Reception, services=services)

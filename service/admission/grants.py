@@ -84,6 +84,8 @@ ROUTES = (
     Access("POST", "/v1/maps:import", Role.ASSOCIATE, searches=True),
     Access("GET", "/v1/maps/{map_id}:check", Role.READ, searches=True),
     Access("POST", "/v1/maps/{map_id}:check", Role.ASSOCIATE, searches=True),
+    Access("POST", "/v1/analyze", Role.ASSOCIATE, searches=True),
+    Access("POST", "/v1/maps/{map_id}:analyze", Role.ASSOCIATE, searches=True),
     Access("GET", "/v1/maps", Role.READ),
     Access("GET", "/v1/maps/{map_id}", Role.READ),
     Access("PUT DELETE", "/v1/maps/{map_id}", Role.WRITE),

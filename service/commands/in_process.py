@@ -13,6 +13,8 @@ from pathlib import Path
 import orjson
 from pydantic import ValidationError
 
+from association import Deadline
+
 from ..http.problems import problem_of
 from ..importing.bounded import ReadMap
 from ..importing.fields import Fields, options_of
@@ -22,10 +24,12 @@ from ..parsing.errors import ParserEndedError
 from ..parsing.parser_process import ParserProcess
 from ..parsing.reading import read_map as read_document
 from ..parsing.reading import read_model
+from ..schemas.analysis import MapAnalyzeRequest
 from ..schemas.parts import InlineMap, StoredMap
 from ..schemas.requests import AssociateRequest, CheckRequest, RegisterRequest, VectorizeRequest
 from ..settings import Settings
 from ..telemetry.metrics import Metrics
+from ..work.analyzing import analysis_json, analysis_of, reference_to
 from ..work.answers import outline_json
 from ..work.association import Associator
 from ..work.checking import check, check_done, sample
@@ -34,9 +38,10 @@ from ..work.importing import answer_import
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
 from ..work.vectorization import answer_vectorization
+from .all_cores import look_on_all_cores
 from .errors import NOTHING, Asked, CommandError, WrongUseError, error_of
 from .inputs import document_of, needing_formats
-from .service import Json, Question, id_of
+from .service import Json, Progress, Question, id_of
 
 MAPS_AT_ONCE = 1000
 
@@ -126,6 +131,20 @@ class InProcess:
         """Forget a stored map."""
         with _refusing(Asked(map_id)):
             self._store.delete(map_id, Preconditions())
+
+    def analyze(self, body: Json, progress: Progress) -> Json:
+        """Return the answer of ``POST /v1/analyze``, worked out on all cores, however long it takes."""
+        self._compile()
+        with _refusing():
+            asked = read_model(MapAnalyzeRequest, orjson.dumps(body), self._limits)
+            on = self._found(asked.map, None)
+            watch = Stopwatch()
+            deadline = Deadline() if asked.deadline_ms is None else watch.deadline(asked.deadline_ms, asked.deadline_ms)
+            analysis = analysis_of(self._lookup.indexed(on, oriented=None, deadline=deadline), asked)
+            found = look_on_all_cores(analysis, self._settings.searches, deadline, progress)
+            watch.lap("search")
+            sealed = {"map": reference_to(on), "client_ref": asked.client_ref, "timing_ms": watch.timing_ms()}
+            return {**analysis_json(analysis, found), **sealed}
 
     def _compile(self) -> None:
         """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB."""

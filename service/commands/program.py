@@ -11,6 +11,7 @@ from typer.main import get_command
 from ..cli import serve
 from ..version import VERSION
 from . import maps
+from .analyze import analyze
 from .errors import WrongUseError
 from .key import key
 from .locate import locate
@@ -20,7 +21,7 @@ from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
-for command in (locate, replay, register, vectorize, key):
+for command in (locate, replay, analyze, register, vectorize, key):
     app.command()(command)
 app.add_typer(maps.app)
 

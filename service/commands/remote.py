@@ -21,7 +21,7 @@ import orjson
 
 from ..importing.fields import Fields
 from .errors import NOTHING, Asked, NoServerError, WrongUseError, error_of
-from .service import KEY, Json, Question, id_of
+from .service import KEY, Json, Progress, Question, id_of
 
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
 _HEADER = re.compile(r"[!-~]+")
@@ -96,6 +96,10 @@ class RemoteService:
     def remove(self, map_id: str) -> None:
         """Forget a stored map."""
         self._send("DELETE", f"/v1/maps/{map_id}", asked=Asked(map_id))
+
+    def analyze(self, body: Json, progress: Progress) -> Json:
+        """Return the answer of ``POST /v1/analyze``; nothing is known of its progress."""
+        return self._json(self._send("POST", "/v1/analyze", orjson.dumps(body)))
 
     def _json(self, content: bytes) -> Json:
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -12,6 +12,7 @@ from ..importing.fields import Fields
 
 Json = dict[str, Any]
 Question = Literal["associate", "register", "vectorize"]
+Progress = Callable[[int, int], None]
 KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a machine
 
 
@@ -31,6 +32,10 @@ class Service(Protocol):
 
     def check(self, on: Json, samples: Json | None) -> Json:
         """Return the answer of ``/v1/maps/{map_id}:check``; `on` is the map of a request."""
+        ...
+
+    def analyze(self, body: Json, progress: Progress) -> Json:
+        """Return the answer of ``POST /v1/analyze``; `progress` is told how many poses are done, of how many."""
         ...
 
     def put(self, map_id: str, document: Json) -> Json:

@@ -11,7 +11,7 @@ from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
 from ..admission.grants import GUARDED
-from ..schemas import parts, replies, requests
+from ..schemas import analysis, parts, replies, requests
 from ..schemas.encoding import encode
 from ..threads import Threads
 
@@ -32,6 +32,8 @@ _REQUESTS = (
     requests.BatchRequest,
     requests.VectorizeRequest,
     requests.CheckRequest,
+    analysis.AnalyzeRequest,
+    analysis.MapAnalyzeRequest,
     parts.MapDocument,
 )
 

@@ -39,6 +39,12 @@ CHECK: dict[str, Any] = {
     "scans": [{"segments": SEEN}, {"segments": SEEN[:4]}],
     "poses": [{"x": 1.0, "y": 0.5, "theta": 1.57}, None],
 }
+ANALYZE: dict[str, Any] = {
+    "laser": {"fov": 4.7, "beams": 540, "range_max": 12.0, "sigma": 0.02},
+    "spacing": 1.0,
+    "deadline_ms": 5000,
+}
+ANALYZE_ROOM: dict[str, Any] = {"map": {"segments": WALLS}, "spacing": 1.0}
 VECTORIZE: dict[str, Any] = {
     "points": [[2.0, 0.1 * i] for i in range(20)] + [[2.0 - 0.1 * i, 2.0] for i in range(20)],
     "options": {"min_points": 5},

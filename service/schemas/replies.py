@@ -152,6 +152,7 @@ class FoundAnswer(Answer):
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool = Field(description="the one flag that a robot gates on")
     probability: Share = Field(description="calibrated chance that the pose is right")
+    sentence: str = Field(description="the verdict in words, for people")
     pose: PoseAnswer | None
     covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is not fixed")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Alternative, AssociationResult, Correspondence, Hinge
+from association import Alternative, AssociationResult, Correspondence, Hinge, sentence_of
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
 
@@ -118,6 +118,7 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
         "status": str(result.status),
         "usable": result.usable,
         "probability": result.probability,
+        "sentence": sentence_of(result),
         "pose": pose_json(result.pose),
         "covariance": matrix_json(result.covariance),
         "unobservable": direction_json(result.unobservable),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis import Analysis, Robot, standing_places
 from association import AssociationOptions, Beams, Deadline, HardPrior, MapIndex, Scan, SoftPrior, associate
 from association.checking import check_map, try_sample
 from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
@@ -36,7 +37,7 @@ SYMMETRIC_ROOM = np.array(
 
 
 def warm_up() -> None:
-    """Register, vectorize, associate and check a map once in each way that has kernels of its own."""
+    """Register, vectorize, associate, check and analyze a map once in each way that has kernels of its own."""
     room = Segments.from_array(ROOM)
     measured = MeasuredSegments.from_segments(room)
     pairs = np.repeat(np.arange(len(room))[:, None], 2, axis=1)
@@ -68,6 +69,10 @@ def warm_up() -> None:
     one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
     for scan in (beams, one_wall):
         try_sample(index, scan, Deadline(), oriented=True)
+    robot = Robot(beams=360)
+    analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
+    for number in range(len(analysis.standing.poses)):
+        analysis.look(number)
 
 
 def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

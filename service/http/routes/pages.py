@@ -26,27 +26,14 @@ _POLICY = (
     "default-src 'none'; script-src 'self' {scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-START = """<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Linefix</title>
-<link rel="icon" href="/docs/assets/favicon.png">
-<style>
-  body { font: 16px/1.5 system-ui, sans-serif; max-width: 44rem; margin: 3rem auto; padding: 0 1rem; color: #1c2430 }
-  code { background: #eef1f5; padding: .1em .3em; border-radius: .2em }
-  a { color: #0b5fa5 }
-</style>
-<h1>Linefix</h1>
-<p>Tells a robot where it is: it lays the line segments of a scan on those of a map, and says when it cannot.</p>
-<ul>
-  <li><a href="/docs">The endpoints</a>, to read and to try</li>
-  <li><a href="/openapi.json">The contract</a> as OpenAPI</li>
-  <li><a href="/v1/limits">Limits</a>, <a href="/version">version</a>, <a href="/readyz">readiness</a>,
-    <a href="/metrics">metrics</a></li>
-</ul>
-</html>
-"""
+# The page loads what is beside it and nothing else; it writes no markup of its own, so no style stands in any.
+_PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_PARTS = {"page.js": "text/javascript; charset=utf-8", "page.css": "text/css; charset=utf-8"}
+_REVALIDATED = {"Cache-Control": "no-cache"}  # a newer service has a newer page
+_EXAMPLE = re.compile(r"[a-z]{1,40}\.json")
 
 
 @cache
@@ -55,10 +42,35 @@ def _content(name: str) -> bytes:
     return files("fastapi_offline").joinpath("static", name).read_bytes()
 
 
+@cache
+def _built(*names: str) -> bytes | None:
+    """Return a file of the package that holds the page; None where there is none."""
+    found = files("service.page").joinpath(*names)
+    return found.read_bytes() if found.is_file() else None
+
+
 @router.get("/", response_class=HTMLResponse)
 async def start() -> HTMLResponse:
-    """Point to what there is."""
-    return _page(START)
+    """Give the page, which shows what the service does."""
+    return _page((_built("built", "index.html") or b"").decode(), _PAGE_POLICY)
+
+
+@router.get("/page/{name}")
+async def part_of_page(name: str) -> Response:
+    """Give a script or a style of the page."""
+    content = _built("built", name) if name in _PARTS else None
+    if content is None:
+        raise NotFoundError("there is no such file")
+    return Response(content, media_type=_PARTS[name], headers=_REVALIDATED)
+
+
+@router.get("/page/examples/{name}")
+async def example(name: str) -> Response:
+    """Give one of the page's examples."""
+    content = _built("examples", name) if _EXAMPLE.fullmatch(name) else None
+    if content is None:
+        raise NotFoundError("there is no such example")
+    return Response(content, media_type="application/json", headers=_REVALIDATED)
 
 
 @router.get("/openapi.json")
@@ -77,15 +89,15 @@ async def docs() -> HTMLResponse:
         swagger_css_url="/docs/assets/swagger-ui.css",
         swagger_favicon_url="/docs/assets/favicon.png",
     )
-    return _page(bytes(page.body).decode())
-
-
-def _page(text: str) -> HTMLResponse:
-    """Return a page that runs nothing but its own, and stands in no other."""
+    text = bytes(page.body).decode()
     scripts = " ".join(
         "'sha256-" + b64encode(sha256(script.encode()).digest()).decode() + "'" for script in _SCRIPT.findall(text)
     )
-    policy = _POLICY.format(scripts=scripts)
+    return _page(text, _POLICY.format(scripts=scripts))
+
+
+def _page(text: str, policy: str) -> HTMLResponse:
+    """Return a page that runs nothing but its own, and stands in no other."""
     headers = {"Content-Security-Policy": policy, "X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
     return HTMLResponse(text, headers={**headers, "Cross-Origin-Opener-Policy": "same-origin"})
 

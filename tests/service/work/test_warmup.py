@@ -80,7 +80,8 @@ def compiled_by_requests() -> list[str]:
         assert client.get("/v1/maps/m:check").status_code == 200
         samples = {"scans": [asked["scan"] for asked in associations()[:6]]}
         checks = ("/v1/maps/m:check", [samples, examples.CHECK])
-        for path, bodies in (("/v1/associate", associations()), ("/v1/register", registrations()), checks):
+        analyses = ("/v1/maps/m:analyze", [{}, examples.ANALYZE])
+        for path, bodies in (("/v1/associate", associations()), ("/v1/register", registrations()), checks, analyses):
             for body in bodies:
                 answer = client.post(path, json=body)
                 assert answer.status_code == 200, answer.text
@@ -94,7 +95,7 @@ def signatures() -> dict[str, int]:
     kernels = {
         id(thing): thing
         for name, module in sys.modules.items()
-        if name.split(".")[0] in ("registration", "vectorization", "association")
+        if name.split(".")[0] in ("registration", "vectorization", "association", "simulation")
         for thing in vars(module).values()
         if isinstance(thing, Dispatcher)
     }

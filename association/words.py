@@ -1,0 +1,40 @@
+"""What an answer means for a robot, in one sentence that needs no knowledge of the search."""
+
+from __future__ import annotations
+
+import math
+
+from registration import wrap_angle
+
+from .result import AssociationResult, Status
+
+AS_WELL = 5.0  # nats below the best score, within which another pose explains a scan about as well
+OTHER_WAY_ROUND = 0.5 * math.pi  # rad
+
+
+def sentence_of(result: AssociationResult) -> str:
+    """Return the verdict in words.
+
+    Parameters
+    ----------
+    result : AssociationResult
+    """
+    chance = f"{100.0 * result.probability:.1f} %"
+    if result.status is Status.NO_MATCH or result.pose is None or result.diagnostics is None:
+        return "Nothing on this map explains the scan."
+    least = result.diagnostics.score - AS_WELL
+    others = [other for other in result.alternatives if other.score >= least]
+    if result.status is Status.DEGENERATE:
+        theta = result.pose.theta
+        turned = any(abs(wrap_angle(one.pose.theta - theta)) > OTHER_WAY_ROUND for one in others)
+        which = ", nor which way round it stands" if turned else ""
+        if result.unobservable is None:
+            return f"The walls that are seen do not fix where the robot is{which}."
+        dx, dy = result.unobservable
+        return f"The robot cannot know where it is along ({dx:.2f}, {dy:.2f}){which}; across that it is fixed."
+    if result.usable:
+        return f"The robot is here, with a chance of {chance}."
+    if any(reason.code == "twin" for reason in result.reasons) and others:
+        many = "1 other place explains" if len(others) == 1 else f"{len(others)} other places explain"
+        return f"{many} the scan about as well: the robot cannot know which is right."
+    return f"Most likely the robot is here, with a chance of {chance}, but that is not to be relied on."

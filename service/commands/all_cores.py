@@ -1,0 +1,111 @@
+"""Places of an analysis, tried on all cores."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis import Analysis, PlaceVerdict, Robot, Standing
+from association import Deadline, MapIndex
+from registration import Segments
+
+from .service import Progress
+
+PORTION = 16  # places that a process is given at a time
+ALONE = 64  # places up to which starting others takes longer than it saves
+
+Looks = dict[int, PlaceVerdict | None]
+_analysis: Analysis | None = None  # of a process that was started for it
+_deadline = Deadline()
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What another process needs to take part; an index does not travel, it is built anew.
+
+    Attributes
+    ----------
+    endpoints : (n, 4)
+        The map as sent, metres.
+    sigma, oriented, robot, standing, seed
+        As in `MapIndex` and `Analysis`.
+    ends_at : float or None
+        Of the machine's monotonic clock.
+    """
+
+    endpoints: NDArray[np.float64]
+    sigma: float | None
+    oriented: bool
+    robot: Robot
+    standing: Standing
+    seed: int
+    ends_at: float | None
+
+
+def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progress: Progress) -> Looks:
+    """Try every place, and return what came of those that there was time for.
+
+    The verdicts are the same however many cores there are.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    cores : int
+    deadline : Deadline
+    progress : callable
+        Is told how many places are done, of how many.
+    """
+    order = analysis.standing.order.tolist()
+    portions = [order[k : k + PORTION] for k in range(0, len(order), PORTION)]
+    found: Looks = {}
+    if cores == 1 or len(order) <= ALONE:
+        for portion in portions:
+            found |= _look(analysis, portion, deadline)
+            progress(len(found), len(order))
+        return found
+    # Spawned, never forked: this process has threads.
+    context = multiprocessing.get_context("spawn")
+    task = Task(analysis.segments.endpoints, analysis.index.sigma, analysis.oriented, analysis.robot,
+                analysis.standing, analysis.seed, deadline.at)  # fmt: skip
+    with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (task,)) as pool:
+        todo, running = iter(portions), set[Future[Looks]]()
+        while True:
+            running |= {pool.submit(_look_here, portion) for portion in islice(todo, 2 * cores - len(running))}
+            if not running:
+                return found
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for one in done:
+                found |= one.result()
+            progress(len(found), len(order))
+
+
+def _look(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Looks:
+    found: Looks = {}
+    for number in portion:
+        if deadline.passed:
+            break
+        verdict = analysis.look(number, deadline)
+        if deadline.passed:
+            break  # what was found is no answer: the search was cut
+        found[number] = verdict
+    return found
+
+
+def _begin(task: Task) -> None:
+    """Index the map once in each process."""
+    global _analysis, _deadline
+    segments = Segments.derived(task.endpoints)
+    index = MapIndex.build(segments, task.sigma, oriented=task.oriented)
+    _analysis = Analysis(index, segments, task.robot, task.standing, task.oriented, task.seed)
+    _deadline = Deadline(task.ends_at)
+
+
+def _look_here(portion: Sequence[int]) -> Looks:
+    assert _analysis is not None
+    return _look(_analysis, portion, _deadline)

@@ -1,0 +1,122 @@
+"""``linefix analyze``: where on a map a robot would not know where it is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import orjson
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+
+from registration import Segments
+
+from .errors import WrongUseError
+from .inputs import needing_formats, read_map_file, read_map_or_id
+from .options import AsJson, MapArgument, Server
+from .printing import print_json, print_rows
+from .service import Json, Progress, answering
+
+COLOURS = {"ok": (46, 125, 70), "ambiguous": (214, 130, 20), "degenerate": (150, 60, 160), "no_match": (190, 40, 40)}
+SUFFIXES = (".json", ".geojson")
+
+
+def analyze(
+    on: MapArgument,
+    fov: Annotated[float, typer.Option(metavar="RADIANS", help="Field of view of the scanner.")] = 6.283185307179586,
+    beams: Annotated[int, typer.Option(metavar="N", help="Over the field of view.")] = 720,
+    range_max: Annotated[float, typer.Option(metavar="METRES", help="How far it sees.")] = 20.0,
+    sigma: Annotated[float, typer.Option(metavar="METRES", help="Standard deviation of its ranges.")] = 0.02,
+    spacing: Annotated[
+        float | None, typer.Option(metavar="METRES", help="From place to place; without it some 400 places.")
+    ] = None,
+    point: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="X Y", help="Only places that are reached from this one.")
+    ] = None,
+    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time for all of it.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it all as .json or .geojson.")] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it over the map, as .png.")] = None,
+    server: Server = None,
+    as_json: AsJson = False,
+) -> None:
+    """Stand a robot all over a map; say where it would know where it is, and where not."""
+    if out is not None and out.suffix.lower() not in SUFFIXES:
+        raise WrongUseError(f"--out: expected a name that ends in {' or '.join(SUFFIXES)}")
+    target = read_map_or_id(on)
+    if picture is not None and "map_id" in target:
+        raise WrongUseError("--picture: it is drawn over the map of a file; name one instead of an id")
+    laser = {"fov": fov, "beams": beams, "range_max": range_max, "sigma": sigma}
+    body: Json = {"map": target, "laser": laser, "spacing": spacing, "deadline_ms": deadline_ms}
+    if point is not None:
+        body["point"] = list(point)
+    with answering(server) as service, _progress() as progress:
+        answer = service.analyze(body, progress)
+    if out is not None:
+        out.write_bytes(orjson.dumps(answer if out.suffix.lower() == ".json" else features(answer)) + b"\n")
+    if picture is not None:
+        _draw(read_map_file(on), answer, picture)
+    if as_json:
+        print_json(answer)
+    else:
+        print_rows(list(_rows(answer)))
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """Show how far it is, to a person who looks on; never in what is piped on."""
+    columns = TextColumn("places"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Bar(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
+        task = bar.add_task("places", total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def features(answer: Json) -> Json:
+    """Return an analysis as GeoJSON: a point for each pose, in the map's own metres."""
+    found = []
+    for place in answer["places"]:
+        pose, rest = place["pose"], {name: value for name, value in place.items() if name != "pose"}
+        found.append(
+            {
+                "type": "Feature",
+                "geometry": {"type": "Point", "coordinates": [pose["x"], pose["y"]]},
+                "properties": {"theta": pose["theta"], **rest},
+            }
+        )
+    return {"type": "FeatureCollection", "features": found}
+
+
+def _draw(document: Json, answer: Json, picture: Path) -> None:
+    with needing_formats("drawing"):
+        from formats import LineMap, PlaceMark, draw_map
+
+        segments = Segments.from_array(document["segments"], argument="map.segments")
+        oriented = document.get("oriented") is not False
+        marks = [
+            PlaceMark(one["pose"]["x"], one["pose"]["y"], answer["spacing"], COLOURS[_kind(one)])
+            for one in answer["places"]
+        ]
+        draw_map(LineMap(segments, oriented=oriented), picture, marks=marks)
+
+
+def _kind(place: Json) -> str:
+    """Return how a place is told: one that is ok, but not usable, is as good as ambiguous."""
+    status: str = place["status"]
+    return "ambiguous" if status == "ok" and not place["usable"] else status
+
+
+def _rows(answer: Json) -> Iterator[tuple[str, str]]:
+    counts = answer["summary"]
+    share = 100.0 * counts["usable"] / counts["places"] if counts["places"] else 0.0
+    yield "places", f"{counts['places']} poses, {answer['spacing']:g} m apart, {counts['not_free']} more are not free"
+    yield "usable", f"{counts['usable']} ({share:.0f} %)"
+    for status in ("ambiguous", "degenerate", "no_match"):
+        if counts[status]:
+            twins = f", {counts['look_alike']} of them look like another" if status == "ambiguous" else ""
+            yield status, f"{counts[status]}{twins}"
+    if not answer["complete"]:
+        yield "left out", f"{counts['left_out']}, for which there was no time"

@@ -1,0 +1,77 @@
+"""/v1/analyze and /v1/maps/{map_id}:analyze: where a robot would not know where it is."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+
+from fastapi import APIRouter, Request, Response
+
+from ...admission.errors import DeadlinePassedError
+from ...parsing.reading import read_model
+from ...schemas import examples
+from ...schemas.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
+from ...schemas.parts import InlineMap, StoredMap
+from ...work.analyzing import Tally, analysis_done, begin_analysis, take_looks
+from ...work.job import Done, Job
+from ..exchange import Exchange, searching
+from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from .maps import MapIdPath
+
+router = APIRouter()
+_FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
+
+
+@router.post(
+    "/v1/maps/{map_id}:analyze",
+    tags=["maps"],
+    response_model=AnalyzeAnswer,
+    responses=problems(*_FAILS, *READS_BODY),
+    openapi_extra=takes(AnalyzeRequest, {"a robot": examples.ANALYZE}),
+    summary="Analyze a stored map",
+)
+async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
+    """Stand a robot all over a map, and say where it would know where it is, and where not."""
+    exchange = searching(request)
+    asked = await exchange.read(partial(read_model, AnalyzeRequest))
+    return await _answer(exchange, StoredMap(map_id=map_id), asked)
+
+
+@router.post(
+    "/v1/analyze",
+    response_model=AnalyzeAnswer,
+    responses=problems(*_FAILS, *READS_BODY),
+    openapi_extra=takes(MapAnalyzeRequest, {"a room": examples.ANALYZE_ROOM}),
+    summary="Analyze a map that comes with the request",
+)
+async def post_analyze_inline(request: Request) -> Response:
+    """Say it of a map that need not be stored."""
+    exchange = searching(request)
+    asked = await exchange.read(partial(read_model, MapAnalyzeRequest))
+    return await _answer(exchange, asked.map, asked)
+
+
+async def _answer(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
+    job = exchange.job(asked.deadline_ms)
+    return exchange.answer(await exchange.unless_hung_up(_work(exchange, on, asked, job), job.deadline))
+
+
+async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: AnalyzeRequest, job: Job) -> Done:
+    """Index the map in one turn at the gate, and try its places in as many short ones as it takes."""
+    lookup = exchange.services.lookup
+    async with exchange.looking_up(named, job.deadline, oriented=None) as on:
+        work = partial(begin_analysis, lookup, on, asked, job)
+        tally = await exchange.take_turn(work, job.deadline, job.searching.is_set)
+    await _take_looks(exchange, tally, job)
+    return await exchange.services.parse_threads.run(partial(analysis_done, tally, asked, job))
+
+
+async def _take_looks(exchange: Exchange, tally: Tally, job: Job) -> None:
+    """Try the places on one core, so that an analysis leaves the others to searches that robots wait for."""
+    more = not tally.done
+    while more:
+        try:
+            more = await exchange.take_turn(partial(take_looks, tally, job.deadline), job.deadline)
+        except DeadlinePassedError:
+            return
+        await asyncio.sleep(0)

@@ -1,0 +1,98 @@
+"""What an analysis of a map asks, and answers; the answer documents the JSON, is never built while answering."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+
+from .errors import TooManyError
+from .limits import Limits
+from .parts import AnyMap
+from .replies import Index, MapReference, Milliseconds, PoseAnswer, Row2, Share
+from .strict import Answer, FreeJson, Point, Strict, in_radians
+
+
+class ScannerFields(Strict):
+    """The scanner that the robot carries."""
+
+    fov: Annotated[
+        float,
+        AfterValidator(in_radians(1e-3, 6.2832, "a full turn at most")),
+        Field(json_schema_extra={"minimum": 1e-3, "maximum": 6.2832}),
+    ] = Field(math.tau, description="field of view about straight ahead, radians")
+    beams: Annotated[int, Field(ge=8, le=20_000)] = Field(720, description="over the field of view")
+    range_max: Annotated[float, Field(ge=0.5, le=1000.0)] = Field(20.0, description="metres")
+    sigma: Annotated[float, Field(ge=1e-6, le=10.0)] = Field(0.02, description="of the ranges, metres")
+
+
+class AnalyzeRequest(Strict):
+    """A robot that is to stand all over a map."""
+
+    laser: ScannerFields = ScannerFields()
+    spacing: Annotated[float, Field(ge=0.3, le=100.0)] | None = Field(
+        None, description="metres from place to place; null: some 400 places over the box around the map"
+    )
+    point: Point | None = Field(
+        None, description="metres in the map; only places that can be reached from there without crossing a wall"
+    )
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of the scanner's noise")
+    deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
+        None, description="milliseconds; what it leaves no time for is left out"
+    )
+    client_ref: FreeJson = Field(None, description="given back as it was sent")
+
+    @model_validator(mode="after")
+    def _within_limits(self, info: ValidationInfo) -> AnalyzeRequest:
+        limits: Limits | None = info.context
+        if limits is not None and self.laser.beams > limits.beams:
+            raise TooManyError("/laser/beams", limits.beams, "beams")
+        return self
+
+
+class MapAnalyzeRequest(AnalyzeRequest):
+    """The same on a map of the request's own."""
+
+    map: AnyMap
+
+
+class AnalyzedPlaceAnswer(Answer):
+    """What a robot would know at a place."""
+
+    pose: PoseAnswer = Field(description="where it stands")
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"] = Field(
+        description="as of /v1/associate; `ambiguous`, too, where a sure answer is another place"
+    )
+    usable: bool = Field(description="whether the answer is usable, and this place")
+    probability: Share
+    look_alike: PoseAnswer | None = Field(description="another place that explains the scan about as well")
+    unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
+    reasons: list[str] = Field(description="codes of why it is not usable, as of /v1/associate")
+
+
+class AnalysisSummaryAnswer(Answer):
+    """How many of the places are what."""
+
+    places: Index
+    usable: Index
+    ok: Index
+    ambiguous: Index
+    degenerate: Index
+    no_match: Index
+    look_alike: Index = Field(description="places for which another one is named")
+    not_free: Index = Field(description="poses of the grid at which no robot can stand")
+    left_out: Index = Field(description="poses of the grid for which no time was left")
+
+
+class AnalyzeAnswer(Answer):
+    """Where a map will fail."""
+
+    places: list[AnalyzedPlaceAnswer] = Field(description="row by row")
+    summary: AnalysisSummaryAnswer
+    spacing: float = Field(description="metres from place to place")
+    complete: bool = Field(description="false where the deadline left something out")
+    map: MapReference | None = Field(description="null where the map came with the request")
+    client_ref: Any = Field(description="as sent")
+    request_id: str
+    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")

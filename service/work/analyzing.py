@@ -1,0 +1,162 @@
+"""Analyses of maps: where a robot would know where it is."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from analysis import Analysis, PlaceVerdict, Robot, standing_places
+from association import CancelledError, Deadline, Status
+from registration import Segments
+
+from ..admission.errors import DeadlinePassedError
+from ..maps import CachedMap
+from ..maps.lookup import FoundMap, MapLookup
+from ..schemas.analysis import AnalyzeRequest
+from ..schemas.parts import InlineMap
+from .answers import Json, direction_json, pose_json
+from .job import Done, Job
+
+TURN_SECONDS = 0.1  # of the gate, before others have theirs
+
+
+@dataclass(slots=True)
+class Tally:
+    """What has been found out so far; one per request, filled by turns at the gate.
+
+    Attributes
+    ----------
+    analysis : Analysis
+    reference : dict or None
+        Id and revision of the map.
+    todo : iterator of int
+        Numbers of the poses that are left to try.
+    found : dict of number to PlaceVerdict or None
+        None where no robot can stand.
+    """
+
+    analysis: Analysis
+    reference: Json | None
+    todo: Iterator[int]
+    found: dict[int, PlaceVerdict | None] = field(default_factory=dict)
+
+    @property
+    def done(self) -> bool:
+        """Whether every pose was tried."""
+        return len(self.found) == len(self.analysis.standing.order)
+
+
+def reference_to(on: InlineMap | FoundMap) -> Json | None:
+    """Return id and revision of a stored map."""
+    return {"map_id": on.record.map_id, "revision": on.record.revision} if isinstance(on, FoundMap) else None
+
+
+def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
+    """Return what there is to do.
+
+    Raises
+    ------
+    AnalysisError
+        When the places asked for cannot be had.
+    """
+    # Of a map without directions the index holds each segment twice.
+    index = cached.index
+    segments = Segments.derived(index.segments.endpoints[: index.directed])
+    laser = asked.laser
+    robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
+    standing = standing_places(segments, robot, asked.spacing, asked.point)
+    return Analysis(index, segments, robot, standing, cached.oriented, asked.seed)
+
+
+def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:
+    """Index a map and lay the grid over it.
+
+    Raises
+    ------
+    StoreError
+        When the map cannot be had.
+    ParserEndedError
+        When it is large and could not be read.
+    AnalysisError
+        When the places asked for cannot be had.
+    DeadlinePassedError
+        When the deadline has passed before.
+    """
+    cached = lookup.indexed(on, oriented=None, deadline=job.deadline)
+    analysis = analysis_of(cached, asked)
+    job.watch.lap("decode")
+    if job.deadline.passed and not job.deadline.cancelled:
+        raise DeadlinePassedError
+    job.searching.set()
+    return Tally(analysis, reference_to(on), iter(analysis.standing.order.tolist()))
+
+
+def take_looks(tally: Tally, deadline: Deadline) -> bool:
+    """Try poses for a turn's time; tell whether any are left.
+
+    Raises
+    ------
+    CancelledError
+        When the client has gone.
+    """
+    until = time.monotonic() + TURN_SECONDS
+    for number in tally.todo:
+        verdict = tally.analysis.look(number, deadline)
+        if deadline.cancelled:
+            raise CancelledError
+        if deadline.passed:
+            return False  # what was found is no answer: the search was cut
+        tally.found[number] = verdict
+        if time.monotonic() >= until:
+            return True
+    return False
+
+
+def analysis_done(tally: Tally, asked: AnalyzeRequest, job: Job) -> Done:
+    """Return the answer."""
+    job.watch.lap("search")
+    answer = analysis_json(tally.analysis, tally.found)
+    sealed = {**answer, "map": tally.reference, "client_ref": asked.client_ref}
+    return job.done(sealed, map=tally.reference, places=answer["summary"]["places"])
+
+
+def analysis_json(analysis: Analysis, found: dict[int, PlaceVerdict | None]) -> Json:
+    """Return what was found out, by the poses' numbers, as JSON."""
+    verdicts = [one for _, one in sorted(found.items()) if one is not None]
+    tried = len(analysis.standing.order)
+    return {
+        "places": [_place_json(one) for one in verdicts],
+        "summary": {
+            **_counts(verdicts),
+            "not_free": len(found) - len(verdicts),
+            "left_out": tried - len(found),
+        },
+        "spacing": analysis.standing.spacing,
+        "complete": len(found) == tried,
+    }
+
+
+def _counts(verdicts: Iterable[PlaceVerdict]) -> Json:
+    listed = list(verdicts)
+    by_status = Counter(one.status for one in listed)
+    return {
+        "places": len(listed),
+        "usable": sum(one.usable for one in listed),
+        **{str(status): by_status[status] for status in (Status.OK, Status.AMBIGUOUS, Status.DEGENERATE)},
+        str(Status.NO_MATCH): by_status[Status.NO_MATCH],
+        "look_alike": sum(one.look_alike is not None for one in listed),
+    }
+
+
+def _place_json(one: PlaceVerdict) -> Json:
+    return {
+        "pose": pose_json(one.pose),
+        "status": str(one.status),
+        "usable": one.usable,
+        "probability": one.probability,
+        "look_alike": pose_json(one.look_alike),
+        "unobservable": direction_json(one.unobservable),
+        "reasons": list(one.reasons),
+    }

@@ -1,0 +1,105 @@
+"""/v1/analyze and /v1/maps/{map_id}:analyze."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from service.schemas import examples
+from simulation import offices
+
+URL = "/v1/maps/analyzed:analyze"
+LASER = {"fov": 6.2831853, "beams": 360, "range_max": 12.0, "sigma": 0.02}
+
+
+@pytest.fixture(autouse=True)
+def _nothing_stays(client: httpx.Client) -> Iterator[None]:
+    yield
+    client.delete("/v1/maps/analyzed")
+
+
+def put(client: httpx.Client, segments: Any, **more: Any) -> None:
+    client.put("/v1/maps/analyzed", json={"segments": np.asarray(segments).tolist(), **more}).raise_for_status()
+
+
+def analyzed(client: httpx.Client, body: dict[str, Any], url: str = URL) -> dict[str, Any]:
+    answer = client.post(url, json=body)
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def test_a_room(client: httpx.Client) -> None:
+    put(client, examples.WALLS)
+    answer = analyzed(client, {"laser": LASER, "spacing": 1.0, "client_ref": "a"})
+    assert (answer["complete"], answer["spacing"], answer["client_ref"]) == (True, 1.0, "a")
+    assert answer["map"]["map_id"] == "analyzed"
+    places, summary = answer["places"], answer["summary"]
+    assert len(places) == summary["places"] > 20
+    assert summary["usable"] == sum(one["usable"] for one in places) > 20
+    assert summary["places"] + summary["not_free"] == 8 * 6
+    assert summary["left_out"] == 0
+    assert all(-4 < one["pose"]["x"] < 4 and -3 < one["pose"]["y"] < 3 for one in places)
+    assert sum(one["status"] == "ok" for one in places) > 0.8 * len(places)
+    again = analyzed(client, {"map": {"segments": examples.WALLS}, "laser": LASER, "spacing": 1.0}, "/v1/analyze")
+    assert again["places"] == places
+    assert again["map"] is None
+
+
+def test_two_equal_rooms_and_a_point_in_one_of_them(client: httpx.Client) -> None:
+    put(client, [*examples.WALLS, *[[a + 20, b, c + 20, d] for a, b, c, d in examples.WALLS]])
+    answer = analyzed(client, {"laser": LASER, "spacing": 1.0, "point": [0, 0]})
+    for place in answer["places"]:
+        assert (place["status"], place["usable"], place["reasons"][0]) == ("ambiguous", False, "twin")
+        assert place["look_alike"]["x"] == pytest.approx(place["pose"]["x"] + 20.0, abs=0.2)
+    assert answer["summary"]["look_alike"] == len(answer["places"]) > 20
+
+
+def test_directions_that_mean_nothing(client: httpx.Client) -> None:
+    flipped = [[c, d, a, b] for a, b, c, d in examples.WALLS]
+    put(client, flipped)
+    outside = [one["pose"] for one in analyzed(client, {"laser": LASER, "spacing": 1.0})["places"]]
+    assert all(pose["x"] > 2.5 and pose["y"] > 1.0 for pose in outside)
+    put(client, flipped, oriented=False)
+    assert analyzed(client, {"laser": LASER, "spacing": 1.0})["summary"]["usable"] > 20
+
+
+def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
+    put(client, offices(np.random.default_rng(0)).segments.endpoints)
+    answer = analyzed(client, {"spacing": 0.3, "deadline_ms": 500})
+    summary = answer["summary"]
+    assert answer["complete"] is False
+    assert summary["left_out"] > 1000
+    assert summary["places"] == len(answer["places"])
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"laser": {"fov": 360}}, "/laser/fov"),
+        ({"laser": {"beams": 2}}, "/laser/beams"),
+        ({"laser": {"fow": 1}}, "/laser/fow"),
+        ({"spacing": 0}, "/spacing"),
+        ({"point": [100, 0]}, "/point"),
+        ({"point": [1]}, "/point"),
+        ({"places": 3}, "/places"),
+    ],
+)
+def test_what_cannot_be_analyzed(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
+    put(client, examples.WALLS)
+    answer = client.post(URL, json=body)
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["errors"][0]["pointer"] == pointer
+
+
+def test_it_is_a_search_like_any_other(client: httpx.Client) -> None:
+    put(client, examples.WALLS)
+    late = client.post(URL, json={"deadline_ms": 0})
+    assert (late.status_code, late.json()["code"]) == (504, "deadline_exceeded")
+    unknown = client.post("/v1/maps/nowhere:analyze", json={})
+    assert (unknown.status_code, unknown.json()["code"]) == (404, "unknown_map")
+    assert 'route="/v1/maps/{map_id}:analyze",status="504"' in client.get("/metrics").text

@@ -1,0 +1,85 @@
+// Requests to the service that this page comes from.
+
+import type { Analysis, Answer, MapDocument, Scan, StoredMap } from "./types";
+
+export class Problem extends Error {
+  constructor(
+    message: string,
+    readonly status: number,
+    readonly code: string,
+  ) {
+    super(message);
+  }
+}
+
+let key = "";
+
+export function setKey(value: string): void {
+  key = value.trim();
+}
+
+async function call<T>(method: string, path: string, body?: BodyInit, type?: string, signal?: AbortSignal): Promise<T> {
+  const headers: Record<string, string> = {};
+  if (key) headers.Authorization = `Bearer ${key}`;
+  if (type) headers["Content-Type"] = type;
+  let response: Response;
+  try {
+    response = await fetch(path, { method, headers, body, signal });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    throw new Problem("The service does not answer. Is it still running?", 0, "no_connection");
+  }
+  if (response.status === 204) return undefined as T;
+  const text = await response.text();
+  let answer: unknown;
+  try {
+    answer = JSON.parse(text);
+  } catch {
+    throw new Problem(`The service answered ${response.status} with something else than JSON.`, response.status, "no_json");
+  }
+  if (!response.ok) throw problemOf(response.status, answer);
+  return answer as T;
+}
+
+function problemOf(status: number, answer: unknown): Problem {
+  const { detail, code, errors } = answer as { detail?: string; code?: string; errors?: { pointer: string; message: string }[] };
+  if (status === 401 || status === 403) return new Problem("The service asks for a key, or for another one: see Key below.", status, code ?? "");
+  const where = errors?.length ? ` (${errors[0].pointer}: ${errors[0].message})` : "";
+  return new Problem(`${detail ?? "The request was refused"}${where}`, status, code ?? "");
+}
+
+const JSON_TYPE = "application/json";
+const post = <T>(path: string, body: unknown, signal?: AbortSignal) => call<T>("POST", path, JSON.stringify(body), JSON_TYPE, signal);
+
+export interface Asked {
+  map: MapDocument | { map_id: string };
+  scan: Scan;
+  prior?: Record<string, number>;
+}
+
+export const associate = (asked: Asked, signal: AbortSignal) => post<Answer>("/v1/associate", asked, signal);
+export const analyze = (asked: Record<string, unknown>) => post<Analysis>("/v1/analyze", asked);
+export const example = <T>(name: string) => call<T>("GET", `/page/examples/${name}.json`);
+
+const pathOf = (id: string) => `/v1/maps/${encodeURIComponent(id)}`;
+export const listMaps = (cursor: string) =>
+  call<{ maps: StoredMap[]; next: string | null }>("GET", `/v1/maps?limit=50&cursor=${encodeURIComponent(cursor)}`);
+export const getMap = (id: string) => call<MapDocument>("GET", pathOf(id));
+export const putMap = (id: string, map: MapDocument) => call<StoredMap>("PUT", pathOf(id), JSON.stringify(map), JSON_TYPE);
+export const deleteMap = (id: string) => call<void>("DELETE", pathOf(id));
+export const checkMap = (id: string) =>
+  call<{ findings: { code: string; message: string; count: number }[] }>("GET", `${pathOf(id)}:check`);
+
+/** Have files of another tool read; nothing is stored. */
+export async function importMap(files: File[]): Promise<MapDocument> {
+  const form = new FormData();
+  for (const file of files) form.append("files", file, file.name);
+  try {
+    const answer = await call<{ map: MapDocument }>("POST", "/v1/maps:import", form);
+    return answer.map;
+  } catch (error) {
+    if (error instanceof Problem && [404, 405, 415].includes(error.status))
+      throw new Problem("This service reads maps as JSON only: the packages for other formats are not installed.", error.status, error.code);
+    throw error;
+  }
+}

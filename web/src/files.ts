@@ -1,0 +1,76 @@
+// Files that a user brings: what they are is told by what is in them.
+
+import { importMap } from "./api";
+import { askSoon } from "./asking";
+import { openLog } from "./log";
+import { changed, forget, setMap, state } from "./state";
+import type { MapDocument, Scan } from "./types";
+import { showAll } from "./scene";
+import { tellProblem } from "./verdict";
+
+export async function open(files: File[]): Promise<void> {
+  const foreign: File[] = [];
+  try {
+    for (const file of files) {
+      if (/\.(json|jsonl|ndjson)$/i.test(file.name)) take(file.name, await file.text());
+      else foreign.push(file);
+    }
+    if (foreign.length) takeMap(await importMap(foreign));
+  } catch (error) {
+    tellProblem(error instanceof Error ? error.message : String(error));
+    return;
+  }
+  askSoon();
+}
+
+function take(name: string, text: string): void {
+  if (openLog(text)) return;
+  let content: unknown;
+  try {
+    content = JSON.parse(text);
+  } catch {
+    throw new Error(`${name} is not JSON.`);
+  }
+  if (Array.isArray(content)) return takeMap({ segments: content } as MapDocument);
+  if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan.`);
+  const told = content as Record<string, unknown>;
+  if ("map" in told && "scan" in told) {
+    // A request as it is sent.
+    const { map, scan } = told as { map: MapDocument; scan: Scan };
+    if (!("segments" in map)) throw new Error(`${name} names a stored map: open that one first, and a file with the scan.`);
+    takeMap(map);
+    takeScan(scan);
+  } else if ("ranges" in told) takeScan({ laser: told } as unknown as Scan);
+  else if ("laser" in told || "points" in told) takeScan(told as Scan);
+  else if ("segments" in told) {
+    // Both are lists of segments. What there is no map for yet is a map; what says so in its name is a scan.
+    if (state.map && (/scan/i.test(name) || "viewpoint" in told || "stamp" in told)) takeScan(told as Scan);
+    else takeMap(told as unknown as MapDocument);
+  } else throw new Error(`${name} is neither a map nor a scan: it has none of segments, points, laser and ranges.`);
+}
+
+function takeMap(map: MapDocument): void {
+  if (!Array.isArray(map.segments) || !map.segments.length) throw new Error("The map has no segments.");
+  if (!map.segments.every((s) => Array.isArray(s) && s.length === 4 && s.every(Number.isFinite)))
+    throw new Error("A segment of the map is not four numbers.");
+  setMap(map);
+  showAll("A map from a file.");
+}
+
+function takeScan(scan: Scan): void {
+  Object.assign(state, { scan, virtual: false });
+  forget();
+  document.querySelector<HTMLInputElement>("#virtual")!.checked = false;
+  changed();
+}
+
+const input = document.querySelector<HTMLInputElement>("#files")!;
+input.addEventListener("change", () => {
+  void open([...(input.files ?? [])]);
+  input.value = "";
+});
+document.addEventListener("dragover", (event) => event.preventDefault());
+document.addEventListener("drop", (event) => {
+  event.preventDefault();
+  void open([...(event.dataTransfer?.files ?? [])]);
+});

@@ -1,0 +1,143 @@
+// Mouse, touch and keyboard on the plan.
+
+import { ask, askSoon } from "./asking";
+import { HANDLE, redraw, toldAt, wallAt } from "./drawing";
+import { wrap } from "./geometry";
+import { boundsOf, changed, state } from "./state";
+import { step } from "./verdict";
+import { fit, toMetres, toPixels, view, zoom } from "./view";
+
+const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
+const hover = document.querySelector<HTMLElement>("#hover")!;
+const erase = document.querySelector<HTMLInputElement>("#erase")!;
+const GRIP = 18; // px about the robot
+let drag: { what: "plan" | "robot" | "turn"; x: number; y: number; moved: boolean } | null = null;
+
+function whatAt(px: number, py: number): "plan" | "robot" | "turn" {
+  if (!state.scan && !state.virtual) return "plan";
+  const [rx, ry] = toPixels(state.robot.x, state.robot.y);
+  const [hx, hy] = [rx + HANDLE * Math.cos(state.robot.theta), ry - HANDLE * Math.sin(state.robot.theta)];
+  if (Math.hypot(px - hx, py - hy) < GRIP / 1.5) return "turn";
+  return Math.hypot(px - rx, py - ry) < GRIP ? "robot" : "plan";
+}
+
+canvas.addEventListener("pointerdown", (event) => {
+  canvas.setPointerCapture(event.pointerId);
+  drag = { what: whatAt(event.offsetX, event.offsetY), x: event.offsetX, y: event.offsetY, moved: false };
+});
+
+canvas.addEventListener("pointermove", (event) => {
+  const [px, py] = [event.offsetX, event.offsetY];
+  if (!drag) {
+    const told = toldAt(px, py);
+    hover.hidden = !told;
+    hover.textContent = told;
+    hover.style.translate = `${Math.min(px + 14, view.width - 260)}px ${py + 14}px`;
+    canvas.style.cursor = { plan: erase.checked ? "crosshair" : "grab", robot: "move", turn: "alias" }[whatAt(px, py)];
+    return;
+  }
+  const [dx, dy] = [px - drag.x, py - drag.y];
+  drag.moved ||= Math.hypot(dx, dy) > 3;
+  if (!drag.moved) return;
+  [drag.x, drag.y] = [px, py];
+  if (drag.what === "plan") {
+    view.x -= dx / view.scale;
+    view.y += dy / view.scale;
+    redraw();
+    return;
+  }
+  if (drag.what === "robot") move(dx / view.scale, -dy / view.scale);
+  else {
+    const [x, y] = toMetres(px, py);
+    state.robot = { ...state.robot, theta: Math.atan2(y - state.robot.y, x - state.robot.x) };
+  }
+  askSoon();
+});
+
+canvas.addEventListener("pointerup", (event) => {
+  if (drag && !drag.moved && erase.checked) toggleWall(event.offsetX, event.offsetY);
+  drag = null;
+});
+canvas.addEventListener("pointercancel", () => (drag = null));
+canvas.addEventListener("pointerleave", () => (hover.hidden = true));
+
+canvas.addEventListener(
+  "wheel",
+  (event) => {
+    event.preventDefault();
+    zoom(Math.exp(-0.0015 * event.deltaY), event.offsetX, event.offsetY);
+    changed();
+  },
+  { passive: false },
+);
+
+function toggleWall(px: number, py: number): void {
+  const wall = wallAt(...toMetres(px, py), 10 / view.scale);
+  if (wall < 0) return;
+  if (state.off.has(wall)) state.off.delete(wall);
+  else if (state.off.size < state.walls.length - 1) state.off.add(wall); // a map has one wall at least
+  askSoon();
+}
+
+function move(dx: number, dy: number, turn = 0): void {
+  const { x, y, theta } = state.robot;
+  state.robot = { x: x + dx, y: y + dy, theta: wrap(theta + turn) };
+}
+
+function fitPlan(): void {
+  fit(boundsOf(state.walls));
+  changed();
+}
+
+const SHIFTED = 10;
+canvas.addEventListener("keydown", (event) => {
+  const metres = 0.1 * (event.shiftKey ? SHIFTED : 1);
+  const radians = (Math.PI / 180) * 5;
+  const pixels = 60 / view.scale;
+  const robot: Record<string, () => void> = {
+    ArrowLeft: () => move(-metres, 0),
+    ArrowRight: () => move(metres, 0),
+    ArrowUp: () => move(0, metres),
+    ArrowDown: () => move(0, -metres),
+    q: () => move(0, 0, radians),
+    e: () => move(0, 0, -radians),
+  };
+  const plan: Record<string, () => void> = {
+    "+": () => zoom(1.25),
+    "-": () => zoom(0.8),
+    "0": fitPlan,
+    w: () => (view.y += pixels),
+    s: () => (view.y -= pixels),
+    a: () => (view.x -= pixels),
+    d: () => (view.x += pixels),
+    n: () => step(1),
+    Enter: () => void ask(),
+  };
+  const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  if (event.ctrlKey || event.metaKey || event.altKey || !(robot[name] || plan[name])) return;
+  event.preventDefault();
+  if (robot[name]) {
+    robot[name]();
+    askSoon();
+  } else {
+    plan[name]();
+    changed();
+  }
+});
+
+for (const [id, action] of Object.entries({
+  "#zoom-in": () => zoom(1.25),
+  "#zoom-out": () => zoom(0.8),
+  "#fit": fitPlan,
+}))
+  document.querySelector(id)!.addEventListener("click", () => {
+    action();
+    changed();
+  });
+
+const help = document.querySelector<HTMLButtonElement>("#help")!;
+help.addEventListener("click", () => {
+  const keys = document.querySelector<HTMLElement>("#keys")!;
+  keys.hidden = !keys.hidden;
+  help.setAttribute("aria-expanded", String(!keys.hidden));
+});

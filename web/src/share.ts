@@ -1,0 +1,56 @@
+// The request as it was sent, for a terminal, a program or a report.
+
+import { request } from "./asking";
+
+const told = document.querySelector<HTMLElement>("#copied")!;
+
+function body(): string | null {
+  const made = request();
+  if (!made) told.textContent = "There is nothing to ask yet.";
+  return made ? JSON.stringify(made.asked) : null;
+}
+
+const quoted = (text: string) => `'${text.replaceAll("'", `'\\''`)}'`;
+
+function asCurl(json: string): string {
+  return `curl -s ${location.origin}/v1/associate -H 'Content-Type: application/json' -d ${quoted(json)}`;
+}
+
+function asPython(json: string): string {
+  return [
+    "import json",
+    "import urllib.request",
+    "",
+    `asked = json.loads(${JSON.stringify(json)})`,
+    `request = urllib.request.Request("${location.origin}/v1/associate", json.dumps(asked).encode(), {"Content-Type": "application/json"})`,
+    "answer = json.load(urllib.request.urlopen(request))",
+    'print(answer["status"], answer["usable"], answer["pose"])',
+    "",
+  ].join("\n");
+}
+
+function copying(id: string, form: (json: string) => string): void {
+  document.querySelector(id)!.addEventListener("click", async () => {
+    const json = body();
+    if (json === null) return;
+    try {
+      await navigator.clipboard.writeText(form(json));
+      told.textContent = "Copied.";
+    } catch {
+      told.textContent = "The browser does not let this page copy; download the request instead.";
+    }
+  });
+}
+
+copying("#curl", asCurl);
+copying("#python", asPython);
+document.querySelector("#download")!.addEventListener("click", () => {
+  const json = body();
+  if (json === null) return;
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([json], { type: "application/json" }));
+  link.download = "linefix-request.json";
+  link.click();
+  URL.revokeObjectURL(link.href);
+  told.textContent = "Downloaded; it can be opened here again.";
+});

@@ -1,0 +1,99 @@
+// Maps that the service keeps.
+
+import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
+import { askSoon } from "./asking";
+import { setMap, state } from "./state";
+import { showAll } from "./scene";
+import { list } from "./verdict";
+
+const box = document.querySelector<HTMLDetailsElement>("#stored")!;
+const maps = document.querySelector<HTMLUListElement>("#maps")!;
+const more = document.querySelector<HTMLButtonElement>("#more")!;
+const findings = document.querySelector<HTMLElement>("#findings")!;
+const name = document.querySelector<HTMLInputElement>("#map-id")!;
+let cursor = "";
+
+function tell(...lines: string[]): void {
+  const shown = document.createElement("ul");
+  list(shown, lines);
+  findings.replaceChildren(shown);
+}
+
+/** Do something, and tell what goes wrong. */
+async function trying(action: () => Promise<void>): Promise<void> {
+  try {
+    await action();
+  } catch (error) {
+    tell(error instanceof Error ? error.message : String(error));
+  }
+}
+
+async function load(from: string): Promise<void> {
+  const page = await listMaps(from);
+  if (!from) maps.replaceChildren();
+  for (const one of page.maps) maps.append(row(one.map_id, one.segments));
+  if (!maps.children.length) {
+    const none = document.createElement("li");
+    none.textContent = "None is stored yet.";
+    maps.append(none);
+  }
+  cursor = page.next ?? "";
+  more.hidden = !cursor;
+}
+
+function row(id: string, segments: number): HTMLLIElement {
+  const item = document.createElement("li");
+  const title = document.createElement("span");
+  title.textContent = `${id} (${segments} walls)`;
+  item.append(title);
+  const actions: [string, () => Promise<void>][] = [
+    ["Open", () => use(id)],
+    ["Check", () => check(id)],
+    ["Delete", () => remove(id)],
+  ];
+  for (const [word, action] of actions) {
+    const button = document.createElement("button");
+    button.textContent = word;
+    button.setAttribute("aria-label", `${word} ${id}`);
+    button.addEventListener("click", () => void trying(action));
+    item.append(button);
+  }
+  return item;
+}
+
+async function use(id: string): Promise<void> {
+  const { scan, virtual } = state;
+  setMap(await getMap(id), id);
+  Object.assign(state, { scan, virtual });
+  showAll(`The stored map ${id}.`);
+  askSoon();
+}
+
+async function check(id: string): Promise<void> {
+  tell(`Checking ${id} ...`);
+  const found = await checkMap(id);
+  tell(...(found.findings.length ? found.findings.map((one) => `${one.message} (${one.count} segments)`) : [`Nothing is doubtful in ${id}.`]));
+}
+
+async function remove(id: string): Promise<void> {
+  if (!confirm(`Delete the map ${id}? It cannot be had back.`)) return;
+  await deleteMap(id);
+  if (state.mapId === id) state.mapId = null;
+  await load("");
+  tell(`${id} is deleted.`);
+}
+
+async function upload(): Promise<void> {
+  if (!state.map) throw new Error("There is no map yet.");
+  if (!name.value || !name.checkValidity()) throw new Error("A name has letters, digits, dots, dashes and underscores only.");
+  const kept = { ...state.map, segments: state.walls.filter((_, k) => !state.off.has(k)) };
+  const told = await putMap(name.value, kept);
+  await load("");
+  tell(`${told.map_id} is stored, revision ${told.revision}.`);
+}
+
+box.addEventListener("toggle", () => {
+  if (box.open) void trying(() => load(""));
+});
+more.addEventListener("click", () => void trying(() => load(cursor)));
+document.querySelector("#upload")!.addEventListener("click", () => void trying(upload));

@@ -1,0 +1,112 @@
+// The contract's shapes, as far as the page reads them.
+
+export type Segment = [number, number, number, number];
+
+export interface Pose {
+  x: number;
+  y: number;
+  theta: number;
+}
+
+export interface MapDocument {
+  segments: Segment[];
+  sigma?: number | null;
+  oriented?: boolean | null;
+  frame_id?: string;
+  meta?: unknown;
+}
+
+export interface Laser {
+  angle_min: number;
+  angle_increment: number;
+  ranges: (number | null)[];
+  range_min?: number;
+  range_max?: number;
+}
+
+export interface Scan {
+  laser?: Laser;
+  segments?: Segment[];
+  points?: [number, number][];
+  sigma?: number | null;
+  [other: string]: unknown;
+}
+
+export interface Correspondence {
+  scan: number;
+  map: number;
+  overlap: number;
+  offset: number;
+  angle: number;
+}
+
+export interface Hinge {
+  scan: number[];
+  map: number[];
+  direction: [number, number];
+  moves: number;
+}
+
+export interface Reason {
+  code: string;
+  message: string;
+}
+
+export interface Answer {
+  status: "ok" | "ambiguous" | "degenerate" | "no_match";
+  usable: boolean;
+  probability: number;
+  sentence: string;
+  pose: Pose | null;
+  covariance: number[][] | null;
+  unobservable: [number, number] | null;
+  correspondences: Correspondence[];
+  unmatched_scan: number[];
+  missing_map: number[];
+  segments: Segment[] | null;
+  diagnostics: { hinges_on: Hinge | null; score: number } | null;
+  reasons: Reason[];
+  warnings: Reason[];
+  alternatives: { pose: Pose; score: number; inlier_fraction: number }[];
+  timing_ms: Record<string, number>;
+}
+
+export interface Place {
+  pose: Pose;
+  status: Answer["status"];
+  usable: boolean;
+  probability: number;
+  look_alike: Pose | null;
+  reasons: string[];
+}
+
+export interface Analysis {
+  places: Place[];
+  summary: Record<string, number>;
+  spacing: number;
+  complete: boolean;
+}
+
+export interface Example {
+  title: string;
+  about: string;
+  map: MapDocument;
+  boxes: Segment[];
+  pose: Pose;
+  laser: { fov: number; beams: number; range_max: number; sigma: number };
+}
+
+export interface LogLine {
+  stamp: unknown;
+  status: Answer["status"];
+  usable: boolean;
+  probability: number;
+  pose: Pose | null;
+  reasons: (Reason | string)[];
+}
+
+export interface StoredMap {
+  map_id: string;
+  revision: number;
+  segments: number;
+}
