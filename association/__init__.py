@@ -1,10 +1,11 @@
 """Unknown correspondences: where in a map of segments a scan was taken, and how sure that is."""
 
+from registration import Beams
+
 from .errors import AssociationError, InvalidMapError, InvalidSearchError
 from .map_index import MapIndex
 from .options import (
     AssociationOptions,
-    Beams,
     CancelledError,
     Deadline,
     HardPrior,

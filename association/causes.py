@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from registration import Segments
+from registration import Beams, Segments
 from registration.limits import MAX_LENGTH, MIN_LENGTH
 
 from .candidates import Effort
@@ -16,7 +16,7 @@ from .context import SearchContext
 from .explain import Explanations, explain
 from .extents import inner_extent
 from .null import mirrored
-from .options import Beams, Scan
+from .options import Scan
 from .scaling import scale_near_one
 from .tuning import (
     CAUSE_CONFIDENCE,

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from registration import Segments
+from registration import Beams, Segments
 
 from .candidates import Effort, find_candidates
 from .context import SearchContext
 from .kernels.symmetry import mirrored_share
-from .options import Beams, Scan
+from .options import Scan
 from .ranking import Ranked, rank_candidates
 from .scan_lines import ScanLines
 from .tuning import NULL_CONFIDENCE, NULL_ENOUGH, NULL_KEPT, NULL_SHARE

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from registration import Beams
+
 from .causes import Cause, Mistake
 from .context import SearchContext
 from .extents import inner_extent
-from .options import Beams
 from .result import AssociationWarning, SearchReport
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .verdict import Verdict

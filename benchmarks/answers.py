@@ -21,7 +21,6 @@ import numpy as np
 
 from association import (
     AssociationOptions,
-    Beams,
     HardPrior,
     MapIndex,
     Prior,
@@ -136,7 +135,7 @@ def _of_ranges(collections: list[Collection]) -> Iterator[Request]:
             if number < len(log.queries):
                 query = log.queries[number]
                 found = vectorize(raw[log.name].laser(query.number))
-                scan = Scan(found.measured, (0.0, 0.0), Beams(found.angles, found.ranges, found.range_max))
+                scan = Scan(found.measured, (0.0, 0.0), found.beams)
                 yield Request(f"ranges {log.name} {query.number}", log.index(query.map), scan, None, VARIANTS[0])
 
 

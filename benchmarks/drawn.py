@@ -31,7 +31,7 @@ def take_scan(
 
 def _walls(found: Vectorization, hits: np.ndarray) -> np.ndarray:
     walls = np.full(len(found.measured), -1)
-    for k, (first, last) in enumerate(found.beams):
+    for k, (first, last) in enumerate(found.spans):
         beams = np.arange(first, last + 1) if first <= last else np.r_[first : len(hits), 0 : last + 1]
         seen = hits[beams]
         seen = seen[seen >= 0]

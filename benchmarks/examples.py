@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from association import Beams, Deadline, MapIndex, Scan
+from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.explain import explain
 from association.families import is_degenerate
@@ -153,7 +153,7 @@ def range_cases(stride: int) -> Iterator[Case]:
         if log.name not in raw:
             raw[log.name] = Log.load(log.name)
         found = vectorize(raw[log.name].laser(query.number))
-        return Scan(found.measured, (0.0, 0.0), Beams(found.angles, found.ranges, found.range_max))
+        return Scan(found.measured, (0.0, 0.0), found.beams)
 
     yield from _log_cases(stride, scan_of)
 

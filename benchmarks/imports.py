@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from association import AssociationResult, Beams, MapIndex, Scan, associate
+from association import AssociationResult, MapIndex, Scan, associate
 from formats import ImportOptions, LineMap, read_map, write_map
 from registration import RigidTransform, Segments
 from vectorization import vectorize
@@ -66,8 +66,7 @@ def _answers(line_map: LineMap, scans: list[PosedScan]) -> list[AssociationResul
     answers = []
     for one in scans:
         seen = vectorize(one.laser)
-        beams = Beams(seen.angles, seen.ranges, seen.range_max)
-        answers.append(associate(index, Scan(seen.measured, (0.0, 0.0), beams), None, OPTIONS))
+        answers.append(associate(index, Scan(seen.measured, (0.0, 0.0), seen.beams), None, OPTIONS))
     return answers
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from association import AssociationResult, Beams, MapIndex, Prior, Scan, SoftPrior, Status, associate
+from association import AssociationResult, MapIndex, Prior, Scan, SoftPrior, Status, associate
 from registration import RigidTransform
 from vectorization import LaserScan, vectorize
 
@@ -73,7 +73,7 @@ def find(index: MapIndex, laser: LaserScan, prior: Prior | None) -> tuple[Associ
     start = time.thread_time()
     found = vectorize(laser)
     between = time.thread_time()
-    scan = Scan(found.measured, (0.0, 0.0), Beams(found.angles, found.ranges, found.range_max))
+    scan = Scan(found.measured, (0.0, 0.0), found.beams)
     result = associate(index, scan, prior)
     return result, (between - start) * 1e3, (time.thread_time() - between) * 1e3
 

@@ -115,7 +115,7 @@ def judge(seen: SimulatedScan, map: Segments, found: Vectorization) -> dict[str,
     for s in range(len(segments)):
         centroid = found.measured.centroids[s]
         slack = 3.0 * found.measured.sigma[s] / math.sqrt(found.measured.points[s] * found.measured.spreads[s])
-        first, last = found.beams[s]
+        first, last = found.spans[s]
         held = np.arange(first, last + 1) if first <= last else np.r_[first : len(angles), 0 : last + 1]
         good = [k for k in np.unique(seen.hits[held]) if k >= 0 and on_wall(local, k, segments, s, centroid, slack)]
         tally["matched"].append(float(bool(good)))
@@ -233,7 +233,7 @@ def logs() -> None:
         for ranges in log["ranges"][::5]:
             laser = LaserScan(a[0], a[1] - a[0], ranges, 0.1001, float(log["range_max_valid"]) - 1e-3)
             found = vectorize(laser)
-            returns = max(1, int(np.isfinite(found.ranges).sum()))
+            returns = max(1, int(np.isfinite(laser.cleaned).sum()))
             rows.append((found.sigma, len(found.measured), found.measured.points.sum() / returns))
         sigma, segments, share = np.median(np.array(rows), axis=0)
         print(f"{name:16s} sigma {sigma:.4f} m, {segments:.0f} segments a scan, {share:.2f} of the points on segments")

@@ -115,7 +115,7 @@ def take(
         return Measurement(measured, np.stack([np.arange(len(walls)), walls], axis=1), points, seen, None)
     options = VectorizationOptions(sigma=sigma, min_points=setup.min_points)
     found = vectorize(_laser(seen) if by_range else points, options)
-    pairs = _pairs(found.beams, seen.hits if by_range else hits, setup.purity)
+    pairs = _pairs(found.spans, seen.hits if by_range else hits, setup.purity)
     return Measurement(found.measured, pairs[_kept(found.measured, setup)[pairs[:, 0]]], points, seen, found)
 
 

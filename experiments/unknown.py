@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from association import Beams, MapIndex, Scan, associate
+from association import MapIndex, Scan, associate
 from registration import RigidTransform, register, wrap_angle
 
 from .icp import align
@@ -69,8 +69,7 @@ def search(name: str, scan: Measurement) -> tuple[RigidTransform | None, bool]:
     """Search for a scan anywhere in its environment: the pose and whether it is said to be usable."""
     if scan.found is None:
         raise ValueError("the search takes a vectorized scan")
-    beams = Beams(scan.found.angles, scan.found.ranges, scan.found.range_max)
-    answer = associate(_index(name), Scan(scan.measured, (0.0, 0.0), beams))
+    answer = associate(_index(name), Scan(scan.measured, (0.0, 0.0), scan.found.beams))
     return answer.pose, answer.usable
 
 

@@ -1,5 +1,6 @@
 """Known correspondences: the rigid transform that fits paired line segments, and how far to trust it."""
 
+from .beams import Beams
 from .correspondences import Correspondences
 from .errors import InputError, InvalidArgumentError, InvalidSegmentsError, RegistrationError
 from .joint import JointSums
@@ -14,6 +15,7 @@ from .wall_error import register_estimating
 
 __all__ = [
     "Ambiguity",
+    "Beams",
     "Correspondences",
     "Freedom",
     "InputError",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from registration import MeasuredSegments, Segments
+from registration import Beams, MeasuredSegments, Segments
 from registration.layout import Floats, Records
 from registration.limits import MAX_BEAMS, MAX_COORDINATE, MAX_LENGTH
 
@@ -47,24 +47,18 @@ class Vectorization:
     rms : (k,) root of the (weighted) mean square distance of the points from their line, metres
     sigma : float
         Standard deviation of the ranges, given or estimated, metres.
-    beams : (k, 2)
+    spans : (k, 2)
         Index of the beam or point at the begin and at the end of each segment. Counter-clockwise, so a clockwise scan
         counts down, and a segment across the seam of a full turn wraps.
-    angles : (m,) radians
-        Of the beams; empty where the scan came as points.
-    ranges : (m,) metres
-        inf where a beam brought no return, nan where nothing is known of it; empty where the scan came as points.
-    range_max : float
-        Metres; how far a beam without return is known to be free; inf where the scanner does not say.
+    beams : Beams or None
+        The single ranges, cleaned, with which `association` weighs a pose; None where the scan came as points.
     """
 
     measured: MeasuredSegments
     rms: Floats = field(repr=False)
     sigma: float
-    beams: Indices = field(repr=False)
-    angles: Floats = field(repr=False)
-    ranges: Floats = field(repr=False)
-    range_max: float
+    spans: Indices = field(repr=False)
+    beams: Beams | None = field(default=None, repr=False)
 
 
 def vectorize(
@@ -118,7 +112,7 @@ def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization
     sigma = options.sigma or _estimated(ray_noise(points, increment), points)
     lines = _trace(points, increment, closed, sigma, options)
     measured, rms = _measured(lines, (0.0, 0.0))
-    return Vectorization(measured, rms, sigma, order[_spans(lines)], angles, ranges, scan.range_max)
+    return Vectorization(measured, rms, sigma, order[_spans(lines)], Beams(angles, ranges, scan.range_max))
 
 
 def _from_viewed_points(places: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:
@@ -138,7 +132,7 @@ def _from_viewed_points(places: Floats, viewpoint: Floats, options: Vectorizatio
     backward = _runs_backward(lines, points)
     spans[backward] = spans[backward, ::-1]
     measured, rms = _measured(lines, (viewpoint[0], viewpoint[1]))
-    return Vectorization(measured, rms, sigma, order[spans], np.zeros(0), np.zeros(0), math.inf)
+    return Vectorization(measured, rms, sigma, order[spans])
 
 
 def _from_bare_points(places: Floats, options: VectorizationOptions) -> Vectorization:
@@ -151,7 +145,7 @@ def _from_bare_points(places: Floats, options: VectorizationOptions) -> Vectoriz
     lines["begin"][backward] = lines["end"][backward]
     lines["end"][backward] = begin[backward]
     measured, rms = _measured(lines, (origin[0], origin[1]))
-    return Vectorization(measured, rms, sigma, _spans(lines), np.zeros(0), np.zeros(0), math.inf)
+    return Vectorization(measured, rms, sigma, _spans(lines))
 
 
 def _spans(lines: Records) -> Indices:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from association import Beams, HardPrior, MapIndex, Scan
+from association import HardPrior, MapIndex, Scan
 from registration import MeasuredSegments
 from simulation import CONDITIONS, FAMILIES, Case, Scanner, draw_case
 from vectorization import LaserScan, VectorizationOptions, vectorize
@@ -62,12 +62,11 @@ def question(case: Case) -> Question:
     """Return a case as it would be sent."""
     scanner = case.scanner
     found = vectorize(laser(scanner, case.ranges), VectorizationOptions(sigma=scanner.sigma))
-    beams = Beams(found.angles, found.ranges, found.range_max)
     bare = MeasuredSegments.from_segments(found.measured.segments, scanner.sigma)
     prior = None
     if case.window is not None:
         prior = HardPrior(case.window.pose, case.window.radius, min(case.window.angle, math.pi))
-    scans = {"ranges": Scan(found.measured, (0.0, 0.0), beams), "segments": Scan(bare)}
+    scans = {"ranges": Scan(found.measured, (0.0, 0.0), found.beams), "segments": Scan(bare)}
     return Question(case, MapIndex.build(case.map), scans, prior)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Beams, Scan
+from association import Scan
 from vectorization import LaserScan, Vectorization, VectorizationError, VectorizationOptions, vectorize
 
 from ..schemas.errors import Fault, InvalidRequestError
@@ -56,7 +56,7 @@ def vectorize_points(
 def scan_laser(laser: Laser, sigma: float | None, viewpoint: Viewpoint) -> Scanned:
     """Return ranges as a scan; the single beams stay evidence."""
     found = vectorize_laser(laser, VectorizationOptions(sigma=sigma), ("/scan", "/scan"))
-    beams = None if viewpoint is None else Beams(found.angles, found.ranges, found.range_max)
+    beams = None if viewpoint is None else found.beams
     return Scanned(Scan(found.measured, viewpoint, beams), found.measured.segments.endpoints)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis import Analysis, Robot, standing_places
-from association import AssociationOptions, Beams, Deadline, HardPrior, MapIndex, Scan, SoftPrior, associate
+from association import AssociationOptions, Deadline, HardPrior, MapIndex, Scan, SoftPrior, associate
 from association.checking import check_map, try_sample
 from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
@@ -55,7 +55,7 @@ def warm_up() -> None:
     vectorize(points, viewpoint=None)
     index = MapIndex.build(room, 0.0)
     pose = RigidTransform(0.0, 0.0, 0.0)
-    beams = Scan(seen.measured, (0.0, 0.0), Beams(seen.angles, seen.ranges, seen.range_max))
+    beams = Scan(seen.measured, (0.0, 0.0), seen.beams)
     for scan, prior, how in (
         (Scan(measured), None, AssociationOptions()),
         (beams, SoftPrior(pose, np.eye(3)), AssociationOptions()),

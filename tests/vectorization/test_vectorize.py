@@ -66,7 +66,7 @@ def test_a_wall_alone_has_the_numbers_of_its_closed_form() -> None:
     assert measured.sigma[0] == pytest.approx(np.sqrt(5 / weights.sum()))
     np.testing.assert_allclose(measured.centroids, [[2, 0]], atol=1e-12)
     assert measured.spreads[0] == pytest.approx(np.sum(weights * y**2) / np.sum(weights))
-    assert found.beams.tolist() == [[0, 4]]
+    assert found.spans.tolist() == [[0, 4]]
     assert found.sigma == 0.01
 
 
@@ -83,8 +83,8 @@ def test_a_clockwise_scan_gives_the_same_segments_with_their_beams_counted_down(
     one = vectorize(laser(seen))
     other = vectorize(LaserScan(seen.angles[-1], -0.007, seen.ranges[::-1], 0.0, 20.0))
     np.testing.assert_allclose(other.measured.segments.endpoints, one.measured.segments.endpoints, atol=1e-9)
-    np.testing.assert_array_equal(other.beams, 699 - one.beams)
-    assert (other.beams[:, 0] > other.beams[:, 1]).all()
+    np.testing.assert_array_equal(other.spans, 699 - one.spans)
+    assert (other.spans[:, 0] > other.spans[:, 1]).all()
 
 
 @settings(deadline=None, max_examples=15)
@@ -135,7 +135,7 @@ def test_a_point_beside_the_end_of_a_wall_is_not_its_own() -> None:
     ranges = 2 / np.cos(a)
     ranges[-1] += 0.06
     found = vectorize(LaserScan(0.0, 0.01, ranges), VectorizationOptions(sigma=0.02))
-    assert found.beams.tolist() == [[0, 29]]
+    assert found.spans.tolist() == [[0, 29]]
     assert found.measured.points.tolist() == [30]
     np.testing.assert_allclose(found.measured.segments.endpoints[0], [2, 0, 2, 2 * math.tan(0.29)], atol=1e-7)
 
@@ -147,7 +147,7 @@ def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does() -> None:
     assert len(vectorize(scan_).measured) == 1
     assert vectorize(scan_).measured.points[0] == 59
     parted = vectorize(scan_, VectorizationOptions(max_gap=0.03))
-    assert parted.beams.tolist() == [[0, 9], [11, 39], [41, 60]]
+    assert parted.spans.tolist() == [[0, 9], [11, 39], [41, 60]]
 
 
 def test_corners_are_cut_where_the_walls_meet() -> None:
@@ -220,8 +220,8 @@ def test_grazing_noise_counts_with_its_incidence() -> None:
     found = vectorize(laser(seen_from(POSE, SQUARE, Scanner())), VectorizationOptions(sigma=0.02))
     m = found.measured
     for k in range(4):
-        a = LaserScan(-math.pi, math.tau / 1080, np.ones(1080)).angles[np.arange(*np.sort(found.beams[k]))]
-        if found.beams[k, 0] > found.beams[k, 1]:
+        a = LaserScan(-math.pi, math.tau / 1080, np.ones(1080)).angles[np.arange(*np.sort(found.spans[k]))]
+        if found.spans[k, 0] > found.spans[k, 1]:
             continue
         cosines = np.stack([np.cos(a), np.sin(a)], 1) @ m.segments.normals[k]
         assert m.sigma[k] == pytest.approx(0.02 / np.sqrt(np.mean(1 / (cosines**2 + 0.0225))), rel=0.01)
@@ -241,10 +241,11 @@ def test_a_rough_wall_has_its_sigma_widened() -> None:
 def test_a_scan_without_returns_has_no_segments(value: Any) -> None:
     found = vectorize(LaserScan(-1.0, 0.01, np.full(200, value), 0.1, 10.0))
     assert len(found.measured) == 0
-    assert found.beams.shape == (0, 2)
+    assert found.spans.shape == (0, 2)
     assert found.rms.shape == (0,)
-    assert found.ranges.shape == found.angles.shape == (200,)
-    assert found.range_max == 10.0
+    assert found.beams is not None
+    assert found.beams.ranges.shape == found.beams.angles.shape == (200,)
+    assert found.beams.range_max == 10.0
 
 
 @pytest.mark.parametrize("ranges", [[], [1.0], [1.0, None, 1.0]])
@@ -254,8 +255,16 @@ def test_a_scan_too_short_for_a_segment_has_none(ranges: Any) -> None:
 
 def test_beams_are_handed_out_as_evidence() -> None:
     found = vectorize(LaserScan(0.5, 0.1, np.array([1.0, None, math.inf, 12.0, 0.01]), 0.1, 10.0))
-    np.testing.assert_allclose(found.angles, [0.5, 0.6, 0.7, 0.8, 0.9])
-    np.testing.assert_array_equal(found.ranges, [1.0, np.nan, np.inf, np.inf, np.nan])
+    assert found.beams is not None
+    np.testing.assert_allclose(found.beams.angles, [0.5, 0.6, 0.7, 0.8, 0.9])
+    np.testing.assert_array_equal(found.beams.ranges, [1.0, np.nan, np.inf, np.inf, np.nan])
+
+
+def test_points_have_no_beams() -> None:
+    along = np.linspace(0.0, 2.0, 30)
+    places = np.stack([along, np.full(30, -1.0)], axis=1)
+    assert vectorize(places).beams is None
+    assert vectorize(places, viewpoint=None).beams is None
 
 
 def test_a_heap_of_points_is_no_wall() -> None:
@@ -302,7 +311,7 @@ def test_a_wall_whose_points_run_the_other_way_still_has_the_viewpoint_on_its_le
     onward = np.stack([np.full(60, 3.0), y], axis=1)
     contrary = np.stack([np.full(30, -3.0), y[:30]], axis=1)
     found = vectorize(np.vstack([onward, contrary]))
-    assert found.beams.tolist() == [[0, 59], [89, 60]]
+    assert found.spans.tolist() == [[0, 59], [89, 60]]
     np.testing.assert_allclose(found.measured.segments.endpoints, [[3, 0, 3, y[59]], [-3, y[29], -3, 0]], atol=1e-9)
 
 
@@ -315,7 +324,7 @@ def test_points_without_a_viewpoint_run_as_they_come() -> None:
     assert len(forth.measured) == len(back.measured) == 4
     walls = back.measured.segments.endpoints[::-1][:, [2, 3, 0, 1]]
     np.testing.assert_allclose(forth.measured.segments.endpoints, walls, atol=0.02)
-    assert (forth.beams[:, 0] < forth.beams[:, 1]).all()
+    assert (forth.spans[:, 0] < forth.spans[:, 1]).all()
 
 
 def test_points_far_from_the_origin_lose_nothing() -> None:

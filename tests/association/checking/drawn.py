@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from association import Beams, MapIndex, Scan
+from association import MapIndex, Scan
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 from simulation import Scanner, free_place, scan
@@ -67,6 +67,5 @@ def sampled(count: int = 6) -> tuple[tuple[RigidTransform, Scan], ...]:
         truth = free_place(walls, rng)
         taken = scan(walls, truth, scanner, rng)
         seen = vectorize(LaserScan(scanner.angle_min, scanner.angle_increment, taken.ranges, 0.0, scanner.range_max))
-        beams = Beams(seen.angles, seen.ranges, seen.range_max)
-        found.append((truth, Scan(seen.measured, (0.0, 0.0), beams)))
+        found.append((truth, Scan(seen.measured, (0.0, 0.0), seen.beams)))
     return tuple(found)

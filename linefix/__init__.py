@@ -1,0 +1,97 @@
+"""Linefix in Python, without HTTP: where in a map of wall segments a scan was taken, and how sure that is.
+
+>>> import linefix
+>>> room = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+>>> seen = [[-1, 1, -1, -5], [-1, -5, 1, -5], [1, -5, 1, -3], [1, -3, 4, -3], [4, -3, 4, 1], [4, 1, -1, 1]]
+>>> answer = linefix.locate(room, seen)
+>>> answer.usable
+True
+
+Metres, radians, counter-clockwise. The packages beside this one hold everything; what is named here is what most
+programs need. What reads and writes files comes with the extra ``linefix[formats]``.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+import simulation
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    Deadline,
+    HardPrior,
+    MapIndex,
+    Scan,
+    SoftPrior,
+    Status,
+    associate,
+)
+from registration import (
+    Beams,
+    InputError,
+    MeasuredSegments,
+    RegistrationOptions,
+    RegistrationResult,
+    RigidTransform,
+    Segments,
+    register,
+)
+from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
+
+from .locating import index_map, locate, scan_of
+
+if TYPE_CHECKING:
+    from formats import ImportOptions, LineMap, LogOptions, draw_map, read_log, read_map, write_map
+
+_OF_FORMATS = frozenset(("ImportOptions", "LineMap", "LogOptions", "draw_map", "read_log", "read_map", "write_map"))
+
+__all__ = [
+    "AssociationOptions",
+    "AssociationResult",
+    "Beams",
+    "Deadline",
+    "HardPrior",
+    "ImportOptions",
+    "InputError",
+    "LaserScan",
+    "LineMap",
+    "LogOptions",
+    "MapIndex",
+    "MeasuredSegments",
+    "RegistrationOptions",
+    "RegistrationResult",
+    "RigidTransform",
+    "Scan",
+    "Segments",
+    "SoftPrior",
+    "Status",
+    "Vectorization",
+    "VectorizationOptions",
+    "associate",
+    "draw_map",
+    "index_map",
+    "locate",
+    "read_log",
+    "read_map",
+    "register",
+    "scan_of",
+    "simulation",
+    "vectorize",
+    "write_map",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Bring in what reads and writes files when it is first asked for: its libraries may be missing."""
+    if name not in _OF_FORMATS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        return getattr(importlib.import_module("formats"), name)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f'linefix.{name} needs more packages: pip install "linefix[formats]"') from error
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,149 @@
+"""Maps and scans in the forms that people have them in, to the search."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Prior, Scan, associate
+from registration import InvalidArgumentError, MeasuredSegments, Segments
+from vectorization import LaserScan, vectorize
+
+if TYPE_CHECKING:
+    from formats import ImportedMap, LineMap
+
+
+def locate(
+    map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike,
+    scan: Scan | LaserScan | Segments | ArrayLike,
+    angles: tuple[float, float] | None = None,
+    *,
+    prior: Prior | None = None,
+    options: AssociationOptions | None = None,
+    deadline: Deadline | None = None,
+) -> AssociationResult:
+    """Find where in a map a scan was taken, and how sure that is.
+
+    Parameters
+    ----------
+    map : MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
+        Metres in the map frame, free space on the left of every segment. For many scans of one map index it once, by
+        `index_map`: that takes longer than a search.
+    scan : Scan, LaserScan, Segments, or array-like
+        In the sensor's frame, metres: ranges of shape (m,), points of shape (m, 2) in scanning order, or segments of
+        shape (n, 4).
+    angles : (float, float), optional
+        For an array of ranges, and needed there: angle of the first beam, and from beam to beam; radians,
+        counter-clockwise.
+    prior : SoftPrior or HardPrior, optional
+    options : AssociationOptions, optional
+        Default: those of the service. Directions count where they do in the map, and `options.oriented` is true.
+    deadline : Deadline, optional
+
+    Returns
+    -------
+    AssociationResult
+        Its `usable` is the one flag to gate on; `pose` is map_from_scan.
+
+    Raises
+    ------
+    InputError
+        When map, scan or options are not what is taken; the message names the argument.
+
+    Examples
+    --------
+    An L-shaped room, and ranges all around from (1, 1), looking along the map's y axis:
+
+    >>> import math
+    >>> import numpy as np
+    >>> import linefix
+    >>> room = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+    >>> scanner = linefix.simulation.Scanner(beams=720, sigma=0.01)
+    >>> truth = linefix.RigidTransform(1.0, 1.0, math.pi / 2)
+    >>> seen = linefix.simulation.scan(linefix.Segments.from_array(room), truth, scanner, np.random.default_rng(1))
+    >>> answer = linefix.locate(room, seen.ranges, (scanner.angle_min, scanner.angle_increment))
+    >>> answer.usable, answer.status.value
+    (True, 'ok')
+    >>> f"{answer.pose.x:.2f} {answer.pose.y:.2f} {answer.pose.theta:.2f}"
+    '1.00 1.00 1.57'
+    """
+    index, how = index_map(map), options or AssociationOptions()
+    directed = len(index.segments) == index.directed
+    how = replace(how, oriented=how.oriented and directed)
+    return associate(index if how.oriented else index.undirected, scan_of(scan, angles), prior, how, deadline)
+
+
+def index_map(map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike) -> MapIndex:
+    """Prepare a map for many scans.
+
+    Parameters
+    ----------
+    map : MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
+        An index is returned as it is. Nothing is known of the error of bare segments: each answer estimates it.
+
+    Raises
+    ------
+    InputError
+        When it is no map that can be searched.
+
+    Examples
+    --------
+    >>> import linefix
+    >>> index = linefix.index_map([[0, 0, 6, 0], [6, 0, 6, 4], [6, 4, 0, 4], [0, 4, 0, 0]])
+    >>> len(index.segments)
+    4
+    """
+    if isinstance(map, MapIndex):
+        return map
+    inner: Any = getattr(map, "map", map)  # what was imported comes with a report
+    segments = getattr(inner, "segments", None)
+    if isinstance(segments, Segments):
+        return MapIndex.build(segments, inner.sigma, oriented=inner.oriented)
+    return MapIndex.build(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument="map"))
+
+
+def scan_of(scan: Scan | LaserScan | Segments | ArrayLike, angles: tuple[float, float] | None = None) -> Scan:
+    """Return a scan as the search takes it; ranges stay evidence beside the segments that are found in them.
+
+    Parameters
+    ----------
+    scan : Scan, LaserScan, Segments, or array-like
+        In the sensor's frame, metres: ranges (m,), points (m, 2) in scanning order, or segments (n, 4). A `Scan` is
+        returned as it is.
+    angles : (float, float), optional
+        Of an array of ranges: angle of the first beam, and from beam to beam; radians.
+
+    Raises
+    ------
+    InputError
+        When it is no scan.
+
+    Examples
+    --------
+    >>> import linefix
+    >>> wall = [[x / 10, -1.0] for x in range(20)]
+    >>> linefix.scan_of(wall).measured.segments.endpoints.round(3).tolist()
+    [[0.0, -1.0, 1.9, -1.0]]
+    """
+    if isinstance(scan, Scan):
+        return scan
+    if isinstance(scan, Segments):
+        return Scan(MeasuredSegments.from_segments(scan))
+    if isinstance(scan, LaserScan):
+        return _vectorized(scan)
+    shape = np.shape(scan)
+    if len(shape) == 1:
+        if angles is None:
+            raise InvalidArgumentError("an array of ranges needs (angle_min, angle_increment)", argument="angles")
+        return _vectorized(LaserScan(*angles, scan))
+    if len(shape) == 2 and shape[1] == 2:
+        return _vectorized(scan)
+    return Scan(MeasuredSegments.from_segments(Segments.from_array(scan, argument="scan")))
+
+
+def _vectorized(scan: LaserScan | ArrayLike) -> Scan:
+    found = vectorize(scan)
+    return Scan(found.measured, (0.0, 0.0), found.beams)

@@ -1,0 +1,58 @@
+"""What `linefix` names, and that it works as its docstrings say."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import linefix
+from linefix import locating
+
+ROOT = Path(linefix.__file__).parent.parent
+
+
+def test_exports_are_sorted_and_complete() -> None:
+    assert linefix.__all__ == sorted(linefix.__all__)
+    private = {"annotations", "importlib", "locating", "Any", "TYPE_CHECKING"}
+    public = {name for name in dir(linefix) if not name.startswith("_")}
+    assert public - private == set(linefix.__all__)
+    with pytest.raises(AttributeError, match="locate_all"):
+        linefix.locate_all  # noqa: B018
+
+
+@pytest.mark.parametrize("name", linefix.__all__)
+def test_every_name_says_what_it_is(name: str) -> None:
+    member = getattr(linefix, name)
+    described = inspect.getdoc(member)
+    assert described
+    assert not described.startswith(f"{name}(")
+
+
+@pytest.mark.parametrize("module", [linefix, locating], ids=lambda module: module.__name__)
+def test_examples_give_what_they_show(module: object) -> None:
+    failed, tried = doctest.testmod(module)  # type: ignore[arg-type]
+    assert (failed, tried > 0) == (0, True)
+
+
+@pytest.mark.parametrize(
+    "package", ["linefix", "registration", "vectorization", "association", "simulation", "formats"]
+)
+def test_types_are_told_to_whoever_imports_it(package: str) -> None:
+    assert (ROOT / package / "py.typed").is_file()
+
+
+def test_it_is_there_without_the_libraries_of_formats() -> None:
+    """And says which extra is missing where a file is to be read."""
+    program = (
+        "import sys; sys.modules['ezdxf'] = sys.modules['rosbags'] = None\n"
+        "import linefix\n"
+        "try: linefix.read_map\n"
+        "except ModuleNotFoundError as error: print(error)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert 'pip install "linefix[formats]"' in ended.stdout
