@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 
 from . import vectorization
+from .batch import batch
 from .drawn import SCANNER
 from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
@@ -97,6 +98,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "sums": _sums,
     "worlds": worlds,
     "imports": imports,
+    "batch": batch,
 }
 
 

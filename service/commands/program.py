@@ -10,6 +10,7 @@ from typer.main import get_command
 
 from ..cli import serve
 from ..version import VERSION
+from .batch import batch
 from .errors import WrongUseError
 from .locate import locate
 from .register import register
@@ -17,7 +18,7 @@ from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
-for command in (locate, register, vectorize):
+for command in (locate, register, vectorize, batch):
     app.command()(command)
 
 
