@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from . import vectorization
 from .analysis import analysis
+from .batch import batch
 from .drawn import SCANNER
 from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
@@ -107,6 +108,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "sums": _sums,
     "worlds": worlds,
     "imports": imports,
+    "batch": batch,
 }
 
 

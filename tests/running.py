@@ -82,8 +82,8 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def start(data_dir: Path, *, probe: str = "/readyz", **settings: object) -> RunningService:
-    port = free_port()
+def start(data_dir: Path, *, probe: str = "/readyz", port: int | None = None, **settings: object) -> RunningService:
+    port = port or free_port()
     environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
     environment |= {f"LINEFIX_{name.upper()}": str(value) for name, value in settings.items()}
     command = [sys.executable, "-m", "service", "--port", str(port), "--data-dir", str(data_dir)]

@@ -5,6 +5,7 @@
     entry                          runs a command, and turns what goes wrong into one line and an exit code
     program                        all commands, put together
     locate, register, vectorize    the commands
+    batch                          many logs, by the package fleet
     service, in_process, remote    who answers: this process, or a server
     inputs, printing               files to requests, answers to people
 """

@@ -12,6 +12,7 @@ from ..cli import serve
 from ..version import VERSION
 from . import maps
 from .analyze import analyze
+from .batch import batch
 from .errors import WrongUseError
 from .key import key
 from .locate import locate
@@ -21,7 +22,7 @@ from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
-for command in (locate, replay, analyze, register, vectorize, key):
+for command in (locate, replay, analyze, batch, register, vectorize, key):
     app.command()(command)
 app.add_typer(maps.app)
 

@@ -1,0 +1,74 @@
+"""What does the work: a function called once for each item, by whoever is there."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+ATTEMPTS = 3  # at an item, while those who work at it end early
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Instead of a result: each worker that had the item ended before it was done."""
+
+
+class Engine(Protocol):
+    """Calls a function for many items.
+
+    A worker that ends early costs the time of what it was at: that is done anew, `ATTEMPTS` times.
+    """
+
+    def run(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[Item, Result | Lost]]:
+        """Yield each item once with its result, as they are done.
+
+        Parameters
+        ----------
+        function : callable
+            Importable by its name, without side effects that a second call would spoil.
+        items : sequence
+            Can be pickled.
+
+        Raises
+        ------
+        WorkerError
+            When the function raised; then nothing more is done.
+        """
+        ...
+
+
+class WorkerError(Exception):
+    """The function raised, which is a defect; the message is the worker's traceback."""
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """Instead of a result: what the function raised, as text, since not every exception can be pickled."""
+
+    text: str
+
+
+def attempt(function: Callable[[Any], Any], item: Any) -> Any:
+    """Return the result, or what was raised."""
+    try:
+        return function(item)
+    except Exception:
+        return Raised(traceback.format_exc())
+
+
+def checked(outcome: Any) -> Any:
+    """Return a result.
+
+    Raises
+    ------
+    WorkerError
+        When it is none.
+    """
+    if isinstance(outcome, Raised):
+        raise WorkerError(outcome.text)
+    return outcome

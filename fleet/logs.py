@@ -1,0 +1,174 @@
+"""Logs to Parquet files whose row groups are no larger than blocks, so that any block is read by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from registration import InputError
+
+from .blocks import Block
+from .errors import UnreadableScansError
+from .tables import FORMS, LASER, SCANS
+
+PARQUET = (".parquet", ".pq")
+WORDS = ("map_id", "error")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A log, and where its scans are laid out as blocks want them.
+
+    Attributes
+    ----------
+    number : int
+        Of the log, in the order in which they were named.
+    log : str
+        As the caller named it.
+    path : str
+        Of a Parquet file; the log itself where that is laid out so already.
+    block : int
+        Scans of a block.
+    """
+
+    number: int
+    log: str
+    path: str
+    block: int
+
+    @property
+    def done(self) -> bool:
+        """Whether the file is there."""
+        return Path(self.path).exists()
+
+    def blocks(self) -> list[Block]:
+        """Return the blocks: whole row groups, together no more than a block's scans."""
+        metadata = pq.read_metadata(self.path)
+        found: list[Block] = []
+        start = stop = 0
+        for group in range(metadata.num_row_groups):
+            count = metadata.row_group(group).num_rows
+            if stop > start and stop + count - start > self.block:
+                found.append(Block(self.number, self.log, self.path, start, stop))
+                start = stop
+            stop += count
+        return [*found, Block(self.number, self.log, self.path, start, stop)] if stop > start else found
+
+
+def layout_of(number: int, log: str, folder: Path, block: int) -> Layout:
+    """Return where a log is, or is to be, laid out.
+
+    Raises
+    ------
+    UnreadableScansError
+        When there is no such log, or it is a Parquet file that holds no scans.
+    """
+    path = Path(log)
+    if not path.exists():
+        raise UnreadableScansError("there is no such file", argument=log)
+    if path.suffix.lower() in PARQUET:
+        metadata = _checked(path)
+        groups = [metadata.row_group(group).num_rows for group in range(metadata.num_row_groups)]
+        if max(groups, default=0) <= block:
+            return Layout(number, log, log, block)
+    return Layout(number, log, str(folder / f"{number:06d}.parquet"), block)
+
+
+def lay_out(layout: Layout) -> None:
+    """Write a log's scans in row groups of a block; what there is of a file is whole."""
+    source, target = Path(layout.log), Path(layout.path)
+    begun = target.with_suffix(".begun")
+    if source.suffix.lower() in PARQUET:
+        file = pq.ParquetFile(source, pre_buffer=False)
+        with pq.ParquetWriter(begun, file.schema_arrow) as writer:
+            for batch in file.iter_batches(layout.block, use_threads=False):
+                writer.write_batch(batch, layout.block)
+    else:
+        with pq.ParquetWriter(begun, SCANS) as writer:
+            for rows in _filled(_scans(layout.log), layout.block):
+                writer.write_table(pa.Table.from_pylist(rows, schema=SCANS))
+    begun.rename(target)
+
+
+def _filled(rows: Iterator[dict[str, Any]], count: int) -> Iterator[list[dict[str, Any]]]:
+    kept: list[dict[str, Any]] = []
+    for row in rows:
+        kept.append(row)
+        if len(kept) == count:
+            yield kept
+            kept = []
+    if kept:
+        yield kept
+
+
+def _scans(log: str) -> Iterator[dict[str, Any]]:
+    """Yield the scans of a log of another tool; at the end a row for each that is none, and for what ends it."""
+    from formats import read_log
+
+    try:
+        opened = read_log(log)
+        for scan in opened:
+            laser = scan.laser
+            turn = -1.0 if scan.flipped else 1.0  # y becomes -y: every angle changes its sign
+            yield {
+                "stamp": scan.stamp_ns,
+                "angle_min": turn * laser.angle_min,
+                "angle_increment": turn * laser.angle_increment,
+                "ranges": laser.ranges,
+                "range_min": laser.range_min,
+                "range_max": laser.range_max,
+            }
+        for note in opened.report.dropped:
+            if note.code == "broken_scan":
+                yield from ({"error": note.message} for _ in range(note.count))
+    except InputError as error:
+        yield {"error": f"the log could not be read any further: {error}"}
+
+
+def _checked(path: Path) -> pq.FileMetaData:
+    """Return what a Parquet file says of itself.
+
+    Raises
+    ------
+    UnreadableScansError
+        When it is none, or its columns are no scans'.
+    """
+    try:
+        metadata = pq.read_metadata(path)
+    except (pa.ArrowException, OSError) as error:
+        raise UnreadableScansError(f"is no Parquet file: {error}", argument=str(path)) from None
+    schema = metadata.schema.to_arrow_schema()
+    wrong = next((told for told in _faults(schema)), None)
+    if wrong is not None:
+        raise UnreadableScansError(wrong, argument=str(path))
+    return metadata
+
+
+def _faults(schema: pa.Schema) -> Iterator[str]:
+    if not any(name in schema.names for name in FORMS):
+        yield f"expected a column {' or '.join(FORMS)}, got {', '.join(schema.names) or 'none'}"
+    if "ranges" in schema.names:
+        yield from (f"expected a column {name} beside ranges" for name in LASER if name not in schema.names)
+    for field in schema:
+        kind = field.type
+        listed = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+        number = pa.types.is_floating(kind) or pa.types.is_integer(kind)
+        if field.name == "ranges" and not (listed and _is_number(kind.value_type)):
+            yield f"expected a list of numbers in ranges, got {kind}"
+        elif field.name == "segments" and not listed:
+            yield f"expected lists of four numbers in segments, got {kind}"
+        elif field.name == "stamp" and not (pa.types.is_integer(kind) or pa.types.is_timestamp(kind)):
+            yield f"expected nanoseconds or points in time in stamp, got {kind}"
+        elif field.name in WORDS and not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
+            yield f"expected text in {field.name}, got {kind}"
+        elif field.name in (*LASER[:2], "range_min", "range_max", "sigma") and not number:
+            yield f"expected numbers in {field.name}, got {kind}"
+
+
+def _is_number(kind: pa.DataType) -> bool:
+    return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))

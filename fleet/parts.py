@@ -1,0 +1,131 @@
+"""What a run has done so far: a folder beside the output, with which one that was killed goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from filelock import FileLock, Timeout
+
+from .blocks import Block
+from .errors import OtherRunError
+from .tables import POSES
+
+_NAME = re.compile(r"(\d+)-(\d+)-(\d+)\.parquet")
+ROWS = 65_536  # of a row group of the output
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The rows of each block in a file of its own, named after it.
+
+    A block that is done twice writes the same file twice: each scan has its row exactly once.
+    """
+
+    folder: Path
+
+    @property
+    def scans(self) -> Path:
+        """Where logs of other tools are laid out."""
+        return self.folder / "scans"
+
+    @property
+    def poses(self) -> Path:
+        """Where the rows are."""
+        return self.folder / "poses"
+
+    def keep(self, block: Block, rows: pa.Table) -> None:
+        """Write the rows of a block; they outlive a kill and a power loss from then on."""
+        path = self.poses / f"{block.number:06d}-{block.start:012d}-{block.stop:012d}.parquet"
+        begun = path.with_suffix(".begun")
+        with begun.open("wb") as file:
+            pq.write_table(rows, file)
+            file.flush()
+            os.fsync(file.fileno())
+        begun.rename(path)
+
+    def left(self, blocks: list[Block]) -> list[Block]:
+        """Return what of the blocks is not done."""
+        done = defaultdict(set)
+        for number, start, stop in self._kept():
+            done[number].add((start, stop))
+        return [one for block in blocks for one in _left(block, done[block.number])]
+
+    def assemble(self, out: Path) -> Iterator[pa.Table]:
+        """Write the rows in the order of logs and scans, then remove the parts; yield them on the way."""
+        begun = out.with_name(out.name + ".begun")
+        with pq.ParquetWriter(begun, POSES) as writer:
+            gathered: list[pa.Table] = []
+            for number, start, stop in self._kept():
+                gathered.append(pq.read_table(self.poses / f"{number:06d}-{start:012d}-{stop:012d}.parquet"))
+                yield gathered[-1]
+                if sum(map(len, gathered)) >= ROWS:
+                    writer.write_table(pa.concat_tables(gathered))
+                    gathered.clear()
+            if gathered:
+                writer.write_table(pa.concat_tables(gathered))
+        with begun.open("rb") as file:
+            os.fsync(file.fileno())
+        begun.replace(out)
+        shutil.rmtree(self.folder)
+
+    def _kept(self) -> list[tuple[int, int, int]]:
+        found = (_NAME.fullmatch(path.name) for path in self.poses.iterdir())
+        return sorted((int(m[1]), int(m[2]), int(m[3])) for m in found if m is not None)
+
+
+def _left(block: Block, done: set[tuple[int, int]]) -> list[Block]:
+    if (block.start, block.stop) in done:
+        return []
+    if any(block.start <= start and stop <= block.stop for start, stop in done):
+        return [one for half in block.halves for one in _left(half, done)]
+    return [block]
+
+
+@contextmanager
+def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
+    """Give the parts of an output to one run at a time.
+
+    Parameters
+    ----------
+    out : Path
+    told : dict
+        What makes two runs the same; can be JSON.
+
+    Raises
+    ------
+    OtherRunError
+        When a run is at work on it, or an unfinished one had other logs, maps or options.
+    """
+    parts = Parts(out.with_name(out.name + ".parts"))
+    parts.folder.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(parts.folder / "lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise OtherRunError("another run is at work on it", argument=str(out)) from None
+    try:
+        for folder in (parts.scans, parts.poses):
+            folder.mkdir(parents=True, exist_ok=True)
+        plan = parts.folder / "run.json"
+        if not plan.exists():
+            plan.with_suffix(".begun").write_text(json.dumps(told))
+            plan.with_suffix(".begun").rename(plan)
+        elif json.loads(plan.read_text()) != json.loads(json.dumps(told)):
+            raise OtherRunError(
+                "an unfinished run of other logs, maps or options lies there; go on with those, or remove the folder",
+                argument=str(parts.folder),
+            )
+        yield parts
+    finally:
+        lock.release()

@@ -1,0 +1,107 @@
+"""One block's scans to rows of poses."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import pyarrow as pa
+
+from association import AssociationOptions, AssociationResult, Deadline, associate
+from registration import InputError
+
+from .blocks import Block, Row, rows_of
+from .maps import MapShelf
+from .tables import POSES
+
+
+@dataclass(frozen=True, slots=True)
+class FleetOptions:
+    """How to search many scans.
+
+    Attributes
+    ----------
+    search : AssociationOptions
+        Directions count only where those of the map do, too.
+    deadline_ms : float
+        For each search; what was found until then is its answer.
+    block : int
+        Scans that a worker does at a time: what a killed one costs, and what is held in memory.
+    prepare : callable, optional
+        Called once in each worker before it searches, such as to compile the kernels while no deadline runs.
+    """
+
+    search: AssociationOptions = field(default_factory=AssociationOptions)
+    deadline_ms: float = 10_000.0
+    block: int = 512
+    prepare: Callable[[], None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BlockSearch:
+    """Searches the scans of a block; called in the process of a worker."""
+
+    maps: MapShelf
+    options: FleetOptions
+
+    def __call__(self, block: Block) -> pa.Table:
+        """Return one row of `POSES` for each scan, in order."""
+        _prepared(self.options.prepare)
+        rows = [_told(block, row) | self._found(block, row) for row in rows_of(block)]
+        return pa.Table.from_pylist(rows, schema=POSES)
+
+    def _found(self, block: Block, row: Row) -> dict[str, Any]:
+        """Return what came of one scan, whatever is wrong with it: no scan costs another its row."""
+        name = self.maps.name(row.values.get("map_id"), block.log)
+        try:
+            on = self.maps.get(name)
+            scan, search = row.scan(), self.options.search
+            if search.oriented and not on.oriented:
+                search = replace(search, oriented=False)
+            begun = time.perf_counter()
+            deadline = Deadline(time.monotonic() + 1e-3 * self.options.deadline_ms)
+            result = associate(on.index, scan, None, search, deadline)
+            return {"map_id": name, "search_ms": 1e3 * (time.perf_counter() - begun), **_answered(result)}
+        except InputError as error:
+            return {"map_id": name, "usable": False, "error": f"invalid: {error}"}
+        except Exception as error:
+            return {"map_id": name, "usable": False, "error": f"internal: {type(error).__name__}: {error}"}
+
+
+@lru_cache
+def _prepared(prepare: Callable[[], None] | None) -> None:
+    """Prepare this process, once."""
+    if prepare is not None:
+        prepare()
+
+
+def lost_row(block: Block) -> pa.Table:
+    """Return the row of a block of one scan whose search ends whoever does it."""
+    row = {"log": block.log, "index": block.start, "usable": False}
+    return pa.Table.from_pylist([row | {"error": "worker_lost: its search ended each worker early"}], schema=POSES)
+
+
+def _told(block: Block, row: Row) -> dict[str, Any]:
+    return {"log": block.log, "index": row.index, "stamp": row.stamp}
+
+
+def _answered(result: AssociationResult) -> dict[str, Any]:
+    pose, found = result.pose, result.diagnostics
+    placed = {} if pose is None else {"x": pose.x, "y": pose.y, "theta": pose.theta}
+    judged = {} if found is None else {"inlier_fraction": found.inlier_fraction, "margin": found.margin}
+    covariance = result.covariance
+    return {
+        "status": str(result.status),
+        "usable": result.usable,
+        "probability": result.probability,
+        **placed,
+        "covariance": None if covariance is None else covariance.ravel().tolist(),
+        "unobservable": None if result.unobservable is None else [float(c) for c in result.unobservable],
+        "reasons": [reason.code for reason in result.reasons],
+        "warnings": [warning.code for warning in result.warnings],
+        **judged,
+        "complete": result.search.complete,
+    }

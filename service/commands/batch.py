@@ -1,0 +1,117 @@
+"""``linefix batch``: where the scans of many logs were taken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bars
+from rich.progress import Task as Bar
+from rich.text import Text
+
+from registration import InputError
+
+from ..work.compiling import compile_kernels
+from .errors import RefusedError, WrongUseError
+from .options import AsJson
+from .printing import print_json, print_rows
+
+if TYPE_CHECKING:
+    from fleet import Engine, FleetOptions, Progress, Summary
+
+
+def batch(
+    logs: Annotated[list[str], typer.Argument(metavar="LOGS", help="Parquet files, bags, mcap or CARMEN logs.")],
+    maps: Annotated[Path, typer.Option(metavar="MAPS", help="A map file, or a folder of them.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The Parquet file to write, one row a scan.")],
+    workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one a core by default.")] = None,
+    ray: Annotated[
+        bool, typer.Option("--ray", help="Work on a Ray cluster: that of RAY_ADDRESS, or a new one.")
+    ] = False,
+    block: Annotated[
+        int, typer.Option(min=1, max=65_536, metavar="N", help="Scans that a worker does at a time.")
+    ] = 512,
+    undirected: Annotated[bool, typer.Option("--undirected", help="Directions of segments mean nothing.")] = False,
+    deadline_ms: Annotated[float, typer.Option(min=1.0, metavar="MS", help="Time for each search.")] = 10_000.0,
+    as_json: AsJson = False,
+) -> None:
+    """Find where the scans of many logs were taken; a run that was killed goes on where it was.
+
+    A scan lies on the map that its column map_id names, else on that named as its log, else on the only one.
+    """
+    if out.is_dir():
+        raise WrongUseError(f"{out}: is a folder")
+    begun = time.monotonic()
+    try:
+        from fleet import associate_many
+
+        with shown_progress() as watch:
+            options = _options(block, deadline_ms, undirected=undirected)
+            summary = associate_many(logs, maps, out, options, _engine(workers, ray=ray), watch)
+    except ModuleNotFoundError as error:
+        extra = "ray" if ray else "batch"
+        raise RefusedError(f'a batch needs {error.name}: pip install "linefix[{extra}]"') from None
+    except InputError as error:
+        raise RefusedError(str(error)) from None
+    if as_json:
+        print_json(asdict(summary))
+    else:
+        print_rows(_rows(summary, time.monotonic() - begun))
+
+
+def _options(block: int, deadline_ms: float, *, undirected: bool) -> FleetOptions:
+    from association import AssociationOptions
+    from fleet import FleetOptions
+
+    search = AssociationOptions(max_alternatives=0, oriented=not undirected)
+    return FleetOptions(search, deadline_ms, block, compile_kernels)
+
+
+def _engine(workers: int | None, *, ray: bool) -> Engine | None:
+    from fleet import OnRay, Processes
+
+    if ray:
+        if workers is not None:
+            raise WrongUseError("--workers: on Ray as many work as the cluster has cores")
+        return OnRay()
+    return None if workers is None else Processes(workers)
+
+
+def _rows(summary: Summary, seconds: float) -> list[tuple[str, str]]:
+    searched = summary.scans - summary.taken_over
+    rows = [("scans", f"{summary.scans:,}, of which {summary.taken_over:,} were done before")]
+    rows += [(status, f"{count:,}") for status, count in sorted(summary.statuses.items())]
+    rows += [("usable", f"{summary.usable:,}"), ("errors", f"{summary.errors:,}")]
+    return [*rows, ("speed", f"{searched / max(seconds, 1e-9):,.0f} scans/s")]
+
+
+@contextmanager
+def shown_progress() -> Iterator[Callable[[Progress], None]]:
+    """Show how far a run is where a terminal is there to see it; give what has to be told of it."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _Speed(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Bars(*columns, console=console, disable=not console.is_terminal) as bars:
+        known = {}
+
+        def watch(progress: Progress) -> None:
+            if progress.stage not in known:
+                known[progress.stage] = bars.add_task(progress.stage, total=progress.total)
+                bars.reset(known[progress.stage], total=progress.total, completed=progress.done)
+            bars.update(known[progress.stage], completed=progress.done)
+
+        yield watch
+
+
+class _Speed(ProgressColumn):
+    """How many a second."""
+
+    def render(self, task: Bar) -> Text:
+        """Return it as text."""
+        return Text("" if task.speed is None else f"{task.speed:,.0f}/s")

@@ -1,0 +1,178 @@
+"""Replicas of the service over one database, behind nginx, each a process of its own."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+
+from tests.running import RunningService, client_of, free_port, start, stop, until
+from tests.service.conftest import LOCAL, empty_database
+
+NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/bin:/opt/homebrew/bin")
+
+# As deploy/compose.yaml has it, without root: what a replica cannot answer another one is asked, once for each.
+CONF = """
+daemon off;
+worker_processes 1;
+pid {folder}/nginx.pid;
+error_log {folder}/error.log warn;
+events {{ worker_connections 512; }}
+http {{
+  access_log {folder}/access.log;
+  client_body_temp_path {folder}/body;
+  proxy_temp_path {folder}/proxy;
+  fastcgi_temp_path {folder}/fastcgi;
+  uwsgi_temp_path {folder}/uwsgi;
+  scgi_temp_path {folder}/scgi;
+  upstream linefix {{
+    {servers}
+    keepalive 16;
+  }}
+  server {{
+    listen 127.0.0.1:{port};
+    client_max_body_size 32m;
+    location / {{
+      proxy_pass http://linefix;
+      proxy_http_version 1.1;
+      proxy_set_header Connection "";
+      proxy_set_header Host $host;
+      proxy_connect_timeout 1s;
+      proxy_next_upstream error timeout http_503 {repeats};
+      proxy_next_upstream_tries 3;
+    }}
+  }}
+}}
+"""
+
+
+class Line:
+    """A way to a database that can be cut: connections are dropped, and new ones refused, until it is mended."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self._there = (host, port)
+        self._cut = False
+        self._ends: set[socket.socket] = set()
+        self._lock = threading.Lock()
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listener.getsockname()[1]
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def cut(self) -> None:
+        with self._lock:
+            self._cut = True
+            for end in self._ends:
+                with suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+
+    def mend(self) -> None:
+        self._cut = False
+
+    def close(self) -> None:
+        self.cut()
+        self._listener.close()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                here, _ = self._listener.accept()
+                with self._lock:
+                    if self._cut:
+                        here.close()
+                        continue
+                    there = socket.create_connection(self._there)
+                    self._ends |= {here, there}
+                for ends in ((here, there), (there, here)):
+                    threading.Thread(target=self._pass, args=ends, daemon=True).start()
+
+    def _pass(self, one: socket.socket, other: socket.socket) -> None:
+        with suppress(OSError):
+            while data := one.recv(65_536):
+                other.sendall(data)
+        for end in (one, other):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+        one.close()
+        with self._lock:
+            self._ends.discard(one)
+
+
+@dataclass
+class Replicas:
+    """Three services, and what stands between them, their clients and their database."""
+
+    services: list[RunningService]
+    url: str
+    line: Line
+    settings: dict[str, object]
+    client: httpx.Client = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.client = client_of(self.url)
+
+    def replace(self, number: int) -> None:
+        """End a replica as a rolling update does, where it has not ended already; start another at its port."""
+        old = self.services[number]
+        stop(old)
+        self.services[number] = start(old.data_dir, port=old.port, **self.settings)
+
+    def kill(self, number: int) -> None:
+        """End a replica with what it is at."""
+        self.services[number].process.kill()
+        self.services[number].process.wait()
+
+
+@contextmanager
+def replicas(folder: Path, count: int = 3, **settings: object) -> Iterator[Replicas]:
+    """Start them; skip where there is no nginx or no PostgreSQL."""
+    if NGINX is None:
+        pytest.skip("no nginx")
+    with ExitStack() as stack:
+        url = stack.enter_context(empty_database("postgresql", folder))
+        parts = urlsplit(LOCAL)
+        line = Line(parts.hostname or "127.0.0.1", parts.port or 5432)
+        stack.callback(line.close)
+        told = {"database_url": url.replace(f":{parts.port}/", f":{line.port}/"), "drain_seconds": 1, **settings}
+        services = []
+        for number in range(count):
+            place = folder / f"replica-{number}"
+            place.mkdir()
+            services.append(start(place, **told))
+        found = Replicas(services, stack.enter_context(_proxy(folder, services)), line, told)
+        stack.callback(lambda: [stop(service) for service in found.services])
+        stack.callback(found.client.close)
+        yield found
+
+
+@contextmanager
+def _proxy(folder: Path, services: list[RunningService]) -> Iterator[str]:
+    port = free_port()
+    # None is ever left out: where all answer 503 that is what clients are to be told, not that nobody is there.
+    servers = " ".join(f"server 127.0.0.1:{one.port} max_fails=0;" for one in services)
+    conf = folder / "nginx.conf"
+    conf.write_text(CONF.format(folder=folder, servers=servers, port=port, repeats="non_idempotent"))
+    process = subprocess.Popen([str(NGINX), "-c", str(conf), "-p", str(folder), "-e", str(folder / "error.log")])
+    try:
+        url = f"http://127.0.0.1:{port}"
+        with client_of(url) as client:
+            until(lambda: _answers(client))
+        yield url
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def _answers(client: httpx.Client) -> bool:
+    try:
+        return client.get("/livez").status_code == 200
+    except httpx.TransportError:
+        return False

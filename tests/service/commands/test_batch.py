@@ -1,0 +1,74 @@
+"""linefix batch, as a user runs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from tests.fleet.logs import rows, write_log, write_room
+from tests.service.commands.test_asking import linefix, refused
+
+
+def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path) -> None:
+    write_log(tmp_path / "a.parquet", 30)
+    write_room(tmp_path)
+    asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "out/poses.parquet", "--block", "10")
+    ended = linefix(tmp_path, *asked, "--workers", "1")
+    assert (ended.returncode, ended.stderr) == (0, "")  # progress is for terminals
+    assert "scans   30, of which 0 were done before" in ended.stdout
+    assert [(row["index"], row["status"]) for row in rows(tmp_path / "out/poses.parquet")] == [
+        (k, "ok") for k in range(30)
+    ]
+    told = json.loads(linefix(tmp_path, *asked, "--workers", "1", "--json").stdout)
+    assert told == {"scans": 30, "taken_over": 0, "usable": 30, "errors": 0, "statuses": {"ok": 30}}
+
+
+def test_a_batch_that_was_killed_goes_on(tmp_path: Path) -> None:
+    write_log(tmp_path / "a.parquet", 3_000)
+    write_room(tmp_path)
+    asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "poses.parquet", "--block", "5", "--workers", "1")
+    command = [sys.executable, "-c", "from service.commands.entry import main; main()", *asked]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    process = subprocess.Popen(command, cwd=tmp_path, env=environment)
+    parts = tmp_path / "poses.parquet.parts" / "poses"
+    while process.poll() is None and len(list(parts.glob("*.parquet"))) < 3:
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    assert not (tmp_path / "poses.parquet").exists()
+    ended = linefix(tmp_path, *asked, "--json")
+    told = json.loads(ended.stdout)
+    assert (told["scans"], told["taken_over"] >= 15) == (3_000, True)
+    assert [row["index"] for row in rows(tmp_path / "poses.parquet")] == list(range(3_000))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "poses.parquet", "room.json"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("a.parquet", "--maps", "room.json"), 2, "--out"),
+        (("gone.parquet", "--maps", "room.json", "--out", "o.parquet"), 3, "gone.parquet"),
+        (("a.parquet", "--maps", "nowhere", "--out", "o.parquet"), 3, "nowhere: holds no map"),
+        (("room.json", "--maps", "room.json", "--out", "o.parquet", "--ray", "--workers", "2"), 2, "--workers"),
+        (("a.parquet", "--maps", "room.json", "--out", "."), 2, "is a folder"),
+    ],
+    ids=["no output", "no log", "no map", "workers on Ray", "folder"],
+)
+def test_what_is_not_done_is_told_in_one_line(tmp_path: Path, arguments: tuple[str, ...], code: int, said: str) -> None:
+    write_log(tmp_path / "a.parquet", 1)
+    write_room(tmp_path)
+    assert said in refused(linefix(tmp_path, "batch", *arguments), code)
+
+
+def test_the_output_says_its_columns(tmp_path: Path) -> None:
+    write_log(tmp_path / "a.parquet", 1)
+    write_room(tmp_path)
+    assert linefix(tmp_path, "batch", "a.parquet", "--maps", "room.json", "--out", "o.parquet").returncode == 0
+    assert pq.read_schema(tmp_path / "o.parquet").names[:5] == ["log", "index", "stamp", "map_id", "status"]
