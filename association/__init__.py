@@ -4,12 +4,10 @@ from .errors import AssociationError, InvalidMapError, InvalidSearchError
 from .map_index import MapIndex
 from .options import (
     AssociationOptions,
-    Beams,
     CancelledError,
     Deadline,
     HardPrior,
     Prior,
-    Scan,
     SoftPrior,
 )
 from .result import (
@@ -23,9 +21,12 @@ from .result import (
     SearchReport,
     Status,
 )
+from .scan import Beams, Scan, Views, mirrored
 from .search import associate
+from .views import MAX_VIEWS, View, assemble
 
 __all__ = [
+    "MAX_VIEWS",
     "Alternative",
     "AssociationDiagnostics",
     "AssociationError",
@@ -47,5 +48,9 @@ __all__ = [
     "SearchReport",
     "SoftPrior",
     "Status",
+    "View",
+    "Views",
+    "assemble",
     "associate",
+    "mirrored",
 ]

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import MeasuredSegments, RigidTransform, wrap_angle
+from registration import RigidTransform, wrap_angle
 
 from .errors import InvalidSearchError
 from .tuning import GREATEST_ANGLE_GATE, REACH
@@ -22,42 +22,6 @@ Sampling = Literal["ordered", "random"]
 MAX_ALTERNATIVES = 50
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Beams:
-    """Single range measurements from one place, evidence for and against a pose.
-
-    Attributes
-    ----------
-    angles : (m,) radians in the scan frame
-    ranges : (m,) metres; inf where the beam came back from nothing within `range_max`; nan where nothing is known
-    range_max : float
-        Metres; how far a beam without return is known to be free.
-    """
-
-    angles: Floats
-    ranges: Floats
-    range_max: float
-
-
-@dataclass(frozen=True, slots=True)
-class Scan:
-    """What the robot saw, in the sensor's frame.
-
-    Attributes
-    ----------
-    measured : MeasuredSegments
-    viewpoint : (float, float) or None
-        Where the sensor stood, metres; None when the segments were not seen from one place, then lines of sight are no
-        evidence.
-    beams : Beams or None
-        The raw ranges, where the scan came as such; they start at `viewpoint`.
-    """
-
-    measured: MeasuredSegments
-    viewpoint: tuple[float, float] | None = (0.0, 0.0)
-    beams: Beams | None = None
 
 
 @dataclass(frozen=True, slots=True)

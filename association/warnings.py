@@ -9,8 +9,8 @@ import numpy as np
 from .causes import Cause, Mistake
 from .context import SearchContext
 from .extents import inner_extent
-from .options import Beams
 from .result import AssociationWarning, SearchReport
+from .scan import Beams
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .verdict import Verdict
 

@@ -19,6 +19,7 @@ from .queries import DATA, data_found
 from .ranges import ranges
 from .sums import sums
 from .table import Row, machine, print_rows
+from .views import views
 from .worlds import worlds
 
 DEFAULT = ("localization", "estimators", "lookalikes")
@@ -97,6 +98,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "sums": _sums,
     "worlds": worlds,
     "imports": imports,
+    "views": views,
 }
 
 
