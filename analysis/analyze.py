@@ -10,7 +10,6 @@ import numpy as np
 from association import (
     AssociationOptions,
     AssociationResult,
-    Beams,
     Deadline,
     MapIndex,
     Scan,
@@ -106,7 +105,7 @@ class Analysis:
         ranges = scan(self.segments, pose, scanner, np.random.default_rng((self.seed, number))).ranges
         laser = LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max)
         found = vectorize(laser, VectorizationOptions(sigma=self.robot.sigma))
-        return Scan(found.measured, (0.0, 0.0), Beams(found.angles, found.ranges, found.range_max))
+        return Scan(found.measured, (0.0, 0.0), found.beams)
 
 
 def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> PlaceVerdict:

@@ -10,7 +10,6 @@ from .options import (
     Deadline,
     HardPrior,
     Prior,
-    Scan,
     SoftPrior,
 )
 from .result import (
@@ -24,11 +23,14 @@ from .result import (
     SearchReport,
     Status,
 )
+from .scan import Scan, Views, mirrored
 from .search import associate
+from .views import MAX_VIEWS, View, assemble
 from .words import AS_WELL, sentence_of
 
 __all__ = [
     "AS_WELL",
+    "MAX_VIEWS",
     "Alternative",
     "AssociationDiagnostics",
     "AssociationError",
@@ -50,6 +52,10 @@ __all__ = [
     "SearchReport",
     "SoftPrior",
     "Status",
+    "View",
+    "Views",
+    "assemble",
     "associate",
+    "mirrored",
     "sentence_of",
 ]

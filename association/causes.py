@@ -8,16 +8,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from registration import Beams, Segments
 from registration.limits import MAX_LENGTH, MIN_LENGTH
 
 from .candidates import Effort
 from .context import SearchContext
 from .explain import Explanations, explain
 from .extents import inner_extent
-from .null import mirrored
-from .options import Scan
 from .scaling import scale_near_one
+from .scan import Scan, mirrored, scaled, turned_round
 from .tuning import (
     CAUSE_CONFIDENCE,
     CAUSE_GAP,
@@ -142,31 +140,6 @@ def _tried(context: SearchContext, mistake: Mistake, factor: float, scan: Scan, 
     best, verdict = explanations.answer.best, judge(changed, explanations)
     better = best.score > max(known + CAUSE_GAP, CAUSE_RATIO * known) and best.share >= CAUSE_SHARE
     return Cause(mistake, factor, best.score, verdict.usable) if verdict.usable or better else None
-
-
-def turned_round(scan: Scan) -> Scan:
-    """Return a scan whose segments begin where they ended.
-
-    What it sees then has its back to the viewpoint, and where it came as ranges it is the map that is the wrong way
-    round: neither beams nor lines of sight count.
-    """
-    ends = scan.measured.segments.endpoints[:, [2, 3, 0, 1]]
-    return Scan(replace(scan.measured, segments=Segments.from_array(ends)), None, None)
-
-
-def scaled(scan: Scan, factor: float) -> Scan:
-    """Return a scan of which all lengths are multiplied."""
-    seen, at, beams = scan.measured, scan.viewpoint, scan.beams
-    measured = replace(
-        seen,
-        segments=Segments.from_array(seen.segments.endpoints * factor),
-        sigma=seen.sigma * factor,
-        centroids=seen.centroids * factor,
-        spreads=seen.spreads * factor**2,
-    )
-    if beams is not None:
-        beams = Beams(beams.angles, beams.ranges * factor, beams.range_max * factor)
-    return Scan(measured, at and (at[0] * factor, at[1] * factor), beams)
 
 
 def _likely_units(context: SearchContext) -> list[float]:

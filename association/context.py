@@ -10,9 +10,25 @@ import numpy as np
 from registration import RigidTransform
 from registration.layout import Records
 
-from .layout import HARD_PRIOR, NO_PRIOR, PRIOR, RULES, SOFT_PRIOR, TERMS, VIEW, Question, Workspace, record
+from .alignment import aligned
+from .layout import (
+    HARD_PRIOR,
+    NO_PRIOR,
+    POINT,
+    PRIOR,
+    RULES,
+    SIGHTING,
+    SOFT_PRIOR,
+    TERMS,
+    Question,
+    Sights,
+    Workspace,
+    as_records,
+    record,
+)
 from .map_index import MapIndex
-from .options import AssociationOptions, Deadline, HardPrior, Prior, Scan, SoftPrior
+from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
+from .scan import Scan
 from .scan_lines import ScanLines, gates
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
@@ -20,8 +36,8 @@ ANY = record(RULES)  # for kernels that keep no poses
 
 
 @lru_cache
-def _view(x: float, y: float, sighted: bool) -> Records:
-    return record(VIEW, x=x, y=y, sighted=sighted)
+def _place(x: float, y: float) -> Records:
+    return record(POINT, x=x, y=y)
 
 
 @dataclass(frozen=True)
@@ -53,8 +69,9 @@ class SearchContext:
     def of(
         cls, index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline
     ) -> SearchContext:
-        """Prepare a search."""
+        """Prepare a search; views that are not exact are laid on one another."""
         place = index if options.oriented else index.undirected
+        scan = aligned(scan)
         lines = ScanLines.of(scan, place.sigma, options)
         return cls(place, scan, prior, options, deadline, lines, gates(options))
 
@@ -69,10 +86,23 @@ class SearchContext:
         return self.prior if isinstance(self.prior, HardPrior) else None
 
     @cached_property
-    def view(self) -> Records:
-        """Where the sensor stood, (1,) of `VIEW`; segments have no lines of sight where single beams tell more."""
-        sighted = self.scan.viewpoint is not None and not self.with_beams
-        return _view(*(self.scan.viewpoint or (0.0, 0.0)), sighted)
+    def sights(self) -> Sights:
+        """What was seen from each place, as far as lines of sight are evidence."""
+        seen, views = self.lines.sightings, self.scan.views
+        if views is None:
+            seen = seen if self.scan.viewpoint is not None else seen[:0]
+            return Sights(_place(*(self.scan.viewpoint or (0.0, 0.0))), np.array([0, len(seen)]), seen)
+        sighted = ~np.isnan(views.viewpoints[:, 0])
+        seen = seen[sighted[seen["sensor"]]]
+        places = as_records(POINT, np.where(sighted[:, None], views.viewpoints, 0.0))
+        return Sights(places, np.searchsorted(seen["sensor"], np.arange(len(views) + 1)), seen)
+
+    @cached_property
+    def lines_of_sight(self) -> Sights:
+        """The same where it scores poses: segments have no lines of sight where single beams tell more."""
+        if not self.with_beams:
+            return self.sights
+        return Sights(self.sights.places, np.zeros(len(self.sights.starts), np.int64), np.zeros(0, SIGHTING))
 
     @cached_property
     def workspace(self) -> Workspace:

@@ -14,6 +14,7 @@ from .result import SearchReport
 from .settling import Settled, settle
 from .sight import BeamShares, agreement, compare_beams
 from .significance import significance
+from .views import corrected
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +94,9 @@ def explain(context: SearchContext, effort: Effort | None = None) -> Explanation
 def _answer(context: SearchContext, best: Ranked) -> Answer | None:
     accepted = accept(context, best)
     settled = settle(context, best)
+    if settled.views is not None:
+        # What is told of it holds where the views are found to have been.
+        context = replace(context, scan=corrected(context.scan, settled.views.found, settled.views.spread))
     registered = register_accepted(context, accepted, settled)
     if registered is None:
         return None

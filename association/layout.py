@@ -50,8 +50,15 @@ SCAN_LINE = _fields(
 
 # What segments of a scan show together that continue or repeat one another: unit direction; midpoint; length from end
 # to end, and of what they cover; mean of the points and their second moment along the line (m^2); how many
-# they are; variance of its offset (m^2).
-LINE_PARTS = _fields((_F, "dx dy x y length covered centroid_x centroid_y spread points variance"))
+# they are; variance of its offset (m^2); what is not known of where they were seen from, as variances of the offset
+# (m^2) and the angle (rad^2).
+LINE_PARTS = _fields(
+    (_F, "dx dy x y length covered centroid_x centroid_y spread points variance common_offset common_angle")
+)
+
+# What one view shows of a line of the scan: which view's sensor that is; the row of that line; unit direction;
+# midpoint; length; mean of the points and their second moment along the line (m^2); variance of its offset (m^2).
+SIGHTING = _fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid_y spread variance"))
 
 # Where a scan line lies: the wall or -1; offset from it; sine of the angle to it; share of the length on walls;
 # worth of the match.
@@ -124,9 +131,6 @@ HINGE = np.dtype([("wall", _I), *_fields((_F, "moves deviation dx dy")).descr])
 # What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
 # together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
 VARIANCES = _fields((_F, "map common least_offset least_angle"))
-
-# Where the sensor stood in the scan frame, and whether lines of sight from there are evidence.
-VIEW = _fields((_F, "x y"), (_I, "sighted"))
 
 # A ray from a place in the index frame: unit direction; how far it is followed.
 RAY = _fields((_F, "x y dx dy limit"))
@@ -271,6 +275,21 @@ class Lines(NamedTuple):
     least_overlap: float
 
 
+class Sights(NamedTuple):
+    """What was seen from each view.
+
+    Attributes
+    ----------
+    places : (v,) of `POINT`, where the sensor of each stood, in the scan frame
+    starts : (v + 1,) view v saw ``seen[starts[v]:starts[v + 1]]``; nothing where lines of sight are no evidence
+    seen : (k,) of `SIGHTING`
+    """
+
+    places: Records
+    starts: Integers
+    seen: Records
+
+
 class Rays(NamedTuple):
     """Single beams of which something is known.
 
@@ -278,12 +297,14 @@ class Rays(NamedTuple):
     ----------
     angles : (m,) radians in the scan frame
     ranges : (m,) metres, inf where nothing was met
+    places : (m,) of `POINT`, where each begins, in the scan frame
     reach : float
         Metres; how far a beam without return is known to be free.
     """
 
     angles: Floats
     ranges: Floats
+    places: Records
     reach: float
 
 

@@ -11,31 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from registration import Beams, Segments
-
 from .candidates import Effort, find_candidates
 from .context import SearchContext
 from .kernels.symmetry import mirrored_share
-from .options import Scan
 from .ranking import Ranked, rank_candidates
+from .scan import mirrored
 from .scan_lines import ScanLines
 from .tuning import NULL_CONFIDENCE, NULL_ENOUGH, NULL_KEPT, NULL_SHARE
-
-MIRROR = np.array([1.0, -1.0])
-
-
-def mirrored(scan: Scan) -> Scan:
-    """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left."""
-    seen = scan.measured
-    ends = seen.segments.endpoints.reshape(-1, 2, 2)[:, ::-1] * MIRROR
-    segments = Segments.from_array(ends.reshape(-1, 4))
-    measured = replace(seen, segments=segments, centroids=seen.centroids * MIRROR)
-    beams, at = scan.beams, scan.viewpoint
-    if beams is not None:
-        beams = Beams(
-            np.ascontiguousarray(-beams.angles[::-1]), np.ascontiguousarray(beams.ranges[::-1]), beams.range_max
-        )
-    return Scan(measured, at and (at[0], -at[1]), beams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +54,8 @@ def null_of(context: SearchContext, best: Ranked) -> Null:
 
 
 def _symmetry(context: SearchContext, best: Ranked, null: Ranked) -> float:
-    rows, view = context.lines.rows, context.view
-    reach = float(np.max(np.hypot(rows["x"] - view["x"], rows["y"] - view["y"]) + 0.5 * rows["length"]))
+    seen, places = context.lines.sightings, context.sights.places
+    at = places[seen["sensor"]]
+    reach = float(np.max(np.hypot(seen["x"] - at["x"], seen["y"] - at["y"]) + 0.5 * seen["length"]))
     place = context.index.tables.place
-    return float(mirrored_share(view, best.estimate, reach, null.estimate, context.gates, place, context.workspace))
+    return float(mirrored_share(places, best.estimate, reach, null.estimate, context.gates, place, context.workspace))

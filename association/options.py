@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import Beams, MeasuredSegments, RigidTransform, wrap_angle
+from registration import RigidTransform, wrap_angle
 
 from .errors import InvalidSearchError
 from .tuning import GREATEST_ANGLE_GATE, REACH
@@ -22,25 +22,6 @@ Sampling = Literal["ordered", "random"]
 MAX_ALTERNATIVES = 50
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Scan:
-    """What the robot saw, in the sensor's frame.
-
-    Attributes
-    ----------
-    measured : MeasuredSegments
-    viewpoint : (float, float) or None
-        Where the sensor stood, metres; None when the segments were not seen from one place, then lines of sight are no
-        evidence.
-    beams : Beams or None
-        The raw ranges, where the scan came as such; they start at `viewpoint`.
-    """
-
-    measured: MeasuredSegments
-    viewpoint: tuple[float, float] | None = (0.0, 0.0)
-    beams: Beams | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from .context import ANY, SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
-from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Rays
+from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, POINT, Rays, as_records
 from .options import CancelledError, Estimator
 from .tuning import (
     BEAM_FINALISTS,
@@ -222,7 +222,7 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
             break
         some = slice(begin, begin + step)
         parts = scored.estimates[some], scored.merits[some], scored.matches[some]
-        rank(context.question(ANY), place, context.view, *parts, context.workspace)
+        rank(context.question(ANY), place, context.lines_of_sight, *parts, context.workspace)
     if context.deadline.cancelled:
         raise CancelledError
     return scored
@@ -262,9 +262,7 @@ def _beam_evidence(context: SearchContext, poses: Records, most: int, refined: i
     Moves the first `refined` of the poses.
     """
     evidence = np.zeros(len(poses), BEAM_EVIDENCE)
-    weigh_beams(
-        rays_of(context, most), context.view, poses, context.index.tables.place, refined, context.workspace, evidence
-    )
+    weigh_beams(rays_of(context, most), poses, context.index.tables.place, refined, context.workspace, evidence)
     return evidence
 
 
@@ -273,6 +271,10 @@ def rays_of(context: SearchContext, most: int) -> Rays:
     beams = context.scan.beams
     assert beams is not None
     known = ~np.isnan(beams.ranges)
-    angles, ranges = beams.angles[known], beams.ranges[known]
-    step = max(1, math.ceil(len(angles) / most))
-    return Rays(np.ascontiguousarray(angles[::step]), np.ascontiguousarray(ranges[::step]), beams.range_max)
+    step = max(1, math.ceil(int(known.sum()) / most))
+    angles, ranges = (np.ascontiguousarray(column[known][::step]) for column in (beams.angles, beams.ranges))
+    if beams.origins is None:
+        origins = np.tile(context.scan.viewpoint or (0.0, 0.0), (len(angles), 1))
+    else:
+        origins = beams.origins[known][::step]
+    return Rays(angles, ranges, as_records(POINT, origins), beams.range_max)

@@ -10,8 +10,8 @@ from registration.layout import Records
 
 from .candidates import Effort, find_candidates
 from .context import SearchContext
-from .options import Scan
 from .ranking import Ranked, rank_candidates
+from .scan import Scan
 from .tuning import (
     GREATEST_STRETCH,
     LEAST_STRETCH,

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from registration import MeasuredSegments
 from registration.layout import Floats, Records
 
 from .kernels.scans import collinear_segments, describe_lines, join_segments
-from .layout import GATES, LINE_PARTS, MODEL, POINT, VARIANCES, Integers, Measured, as_records, record
-from .options import AssociationOptions, Scan
+from .layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, Measured, as_records, record
+from .options import AssociationOptions
+from .scan import Scan, Views
 from .tuning import (
     COMMON_ERROR,
     CUT_COSINE,
@@ -24,11 +27,15 @@ from .tuning import (
     LEAST_ANGLE_GATE,
     LEAST_OFFSET_GATE,
     LEAST_OVERLAP,
+    LINE_ANGLE,
     LINE_COSINE,
     LINE_LATERAL,
     MODEL_OFFSET,
+    MOST_LATERAL,
+    MOST_TURN,
     REACH,
     ROUGHNESS,
+    VIEW_SIGMAS,
 )
 
 
@@ -41,11 +48,14 @@ class ScanLines:
     row_of : (segments,) which row each segment of the scan is part of
     rows : (n,) of `SCAN_LINE`
     model : (1,) of `MODEL`
+    sightings : (k,) of `SIGHTING`
+        What each view shows of them, view by view; of one view the rows themselves.
     """
 
     row_of: NDArray[np.intp]
     rows: Records
     model: Records
+    sightings: Records
 
     @classmethod
     def of(cls, scan: Scan, map_sigma: float | None, options: AssociationOptions) -> ScanLines:
@@ -59,20 +69,116 @@ class ScanLines:
         options : AssociationOptions
             A tolerance wider than the sigmas' own gate says that the map is that far off.
         """
-        measured, segments = scan.measured, scan.measured.segments
-        given = Measured(
-            as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
-            as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.points,
-        )  # fmt: skip
-        cut, lines = _joined(given, CUT_LATERAL, CUT_COSINE, counted=True)
-        whole = given if len(lines) == len(measured) else _measured(lines)
-        apart, lines = _joined(whole, LINE_LATERAL, LINE_COSINE, counted=measured.counted)
-        labels = apart if whole is given else apart[cut]
+        measured = scan.measured
         variances, model = _variances(map_sigma or 0.0, options, with_beams=scan.beams is not None)
-        order = np.argsort(-lines["length"], kind="stable")
-        place = np.empty(len(order), dtype=np.intp)
-        place[order] = np.arange(len(order))
-        return cls(place[labels], describe_lines(lines, order, variances, model), model)
+        if scan.views is None:
+            labels, lines = _joined_lines(_given(measured), counted=measured.counted)
+            row_of, rows = _described(labels, lines, variances, model)
+            return cls(row_of, rows, model, _seen_at_once(rows))
+        part_of, parts, views = parts_of(measured, scan.views)
+        labels, lines = _joined_views(parts, scan.views)
+        line_row, rows = _described(labels, lines, variances, model)
+        return cls(line_row[part_of], rows, model, _sightings(parts, views, line_row))
+
+
+def _given(measured: MeasuredSegments) -> Measured:
+    """Return segments as the kernels are handed them."""
+    segments = measured.segments
+    return Measured(
+        as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
+        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.points,
+    )  # fmt: skip
+
+
+def _joined_lines(given: Measured, *, counted: bool) -> tuple[Integers, Records]:
+    """Join what one view shows of a line: first what was cut, then what lies about on it."""
+    cut, lines = _joined(given, CUT_LATERAL, CUT_COSINE, counted=True)
+    whole = given if len(lines) == len(given.lengths) else _measured(lines)
+    apart, lines = _joined(whole, LINE_LATERAL, LINE_COSINE, counted=counted)
+    return apart if whole is given else apart[cut], lines
+
+
+def _described(
+    labels: Integers, lines: Records, variances: Records, model: Records
+) -> tuple[NDArray[np.intp], Records]:
+    """Order lines by what they tell; return the row of each that is labelled, and the rows."""
+    order = np.argsort(-lines["length"], kind="stable")
+    place = np.empty(len(order), dtype=np.intp)
+    place[order] = np.arange(len(order))
+    return place[labels], describe_lines(lines, order, variances, model)
+
+
+def _seen_at_once(rows: Records) -> Records:
+    """Return what one view shows: all rows, in their order."""
+    seen = np.zeros(len(rows), SIGHTING)
+    seen["row"] = np.arange(len(rows))
+    for name in ("dx", "dy", "x", "y", "length"):
+        seen[name] = rows[name]
+    return seen
+
+
+def parts_of(measured: MeasuredSegments, views: Views) -> tuple[NDArray[np.intp], Records, NDArray[np.intp]]:
+    """Join what each view shows of a line.
+
+    Returns
+    -------
+    (n,) the part of each segment
+    (k,) of `LINE_PARTS`, with what is not known of where they were seen from
+    (k,) the view of each
+    """
+    part_of = np.empty(len(measured), dtype=np.intp)
+    found, of_view = [np.zeros(0, LINE_PARTS)], [np.zeros(0, dtype=np.intp)]
+    covariance, before = views.covariance, 0
+    for v, pose in enumerate(views.poses):
+        own = np.flatnonzero(views.of_segment == v)
+        labels, lines = _joined_lines(_given(_taken(measured, own)), counted=measured.counted)
+        part_of[own] = labels + before
+        block = covariance[3 * v : 3 * v + 3, 3 * v : 3 * v + 3]
+        levers = lines["dx"] * (lines["centroid_x"] - pose.x) + lines["dy"] * (lines["centroid_y"] - pose.y)
+        g = np.stack([-lines["dy"], lines["dx"], levers], axis=1)
+        lines["common_offset"] = np.maximum(0.0, np.einsum("ij,jk,ik->i", g, block, g))
+        lines["common_angle"] = max(0.0, block[2, 2])
+        found.append(lines)
+        of_view.append(np.full(len(lines), v))
+        before += len(lines)
+    return part_of, np.concatenate(found), np.concatenate(of_view)
+
+
+def _taken(measured: MeasuredSegments, rows: NDArray[np.intp]) -> MeasuredSegments:
+    return replace(
+        measured,
+        segments=measured.segments.take(rows),
+        sigma=measured.sigma[rows],
+        points=measured.points[rows],
+        centroids=measured.centroids[rows],
+        spreads=measured.spreads[rows],
+    )
+
+
+def _joined_views(parts: Records, views: Views) -> tuple[Integers, Records]:
+    """Join what several views show of a line, so that it is one piece of evidence.
+
+    What is not known of where they were seen from lets them lie so much farther apart. The line that they make is as
+    badly known as its parts are, by their lengths: their errors may be one.
+    """
+    lateral, turn = LINE_LATERAL, LINE_ANGLE
+    if views.uncertain and len(parts):
+        lateral = min(MOST_LATERAL, lateral + VIEW_SIGMAS * float(np.sqrt(parts["common_offset"].mean())))
+        turn = min(MOST_TURN, turn + VIEW_SIGMAS * float(np.sqrt(parts["common_angle"].mean())))
+    labels, lines = _joined(_measured(parts), lateral, math.cos(turn), counted=True)
+    weights = np.bincount(labels, parts["length"], len(lines))
+    for name in ("common_offset", "common_angle"):
+        lines[name] = np.bincount(labels, parts["length"] * parts[name], len(lines)) / weights
+    return labels, lines
+
+
+def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) -> Records:
+    """Return what each view shows of the rows."""
+    seen = np.zeros(len(parts), SIGHTING)
+    seen["sensor"], seen["row"] = views, rows
+    for name in ("dx", "dy", "x", "y", "length", "centroid_x", "centroid_y", "spread", "variance"):
+        seen[name] = parts[name]
+    return seen[np.lexsort((rows, views))]
 
 
 def _joined(given: Measured, lateral: float, cosine: float, *, counted: bool) -> tuple[Integers, Records]:

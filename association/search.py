@@ -8,9 +8,10 @@ from .causes import find_causes
 from .context import SearchContext
 from .explain import explain
 from .map_index import MapIndex
-from .options import AssociationOptions, Deadline, Prior, Scan
+from .options import AssociationOptions, Deadline, Prior
 from .report import report
 from .result import AssociationResult
+from .scan import Scan
 from .verdict import judge
 
 DEFAULT_OPTIONS = AssociationOptions()

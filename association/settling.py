@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from .context import ANY, SearchContext
 from .kernels.settling import settle as settle_matches
 from .layout import HINGE, SETTLED
 from .ranking import Ranked
-from .tuning import ONE_OF_MANY
+from .scan import Views
+from .tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY
+from .view_settling import SeenOnWalls, ViewsSettled
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,8 @@ class Settled:
         Whether all walls are parallel within three standard deviations of their angles.
     hinges : (k,) of `HINGE`
         What the pose would be without each of its walls.
+    views : ViewsSettled or None
+        Where the scan's views were, if they are not exact.
     """
 
     pose: RigidTransform
@@ -51,6 +55,7 @@ class Settled:
     free: bool
     parallel: bool
     hinges: Records
+    views: ViewsSettled | None = None
 
 
 def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Settled:
@@ -69,7 +74,7 @@ def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Sett
     pairs = int(best.matched.sum())
     parallel = pairs < 2 or unlike <= chi_square_quantile(pairs - 1, THREE_SIGMA_TAIL)
     spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
-    return Settled(
+    alone = Settled(
         pose=RigidTransform(x, y, theta),
         covariance=covariance,
         wall_sigma=math.sqrt(variance),
@@ -78,4 +83,42 @@ def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Sett
         free=parallel or spread > ONE_OF_MANY**2,
         parallel=parallel,
         hinges=without[:count],
+    )
+    views = context.scan.views
+    return alone if views is None or not views.uncertain else _with_views(context, best, views, alone)
+
+
+def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settled) -> Settled:
+    """Solve again for the errors of the views beside the pose.
+
+    Without one of its walls the pose cannot be known better than with it.
+    """
+    on = best.matches["wall"][context.lines.sightings["row"]]
+    seen, on = context.lines.sightings[on >= 0], on[on >= 0]
+    if not len(seen):
+        return alone
+    shown, known = SeenOnWalls(views, seen, context.index.walls.rows[on], on), context.index.sigma
+    if known is None:
+        found = shown.estimate(alone.pose)
+        variance = found.wall_variance
+    else:
+        variance = max(known**2, LEAST_KNOWN_VARIANCE)
+        found = shown.settle(alone.pose, variance)
+    loose = shown.settle(found.pose, max(variance, COMMON_WALL_ERROR**2)).covariance
+    values, vectors = np.linalg.eigh(loose[:2, :2])
+    dx, dy = vectors[:, 1].tolist()
+    sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
+    weakest = math.sqrt(max(0.0, float(values[1])))
+    hinges = alone.hinges.copy()
+    hinges["deviation"] = np.maximum(hinges["deviation"], weakest)
+    return replace(
+        alone,
+        pose=found.pose,
+        covariance=found.covariance,
+        wall_sigma=math.sqrt(variance),
+        weakest=weakest,
+        direction=(sign * dx, sign * dy),
+        free=alone.parallel or float(np.linalg.eigvalsh(found.covariance[:2, :2])[1]) > ONE_OF_MANY**2,
+        hinges=hinges,
+        views=found,
     )

@@ -36,9 +36,8 @@ def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
         return ()
     index = context.index
     pieces = missing_pieces(
-        context.lines.rows, best.matches, context.view, best.estimate, index.tables.place, index.pieces,
-        context.workspace,
-    )  # fmt: skip
+        context.sights, best.matches, best.estimate, index.tables.place, index.pieces, context.workspace
+    )
     return tuple(sorted(set((pieces % index.directed).tolist())))
 
 
@@ -47,7 +46,7 @@ def agreement(context: SearchContext, best: Ranked) -> float:
     if context.scan.viewpoint is None:
         return NEUTRAL
     pose, place = best.estimate, context.index.tables.place
-    return float(agreement_at(context.lines.rows, context.view, pose, place, context.workspace))
+    return float(agreement_at(context.sights, pose, place, context.workspace))
 
 
 def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
@@ -56,5 +55,5 @@ def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
         return BeamShares()
     pose, place = settled.pose, context.index.tables.place
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
-    farther, nearer = beam_shares(rays_of(context, COMPARED_BEAMS), context.view, at, place, context.workspace)
+    farther, nearer = beam_shares(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)
     return BeamShares(farther, nearer)

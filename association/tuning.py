@@ -38,7 +38,8 @@ CELL_GROWTH = 1.25  # by which cells grow until their lists fit
 CUT_LATERAL = 1e-4  # m, rounding
 CUT_COSINE = 1.0 - 1e-7  # rounding: some 0.03 degrees
 LINE_LATERAL = 0.04  # m, tables; how far the middle of one may lie beside the line of another,
-LINE_COSINE = math.cos(math.radians(2.5))  # tables; of the angle between them,
+LINE_ANGLE = math.radians(2.5)  # tables; the angle between them,
+LINE_COSINE = math.cos(LINE_ANGLE)
 LINE_GAP = 0.3  # m, geometry: as for walls; and along it
 # What no sigma that is sent accounts for: maps drawn or built with some slack, walls that are not quite straight.
 MODEL_OFFSET = 0.02  # m, tables; of a wall as a whole,
@@ -47,6 +48,21 @@ MODEL_ANGLE = math.radians(0.6)  # tables
 # Roughness of a wall and bias of the ranges shift neighbouring points together: no number of points averages it out. It
 # decides the angle of short segments, which come with raw ranges.
 COMMON_ERROR = 0.008  # m, tables
+# Of several views whose poses are not exact: by how many standard deviations more lines of two may lie apart that are
+# one, and up to how far.
+VIEW_SIGMAS = 1.5  # tables
+MOST_LATERAL = 0.12  # m, tables
+MOST_TURN = math.radians(6.0)  # tables
+# Views laid on one another before the search.
+ALIGNING_ROUNDS = 3  # tables
+ALIGNED_LINES = 40  # tables; of a view, the longest
+ALIGNED_VIEWS = 8  # tables; that many views before it a view is laid on
+LEAST_ALIGNED = 0.4  # m, tables; that two lines which are one have in common, or half of the shorter
+MOST_APART = 0.6  # m, tables; by which they lie apart at most,
+MOST_TURNED = 0.3  # sine, tables; and by which they are turned
+SAME_LINE = 0.08  # m, tables; two lines of one view that are farther apart cannot both be the line of another
+ALIGNING_SHARE = 0.5  # tables; of its information that a seam counts with: seams of one wall have errors in common
+VIEW_ROUNDS = 6  # tables; of solving for a pose and the errors of its views
 # What finding a segment on a wall is worth against its being clutter: a share of its own, and one by length.
 GAIN = 6.0  # nats, tables
 GAIN_PER_METRE = 2.0  # nats, tables

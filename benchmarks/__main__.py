@@ -22,6 +22,7 @@ from .ranges import ranges
 from .request import request
 from .sums import sums
 from .table import Row, machine, print_rows
+from .views import views
 from .worlds import worlds
 
 DEFAULT = ("localization", "estimators", "lookalikes")
@@ -109,6 +110,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "worlds": worlds,
     "imports": imports,
     "batch": batch,
+    "views": views,
 }
 
 

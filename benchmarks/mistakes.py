@@ -8,8 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from association import AssociationResult, MapIndex, Scan, associate
-from association.causes import scaled, turned_round
-from association.null import mirrored
+from association.scan import mirrored, scaled, turned_round
 
 from .collection import Collection, MapKey, Query
 from .outcomes import OPTIONS, WARM_UP, other_map

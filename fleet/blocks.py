@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from association import Beams, Scan
+from association import Scan
 from registration import MeasuredSegments, Segments
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
@@ -101,7 +101,7 @@ class Row:
             math.inf if farthest is None else farthest,
         )
         found = vectorize(laser, VectorizationOptions(sigma=self._number("sigma")))
-        return Scan(found.measured, (0.0, 0.0), Beams(found.angles, found.ranges, found.range_max))
+        return Scan(found.measured, (0.0, 0.0), found.beams)
 
     def _segments(self) -> Scan:
         try:

@@ -1,7 +1,7 @@
 """Laser ranges and ordered points to directed line segments."""
 
 from .errors import InvalidOptionError, InvalidScanError, VectorizationError
-from .laser import LaserScan
+from .laser import LaserScan, Motion
 from .options import VectorizationOptions
 from .vectorizer import Vectorization, vectorize
 
@@ -9,6 +9,7 @@ __all__ = [
     "InvalidOptionError",
     "InvalidScanError",
     "LaserScan",
+    "Motion",
     "Vectorization",
     "VectorizationError",
     "VectorizationOptions",

@@ -17,6 +17,37 @@ from .kernels.rays import clean
 MIN_INCREMENT = 1e-6  # rad; neighbouring beams closer than that are one
 
 
+MOST_TURN = 0.5  # of the step from beam to beam, that the sensor itself may turn meanwhile
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How a sensor moved while it scanned: a constant twist in its own frame.
+
+    Attributes
+    ----------
+    time_increment : float
+        From beam to beam, seconds.
+    vx, vy : float
+        m/s.
+    omega : float
+        rad/s.
+    """
+
+    time_increment: float
+    vx: float
+    vy: float
+    omega: float
+
+    def places(self, count: int) -> Floats:
+        """Return where the sensor was at each of `count` beams, (count, 3) x, y, theta; the first is at the origin."""
+        t = self.time_increment * np.arange(count, dtype=np.float64)
+        turned = self.omega * t
+        ahead = t * np.sinc(turned / math.pi)  # sin(omega t) / omega
+        aside = t * np.sin(0.5 * turned) * np.sinc(0.5 * turned / math.pi)  # (1 - cos(omega t)) / omega
+        return np.stack([self.vx * ahead - self.vy * aside, self.vx * aside + self.vy * ahead, turned], axis=1)
+
+
 @dataclass(frozen=True, slots=True, init=False, eq=False)
 class LaserScan:
     """Ranges over evenly spaced angles, as REP-117 has them.
@@ -33,6 +64,8 @@ class LaserScan:
     range_min, range_max : float
         Metres. Ranges above `range_max` mean that nothing came back, those below `range_min` and those not above 0 that
         nothing is known; a `range_max` of inf lets any range up to 10 km stand.
+    motion : Motion or None
+        Of the sensor while it scanned; the scan frame is where it was at the first beam.
 
     Raises
     ------
@@ -45,6 +78,7 @@ class LaserScan:
     ranges: Floats = field(repr=False)
     range_min: float = 0.0
     range_max: float = math.inf
+    motion: Motion | None = None
 
     def __init__(
         self,
@@ -53,6 +87,7 @@ class LaserScan:
         ranges: ArrayLike,
         range_min: float = 0.0,
         range_max: float = math.inf,
+        motion: Motion | None = None,
     ) -> None:
         values = _numbers(ranges)
         m = len(values)
@@ -69,6 +104,9 @@ class LaserScan:
             raise InvalidScanError(f"expected from 0 up, got {range_min!r}", argument="range_min")
         if not range_max > range_min:
             raise InvalidScanError(f"expected above range_min, got {range_max!r}", argument="range_max")
+        if motion is not None and abs(motion.omega * motion.time_increment) > MOST_TURN * abs(angle_increment):
+            raise InvalidScanError("the sensor turns nearly as fast as it scans", argument="twist")
+        object.__setattr__(self, "motion", motion)
         object.__setattr__(self, "angle_min", float(angle_min))
         object.__setattr__(self, "angle_increment", float(angle_increment))
         object.__setattr__(self, "ranges", values)
@@ -79,6 +117,12 @@ class LaserScan:
     def angles(self) -> Floats:
         """The beams' angles, ``(m,)`` radians, not wrapped."""
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
+
+    @property
+    def places(self) -> Floats:
+        """Where the sensor was at each beam, ``(m, 3)`` x, y, theta in the scan frame; metres and radians."""
+        m = len(self.ranges)
+        return np.zeros((m, 3)) if self.motion is None else self.motion.places(m)
 
     @property
     def cleaned(self) -> Floats:
@@ -92,8 +136,9 @@ class LaserScan:
         """Return the measured points in the scan frame, ``(k, 2)`` metres, beams without a range left out."""
         r = self.cleaned
         seen = np.isfinite(r)
-        a = self.angles[seen]
-        return np.stack([r[seen] * np.cos(a), r[seen] * np.sin(a)], axis=1)
+        places = self.places[seen]
+        a = self.angles[seen] + places[:, 2]
+        return places[:, :2] + np.stack([r[seen] * np.cos(a), r[seen] * np.sin(a)], axis=1)
 
 
 def _numbers(ranges: ArrayLike) -> Floats:

@@ -15,7 +15,7 @@ from registration.limits import MAX_BEAMS, MAX_COORDINATE, MAX_LENGTH
 from .errors import InvalidScanError
 from .kernels.rays import gather, place, quantum, ray_noise, window_noise
 from .kernels.tracing import describe, trace
-from .laser import LaserScan
+from .laser import LaserScan, Motion
 from .layout import FITTED, SCANNER
 from .options import VectorizationOptions
 from .tuning import (
@@ -60,6 +60,14 @@ class Vectorization:
     spans: Indices = field(repr=False)
     beams: Beams | None = field(default=None, repr=False)
 
+    @property
+    def viewpoint(self) -> tuple[float, float]:
+        """Where the segments were seen from, metres: the middle of the way, of a scanner that moved."""
+        if self.beams is None or self.beams.origins is None or not len(self.beams.origins):
+            return 0.0, 0.0
+        x, y = self.beams.origins.mean(axis=0).tolist()
+        return x, y
+
 
 def vectorize(
     scan: LaserScan | ArrayLike,
@@ -73,8 +81,8 @@ def vectorize(
     running sums. The lines are then fitted by maximum likelihood under noise along the rays, extended over the points
     that lie on them, and cut at the corner with their neighbour where it lies between the two's nearest rays.
 
-    The scan is taken to come from one place at one time: skew by the robot's motion during a sweep is not undone, and
-    is the caller's to undo.
+    Points are taken to come from one place at one time. Of ranges with a `Motion` each beam is taken to where the
+    sensor was; then they are points that are seen from the middle of its way.
 
     Parameters
     ----------
@@ -104,6 +112,8 @@ def vectorize(
 
 
 def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization:
+    if scan.motion is not None:
+        return _from_moving_laser(scan, scan.motion, options)
     angles = scan.angles
     increment = abs(scan.angle_increment)
     closed = increment * len(angles) > math.tau - 0.5 * increment
@@ -113,6 +123,24 @@ def _from_laser(scan: LaserScan, options: VectorizationOptions) -> Vectorization
     lines = _trace(points, increment, closed, sigma, options)
     measured, rms = _measured(lines, (0.0, 0.0))
     return Vectorization(measured, rms, sigma, order[_spans(lines)], Beams(angles, ranges, scan.range_max))
+
+
+def _from_moving_laser(scan: LaserScan, motion: Motion, options: VectorizationOptions) -> Vectorization:
+    ranges, places = scan.cleaned, scan.places
+    angles, origins = scan.angles + places[:, 2], np.ascontiguousarray(places[:, :2])
+    step = scan.angle_increment + motion.omega * motion.time_increment
+    # Overlapping or apart by the turn, its two ends do not meet.
+    order, as_read = gather(ranges, np.cos(angles), np.sin(angles), step < 0.0, False)
+    middle = origins.mean(axis=0) if len(origins) else np.zeros(2)
+    seen = np.stack([as_read["x"], as_read["y"]], axis=1) + origins[order] - middle
+    points = place(seen, np.hypot(seen[:, 0], seen[:, 1]))
+    sigma = options.sigma or _estimated(ray_noise(points, abs(step)), as_read)
+    lines = _trace(points, abs(step), False, sigma, options)
+    spans = _spans(lines)
+    backward = _runs_backward(lines, points)
+    spans[backward] = spans[backward, ::-1]
+    measured, rms = _measured(lines, (float(middle[0]), float(middle[1])))
+    return Vectorization(measured, rms, sigma, order[spans], Beams(angles, ranges, scan.range_max, origins))
 
 
 def _from_viewed_points(places: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:

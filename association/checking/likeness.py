@@ -11,8 +11,9 @@ import numpy as np
 from registration import MeasuredSegments, RigidTransform, Segments, wrap_angle
 
 from ..map_index import MapIndex
-from ..options import AssociationOptions, Deadline, Scan
+from ..options import AssociationOptions, Deadline
 from ..result import AssociationResult
+from ..scan import Scan
 from ..search import associate
 from .looking import Looker, segments_of
 from .result import Finding, Place

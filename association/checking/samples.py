@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 
 from registration import RigidTransform
 
-from ..causes import Cause, Mistake, find_causes, scaled
+from ..causes import Cause, Mistake, find_causes
 from ..context import SearchContext
 from ..explain import explain
 from ..map_index import MapIndex
-from ..null import mirrored
-from ..options import AssociationOptions, Deadline, Scan
+from ..options import AssociationOptions, Deadline
 from ..report import report
 from ..result import AssociationResult
 from ..scaling import scale_near_one
+from ..scan import Scan, mirrored, scaled
 from ..verdict import judge
 from .tuning import (
     BETTER_SCALED,

@@ -7,7 +7,7 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
-from ..layout import BLOCKER, Blockers, Indices, Lines, Pieces, Place, Workspace
+from ..layout import BLOCKER, Blockers, Indices, Lines, Pieces, Place, Sights, Workspace
 from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT
 from .sight import count_blockers
 
@@ -131,20 +131,20 @@ def accept_matches(
 
 @kernel
 def missing_pieces(
-    scan: Records, matches: Records, view: Records, pose: Records, place: Place, pieces: Pieces, work: Workspace
+    sights: Sights, matches: Records, pose: Records, place: Place, pieces: Pieces, work: Workspace
 ) -> Indices:
     """List the pieces of walls that rays to the consensus set pass through, of which nothing was seen.
 
-    `view` and `pose` (1,).
+    `pose` (1,).
     """
     items = pieces.items
     piece_starts = pieces.starts
     blockers = Blockers(np.zeros(len(place.walls), dtype=BLOCKER), np.empty(len(place.walls), dtype=np.int64))
     counts = blockers.counts
     touched = blockers.touched
-    passed = count_blockers(scan, matches, view[0], pose[0], place, blockers, work.scratch[0].ray)
+    passed = count_blockers(sights, matches, pose[0], place, blockers, work.scratch[0].ray)
     # A wall that holds part of the consensus set was seen, and at a grazing angle rays to its neighbour pass its end.
-    for i in range(len(scan)):
+    for i in range(len(matches)):
         w = matches[i].wall
         if w >= 0:
             counts[w].to_matched = 0

@@ -7,7 +7,7 @@ import numpy as np
 from registration.compiling import kernel
 from registration.layout import Floats, Records
 
-from ..layout import Flags, Place, Workspace
+from ..layout import Flags, Place, Sights, Workspace
 from ..tuning import (
     AGREEING,
     AGREEING_SHARE,
@@ -79,11 +79,11 @@ def in_view(distances: Floats, view: Flags) -> None:
 
 
 @kernel
-def agreement(scan: Records, view: Records, pose: Records, place: Place, work: Workspace) -> float:
+def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> float:
     """Return of the directions that tell something the share in which the scan shows what the map does, 0 to 1.
 
-    Rays from the sensor. For: the first segment and the first wall are as far away. Against: the wall is before the
-    segment, or there is none where the wall should have left one. What stands before a wall tells nothing. `view` and
+    Rays from the sensor of each view. For: the first segment and the first wall are as far away. Against: the wall is
+    before the segment, or there is none where the wall should have left one. What stands before a wall tells nothing.
     `pose` (1,).
     """
     walls = place.walls
@@ -91,40 +91,42 @@ def agreement(scan: Records, view: Records, pose: Records, place: Place, work: W
     items = place.grid.items
     shape = place.grid.shape[0]
     ray = work.scratch[0].ray
-    sensor = view[0]
     at = pose[0]
     distances = np.empty(RAYS)
-    seen = np.empty(RAYS, dtype=np.bool_)
-    farthest = scan_distances(scan, sensor.x, sensor.y, distances)
-    in_view(distances, seen)
+    looked = np.empty(RAYS, dtype=np.bool_)
     c = math.cos(at.theta)
     s = math.sin(at.theta)
-    ray.x = c * sensor.x - s * sensor.y + at.x
-    ray.y = s * sensor.x + c * sensor.y + at.y
-    ray.limit = max(FAR, FARTHER * farthest)
     agree = 0
     against = 0
-    for k in range(RAYS):
-        if not seen[k]:
-            continue
-        angle = 2.0 * math.pi * (k + 0.5) / RAYS + at.theta
-        dx = math.cos(angle)
-        dy = math.sin(angle)
-        ray.dx = dx
-        ray.dy = dy
-        reach, w = first_hit(ray, walls, starts, items, shape)
-        if w < 0:
-            continue
-        if distances[k] < math.inf:
-            tolerance = AGREEING + AGREEING_SHARE * distances[k]
-            if abs(distances[k] - reach) < tolerance:
-                agree += 1
-            elif reach < distances[k]:
+    for v in range(len(sights.places)):
+        sensor = sights.places[v]
+        seen = sights.seen[sights.starts[v] : sights.starts[v + 1]]
+        farthest = scan_distances(seen, sensor.x, sensor.y, distances)
+        in_view(distances, looked)
+        ray.x = c * sensor.x - s * sensor.y + at.x
+        ray.y = s * sensor.x + c * sensor.y + at.y
+        ray.limit = max(FAR, FARTHER * farthest)
+        for k in range(RAYS):
+            if not looked[k]:
+                continue
+            angle = 2.0 * math.pi * (k + 0.5) / RAYS + at.theta
+            dx = math.cos(angle)
+            dy = math.sin(angle)
+            ray.dx = dx
+            ray.dy = dy
+            reach, w = first_hit(ray, walls, starts, items, shape)
+            if w < 0:
+                continue
+            if distances[k] < math.inf:
+                tolerance = AGREEING + AGREEING_SHARE * distances[k]
+                if abs(distances[k] - reach) < tolerance:
+                    agree += 1
+                elif reach < distances[k]:
+                    against += 1
+            elif (
+                reach < min(farthest, MISSING_RANGE)
+                and walls[w].end - walls[w].begin > MISSING_LENGTH
+                and abs(walls[w].dx * dy - walls[w].dy * dx) > MISSING_SINE
+            ):
                 against += 1
-        elif (
-            reach < min(farthest, MISSING_RANGE)
-            and walls[w].end - walls[w].begin > MISSING_LENGTH
-            and abs(walls[w].dx * dy - walls[w].dy * dx) > MISSING_SINE
-        ):
-            against += 1
     return agree / (agree + against) if agree + against > 0 else NEUTRAL

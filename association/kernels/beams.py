@@ -43,16 +43,14 @@ def across_wall(
 
 
 @inlined
-def put_sensor(ray: Record, view: Record, pose: Record) -> None:
-    """Let a ray begin where the sensor is."""
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
-    ray.x = c * view.x - s * view.y + pose.x
-    ray.y = s * view.x + c * view.y + pose.y
+def put_sensor(ray: Record, at: Record, c: float, s: float, pose: Record) -> None:
+    """Let a ray begin where the sensor was; `c` and `s` are cosine and sine of the pose's heading."""
+    ray.x = c * at.x - s * at.y + pose.x
+    ray.y = s * at.x + c * at.y + pose.y
 
 
 @kernel
-def beam_evidence(rays: Rays, view: Record, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
+def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
     """Write the shares of the beams that read the wall they should, and that passed through one, to `evidence`.
 
     A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
@@ -60,16 +58,19 @@ def beam_evidence(rays: Rays, view: Record, pose: Record, place: Place, ray: Rec
     """
     angles = rays.angles
     ranges = rays.ranges
+    places = rays.places
     walls = place.walls
     starts = place.grid.starts
     items = place.grid.items
     shape = place.grid.shape[0]
-    put_sensor(ray, view, pose)
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
     read = 0.0
     passed = 0.0
     for i in range(len(angles)):
         if math.isinf(ranges[i]):
             continue
+        put_sensor(ray, places[i], c, s, pose)
         ray.limit = min(rays.reach, ranges[i] + BEHIND)
         across, w = across_wall(ray, pose.theta + angles[i], ranges[i], walls, starts, items, shape)
         if w < 0:
@@ -83,25 +84,28 @@ def beam_evidence(rays: Rays, view: Record, pose: Record, place: Place, ray: Rec
 
 
 @kernel
-def beam_shares(rays: Rays, views: Records, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
+def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
     """Return the shares of the beams that read farther, and nearer, than the map shows from the first pose.
 
-    Where the map shows nothing, and where nothing came back, nothing is compared. `views` and `poses` (1,).
+    Where the map shows nothing, and where nothing came back, nothing is compared. `poses` (1,).
     """
     angles = rays.angles
     ranges = rays.ranges
+    places = rays.places
     walls = place.walls
     starts = place.grid.starts
     items = place.grid.items
     shape = place.grid.shape[0]
     pose = poses[0]
     ray = work.scratch[0].ray
-    put_sensor(ray, views[0], pose)
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
     farther = 0
     nearer = 0
     for i in range(len(angles)):
         if math.isinf(ranges[i]):
             continue
+        put_sensor(ray, places[i], c, s, pose)
         ray.limit = min(rays.reach, ranges[i] + WALL_BEHIND)
         across, w = across_wall(ray, pose.theta + angles[i], ranges[i], walls, starts, items, shape)
         if w < 0:
@@ -115,7 +119,7 @@ def beam_shares(rays: Rays, views: Records, poses: Records, place: Place, work: 
 
 
 @kernel
-def refine_by_beams(rays: Rays, view: Record, pose: Record, place: Place, gate: float, work: Workspace) -> None:
+def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: Workspace) -> None:
     """Move `pose` to where the ends of the beams lie on the walls nearest to them, up to `gate` metres off.
 
     One round of point-to-line least squares by the same sums; a point is a pair without spread. A direction that no
@@ -123,6 +127,7 @@ def refine_by_beams(rays: Rays, view: Record, pose: Record, place: Place, gate: 
     """
     angles = rays.angles
     ranges = rays.ranges
+    places = rays.places
     walls = place.walls
     starts = place.grid.starts
     items = place.grid.items
@@ -135,8 +140,8 @@ def refine_by_beams(rays: Rays, view: Record, pose: Record, place: Place, gate: 
     for i in range(len(angles)):
         if math.isinf(ranges[i]):
             continue
-        px = view.x + ranges[i] * math.cos(angles[i])
-        py = view.y + ranges[i] * math.sin(angles[i])
+        px = places[i].x + ranges[i] * math.cos(angles[i])
+        py = places[i].y + ranges[i] * math.sin(angles[i])
         x = c * px - s * py + pose.x
         y = s * px + c * py + pose.y
         fx = (x - shape.x0) / shape.cell
@@ -167,24 +172,22 @@ def refine_by_beams(rays: Rays, view: Record, pose: Record, place: Place, gate: 
 
 
 @kernel
-def weigh_beams(
-    rays: Rays, view: Records, poses: Records, place: Place, refined: int, work: Workspace, out: Records
-) -> None:
-    """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`. `view` (1,).
+def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Workspace, out: Records) -> None:
+    """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.
 
     The first `refined` poses are moved to where the beams fit best, if they fit better there.
     """
     moved = work.scratch[0].estimate
     evidence = work.scratch[0].evidence
     for k in range(len(poses)):
-        beam_evidence(rays, view[0], poses[k], place, work.scratch[0].ray, out[k])
+        beam_evidence(rays, poses[k], place, work.scratch[0].ray, out[k])
         if k < refined:
             moved.theta = poses[k].theta
             moved.x = poses[k].x
             moved.y = poses[k].y
             for gate in BEAM_GATES:
-                refine_by_beams(rays, view[0], moved, place, gate, work)
-            beam_evidence(rays, view[0], moved, place, work.scratch[0].ray, evidence)
+                refine_by_beams(rays, moved, place, gate, work)
+            beam_evidence(rays, moved, place, work.scratch[0].ray, evidence)
             if evidence.read > out[k].read and evidence.passed <= out[k].passed + PASSED_SLACK:
                 out[k].read = evidence.read
                 out[k].passed = evidence.passed

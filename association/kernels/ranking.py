@@ -8,7 +8,7 @@ from registration.compiling import kernel
 from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Floats, Records
 
-from ..layout import BLOCKER, Blockers, Integers, Place, Question, Workspace
+from ..layout import BLOCKER, Blockers, Integers, Place, Question, Sights, Workspace
 from ..tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
 from .consensus import one_step_cost, refine
 from .matching import wrap
@@ -19,7 +19,7 @@ from .sight import count_blockers, sight_penalty
 def rank(
     question: Question,
     place: Place,
-    view: Records,
+    sights: Sights,
     estimates: Records,
     merits: Records,
     matches: Records,
@@ -27,12 +27,13 @@ def rank(
 ) -> None:
     """Refine the candidate poses of `estimates` (k,) in place and score them with the lines of sight.
 
-    The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). `view` (1,).
+    The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). Where there are no sights
+    there are no lines of sight.
     """
     scan = question.scan
     terms = question.terms[0]
     sums = work.scratch[0].sums
-    sighted = view[0].sighted
+    sighted = len(sights.seen) > 0
     blockers = Blockers(np.zeros(len(place.walls), dtype=BLOCKER), np.empty(len(place.walls), dtype=np.int64))
     best = 0.0
     length = 0.0
@@ -66,7 +67,7 @@ def rank(
         merit.misfit /= max(1, count)
         # The candidates come best first: what is far behind is no rival, its score may stay too good.
         if sighted and merit.score > best - FAR_BEHIND:
-            count = count_blockers(scan, matches[k], view[0], one, place, blockers, work.scratch[0].ray)
+            count = count_blockers(sights, matches[k], one, place, blockers, work.scratch[0].ray)
             merit.blocked = sight_penalty(blockers, count, place.walls)
             merit.score -= merit.blocked
             best = max(best, merit.score)

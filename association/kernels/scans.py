@@ -114,6 +114,8 @@ def join_segments(measured: Measured, order: Integers, labels: Integers, counted
         line.spread = measured.spreads[first]
         line.points = measured.points[first]
         line.variance = measured.sigma[first] ** 2 / line.points
+        line.common_offset = 0.0
+        line.common_angle = 0.0
         if starts[k + 1] - starts[k] > 1:
             join(measured, members[starts[k] : starts[k + 1]], line)
         if not counted and line.points < LEAST_POINTS:
@@ -239,12 +241,19 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
         one.centroid_x = line.centroid_x
         one.centroid_y = line.centroid_y
         one.spread = line.spread
-        one.offset_variance = max(given.least_offset, line.variance + given.map + MODEL_OFFSET**2)
-        one.angle_variance = max(given.least_angle, (line.variance + given.common) / spread + MODEL_ANGLE**2)
-        one.weight = 1.0 / max(line.variance + ROUGHNESS**2, given.least_angle * spread)
+        offset = line.variance + given.map + MODEL_OFFSET**2
+        angle = (line.variance + given.common) / spread + MODEL_ANGLE**2
+        one.offset_variance = max(given.least_offset, offset + line.common_offset)
+        one.angle_variance = max(given.least_angle, angle + line.common_angle)
+        common = max(line.common_offset, line.common_angle * spread)
+        one.weight = 1.0 / max(line.variance + ROUGHNESS**2 + common, given.least_angle * spread)
         one.gain = GAIN + GAIN_PER_METRE * min(line.covered, GAIN_LENGTH)
+        if common > 0.0:
+            # Wider gates are met by chance more often: what a match tells less for that.
+            one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_offset / offset))
+            one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_angle / angle))
         one.later_gain = later
-        one.plain_variance = max(LEAST_VARIANCE, line.variance + given.map)
+        one.plain_variance = max(LEAST_VARIANCE, line.variance + given.map + line.common_offset)
         one.freedom = freedom_alone(one, model[0], alone[0])
         later += one.gain
     keep_alive(alone)

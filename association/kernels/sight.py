@@ -5,7 +5,7 @@ import math
 from registration.compiling import kernel
 from registration.layout import Record, Records
 
-from ..layout import Blockers, Integers, Place
+from ..layout import Blockers, Integers, Place, Sights
 from ..tuning import (
     BLOCKED,
     BLOCKED_CLUTTER,
@@ -82,13 +82,15 @@ def first_hit(ray: Record, walls: Records, starts: Integers, items: Integers, sh
 
 @kernel
 def count_blockers(
-    scan: Records, matches: Records, view: Record, pose: Record, place: Place, blockers: Blockers, ray: Record
+    sights: Sights, matches: Records, pose: Record, place: Place, blockers: Blockers, ray: Record
 ) -> int:
-    """Count for every wall the rays to segments that pass through it well before their end.
+    """Count for every wall the rays to segments, from where each was seen, that pass through it well before their end.
 
-    `blockers` counts nothing before. Returns how many walls that are, listed in ``blockers.touched``.
+    `matches` by row of the scan. `blockers` counts nothing before. Returns how many walls that are, listed in
+    ``blockers.touched``.
     """
     walls = place.walls
+    places = sights.places
     starts = place.grid.starts
     items = place.grid.items
     shape = place.grid.shape[0]
@@ -97,18 +99,20 @@ def count_blockers(
     count = 0
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
-    x = c * view.x - s * view.y + pose.x
-    y = s * view.x + c * view.y + pose.y
-    ray.x = x
-    ray.y = y
-    for i in range(len(scan)):
-        length = scan[i].length
+    seen = sights.seen
+    for i in range(len(seen)):
+        view = places[seen[i].sensor]
+        x = c * view.x - s * view.y + pose.x
+        y = s * view.x + c * view.y + pose.y
+        ray.x = x
+        ray.y = y
+        length = seen[i].length
         rays = min(MAX_RAYS, max(1, math.ceil(length / RAY_SPACING)))
         usable = max(0.0, length - 2.0 * END_MARGIN)
         for k in range(rays):
             along = ((k + 0.5) / rays - 0.5) * usable
-            px = scan[i].x + along * scan[i].dx
-            py = scan[i].y + along * scan[i].dy
+            px = seen[i].x + along * seen[i].dx
+            py = seen[i].y + along * seen[i].dy
             gx = c * px - s * py + pose.x - x
             gy = s * px + c * py + pose.y - y
             distance = math.sqrt(gx * gx + gy * gy)
@@ -122,7 +126,7 @@ def count_blockers(
                     if counts[w].to_matched + counts[w].to_clutter == 0:
                         touched[count] = w
                         count += 1
-                    if matches[i].wall >= 0:
+                    if matches[seen[i].row].wall >= 0:
                         counts[w].to_matched += 1
                     else:
                         counts[w].to_clutter += 1

@@ -25,9 +25,9 @@ from .sight import first_hit
 def shown_walls(
     view: Record, pose: Record, place: Place, reach: float, ray: Record, lows: Floats, highs: Floats
 ) -> None:
-    """Write for each wall the abscissae between which it is seen from a pose, `lows` above `highs` for one that is not.
+    """Widen for each wall the abscissae between which it is seen, `lows` above `highs` where it is not, by one view.
 
-    Both (m,), by wall. Rays from the sensor of `view`, as far as `reach` metres.
+    Both (m,), by wall. Rays from where the sensor stands at a pose, as far as `reach` metres.
     """
     walls = place.walls
     starts = place.grid.starts
@@ -38,8 +38,6 @@ def shown_walls(
     ray.x = c * view.x - s * view.y + pose.x
     ray.y = s * view.x + c * view.y + pose.y
     ray.limit = reach
-    lows[:] = math.inf
-    highs[:] = -math.inf
     for k in range(RAYS):
         angle = 2.0 * math.pi * (k + 0.5) / RAYS
         ray.dx = math.cos(angle)
@@ -85,15 +83,17 @@ def mirror_walls(pose: Record, walls: Records, lows: Floats, highs: Floats) -> R
 
 @kernel
 def mirrored_share(
-    view: Records, pose: Records, reach: float, null: Records, gates: Records, place: Place, work: Workspace
+    views: Records, pose: Records, reach: float, null: Records, gates: Records, place: Place, work: Workspace
 ) -> float:
-    """Return how much of what the map shows from `pose` it shows mirrored from `null`, 0 to 1; all (1,).
+    """Return how much of what the map shows from `pose` it shows mirrored from `null`, 0 to 1; both (1,).
 
-    The share of the gains of the walls that are seen, each matched as a scan line would be.
+    Seen from the places (v,) of `views` together: the share of the gains of the walls that are seen, each matched as a
+    scan line would be.
     """
-    lows = np.empty(len(place.walls))
-    highs = np.empty(len(place.walls))
-    shown_walls(view[0], pose[0], place, reach, work.scratch[0].ray, lows, highs)
+    lows = np.full(len(place.walls), math.inf)
+    highs = np.full(len(place.walls), -math.inf)
+    for v in range(len(views)):
+        shown_walls(views[v], pose[0], place, reach, work.scratch[0].ray, lows, highs)
     lines = mirror_walls(pose[0], place.walls, lows, highs)
     matches = np.zeros(len(lines), dtype=MATCH)
     total = 0.0

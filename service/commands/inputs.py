@@ -25,7 +25,7 @@ STDIN = "-"
 MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's business
 _ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
-_FORMS = ("laser", "points", "segments")
+_FORMS = ("laser", "points", "segments", "views")
 
 
 def read_json(name: str) -> Any:

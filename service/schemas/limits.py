@@ -23,6 +23,10 @@ class Limits:
         Correspondences, or weights, of one registration.
     batch : int
         Scans of one batch.
+    views : int
+        Of one scan.
+    beams_together, segments_together : int
+        Ranges or points, and segments, of all views of one scan.
     """
 
     values: int
@@ -31,3 +35,6 @@ class Limits:
     beams: int
     pairs: int
     batch: int
+    views: int = 64
+    beams_together: int = 100_000
+    segments_together: int = 10_000

@@ -27,11 +27,11 @@ EVERYTHING: tuple[IncludeName, ...] = ("correspondences", "alternatives", "segme
 
 # Union tags; in brackets, so that no field of a request is ever taken for one.
 INLINE, STORED = "<inline>", "<stored>"
-BY_SEGMENTS, BY_LASER, BY_POINTS = "<segments>", "<laser>", "<points>"
+BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS = "<segments>", "<laser>", "<points>", "<views>"
 SOFT, HARD = "<soft>", "<hard>"
 _BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta"))
-_BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint"))
-TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, SOFT, HARD))
+_BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint", "twist"))
+TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS, SOFT, HARD))
 
 
 class MapDocument(Strict):
@@ -157,10 +157,29 @@ class Laser(Strict):
         None, description="metres; a range of exactly this is a return"
     )
     header: Header | None = Field(None, description="of a LaserScan message")
-    angle_max: Any = Field(None, description="of a LaserScan message; taken and not used, as the next three")
-    time_increment: Any = None
+    time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
+        None, description="seconds from beam to beam; with a `twist` every beam is taken to where the sensor was"
+    )
+    angle_max: Any = Field(None, description="of a LaserScan message; taken and not used, as the next two")
     scan_time: Any = None
     intensities: Any = None
+
+
+Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
+
+
+class Twist(Strict):
+    """How a sensor moves while it scans: a constant velocity in its own frame."""
+
+    vx: Speed = Field(description="m/s")
+    vy: Speed = Field(0.0, description="m/s")
+    omega: Speed = Field(description="rad/s, counter-clockwise")
+
+
+def require_times(laser: Laser, twist: Twist | None) -> None:
+    """Refuse a motion of which it is not known when each beam was measured."""
+    if twist is not None and laser.time_increment is None:
+        raise PydanticCustomError("twist", "a twist needs the laser's time_increment")
 
 
 class LaserScan(_Scan):
@@ -168,6 +187,9 @@ class LaserScan(_Scan):
 
     laser: Laser
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+    twist: Twist | None = Field(
+        None, description="how the sensor moved meanwhile, in its own frame; the pose is that at the first beam"
+    )
 
     @property
     def told_stamp(self) -> Any:
@@ -186,6 +208,7 @@ class LaserScan(_Scan):
     @model_validator(mode="after")
     def _from_the_sensor(self) -> LaserScan:
         require_at_the_sensor(self.viewpoint)
+        require_times(self.laser, self.twist)
         return self
 
 
@@ -196,7 +219,8 @@ class PointScan(_Scan):
     sigma: RaySigma | None = Field(None, description="of single points, metres; null: estimated")
 
 
-def _scan_kind(value: Any) -> str | None:
+def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None:
+    """Return the form of a scan, or of a view, by its fields; None where it has several, or none."""
     if not isinstance(value, dict):
         return BY_SEGMENTS
     if "laser" in value:
@@ -207,19 +231,7 @@ def _scan_kind(value: Any) -> str | None:
         return BY_POINTS
     if "ranges" in value:
         return BY_LASER  # without its `laser` around it
-    return BY_SEGMENTS if value.keys() - _BESIDE_A_SCAN else None
-
-
-AnyScan = Annotated[
-    Annotated[SegmentScan, Tag(BY_SEGMENTS)]
-    | Annotated[LaserScan, Tag(BY_LASER)]
-    | Annotated[PointScan, Tag(BY_POINTS)],
-    Discriminator(
-        _scan_kind,
-        custom_error_type="one_of",
-        custom_error_message="expected exactly one of segments, laser and points",
-    ),
-]
+    return BY_SEGMENTS if value.keys() - beside else None
 
 
 class SoftPriorFields(Pose):

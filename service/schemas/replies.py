@@ -73,9 +73,17 @@ class RegisterAnswer(Answer):
     timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
 
 
+class SegmentOfView(Answer):
+    """A segment of a scan of several views."""
+
+    view: Index
+    scan: Index = Field(description="of that view's segments")
+
+
 class CorrespondenceAnswer(Residual):
     """A scan segment found on a map segment."""
 
+    view: Index | None = Field(None, description="of a scan of several views; `scan` is an index in it")
     overlap: Share = Field(description="share of the scan segment's length that lies on the map")
     alternatives: list[Index] = Field(description="other map segments that pass the gates")
 
@@ -94,7 +102,7 @@ class AlternativeAnswer(Answer):
 class HingeAnswer(Answer):
     """The wall that a pose hinges on."""
 
-    scan: list[Index]
+    scan: list[Index] | list[SegmentOfView]
     map: list[Index]
     direction: Row2 = Field(description="unit vector in the map frame")
     moves: float = Field(description="metres")
@@ -160,13 +168,17 @@ class FoundAnswer(Answer):
     child_frame_id: str = Field(description="the scan's")
     stamp: Any = Field(description="as sent")
     correspondences: list[CorrespondenceAnswer] = Field([], description="where included")
-    unmatched_scan: list[Index]
+    unmatched_scan: list[Index] | list[SegmentOfView] = Field(description="of several views with the view")
     missing_map: list[Index] = Field([], description="where included: map segments that should have been seen")
     diagnostics: AssociationDiagnosticsAnswer | None
     reasons: list[ReasonAnswer] = Field(description="why not usable, the weightiest first")
     alternatives: list[AlternativeAnswer] = Field([], description="where included: distinct poses, best first")
     search: SearchAnswer
-    segments: list[Row4] | None = Field(None, description="where included, and the scan came as ranges or points")
+    segments: list[Row4] | list[list[Row4] | None] | None = Field(
+        None,
+        description="where included, and the scan came as ranges or points; of several views one list each, in the "
+        "frame that they share",
+    )
     warnings: list[WarningAnswer]
 
 
@@ -275,7 +287,10 @@ class Limits(Answer):
     request_timeout: float = Field(description="seconds that a request may take to arrive, head and body")
     max_map_segments: int
     max_scan_segments: int
-    max_beams: int = Field(description="ranges or points of one scan")
+    max_beams: int = Field(description="ranges or points of one scan, or view")
+    max_views: int = Field(description="of one scan")
+    max_beams_together: int = Field(description="ranges or points of all views of one scan")
+    max_segments_together: int = Field(description="segments of all views of one scan")
     max_correspondences: int
     max_batch: int = Field(description="scans of one batch")
     max_deadline_ms: float = Field(description="and the deadline where none is asked for")

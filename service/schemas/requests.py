@@ -13,7 +13,6 @@ from .limits import Limits
 from .parts import (
     AnyMap,
     AnyPrior,
-    AnyScan,
     InlineMap,
     Laser,
     MeasuredFields,
@@ -22,6 +21,7 @@ from .parts import (
     require_at_the_sensor,
 )
 from .strict import FreeJson, Point, Pose, Sigma, Strict
+from .views import AnyScan
 
 
 class KnownMap(InlineMap):

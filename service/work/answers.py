@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,10 @@ from vectorization import Vectorization
 
 from ..maps import MapOutline
 from ..schemas.encoding import encode_list
+from .scanning import Scanned
 
 Json = dict[str, Any]
+Indices = NDArray[np.intp]
 
 
 def pose_json(pose: RigidTransform | None) -> Json | None:
@@ -73,10 +77,26 @@ def registration_json(result: RegistrationResult, pairs: NDArray[np.intp]) -> Js
     }
 
 
-def correspondence_json(pair: Correspondence) -> Json:
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """What segments of a scan are called: by their index, and of several views by the view and the index in it."""
+
+    starts: Indices | None
+
+    def fields(self, scan: int) -> Json:
+        if self.starts is None:
+            return {"scan": scan}
+        view = int(np.searchsorted(self.starts, scan, side="right")) - 1
+        return {"view": view, "scan": scan - int(self.starts[view])}
+
+    def listed(self, scans: Sequence[int]) -> list[Any]:
+        return list(scans) if self.starts is None else [self.fields(scan) for scan in scans]
+
+
+def correspondence_json(pair: Correspondence, named: _Names) -> Json:
     """Return an accepted pair."""
     return {
-        "scan": pair.scan,
+        **named.fields(pair.scan),
         "map": pair.map,
         "overlap": pair.overlap,
         "offset": pair.offset,
@@ -98,20 +118,31 @@ def alternative_json(other: Alternative) -> Json:
     }
 
 
-def hinge_json(hinge: Hinge | None) -> Json | None:
+def hinge_json(hinge: Hinge | None, named: _Names) -> Json | None:
     """Return the wall that a pose hinges on."""
     if hinge is None:
         return None
     return {
-        "scan": list(hinge.scan),
+        "scan": named.listed(hinge.scan),
         "map": list(hinge.map),
         "direction": list(hinge.direction),
         "moves": hinge.moves,
     }
 
 
-def association_json(result: AssociationResult, include: frozenset[str]) -> Json:
-    """Return the answer of a search, without the parts that were not asked for."""
+def segments_json(scanned: Scanned) -> list[Any] | None:
+    """Return the segments that the caller did not send; of several views one list each."""
+    if scanned.parts is None:
+        return None if scanned.segments is None else scanned.segments.tolist()
+    return [None if part is None else part.tolist() for part in scanned.parts]
+
+
+def association_json(result: AssociationResult, include: frozenset[str], starts: Indices | None = None) -> Json:
+    """Return the answer of a search, without the parts that were not asked for.
+
+    Of several views `starts` says which segment is the first of each; segments are then named by view and index.
+    """
+    named = _Names(starts)
     diagnostics = result.diagnostics
     search = result.search
     answer: Json = {
@@ -122,7 +153,7 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
         "pose": pose_json(result.pose),
         "covariance": matrix_json(result.covariance),
         "unobservable": direction_json(result.unobservable),
-        "unmatched_scan": list(result.unmatched_scan),
+        "unmatched_scan": named.listed(result.unmatched_scan),
         "diagnostics": None
         if diagnostics is None
         else {
@@ -132,7 +163,7 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
             "runner_up": diagnostics.runner_up,
             "margin": diagnostics.margin,
             "significance": diagnostics.significance,
-            "hinges_on": hinge_json(diagnostics.hinges_on),
+            "hinges_on": hinge_json(diagnostics.hinges_on, named),
         },
         "reasons": [{"code": reason.code, "message": reason.message} for reason in result.reasons],
         "search": {
@@ -149,7 +180,7 @@ def association_json(result: AssociationResult, include: frozenset[str]) -> Json
         "warnings": [{"code": warning.code, "message": warning.message} for warning in result.warnings],
     }
     if "correspondences" in include:
-        answer["correspondences"] = [correspondence_json(pair) for pair in result.correspondences]
+        answer["correspondences"] = [correspondence_json(pair, named) for pair in result.correspondences]
     if "alternatives" in include:
         answer["alternatives"] = [alternative_json(other) for other in result.alternatives]
     if "missing_map" in include:

@@ -18,7 +18,7 @@ from ..schemas.encoding import encode
 from ..schemas.parts import InlineMap, SearchOptions
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..telemetry.metrics import Metrics
-from .answers import Json, association_json
+from .answers import Json, association_json, segments_json
 from .inputs import association_options_of, prior_of, scanned_of
 from .job import Done, Job
 
@@ -119,12 +119,12 @@ class Associator:
         result = associate(target.cached.index, scanned.scan, prior, how, deadline)
         seconds = time.perf_counter() - begun
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
-        answer = association_json(result, frozenset(options.include))
+        answer = association_json(result, frozenset(options.include), scanned.starts)
         answer["frame_id"] = target.cached.frame_id
         answer["child_frame_id"] = sought.scan.told_frame_id
         answer["stamp"] = sought.scan.told_stamp
         if "segments" in options.include:
-            answer["segments"] = None if scanned.segments is None else scanned.segments.tolist()
+            answer["segments"] = segments_json(scanned)
         return answer
 
     def find_for_batch(

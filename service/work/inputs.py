@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from association import AssociationOptions, HardPrior, Prior, Scan, SoftPrior
+from association import AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
 from registration import InvalidArgumentError, MeasuredSegments, RegistrationOptions, RigidTransform, Segments
 
 from ..maps.lookup import is_oriented
@@ -20,6 +20,7 @@ from ..schemas.parts import (
 )
 from ..schemas.requests import RegisterRequest
 from ..schemas.strict import Pose
+from ..schemas.views import LaserView, PointView, SegmentView, ViewsScan
 from .scanning import Scanned, scan_laser, scan_points, viewpoint_of
 
 
@@ -28,23 +29,53 @@ def transform_of(pose: Pose) -> RigidTransform:
     return RigidTransform(pose.x, pose.y, pose.theta)
 
 
-def measured_of(scan: MeasuredFields) -> MeasuredSegments:
-    """Return segments with what is known of their points."""
-    segments = Segments.from_array(scan.segments, argument="scan.segments")
+def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegments:
+    """Return segments with what is known of their points; `argument` is what errors call the scan."""
+    segments = Segments.from_array(scan.segments, argument=f"{argument}.segments")
     moments = None
     if scan.centroids is not None and scan.spreads is not None:
         moments = (scan.centroids, scan.spreads)
-    return MeasuredSegments.from_segments(segments, scan.sigma, scan.points, moments, argument="scan")
+    return MeasuredSegments.from_segments(segments, scan.sigma, scan.points, moments, argument=argument)
 
 
-def scanned_of(scan: SegmentScan | LaserScan | PointScan) -> Scanned:
+def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan) -> Scanned:
     """Return what the robot saw, whatever form it came in."""
+    if isinstance(scan, ViewsScan):
+        return _of_views(scan)
     viewpoint = viewpoint_of(scan.viewpoint)
     if isinstance(scan, LaserScan):
-        return scan_laser(scan.laser, scan.sigma, viewpoint)
+        return _vectorized(scan_laser(scan.laser, scan.sigma, viewpoint, scan.twist))
     if isinstance(scan, PointScan):
-        return scan_points(scan.points, scan.sigma, viewpoint)
+        return _vectorized(scan_points(scan.points, scan.sigma, viewpoint))
     return Scanned(Scan(measured_of(scan), viewpoint), None)
+
+
+def _vectorized(scan: Scan) -> Scanned:
+    return Scanned(scan, scan.measured.segments.endpoints)
+
+
+def _of_views(scan: ViewsScan) -> Scanned:
+    views = [_view_of(view, k) for k, view in enumerate(scan.views)]
+    together = assemble(views)
+    counts = np.array([len(view.scan.measured) for view in views])
+    starts = np.cumsum(counts) - counts
+    rows = np.split(together.measured.segments.endpoints, starts[1:])
+    sent = (isinstance(view, SegmentView) for view in scan.views)
+    parts = tuple(None if as_sent else own for own, as_sent in zip(rows, sent, strict=True))
+    return Scanned(together, None, parts, starts)
+
+
+def _view_of(view: SegmentView | LaserView | PointView, number: int) -> View:
+    """Return what one sensor saw, from where it stood."""
+    viewpoint, place = viewpoint_of(view.viewpoint), f"/scan/views/{number}"
+    if isinstance(view, LaserView):
+        seen = scan_laser(view.laser, view.sigma, viewpoint, view.twist, place)
+    elif isinstance(view, PointView):
+        seen = scan_points(view.points, view.sigma, viewpoint, place)
+    else:
+        seen = Scan(measured_of(view, f"scan.views.{number}"), viewpoint)
+    seen = mirrored(seen) if view.flipped else seen
+    return View(seen, transform_of(view.pose), view.covariance, view.relative_to)
 
 
 def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Scan
-from vectorization import LaserScan, Vectorization, VectorizationError, VectorizationOptions, vectorize
+from vectorization import LaserScan, Motion, Vectorization, VectorizationError, VectorizationOptions, vectorize
 
 from ..schemas.errors import Fault, InvalidRequestError
-from ..schemas.parts import Laser
+from ..schemas.parts import Laser, Twist
 
 Floats = NDArray[np.float64]
 Viewpoint = tuple[float, float] | None
@@ -28,50 +28,74 @@ def viewpoint_of(place: list[float] | None) -> Viewpoint:
 
 @dataclass(frozen=True, slots=True)
 class Scanned:
-    """A scan, and its segments where the caller did not send them."""
+    """A scan, and its segments where the caller did not send them.
+
+    Attributes
+    ----------
+    scan : Scan
+    segments : (n, 4), or None
+        Metres in the scan's frame; of several views None, see `parts`.
+    parts : tuple of (m, 4) or None, or None
+        Of several views the segments of each, likewise.
+    starts : (v,) or None
+        Which segment of the scan is the first of each view.
+    """
 
     scan: Scan
     segments: Floats | None
+    parts: tuple[Floats | None, ...] | None = None
+    starts: NDArray[np.intp] | None = None
 
 
-def vectorize_laser(laser: Laser, options: VectorizationOptions, places: tuple[str, str]) -> Vectorization:
+def vectorize_laser(
+    laser: Laser, options: VectorizationOptions, places: tuple[str, str], twist: Twist | None = None
+) -> Vectorization:
     """Return the segments in a turn of a scanner; `places` are the pointers of scan and options."""
     bounds = {
         name: value
         for name, value in (("range_min", laser.range_min), ("range_max", laser.range_max))
         if value is not None
     }
-    with _placed(f"{places[0]}/laser", places[1]):
-        return vectorize(LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, **bounds), options)
+    motion = None
+    if twist is not None and laser.time_increment:
+        motion = Motion(laser.time_increment, twist.vx, twist.vy, twist.omega)
+    with _placed(f"{places[0]}/laser", places):
+        scan = LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, motion=motion, **bounds)
+        return vectorize(scan, options)
 
 
 def vectorize_points(
     points: Floats, options: VectorizationOptions, viewpoint: Viewpoint, places: tuple[str, str]
 ) -> Vectorization:
     """Return the segments in ordered points; `places` are the pointers of scan and options."""
-    with _placed(*places):
+    with _placed(places[0], places):
         return vectorize(points, options, viewpoint)
 
 
-def scan_laser(laser: Laser, sigma: float | None, viewpoint: Viewpoint) -> Scanned:
+def scan_laser(
+    laser: Laser, sigma: float | None, viewpoint: Viewpoint, twist: Twist | None = None, place: str = "/scan"
+) -> Scan:
     """Return ranges as a scan; the single beams stay evidence."""
-    found = vectorize_laser(laser, VectorizationOptions(sigma=sigma), ("/scan", "/scan"))
-    beams = None if viewpoint is None else found.beams
-    return Scanned(Scan(found.measured, viewpoint, beams), found.measured.segments.endpoints)
+    found = vectorize_laser(laser, VectorizationOptions(sigma=sigma), (place, place), twist)
+    if viewpoint is None:
+        return Scan(found.measured, None)
+    return Scan(found.measured, found.viewpoint, found.beams)
 
 
-def scan_points(points: Floats, sigma: float | None, viewpoint: Viewpoint) -> Scanned:
+def scan_points(points: Floats, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan") -> Scan:
     """Return points in scanning order as a scan."""
-    found = vectorize_points(points, VectorizationOptions(sigma=sigma), viewpoint, ("/scan", "/scan"))
-    return Scanned(Scan(found.measured, viewpoint), found.measured.segments.endpoints)
+    found = vectorize_points(points, VectorizationOptions(sigma=sigma), viewpoint, (place, place))
+    return Scan(found.measured, viewpoint)
 
 
 @contextmanager
-def _placed(scan: str, options: str) -> Iterator[None]:
+def _placed(form: str, places: tuple[str, str]) -> Iterator[None]:
     """Say where in the request the argument is that the vectorizer refuses."""
     try:
         yield
     except VectorizationError as error:
-        place = f"{options if error.argument in _OPTIONS else scan}/{error.argument}"
+        scan, options = places
+        beside = {**dict.fromkeys(_OPTIONS, options), "twist": scan}
+        place = f"{beside.get(error.argument, form)}/{error.argument}"
         row = "" if error.index is None else f"/{error.index}"
         raise InvalidRequestError([Fault(place + row, error.message)]) from error

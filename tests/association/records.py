@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from association.layout import ESTIMATE, record
+from association.layout import ESTIMATE, POINT, SIGHTING, Rays, Sights, as_records, record
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 
@@ -35,3 +35,17 @@ def assert_records(got: Records, expected: Records, **tolerance: Any) -> None:
     assert got.dtype == expected.dtype
     for name in expected.dtype.names or ():
         np.testing.assert_allclose(got[name], expected[name], err_msg=name, **tolerance)
+
+
+def rays_of(angles: Floats, ranges: Floats, viewpoint: Any = (0.0, 0.0), reach: float = 20.0) -> Rays:
+    """Return beams that all begin at one place."""
+    return Rays(angles, ranges, as_records(POINT, np.tile(np.asarray(viewpoint, float), (len(angles), 1))), reach)
+
+
+def sights_of(scan: Records, viewpoint: Any = (0.0, 0.0), *, sighted: bool = True) -> Sights:
+    """Return the rows of a scan as one view saw them; without lines of sight where it is not `sighted`."""
+    seen = np.zeros(len(scan) if sighted else 0, SIGHTING)
+    for name in ("dx", "dy", "x", "y", "length") if sighted else ():
+        seen[name] = scan[name]
+    seen["row"] = np.arange(len(seen))
+    return Sights(record(POINT, x=viewpoint[0], y=viewpoint[1]), np.array([0, len(seen)]), seen)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, Beams, CancelledError, Deadline, MapIndex, Scan, associate
-from association.causes import UNITS, find_causes, scaled, turned_round
+from association.causes import UNITS, find_causes
 from association.explain import explain
-from association.null import mirrored
 from association.scaling import scale_near_one
+from association.scan import mirrored, scaled, turned_round
 from association.verdict import judge
 from association.warnings import warnings_of
 

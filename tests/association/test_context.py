@@ -34,16 +34,17 @@ def test_the_sigma_of_the_map_counts_in_the_scans_variances() -> None:
 @pytest.mark.parametrize(
     ("viewpoint", "beams", "expected"),
     [
-        ((0.5, -0.25), False, (0.5, -0.25, 1)),
-        (None, False, (0.0, 0.0, 0)),
-        ((0.5, -0.25), True, (0.5, -0.25, 0)),
+        ((0.5, -0.25), False, (True, True)),
+        (None, False, (False, False)),
+        ((0.5, -0.25), True, (True, False)),
     ],
 )
 def test_lines_of_sight_are_evidence_where_beams_are_not(
-    viewpoint: tuple[float, float] | None, beams: bool, expected: tuple[float, float, int]
+    viewpoint: tuple[float, float] | None, beams: bool, expected: tuple[bool, bool]
 ) -> None:
     context = context_of(ROOM_INDEX, scan_of(ENDS, viewpoint=viewpoint, beams=BEAMS if beams else None))
-    assert context.view[0].item() == expected
+    assert context.sights.places[0].item() == (viewpoint or (0.0, 0.0))
+    assert (len(context.sights.seen) > 0, len(context.lines_of_sight.seen) > 0) == expected
     assert context.with_beams is beams
 
 

@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from association import Beams, HardPrior, Scan, tuning
 from association.context import SearchContext
 from association.explain import Answer, explain
-from association.null import Null, mirrored, null_of
+from association.null import Null, null_of
 from association.report import report
+from association.scan import mirrored
 from association.verdict import judge
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats

@@ -14,13 +14,14 @@ from association import explain as explaining
 from association.candidates import Candidates, find_candidates
 from association.context import SearchContext
 from association.explain import explain
-from association.layout import FOUND, Rays
+from association.layout import FOUND
 from association.ranking import Ranked, rank_candidates
 from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LEAST_DISTINCT, MOST_BEAMS
 from registration import RigidTransform
 from registration.layout import Floats
 
 from .answers import explanations_of, ranked
+from .records import rays_of
 from .reference import beams as beams_twin
 from .reference import ranking as twin
 from .reference.best_poses import prior_value
@@ -167,9 +168,9 @@ def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
     found = ranked_at(context, INSIDE)[0]
     known = ~np.isnan(beams.ranges)
     step = math.ceil(known.sum() / MOST_BEAMS)
-    rays = Rays(beams.angles[known][::step], beams.ranges[known][::step], 20.0)
+    rays = rays_of(beams.angles[known][::step], beams.ranges[known][::step])
     place, here = index.tables.place, local(index, INSIDE)
-    moved, (reading, passed), _ = beams_twin.weigh_beams(rays, (0.0, 0.0), here, place)
+    moved, (reading, passed), _ = beams_twin.weigh_beams(rays, here, place)
     ((_, _, merit, _),) = twin.rank(context.lines.rows, [moved], None, place, context.gates, context.lines.model)
     expected = merit["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
     assert (found.read, found.passed) == pytest.approx((reading, passed), abs=1e-4)

@@ -58,6 +58,12 @@ async def limits(request: Request) -> Response:
     )
     more = ("max_batch", "max_deadline_ms", "searches", "queue")
     fixed = {"max_magnitude": 1e9, "min_segment_length": 1e-6, "max_segment_length": 1e4, "max_map_extent": 1e5}
+    held = settings.limits()
+    fixed |= {
+        "max_views": held.views,
+        "max_beams_together": held.beams_together,
+        "max_segments_together": held.segments_together,
+    }
     return json_response(encode({name: getattr(settings, name) for name in (*names, *more)} | fixed))
 
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import acceptance
-from association.layout import ENDS, MATCH, SCAN_LINE, VIEW, Lines, as_records, record
+from association.layout import ENDS, MATCH, SCAN_LINE, Lines, as_records
 from association.tuning import MAX_RIVALS
 
-from ..records import estimate_of
+from ..records import estimate_of, sights_of
 from ..reference import acceptance as twin
 from ..reference.matching import match_scan
 from ..scenes import context_of, index_of, local, pose, scan_of
@@ -134,7 +134,7 @@ def test_missing_pieces(seed: int) -> None:
     on_map = rng.random(len(d.scan)) < 0.8
     matches["wall"] = np.where(on_map, rng.integers(0, len(index.walls.rows), len(d.scan)), -1)
     viewpoint = rng.normal(size=2).tolist()
-    view, work = record(VIEW, x=viewpoint[0], y=viewpoint[1]), workspace_of(d.scan, index)
-    got = acceptance.missing_pieces(d.scan, matches, view, estimate_of(d.at), index.tables.place, index.pieces, work)
+    sights, work = sights_of(d.scan, viewpoint), workspace_of(d.scan, index)
+    got = acceptance.missing_pieces(sights, matches, estimate_of(d.at), index.tables.place, index.pieces, work)
     expected = twin.missing_pieces(d.scan, matches["wall"], viewpoint, d.at, index.walls.rows, index.pieces)
     assert sorted(got.tolist()) == expected

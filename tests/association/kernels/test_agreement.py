@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import agreement as comparing
-from association.layout import VIEW, Workspace, record
+from association.layout import Workspace
 from association.tuning import RAYS
 from registration import RigidTransform
 from registration.layout import Records
 
-from ..records import estimate_of
+from ..records import estimate_of, sights_of
 from ..reference import agreement as twin
 from ..reference.geometry import moved
 from ..scenes import context_of, local, pose, scan_of, seen
@@ -22,8 +22,8 @@ from .drawn import INDEX, MAZE, PLACE, SEEDS, drawn
 
 
 def agreement(scan: Records, viewpoint: np.ndarray, at: RigidTransform) -> float:
-    view = record(VIEW, x=viewpoint[0], y=viewpoint[1])
-    return comparing.agreement(scan, view, estimate_of(at), PLACE, Workspace.of(len(scan), len(PLACE.walls)))
+    work = Workspace.of(len(scan), len(PLACE.walls))
+    return comparing.agreement(sights_of(scan, viewpoint), estimate_of(at), PLACE, work)
 
 
 @given(SEEDS)
@@ -31,7 +31,7 @@ def agreement(scan: Records, viewpoint: np.ndarray, at: RigidTransform) -> float
 def test_scan_distances(seed: int) -> None:
     d = drawn(seed)
     (x, y), distances = d.rng.normal(size=2), np.zeros(RAYS)
-    farthest = comparing.scan_distances(d.scan, x, y, distances)
+    farthest = comparing.scan_distances(sights_of(d.scan).seen, x, y, distances)
     expected, reach = twin.scan_distances(d.scan, (x, y), RAYS)
     assert farthest == pytest.approx(reach)
     np.testing.assert_array_equal(np.isinf(distances), np.isinf(expected))

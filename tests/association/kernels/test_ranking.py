@@ -7,24 +7,26 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import ranking
-from association.layout import MATCH, MERIT, VIEW, Place, Question, Workspace, record
+from association.layout import MATCH, MERIT, Place, Question, Sights, Workspace
 from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_FAMILY
 from registration import RigidTransform
 from registration.layout import Records
 
-from ..records import assert_records, covariance_of, estimate_of, pose_of
+from ..records import assert_records, covariance_of, estimate_of, pose_of, sights_of
 from ..reference import ranking as twin
 from ..reference.geometry import moved
 from ..scenes import INSIDE, ROOM, context_of, index_of, local, pose, same_pose, scan_of, seen
 from .drawn import GATES, MODEL, PLACE, SEEDS, TERMS, drawn
 
 
-def ranked(scan: Records, poses: list[RigidTransform], view: Records, place: Place) -> tuple[Records, Records, Records]:
+def ranked(
+    scan: Records, poses: list[RigidTransform], sights: Sights, place: Place
+) -> tuple[Records, Records, Records]:
     """Return estimates, merits and matches."""
     estimates = np.concatenate([estimate_of(at, np.full((3, 3), 9.0)) for at in poses])
     merits, matches = np.zeros(len(poses), MERIT), np.zeros((len(poses), len(scan)), MATCH)
     work = Workspace.of(len(scan), len(place.walls))
-    ranking.rank(Question(scan, TERMS), place, view, estimates, merits, matches, work)
+    ranking.rank(Question(scan, TERMS), place, sights, estimates, merits, matches, work)
     return estimates, merits, matches
 
 
@@ -41,9 +43,9 @@ def test_rank(seed: int) -> None:
         d.near(0.01, 0.5, 0.5),
     ]
     viewpoint = d.rng.normal(size=2) * 0.2
-    for sighted in (0, 1):
-        view = record(VIEW, x=viewpoint[0], y=viewpoint[1], sighted=sighted)
-        estimates, merits, matches = ranked(d.scan, poses, view, PLACE)
+    for sighted in (False, True):
+        sights = sights_of(d.scan, viewpoint, sighted=sighted)
+        estimates, merits, matches = ranked(d.scan, poses, sights, PLACE)
         expected = twin.rank(d.scan, poses, viewpoint if sighted else None, PLACE, GATES, MODEL)
         for k, (at, covariance, merit, match) in enumerate(expected):
             assert same_pose(pose_of(estimates[k]), at, 1e-5, 1e-6)
@@ -59,10 +61,10 @@ def test_lines_of_sight_are_spared_where_a_pose_is_far_behind(lacking: int, char
     index = index_of(np.vstack([ROOM, second, [[24.0, 0.5, 24.0, 3.5]]]))
     scan = context_of(index, scan_of(seen(ROOM, INSIDE)[0])).lines.rows
     poses = [local(index, INSIDE), local(index, pose(INSIDE.x + 20.0, INSIDE.y, INSIDE.theta))]
-    place, view = index.tables.place, record(VIEW, sighted=1)
+    place, sights = index.tables.place, sights_of(scan)
     blind, both, alone = (
         ranked(scan, some, one, place)[1]["score"][-1]
-        for some, one in ((poses, np.zeros(1, VIEW)), (poses, view), (poses[1:], view))
+        for some, one in ((poses, sights_of(scan, sighted=False)), (poses, sights), (poses[1:], sights))
     )
     assert blind - alone > 3.0
     assert both == (alone if charged else blind)

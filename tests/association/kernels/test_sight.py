@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import sight
-from association.layout import BLOCKER, MATCH, RAY, VIEW, Blockers, record
+from association.layout import BLOCKER, MATCH, RAY, Blockers, record
 from registration import RigidTransform
 from registration.layout import Records
 
-from ..records import estimate_of
+from ..records import estimate_of, sights_of
 from ..reference import sight as twin
 from ..scenes import ROOM, context_of, index_of, local, pose, scan_of
 from .drawn import PLACE, SEEDS, drawn
@@ -49,10 +49,11 @@ def test_count_blockers(seed: int) -> None:
     d = drawn(seed)
     matches = np.zeros(len(d.scan), MATCH)
     matches["wall"] = d.rng.integers(-1, 2, len(d.scan))
-    view = record(VIEW, x=d.rng.normal(), y=d.rng.normal())
+    viewpoint = d.rng.normal(size=2)
     at, blockers, ray = d.near(1.0, 3.0, 3.0), no_blockers(PLACE.walls), np.zeros(1, RAY)[0]
-    count = sight.count_blockers(d.scan, matches, view[0], estimate_of(at)[0], PLACE, blockers, ray)
-    expected = twin.count_blockers(d.scan, matches["wall"] >= 0, view[0][["x", "y"]].item(), at, PLACE.walls)
+    sights = sights_of(d.scan, viewpoint)
+    count = sight.count_blockers(sights, matches, estimate_of(at)[0], PLACE, blockers, ray)
+    expected = twin.count_blockers(d.scan, matches["wall"] >= 0, viewpoint, at, PLACE.walls)
     assert counted(blockers, count) == expected
     assert len(set(blockers.touched[:count].tolist())) == count
 
@@ -79,8 +80,8 @@ def penalty(scan: list[list[float]], at: RigidTransform, walls: np.ndarray) -> f
     rows = context_of(index, scan_of(scan)).lines.rows
     matches, blockers = np.zeros(len(rows), MATCH), no_blockers(index.walls.rows)
     matches["wall"][1:] = -1
-    view, estimate = np.zeros(1, VIEW), estimate_of(local(index, at))
-    count = sight.count_blockers(rows, matches, view[0], estimate[0], index.tables.place, blockers, np.zeros(1, RAY)[0])
+    sights, estimate = sights_of(rows), estimate_of(local(index, at))
+    count = sight.count_blockers(sights, matches, estimate[0], index.tables.place, blockers, np.zeros(1, RAY)[0])
     return sight.sight_penalty(blockers, count, index.walls.rows)
 
 

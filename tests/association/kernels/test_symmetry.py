@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from association import MapIndex, Scan
 from association.kernels import symmetry
-from association.layout import RAY, VIEW, record
+from association.layout import POINT, RAY, record
 from association.tuning import RAYS, SHORTEST_SHOWN
 from registration import RigidTransform, Segments
 from registration.layout import Floats, Records
@@ -52,9 +52,9 @@ def mirrored_ends(at: RigidTransform, walls: Records, lows: Floats, highs: Float
 def test_what_is_shown_is_mirrored_as_by_the_twin(seed: int) -> None:
     d = drawn(seed)
     viewpoint = d.rng.normal(size=2)
-    view, reach = record(VIEW, x=viewpoint[0], y=viewpoint[1]), float(d.rng.uniform(2.0, 12.0))
+    view, reach = record(POINT, x=viewpoint[0], y=viewpoint[1]), float(d.rng.uniform(2.0, 12.0))
     walls = PLACE.walls
-    lows, highs = np.empty(len(walls)), np.empty(len(walls))
+    lows, highs = np.full(len(walls), math.inf), np.full(len(walls), -math.inf)
     symmetry.shown_walls(view[0], estimate_of(d.at)[0], PLACE, reach, record(RAY)[0], lows, highs)
     for got, expected in zip((lows, highs), shown(d.at, viewpoint, reach, INDEX), strict=True):
         np.testing.assert_allclose(got, expected, atol=1e-9)
@@ -81,7 +81,7 @@ def test_the_share_is_that_of_the_gains_that_match(seed: int) -> None:
         matched += match_scan(row, pose_of(null[0]), covariance_of(null[0]), PLACE, GATES)[1]
         total += row["gain"][0]
     work = workspace_of(d.scan)
-    got = symmetry.mirrored_share(record(VIEW), estimate_of(d.at), 8.0, null, GATES, PLACE, work)
+    got = symmetry.mirrored_share(record(POINT), estimate_of(d.at), 8.0, null, GATES, PLACE, work)
     assert got == pytest.approx(matched / total if total else 0.0, abs=1e-9)
 
 
@@ -94,7 +94,7 @@ def share(walls: Floats, at: RigidTransform, null: RigidTransform, reach: float 
     index = index_of(walls)
     poses = [estimate_of(local(index, one), SMALL) for one in (at, null)]
     work = workspace_of(context_of(index, exact(walls)).lines.rows, index)
-    return float(symmetry.mirrored_share(record(VIEW), poses[0], reach, poses[1], GATES, index.tables.place, work))
+    return float(symmetry.mirrored_share(record(POINT), poses[0], reach, poses[1], GATES, index.tables.place, work))
 
 
 def test_a_square_is_its_own_mirror_image() -> None:

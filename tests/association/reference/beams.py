@@ -22,53 +22,56 @@ from association.tuning import (
     WALL_BEHIND,
 )
 from registration import RigidTransform
-from registration.layout import SEEN
+from registration.layout import SEEN, Floats
 
 from .consensus import Pairs, solve
-from .geometry import Vector, direction, listed, normal
+from .geometry import direction, listed, normal
 from .sight import first_hit
 
 Evidence = tuple[float, float]  # read, passed
 
 
-def offsets(
-    rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place, behind: float
-) -> Iterator[tuple[float, np.void]]:
+def begins(rays: Rays) -> Floats:
+    """Return where beams begin, (m, 2)."""
+    return np.stack([rays.places["x"], rays.places["y"]], axis=1)
+
+
+def offsets(rays: Rays, pose: RigidTransform, place: Place, behind: float) -> Iterator[tuple[float, np.void]]:
     """Yield how much farther each beam reads than the first wall on its way, metres across that, and the wall."""
-    for angle, distance in zip(rays.angles + pose.theta, rays.ranges, strict=True):
+    for angle, distance, begin in zip(rays.angles + pose.theta, rays.ranges, begins(rays), strict=True):
         if distance == math.inf:
             continue
         limit = min(rays.reach, distance + behind)
-        expected, w = first_hit(pose.apply(viewpoint), angle, limit, place.walls)
+        expected, w = first_hit(pose.apply(begin), angle, limit, place.walls)
         if w >= 0:
             wall = place.walls[w]
             sine = abs(normal(wall) @ [math.cos(angle), math.sin(angle)])
             yield (distance - expected) * max(LEAST_INCIDENCE, sine), wall
 
 
-def beam_evidence(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place) -> Evidence:
+def beam_evidence(rays: Rays, pose: RigidTransform, place: Place) -> Evidence:
     """Compare every beam with the first wall on its way."""
     read = passed = 0.0
-    for across, wall in offsets(rays, viewpoint, pose, place, BEHIND):
+    for across, wall in offsets(rays, pose, place, BEHIND):
         read += math.exp(-0.5 * (across / NEAR) ** 2)
         passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
     return read / max(1, len(rays.angles)), passed / max(1, len(rays.angles))
 
 
-def beam_shares(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place) -> tuple[float, float]:
+def beam_shares(rays: Rays, pose: RigidTransform, place: Place) -> tuple[float, float]:
     """Count the beams that read farther than the map shows, and nearer."""
-    across = np.array([offset for offset, _ in offsets(rays, viewpoint, pose, place, WALL_BEHIND)])
+    across = np.array([offset for offset, _ in offsets(rays, pose, place, WALL_BEHIND)])
     n = max(1, len(rays.angles))
     return float((across > FARTHER_BY).sum()) / n, float((across < -NEARER_BY).sum()) / n
 
 
-def refine_by_beams(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:
+def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:
     """Lay the ends of the beams on the nearest of the walls that are listed where they are."""
     ends, lines = [], []
-    for angle, distance in zip(rays.angles, rays.ranges, strict=True):
+    for angle, distance, begin in zip(rays.angles, rays.ranges, begins(rays), strict=True):
         if distance == math.inf:
             continue
-        end = np.asarray(viewpoint) + distance * np.array([math.cos(angle), math.sin(angle)])
+        end = begin + distance * np.array([math.cos(angle), math.sin(angle)])
         there = pose.apply(end)
         across = {}
         for w in listed(place.grid, there):
@@ -86,14 +89,12 @@ def refine_by_beams(rays: Rays, viewpoint: Vector, pose: RigidTransform, place: 
     return solve(Pairs(seen, place.walls[lines], np.eye(2 * len(lines))), pose).pose
 
 
-def weigh_beams(
-    rays: Rays, viewpoint: Vector, pose: RigidTransform, place: Place
-) -> tuple[RigidTransform, Evidence, Evidence]:
+def weigh_beams(rays: Rays, pose: RigidTransform, place: Place) -> tuple[RigidTransform, Evidence, Evidence]:
     """Return where a pose is moved to, and what the beams say there and where it was."""
     moved = pose
     for gate in BEAM_GATES:
-        moved = refine_by_beams(rays, viewpoint, moved, place, gate)
-    before, after = (beam_evidence(rays, viewpoint, at, place) for at in (pose, moved))
+        moved = refine_by_beams(rays, moved, place, gate)
+    before, after = (beam_evidence(rays, at, place) for at in (pose, moved))
     if after[0] > before[0] and after[1] <= before[1] + PASSED_SLACK:
         return moved, after, before
     return pose, before, before

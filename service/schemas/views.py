@@ -1,0 +1,153 @@
+"""Scans of several views: what each sensor saw, and where it was."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
+
+from .arrays import Covariance, PointRows
+from .errors import TooManyError
+from .limits import Limits
+from .parts import (
+    BY_LASER,
+    BY_POINTS,
+    BY_SEGMENTS,
+    BY_VIEWS,
+    Laser,
+    LaserScan,
+    MeasuredFields,
+    PointScan,
+    RaySigma,
+    SegmentScan,
+    Twist,
+    require_at_the_sensor,
+    require_times,
+    scan_kind,
+)
+from .strict import FrameId, FreeJson, Point, Pose, Strict
+
+_BESIDE_A_VIEW = frozenset(("pose", "flipped", "sigma", "covariance", "relative_to", "viewpoint"))
+
+
+class SensorPose(Pose):
+    """The sensor's pose in the scan's frame: ``p_scan = R(theta) p_sensor + [x, y]``."""
+
+
+class _View(Strict):
+    pose: SensorPose
+    flipped: bool = Field(False, description="mounted upside down: y becomes -y in the sensor's data before `pose`")
+    covariance: Covariance | None = Field(
+        None,
+        description="what is not known of the step from the view `relative_to`: of additive (x, y, theta) of this "
+        "pose in that one's frame; m^2, m rad, rad^2; positive definite; null: exact",
+    )
+    relative_to: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="index of the view that `covariance` is relative to; null: the scan's frame itself"
+    )
+    viewpoint: Point | None = Field(
+        default_factory=lambda: [0.0, 0.0],
+        description="where the sensor stood in its own frame, metres; null: not from one place",
+    )
+
+
+class SegmentView(_View, MeasuredFields):
+    """A view as segments."""
+
+
+class LaserView(_View):
+    """A view as ranges."""
+
+    laser: Laser
+    sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+    twist: Twist | None = Field(None, description="how the sensor moved meanwhile, in its own frame")
+
+    @model_validator(mode="after")
+    def _from_the_sensor(self) -> LaserView:
+        require_at_the_sensor(self.viewpoint)
+        require_times(self.laser, self.twist)
+        return self
+
+
+class PointView(_View):
+    """A view as points in scanning order."""
+
+    points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
+    sigma: RaySigma | None = Field(None, description="of single points, metres; null: estimated")
+
+
+def _view_kind(value: Any) -> str | None:
+    return scan_kind(value, _BESIDE_A_VIEW)
+
+
+AnyView = Annotated[
+    Annotated[SegmentView, Tag(BY_SEGMENTS)]
+    | Annotated[LaserView, Tag(BY_LASER)]
+    | Annotated[PointView, Tag(BY_POINTS)],
+    Discriminator(
+        _view_kind,
+        custom_error_type="one_of",
+        custom_error_message="expected exactly one of segments, laser and points",
+    ),
+]
+
+
+class ViewsScan(Strict):
+    """A scan of several views: of the sensors of a robot, or from places along its way."""
+
+    views: list[AnyView] = Field(min_length=1, description="at most `max_views`")
+    frame_id: FrameId = "base_link"
+    stamp: FreeJson = Field(None, description="given back as it was sent")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _few(cls, value: Any, info: ValidationInfo) -> Any:
+        limits: Limits | None = info.context
+        views = value.get("views") if isinstance(value, dict) else None
+        if limits is not None and isinstance(views, list) and len(views) > limits.views:
+            raise TooManyError("", limits.views, "views")
+        return value
+
+    @model_validator(mode="after")
+    def _within_limits(self, info: ValidationInfo) -> ViewsScan:
+        limits: Limits | None = info.context
+        if limits is None:
+            return self
+        segments = sum(len(view.segments) for view in self.views if isinstance(view, SegmentView))
+        if segments > limits.segments_together:
+            raise TooManyError("", limits.segments_together, "segments of all views together")
+        beams = sum(
+            len(view.laser.ranges) if isinstance(view, LaserView) else len(view.points)
+            for view in self.views
+            if not isinstance(view, SegmentView)
+        )
+        if beams > limits.beams_together:
+            raise TooManyError("", limits.beams_together, "ranges or points of all views together")
+        return self
+
+    @property
+    def told_stamp(self) -> Any:
+        """When it was taken, as sent."""
+        return self.stamp
+
+    @property
+    def told_frame_id(self) -> str:
+        """The frame that the views share."""
+        return self.frame_id
+
+
+def _any_kind(value: Any) -> str | None:
+    return BY_VIEWS if isinstance(value, dict) and "views" in value else scan_kind(value)
+
+
+AnyScan = Annotated[
+    Annotated[SegmentScan, Tag(BY_SEGMENTS)]
+    | Annotated[LaserScan, Tag(BY_LASER)]
+    | Annotated[PointScan, Tag(BY_POINTS)]
+    | Annotated[ViewsScan, Tag(BY_VIEWS)],
+    Discriminator(
+        _any_kind,
+        custom_error_type="one_of",
+        custom_error_message="expected exactly one of segments, laser and points",
+    ),
+]

@@ -1,0 +1,248 @@
+"""Several views of one question: put together, laid on one another, and settled with their errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from association import InvalidSearchError, Scan, Status, View, assemble, mirrored
+from association.alignment import aligned
+from association.explain import explain
+from association.layout import SIGHTING, WALL
+from association.scan import Views, scaled
+from association.tuning import ROUGH_SHARE, SPRING
+from association.view_settling import SeenOnWalls
+from association.views import corrected
+from registration import RigidTransform
+from registration.layout import Floats
+
+from .scenes import (
+    INSIDE,
+    ROOM,
+    answer_of,
+    beams_of,
+    context_of,
+    equal_rooms,
+    index_of,
+    pose,
+    pose_in,
+    same_pose,
+    scan_of,
+    seen,
+)
+
+INDEX = index_of(ROOM)
+ENDS = seen(ROOM, INSIDE, noise=0.01, cut=0.3, seed=4)[0]
+STEP = np.diag([0.02**2, 0.02**2, 0.02**2])
+
+
+def view_at(at: RigidTransform, true: RigidTransform | None = None, covariance: Floats | None = None) -> View:
+    """Return what is seen of ROOM from beside INSIDE, and where that is said to have been."""
+    ends = seen(ROOM, INSIDE.compose(true or at), noise=0.005, seed=5)[0]
+    return View(scan_of(ends, viewpoint=(0.0, 0.0)), at, covariance)
+
+
+def test_one_exact_view_in_the_scans_frame_is_the_scan() -> None:
+    scan = scan_of(ENDS)
+    assert assemble([View(scan)]) is scan
+
+
+def test_the_answer_is_the_pose_of_the_frame_that_views_share() -> None:
+    """Whatever the mount is, upside down too."""
+    mount = pose(0.4, -0.3, 2.0)
+    ends = mount.inverse().apply(ENDS.reshape(-1, 2, 2)).reshape(-1, 4)
+    here, there = answer_of(INDEX, scan_of(ENDS)), answer_of(INDEX, assemble([View(scan_of(ends), mount)]))
+    assert same_pose(pose_in(there), pose_in(here), 1e-6, 1e-7)
+    upside_down = mirrored(scan_of(ends))  # what a sensor on its head would say
+    turned = answer_of(INDEX, assemble([View(mirrored(upside_down), mount)]))
+    assert same_pose(pose_in(turned), pose_in(here), 1e-6, 1e-7)
+
+
+def test_a_scan_split_into_two_views_answers_as_one() -> None:
+    whole = answer_of(INDEX, scan_of(ENDS, viewpoint=(0.0, 0.0)))
+    halves = [View(scan_of(part, viewpoint=(0.0, 0.0))) for part in (ENDS[::2], ENDS[1::2])]
+    split = answer_of(INDEX, assemble(halves))
+    assert (split.status, split.usable) == (whole.status, whole.usable)
+    assert same_pose(pose_in(split), pose_in(whole), 1e-6, 1e-6)
+    assert len(split.correspondences) == len(whole.correspondences)
+    assert split.probability == pytest.approx(whole.probability, abs=0.02)
+
+
+def test_what_two_views_see_is_one_piece_of_evidence() -> None:
+    """Walls of the map, and things that are on none: the same twice is not worth more."""
+    clutter = np.vstack([ENDS, seen(ROOM, INSIDE, clutter=3, seed=9)[0][-3:]])
+    once = context_of(INDEX, scan_of(clutter))
+    twice = context_of(INDEX, assemble([View(scan_of(clutter)), View(scan_of(clutter))]))
+    assert len(twice.lines.rows) == len(once.lines.rows)
+    assert twice.lines.rows["gain"].sum() == pytest.approx(once.lines.rows["gain"].sum())
+    np.testing.assert_allclose(twice.lines.rows["weight"], once.lines.rows["weight"], rtol=1e-6)
+    assert len(twice.lines.sightings) == 2 * len(once.lines.sightings)
+
+
+@pytest.mark.parametrize("with_beams", [False, True])
+def test_a_second_view_tells_two_rooms_apart(with_beams: bool) -> None:
+    """Equal but for a wall that is not seen from the first place."""
+    walls = np.vstack([equal_rooms(2), [[12.0, 8.0, 18.0, 8.0]]])
+    index = index_of(walls)
+    away = pose(2.0, 3.9, 0.5)  # behind the far wall of the room, as if through a door
+
+    def look(of: Floats, at: RigidTransform) -> Scan:
+        beams = beams_of(index_of(of), at) if with_beams else None
+        return scan_of(seen(of, at, noise=0.005, seed=6)[0], viewpoint=(0.0, 0.0) if with_beams else None, beams=beams)
+
+    first = look(ROOM, INSIDE)
+    alone = answer_of(index, first)
+    assert not alone.usable
+    outside = look(np.array([[0.0, 8.0, 6.0, 8.0], [5.0, 7.0, 2.0, 7.0]]), INSIDE.compose(away))
+    together = answer_of(index, assemble([View(first), View(outside, away)]))
+    assert same_pose(pose_in(together), pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta), 0.05, 0.01)
+
+
+def test_views_in_a_circle_are_refused() -> None:
+    scan = scan_of(ENDS)
+    with pytest.raises(InvalidSearchError) as caught:
+        assemble([View(scan), View(scan, relative_to=2), View(scan, relative_to=1)])
+    assert caught.value.argument == "scan.views.1.relative_to"
+    with pytest.raises(InvalidSearchError):
+        assemble([View(scan, relative_to=1)])
+    with pytest.raises(InvalidSearchError):
+        assemble([])
+
+
+def chain(rng: np.random.Generator, count: int = 4) -> tuple[list[RigidTransform], list[Floats]]:
+    """Return the steps of a drive and their covariances."""
+    steps = [RigidTransform(*(rng.normal(size=3) * [1.0, 0.3, 0.3])) for _ in range(count)]
+    roots = [rng.normal(size=(3, 3)) * 0.01 + np.diag([0.03, 0.02, 0.02]) for _ in range(count)]
+    return steps, [root @ root.T for root in roots]
+
+
+def placed(steps: list[RigidTransform], errors: Floats) -> Floats:
+    """Return the poses along a drive with these errors of its steps, (v, 3)."""
+    at, out = pose(), []
+    for step, (x, y, theta) in zip(steps, errors.tolist(), strict=True):
+        at = at.compose(RigidTransform(step.x + x, step.y + y, step.theta + theta))
+        out.append([at.x, at.y, at.theta])
+    return np.array(out)
+
+
+def test_the_views_of_a_drive_share_the_errors_of_its_steps() -> None:
+    """The covariance of all is that of the poses' derivatives by the steps."""
+    rng = np.random.default_rng(3)
+    steps, covariances = chain(rng)
+    nominal = placed(steps, np.zeros((4, 3)))
+    views = [View(scan_of(ENDS))]
+    views += [View(scan_of(ENDS), RigidTransform(*nominal[k]), covariances[k], k) for k in range(4)]
+    found = assemble(views).views
+    assert found is not None
+    jacobian = np.zeros((12, 12))
+    for k in range(12):
+        errors = np.zeros(12)
+        errors[k] = 1e-6
+        jacobian[:, k] = (placed(steps, errors.reshape(4, 3)) - nominal).reshape(-1) / 1e-6
+    every = np.zeros((12, 12))
+    for k, covariance in enumerate(covariances):
+        every[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = covariance
+    np.testing.assert_allclose(found.covariance[3:, 3:], jacobian @ every @ jacobian.T, atol=1e-7)
+    assert not found.covariance[:3].any()
+
+
+def on_walls(rng: np.random.Generator, views: Views) -> SeenOnWalls:
+    """Return what views show of four walls, each of them every one, where they should be at the origin."""
+    walls, sights = np.zeros(4, WALL), []
+    for w, angle in enumerate((0.1, 1.5, 3.0, 4.4)):
+        walls[w]["dx"], walls[w]["dy"], walls[w]["offset"] = math.cos(angle), math.sin(angle), -3.0 - w
+    for v in range(len(views)):
+        for w, wall in enumerate(walls):
+            one = np.zeros(1, SIGHTING)
+            along = rng.uniform(-2.0, 2.0)
+            one["sensor"], one["row"], one["dx"], one["dy"] = v, w, wall["dx"], wall["dy"]
+            one["centroid_x"] = along * wall["dx"] - wall["offset"] * wall["dy"]
+            one["centroid_y"] = along * wall["dy"] + wall["offset"] * wall["dx"]
+            one["spread"], one["variance"] = rng.uniform(0.1, 1.0), rng.uniform(1e-6, 1e-4)
+            sights.append((one, w))
+    of_wall = np.array([w for _, w in sights])
+    return SeenOnWalls(views, np.concatenate([one for one, _ in sights]), walls[of_wall], of_wall)
+
+
+@pytest.mark.parametrize("chained", [True, False])
+def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained: bool) -> None:
+    """Errors of walls and of views as correlations of the residuals, in one dense matrix."""
+    rng = np.random.default_rng(8)
+    steps, covariances = chain(rng, 3)
+    places = placed(steps, np.zeros((3, 3)))
+    views = [View(scan_of(ENDS))]
+    views += [View(scan_of(ENDS), RigidTransform(*places[k]), covariances[k], k if chained else None) for k in range(3)]
+    together = assemble(views).views
+    assert together is not None
+    shown, variance = on_walls(rng, together), 0.02**2
+    settled = shown.settle(pose(), variance)
+    assert same_pose(settled.pose, pose(), 1e-9, 1e-9)
+    rows, by_pose, by_views, noise = [], [], [], []
+    for one, wall in zip(shown.seen, shown.walls, strict=True):
+        n, c = np.array([-wall["dy"], wall["dx"]]), np.array([one["centroid_x"], one["centroid_y"]])
+        at = together.poses[one["sensor"]]
+        lever = n @ [-c[1], c[0]]
+        by_pose.append([n[0], n[1], lever])
+        own = np.zeros(3 * len(together))
+        own[3 * one["sensor"] : 3 * one["sensor"] + 3] = [n[0], n[1], lever - n @ [-at.y, at.x]]
+        by_views.append(own)
+        noise.append(one["variance"] + ROUGH_SHARE * variance)
+        turn = np.zeros(3 * len(together))
+        turn[3 * one["sensor"] + 2] = 1.0
+        rows.append((turn, noise[-1] / one["spread"]))
+    jacobian = np.vstack([by_pose, np.tile([0.0, 0.0, 1.0], (len(rows), 1))])
+    of_views = np.vstack([by_views, [turn for turn, _ in rows]])
+    together_covariance = np.diag([*noise, *(angle for _, angle in rows)]) + of_views @ together.covariance @ of_views.T
+    same = shown.of_wall[:, None] == shown.of_wall[None]
+    together_covariance[: len(noise), : len(noise)] += variance * same
+    information = jacobian.T @ np.linalg.solve(together_covariance, jacobian) + np.diag([SPRING, SPRING, 0.0])
+    np.testing.assert_allclose(settled.covariance, np.linalg.inv(information), rtol=1e-6)
+
+
+def test_views_are_laid_on_one_another_where_their_walls_are_one() -> None:
+    true = pose(-1.0, 0.3, 0.2)
+    off = pose(-0.95, 0.24, 0.23)
+    scan = assemble([view_at(pose()), view_at(off, true, np.diag([0.05**2, 0.05**2, 0.03**2]))])
+    found = aligned(scan).views
+    assert found is not None
+    assert same_pose(found.poses[1], true, 0.02, 0.005)
+    assert np.sqrt(np.diag(found.covariance)[3:5]).max() < 0.02
+    exact = assemble([view_at(pose()), view_at(true)])
+    assert aligned(exact) is exact
+
+
+def test_the_errors_of_views_are_found_beside_the_pose() -> None:
+    """And where the scan is moved to them, its segments lie on the walls."""
+    true, off = pose(-1.0, 0.3, 0.2), pose(-0.96, 0.25, 0.23)
+    scan = assemble([view_at(pose()), view_at(off, true, np.diag([0.04**2, 0.04**2, 0.03**2]))])
+    result = answer_of(INDEX, scan)
+    assert result.status is Status.OK
+    assert same_pose(pose_in(result), INSIDE, 0.02, 0.004)
+    assert max(abs(pair.offset) for pair in result.correspondences) < 0.03
+    answer = explain(context_of(INDEX, scan)).answer
+    assert answer is not None
+    assert answer.settled.views is not None
+    views = corrected(aligned(scan), answer.settled.views.found, answer.settled.views.spread).views
+    assert views is not None
+    assert same_pose(views.poses[1], true, 0.02, 0.005)
+
+
+def test_views_scale_and_mirror_with_their_scan() -> None:
+    scan = assemble([view_at(pose()), view_at(pose(1.0, 0.5, 0.3), covariance=STEP)])
+    for changed, back in ((mirrored(scan), mirrored), (scaled(scan, 2.0), lambda one: scaled(one, 0.5))):
+        again = back(changed)
+        assert again.views is not None
+        assert scan.views is not None
+        np.testing.assert_allclose(again.views.covariance, scan.views.covariance, atol=1e-15)
+        np.testing.assert_allclose(again.views.viewpoints, scan.views.viewpoints)
+        np.testing.assert_allclose(again.measured.segments.endpoints, scan.measured.segments.endpoints)
+
+
+def test_beams_count_where_every_view_has_them() -> None:
+    ends = seen(ROOM, INSIDE)[0]
+    with_beams = View(scan_of(ends, viewpoint=(0.0, 0.0), beams=beams_of(INDEX, INSIDE)))
+    assert assemble([with_beams, replace(with_beams, pose=pose(0.1))]).beams is not None
+    assert assemble([with_beams, View(scan_of(ends))]).beams is None

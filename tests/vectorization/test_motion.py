@@ -1,0 +1,75 @@
+"""A scanner that moves while it scans: every beam from where it then was."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from registration import RigidTransform, Segments
+from simulation import Scanner, scan
+from vectorization import InvalidScanError, LaserScan, Motion, vectorize
+
+ROOM = np.array([[-3, -2, 5, -2], [5, -2, 5, 3], [5, 3, -3, 3], [-3, 3, -3, -2]], dtype=float)
+MOTION = Motion(0.1 / 540, 1.5, -0.2, math.radians(120.0))
+
+
+def moving_ranges(scanner: Scanner, motion: Motion) -> np.ndarray:
+    """Return what is read in ROOM, from the origin on."""
+    walls, out = Segments.from_array(ROOM), []
+    for angle, (x, y, theta) in zip(scanner.angles, motion.places(scanner.beams).tolist(), strict=True):
+        beam = Scanner(1, float(angle), scanner.angle_increment, sigma=0.0)
+        out.append(scan(walls, RigidTransform(x, y, theta), beam).ranges[0])
+    return np.array(out)
+
+
+def test_a_constant_twist_is_an_arc() -> None:
+    """A quarter of a circle of 2 m in a second; straight on without a turn."""
+    places = Motion(0.25, math.pi, 0.0, 0.5 * math.pi).places(5)
+    assert places[4] == pytest.approx([2.0, 2.0, 0.5 * math.pi])
+    assert places[0] == pytest.approx([0.0, 0.0, 0.0])
+    assert Motion(0.5, 1.0, -2.0, 0.0).places(3)[2] == pytest.approx([1.0, -2.0, 0.0])
+    aside = Motion(0.25, 0.0, math.pi, 0.5 * math.pi).places(5)
+    assert aside[4] == pytest.approx([-2.0, 2.0, 0.5 * math.pi])
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_walls_are_where_they_are_though_the_scanner_moved(backward: bool) -> None:
+    """In the frame of the first beam; without the motion they are not."""
+    scanner = Scanner.over(1.5 * math.pi, 541, sigma=0.0)
+    if backward:
+        scanner = Scanner(541, -scanner.angle_min, -scanner.angle_increment, sigma=0.0)
+    ranges = moving_ranges(scanner, MOTION)
+    told = vectorize(LaserScan(scanner.angle_min, scanner.angle_increment, ranges, motion=MOTION)).measured.segments
+    untold = vectorize(LaserScan(scanner.angle_min, scanner.angle_increment, ranges)).measured.segments
+    walls = Segments.from_array(ROOM)
+
+    def worst(found: Segments) -> float:
+        gaps = np.abs(found.midpoints @ walls.normals.T - walls.offsets)
+        alike = found.directions @ walls.directions.T > 0.9
+        return float(np.where(alike, gaps, np.inf).min(axis=1).max())
+
+    assert worst(told) < 0.01
+    assert worst(untold) > 0.05
+    assert len(told) >= 3
+
+
+def test_beams_begin_where_the_scanner_was() -> None:
+    scanner = Scanner.over(1.5 * math.pi, 541, sigma=0.0)
+    found = vectorize(
+        LaserScan(scanner.angle_min, scanner.angle_increment, moving_ranges(scanner, MOTION), motion=MOTION)
+    )
+    beams = found.beams
+    assert beams is not None
+    assert beams.origins is not None
+    ends = beams.origins + beams.ranges[:, None] * np.stack([np.cos(beams.angles), np.sin(beams.angles)], axis=1)
+    walls = Segments.from_array(ROOM)
+    assert np.abs(ends @ walls.normals.T - walls.offsets).min(axis=1).max() < 1e-9
+    assert found.viewpoint == pytest.approx(beams.origins.mean(axis=0))
+
+
+def test_one_that_turns_as_fast_as_it_scans_is_refused() -> None:
+    with pytest.raises(InvalidScanError) as caught:
+        LaserScan(0.0, 0.01, [1.0, 1.0], motion=Motion(0.001, 0.0, 0.0, -8.0))
+    assert caught.value.argument == "twist"
