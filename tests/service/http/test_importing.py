@@ -74,7 +74,7 @@ def test_fields_say_what_a_drawing_does_not(client: httpx.Client) -> None:
     found = answer.json()
     lengths = np.hypot(*np.diff(np.reshape(found["map"]["segments"], (-1, 2, 2)), axis=1)[:, 0].T)
     assert found["map"]["oriented"]
-    assert sorted(np.round(lengths / 0.3048).tolist()) == [10, 10, 20, 20, 30, 40]
+    assert sorted(np.round(lengths / 0.3048).tolist()) == [10, 20, 20, 20, 30, 40]
 
 
 def test_a_bomb_of_xml(client: httpx.Client) -> None:
