@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx
 import numpy as np
+import pytest
 from ezdxf.filemanagement import new
 from PIL import Image
 
@@ -22,6 +23,11 @@ LAUGHS = (
     + b"".join(b'<!ENTITY %c "%b">' % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9))
     + b']><svg xmlns="http://www.w3.org/2000/svg"><text>&j;</text></svg>'
 )
+
+
+@pytest.fixture
+def client(patient: RunningService) -> httpx.Client:
+    return patient.client
 
 
 def send(client: httpx.Client, files: dict[str, bytes], *fields: tuple[str, str], **headers: str) -> httpx.Response:
