@@ -12,6 +12,7 @@ Each room imports only from those below it; import-linter holds them to that (`p
     work/                  one request's work in a thread: models to the libraries, results to JSON
     settings               command line and environment
     admission/, maps/      who is let in; stored maps and their indices
+    importing/             maps of other tools, read in a process with bounds of its own
     parsing/               from the bytes of a body to a checked request, large ones in another process
     schemas/, telemetry/   models of requests and answers, their limits; counts and the log
     page/                  the files of the page at /, built

@@ -52,7 +52,11 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if options.inside and not made:
         endpoints, oriented = _directed(endpoints, drawing, options), True
     if not oriented:
-        drawing.notes.add_assumed("directions", "directions mean nothing, for nobody says where free space is")
+        drawing.notes.add_assumed(
+            "directions",
+            "directions mean nothing, for nobody says where free space is; a free place (point) tells, and where lines "
+            "run in the middle of walls their thickness (drawn centres, thickness)",
+        )
     drawing.notes.add_read("segments", "faces of walls" if oriented else "lines", len(endpoints))
     meta = drawing.meta or {"source": drawing.name}
     return LineMap(_segments(endpoints, drawing), drawing.sigma, oriented, drawing.frame_id, meta)

@@ -4,8 +4,8 @@
 
     entry                          runs a command, and turns what goes wrong into one line and an exit code
     program                        all commands, put together
-    locate, register, vectorize    the commands
-    batch                          many logs, by the package fleet
+    locate, replay, analyze, batch, register, vectorize, key, maps/    the commands
+    logs, tracking                 a log's scans to requests; what is known of the next pose
     service, in_process, remote    who answers: this process, or a server
     inputs, printing               files to requests, answers to people
 """

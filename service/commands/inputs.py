@@ -25,6 +25,7 @@ STDIN = "-"
 MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's business
 _ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
+FILES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv", ".bag", ".mcap", ".db3")  # never meant as ids
 _FORMS = ("laser", "points", "segments", "views")
 
 
@@ -74,7 +75,7 @@ def read_map_or_id(name: str) -> Json:
     RefusedError
         When the file is not taken.
     """
-    if not Path(name).exists() and MAP_ID.fullmatch(name) and not Path(name).suffix:
+    if not Path(name).exists() and MAP_ID.fullmatch(name) and Path(name).suffix.lower() not in FILES:
         return {"map_id": name}
     return read_map_file(name)
 

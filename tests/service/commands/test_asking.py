@@ -27,13 +27,12 @@ def lasting(answer: Any) -> dict[str, Any]:
     return {name: value for name, value in answer.items() if name not in PER_REQUEST}
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "room.json").write_text(json.dumps({"segments": ROOM}))
-    (tmp_path / "scan.json").write_text(json.dumps({"segments": SEEN, "sigma": 0.02}))
-    (tmp_path / "pairs.json").write_text(json.dumps([[0, 0], [1, 1], [2, 3], [3, 4]]))
-    (tmp_path / "points.json").write_text(json.dumps({"points": POINTS, "frame_id": "front"}))
-    return tmp_path
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    (folder / "scan.json").write_text(json.dumps({"segments": SEEN, "sigma": 0.02}))
+    (folder / "pairs.json").write_text(json.dumps([[0, 0], [1, 1], [2, 3], [3, 4]]))
+    (folder / "points.json").write_text(json.dumps({"points": POINTS, "frame_id": "front"}))
 
 
 def test_locate_answers_as_the_route_does_without_a_server_and_with_one(
@@ -79,12 +78,13 @@ def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None
         (("locate", "room.json"), 2, "linefix locate --help"),
         (("lokate",), 2, "locate"),
         (("locate", "nowhere.json", "scan.json"), 2, "nowhere.json"),
+        (("locate", "hall", "scan.json"), 3, "hall: no such file, and no map is stored"),
         (("locate", "room.json", "broken.json"), 3, "broken.json: not JSON"),
         (("locate", "room.json", "short.json"), 3, "/scan/segments/0"),
         (("locate", "room.json", "scan.json", "--server", "localhost"), 2, "--server"),
         (("locate", "room.json", "scan.json", "--server", f"http://127.0.0.1:{free_port()}"), 4, "linefix serve"),
     ],
-    ids=["no scan", "no command", "no file", "no JSON", "no segment", "no URL", "no server"],
+    ids=["no scan", "no command", "no file", "no map", "no JSON", "no segment", "no URL", "no server"],
 )
 def test_what_is_not_done_is_told_in_one_line(
     linefix: Linefix, folder: Path, arguments: tuple[str, ...], code: int, said: str

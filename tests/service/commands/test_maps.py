@@ -1,0 +1,112 @@
+"""linefix map: import, check, draw, put, list, get, rm."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from formats import read_map
+from tests.association.checking.drawn import faces
+from tests.running import RunningService
+from tests.service.importing.forms import SQUARE, room_grid
+
+from .drives import write_log
+from .running import Linefix, refused
+
+
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    (folder / "maps").mkdir()
+    for name, content in room_grid().items():
+        (folder / "maps" / name).write_bytes(content)
+    (folder / "plan.csv").write_bytes(SQUARE)
+    (folder / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
+
+
+@pytest.mark.parametrize("where", ["here", "at a server"])
+def test_a_grid_becomes_a_map_file(linefix: Linefix, folder: Path, patient: RunningService, where: str) -> None:
+    server = [] if where == "here" else ["--server", patient.url]
+    told = linefix("map", "import", "maps/room.yaml", "--out", "room.json", "--picture", "room.png", *server)
+    assert told.code == 0, told.err
+    expected = read_map(folder / "maps" / "room.yaml").map
+    assert json.loads((folder / "room.json").read_text())["segments"] == expected.segments.endpoints.tolist()
+    assert [row.split()[0] for row in told.out.splitlines()[:3]] == ["from", "map", "read"]
+    assert "room.yaml, room.pgm (map_server)" in told.out
+    assert "walls are taken to lie" in told.out
+    assert "finding" in told.out
+    with Image.open(folder / "room.png") as picture:
+        assert picture.size[0] > 1000
+
+
+def test_what_a_drawing_does_not_say_is_said_by_options(linefix: Linefix) -> None:
+    undirected = json.loads(linefix("map", "import", "plan.csv", "--json").out)
+    assert (undirected["map"]["oriented"], undirected["report"]["format"]) == (False, "csv")
+    answer = json.loads(linefix("map", "import", "plan.csv", "--units", "ft", "--point", "0.3", "0.3", "--json").out)
+    assert answer["map"]["oriented"]
+    assert answer["check"]["size"]["length"] == pytest.approx(14 * 0.3048)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("nowhere.yaml",), 2, "nowhere.yaml: there is no such file"),
+        (("plan.csv", "--units", "parsec"), 3, "--units: expected one of mm"),
+        (("plan.csv", "--point", "99", "99"), 3, "--point: lies on a line or outside"),
+        (("plan.csv", "--out", "plan.dwg"), 3, "plan.dwg: expected a name"),
+        (("broken.svg", "--units", "m"), 3, "broken.svg: is no XML"),
+    ],
+    ids=["file", "units", "point", "out", "content"],
+)
+def test_what_is_wrong_is_told_in_one_line(
+    linefix: Linefix, folder: Path, arguments: tuple[str, ...], code: int, said: str
+) -> None:
+    (folder / "broken.svg").write_text("<svg")
+    assert said in refused(linefix("map", "import", *arguments), code)
+
+
+def test_a_server_names_the_file_and_the_option(linefix: Linefix, folder: Path, patient: RunningService) -> None:
+    (folder / "plan.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><rect width="4" height="3"/></svg>')
+    asked = ("map", "import", "plan.svg", "--server", patient.url)
+    assert "linefix: plan.svg: does not say its unit" in refused(linefix(*asked), 3)
+    assert "linefix: --units: expected one of mm" in refused(linefix(*asked, "--units", "parsec"), 3)
+
+
+@pytest.mark.parametrize("where", ["here", "at a server"])
+def test_maps_are_stored_listed_and_forgotten(
+    linefix: Linefix, folder: Path, service: RunningService, where: str
+) -> None:
+    server = [] if where == "here" else ["--server", service.url]
+    assert "revision 1" in linefix("map", "put", f"hall.{len(server)}", "floor.json", *server).out
+    (listed,) = [json.loads(row) for row in linefix("map", "list", "--json", *server).out.splitlines()]
+    assert (listed["map_id"], listed["segments"]) == (f"hall.{len(server)}", len(faces()))
+    assert "hall" in linefix("map", "list", *server).out
+    found = json.loads(linefix("map", "get", listed["map_id"], *server).out)
+    assert found["segments"] == faces().tolist()
+    assert linefix("map", "get", listed["map_id"], "--out", "hall.dxf", *server).code == 0
+    assert len(read_map(folder / "hall.dxf").map.segments) == len(faces())
+    assert "walls" in linefix("map", "check", listed["map_id"], *server).out
+    assert linefix("map", "draw", listed["map_id"], "--out", "hall.png", *server).code == 0
+    assert linefix("map", "rm", listed["map_id"], *server).code == 0
+    assert f"{listed['map_id']}: no such file" in refused(linefix("map", "rm", listed["map_id"], *server), 3)
+    assert linefix("map", "list", "--json", *server).out == ""
+
+
+def test_a_check_beside_the_scans_of_a_log(linefix: Linefix, folder: Path) -> None:
+    """A map that is mirrored, as one whose rows were not flipped: its scans fit when it is turned back."""
+    write_log(folder / "drive.log", 5)
+    mirrored = faces() * [1.0, -1.0, 1.0, -1.0]
+    (folder / "mirrored.json").write_text(json.dumps({"segments": mirrored[:, [2, 3, 0, 1]].tolist()}))
+    told = linefix("map", "check", "mirrored.json", "--log", "drive.log", LINEFIX_MAX_DEADLINE_MS="600000").out
+    assert "finding  mirrored" in told
+    assert "of 5 usable" in told
+
+
+def test_a_server_checks_stored_maps_alone(linefix: Linefix, service: RunningService) -> None:
+    assert "map put" in refused(linefix("map", "check", "floor.json", "--server", service.url), 2)
+
+
+def test_an_id_is_one(linefix: Linefix) -> None:
+    assert "an id is" in refused(linefix("map", "put", "a/b", "floor.json"), 2)

@@ -1,0 +1,140 @@
+"""linefix replay: a log of another tool to poses with verdicts."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from registration import RigidTransform
+from service.commands.tracking import LOST, Tracker
+from tests.association.checking.drawn import faces
+from tests.running import RunningService
+
+from .drives import ODOM_FROM_MAP, write_log
+from .running import Ended, Linefix, refused
+
+SCANS = 12
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> list[RigidTransform]:
+    (tmp_path / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
+    return write_log(tmp_path / "drive.log", SCANS)
+
+
+def lines(ended: Ended) -> list[dict[str, Any]]:
+    assert ended.code == 0, ended.err
+    return [json.loads(line) for line in ended.out.splitlines()]
+
+
+def assert_right(found: list[dict[str, Any]], truth: list[RigidTransform]) -> None:
+    for line, pose in zip(found, truth, strict=True):
+        if line["usable"]:
+            assert math.hypot(line["pose"]["x"] - pose.x, line["pose"]["y"] - pose.y) < 0.1
+            assert abs(line["pose"]["theta"] - pose.theta) < 0.02
+
+
+def lasting(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{name: value for name, value in line.items() if name != "timing_ms"} for line in found]
+
+
+@pytest.mark.parametrize("mode", ["global", "track"])
+def test_a_line_a_scan(linefix: Linefix, truth: list[RigidTransform], mode: str) -> None:
+    ended = linefix("replay", "drive.log", "--map", "floor.json", "--mode", mode, "--json")
+    found = lines(ended)
+    assert [line["stamp"] for line in found] == [100 + 0.5 * k for k in range(SCANS)]
+    assert list(found[0]) == ["stamp", "status", "usable", "probability", "pose", "reasons", "timing_ms"]
+    assert sum(line["usable"] for line in found) >= SCANS // 2
+    assert_right(found, truth)
+    assert "ROBOTLASER1" in ended.err  # which of the topics was taken
+
+
+def test_a_server_answers_as_the_process_does(
+    linefix: Linefix, folder: Path, truth: list[RigidTransform], service: RunningService
+) -> None:
+    asked = ("replay", "drive.log", "--map", "floor.json", "--every", "4", "--json")
+    here, there = lines(linefix(*asked)), lines(linefix(*asked, "--server", service.url))
+    assert len(here) == SCANS // 4
+    assert lasting(here) == lasting(there)
+
+
+def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, truth: list[RigidTransform]) -> None:
+    assert linefix("map", "put", "floor", "floor.json").code == 0
+    asked = ("replay", "drive.log", "--map", "floor", "--out", "poses.tum", "--picture", "poses.png")
+    told = linefix(*asked)
+    assert told.code == 0, told.err
+    assert "ok, usable" in told.out
+    assert "ROBOTLASER1" in told.out
+    poses = [list(map(float, row.split())) for row in (folder / "poses.tum").read_text().splitlines()]
+    assert len(poses) >= SCANS // 2
+    by_stamp = {100 + 0.5 * k: pose for k, pose in enumerate(truth)}
+    for stamp, x, y, *_ in poses:
+        assert math.hypot(x - by_stamp[stamp].x, y - by_stamp[stamp].y) < 0.1
+    with Image.open(folder / "poses.png") as picture:
+        assert (200, 40, 40) in {colour for _, colour in picture.getcolors(1000) or []}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("nowhere.log", "--map", "floor.json"), 3, "nowhere.log: there is no such file"),
+        (("empty.log", "--map", "floor.json"), 3, "empty.log: has no scan"),
+        (("drive.log", "--map", "floor.json", "--topic", "FLASER"), 3, "FLASER"),
+        (("drive.log", "--map", "hall"), 3, "hall: no such file, and no map is stored"),
+        (("drive.txt", "--map", "floor.json"), 3, "ends in one of .bag"),
+        (("drive.log",), 2, "--map"),
+        (("drive.log", "--map", "floor.json", "--mode", "both"), 2, "--mode"),
+    ],
+    ids=["no log", "no scans", "no topic", "no map", "no format", "map left out", "mode"],
+)
+def test_what_cannot_be_replayed(
+    linefix: Linefix, folder: Path, truth: list[RigidTransform], arguments: tuple[str, ...], code: int, said: str
+) -> None:
+    (folder / "empty.log").write_text("# nothing\n")
+    (folder / "drive.txt").write_text("")
+    assert said in refused(linefix("replay", *arguments), code)
+
+
+def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = None) -> dict[str, Any]:
+    warnings = [] if warning is None else [{"code": warning, "message": ""}]
+    return {"usable": usable, "pose": {"x": pose.x, "y": pose.y, "theta": pose.theta}, "warnings": warnings}
+
+
+def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
+    tracker, at = Tracker(), RigidTransform(2.0, 1.0, 0.5)
+    before, after = ODOM_FROM_MAP.compose(at), ODOM_FROM_MAP.compose(RigidTransform(3.0, 1.2, 0.9))
+    assert tracker.prior(before) is None
+    tracker.learn(answer(at, usable=False), before)
+    assert tracker.prior(before) is None
+    tracker.learn(answer(at), before)
+    prior = tracker.prior(after)
+    assert prior is not None
+    assert [round(prior[name], 9) for name in ("x", "y", "theta")] == [3.0, 1.2, 0.9]
+    tracker.learn(answer(at, usable=False), after)
+    again = tracker.prior(after)
+    assert again is not None
+    assert again["covariance"][0] == pytest.approx(prior["covariance"][0])
+    tracker.learn(answer(at, warning="prior_contradicted"), after)
+    assert tracker.prior(after) is None
+
+
+def test_what_is_known_gets_less_with_the_way_and_ends() -> None:
+    tracker, here = Tracker(), RigidTransform(0.0, 0.0, 0.0)
+    tracker.prior(here)
+    tracker.learn(answer(here), here)
+    sigmas = []
+    for k in range(1, 100):
+        prior = tracker.prior(RigidTransform(float(k % 2), 0.0, 0.0))  # to and fro
+        if prior is None:
+            break
+        sigmas.append(math.sqrt(prior["covariance"][0][0]))
+    assert sigmas == sorted(sigmas)
+    assert LOST - 0.2 < sigmas[-1] <= LOST
+    tracker.learn(answer(here), here)
+    assert tracker.prior(None) is None
+    assert tracker.prior(here) is None
