@@ -36,7 +36,11 @@ def aligned(scan: Scan) -> Scan:
         seams = lines.moved(shifts).seams(views.root @ spread @ views.root.T, views.root)
         weighed = seams.jacobian * (ALIGNING_SHARE / seams.variances)[:, None]
         spread = np.asarray(np.linalg.inv(np.eye(len(found)) + seams.jacobian.T @ weighed))
-        found = np.asarray(spread @ (weighed.T @ (seams.jacobian @ found - seams.residuals)))
+        left = seams.residuals - seams.jacobian @ found
+        found = np.asarray(spread @ (weighed.T @ -left))
+        # Where lines do not fit one another as they should, some of them are not one.
+        worse = max(1.0, float(np.mean((left + seams.jacobian @ found) ** 2 / seams.variances)) if len(left) else 1.0)
+        spread = spread * worse
     return corrected(scan, found, 0.5 * (spread + spread.T))
 
 

@@ -95,7 +95,7 @@ class SeenOnWalls:
             step = np.linalg.solve(normal, -gradient)
             x = x + step
             if known is None:
-                variance = self._shown_variance(x, np.linalg.inv(normal), variance)
+                variance = self._shown_variance(x, np.asarray(np.linalg.inv(normal), dtype=np.float64), variance)
             elif np.abs(step).max() < SETTLED_STEP:
                 break
         far = math.hypot(x[0] - start.x, x[1] - start.y) > MAX_STEP or abs(wrap_angle(x[2] - start.theta)) > MAX_TURN
