@@ -97,14 +97,9 @@ def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settl
     seen, on = context.lines.sightings[on >= 0], on[on >= 0]
     if not len(seen):
         return alone
-    shown, known = SeenOnWalls(views, seen, context.index.walls.rows[on], on), context.index.sigma
-    if known is None:
-        found = shown.estimate(alone.pose)
-        variance = found.wall_variance
-    else:
-        variance = max(known**2, LEAST_KNOWN_VARIANCE)
-        found = shown.settle(alone.pose, variance)
-    loose = shown.settle(found.pose, max(variance, COMMON_WALL_ERROR**2)).covariance
+    shown, sigma = SeenOnWalls.of(views, seen, context.index.walls.rows, on), context.index.sigma
+    found = shown.settle(alone.pose, None if sigma is None else max(sigma**2, LEAST_KNOWN_VARIANCE))
+    loose = shown.covariance_with(found, max(found.wall_variance, COMMON_WALL_ERROR**2))
     values, vectors = np.linalg.eigh(loose[:2, :2])
     dx, dy = vectors[:, 1].tolist()
     sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
@@ -115,7 +110,7 @@ def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settl
         alone,
         pose=found.pose,
         covariance=found.covariance,
-        wall_sigma=math.sqrt(variance),
+        wall_sigma=math.sqrt(found.wall_variance),
         weakest=weakest,
         direction=(sign * dx, sign * dy),
         free=alone.parallel or float(np.linalg.eigvalsh(found.covariance[:2, :2])[1]) > ONE_OF_MANY**2,

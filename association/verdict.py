@@ -24,6 +24,7 @@ from .tuning import (
     FAR_FROM_PRIOR,
     NO_MATCH_PROBABILITY,
     USABLE_CAUTIOUS,
+    USABLE_CAUTIOUS_DRIVE,
     USABLE_CAUTIOUS_WITH_BEAMS,
     USABLE_PROBABILITY,
 )
@@ -153,6 +154,8 @@ def _logistic(logit: float) -> float:
 
 def _bar(context: SearchContext) -> float:
     """Return what the cautious probability has to reach."""
+    if context.scan.views is not None and context.scan.views.uncertain:
+        return USABLE_CAUTIOUS_DRIVE
     return USABLE_CAUTIOUS_WITH_BEAMS if context.with_beams else USABLE_CAUTIOUS
 
 

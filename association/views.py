@@ -17,6 +17,7 @@ from .scan import Scan, Views
 Floats = NDArray[np.float64]
 
 MAX_VIEWS = 64
+MOST_VARIANCE = 100.0  # m^2 and rad^2, rounding; a step that is worse known says nothing
 HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
@@ -51,12 +52,18 @@ def assemble(views: Sequence[View]) -> Scan:
     Raises
     ------
     InvalidSearchError
-        When there are no views, or too many, or they are relative to one another in a circle.
+        When there are no views, or too many, or they are relative to one another in a circle, or the error of a step
+        has a deviation beyond 10 m or rad.
     """
     if not 1 <= len(views) <= MAX_VIEWS:
         raise InvalidSearchError(f"expected 1 to {MAX_VIEWS} views, got {len(views)}", argument="scan.views")
+    for v, view in enumerate(views):
+        if view.covariance is not None and not np.diag(view.covariance).max() <= MOST_VARIANCE:
+            raise InvalidSearchError(
+                f"expected variances of at most {MOST_VARIANCE:g}", argument=f"scan.views.{v}.covariance"
+            )
     order = _outward(views)
-    if len(views) == 1 and views[0].covariance is None and views[0].pose == HERE:
+    if len(views) == 1 and not _uncertain(views[0]) and views[0].pose == HERE:
         return views[0].scan
     root = _root(views, order)
     places = [_viewpoint(view) for view in views]
@@ -156,6 +163,10 @@ def _each_moved(
     return replace(measured, segments=Segments.derived(np.hstack([begins, finishes])), centroids=centroids)
 
 
+def _uncertain(view: View) -> bool:
+    return view.covariance is not None and bool(np.any(view.covariance))
+
+
 def _outward(views: Sequence[View]) -> list[int]:
     """Order views so that each comes after the one that it is relative to."""
     order: list[int] = []
@@ -180,7 +191,7 @@ def _root(views: Sequence[View], order: Sequence[int]) -> Floats:
     With the pose ``P_v = P_r (s + e)``, where s is the step and e its error, the first order is
     ``dt_v = dt_r + J R_r s dtheta_r + R_r e_t`` and ``dtheta_v = dtheta_r + e_theta``.
     """
-    uncertain = [v for v in order if views[v].covariance is not None]
+    uncertain = [v for v in order if _uncertain(views[v])]
     root = np.zeros((3 * len(views), 3 * len(uncertain)))
     for v in order:
         view = views[v]
@@ -193,7 +204,8 @@ def _root(views: Sequence[View], order: Sequence[int]) -> Floats:
             carried = np.eye(3)
             carried[:2, 2] = [-(view.pose.y - start.y), view.pose.x - start.x]
             own += carried @ root[3 * before : 3 * before + 3]
-        if view.covariance is not None:
+        if view.covariance is not None and _uncertain(view):
             k = 3 * uncertain.index(v)
-            own[:, k : k + 3] += turn @ np.linalg.cholesky(view.covariance)
+            values, vectors = np.linalg.eigh(view.covariance)
+            own[:, k : k + 3] += turn @ (vectors * np.sqrt(np.maximum(0.0, values)))
     return root

@@ -172,7 +172,7 @@ Weights = Annotated[
 ]
 
 
-def _covariance(value: Any) -> Floats:
+def _symmetric(value: Any) -> Floats:
     if type(value) is not list:
         raise PydanticCustomError("not_an_array", "expected an array")
     if len(value) in (6, 36):
@@ -184,6 +184,11 @@ def _covariance(value: Any) -> Floats:
     matrix = _rows(value, 3, NUMBERS, -_M, _M)
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
         raise PydanticCustomError("covariance", "expected a symmetric matrix")
+    return matrix
+
+
+def _covariance(value: Any) -> Floats:
+    matrix = _symmetric(value)
     try:
         np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError as error:
@@ -191,15 +196,21 @@ def _covariance(value: Any) -> Floats:
     return matrix
 
 
-Covariance = Annotated[
-    Floats,
-    PlainValidator(_covariance),
-    WithJsonSchema(
-        {
-            "type": "array",
-            "items": {"type": "array", "items": _number(), "minItems": 3, "maxItems": 3},
-            "minItems": 3,
-            "maxItems": 3,
-        }
-    ),
-]
+def _semidefinite(value: Any) -> Floats:
+    matrix = _symmetric(value)
+    if np.linalg.eigvalsh(matrix).min() < -1e-9 * np.abs(matrix).max():
+        raise PydanticCustomError("covariance", "expected a covariance: no negative eigenvalue")
+    return matrix
+
+
+_MATRIX = WithJsonSchema(
+    {
+        "type": "array",
+        "items": {"type": "array", "items": _number(), "minItems": 3, "maxItems": 3},
+        "minItems": 3,
+        "maxItems": 3,
+    }
+)
+Covariance = Annotated[Floats, PlainValidator(_covariance), _MATRIX]
+StepCovariance = Annotated[Floats, PlainValidator(_semidefinite), _MATRIX]
+"""Of a step; a direction may be exact."""

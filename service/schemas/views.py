@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
 
-from .arrays import Covariance, PointRows
+from .arrays import PointRows, StepCovariance
 from .errors import TooManyError
 from .limits import Limits
 from .parts import (
@@ -37,10 +37,10 @@ class SensorPose(Pose):
 class _View(Strict):
     pose: SensorPose
     flipped: bool = Field(False, description="mounted upside down: y becomes -y in the sensor's data before `pose`")
-    covariance: Covariance | None = Field(
+    covariance: StepCovariance | None = Field(
         None,
         description="what is not known of the step from the view `relative_to`: of additive (x, y, theta) of this "
-        "pose in that one's frame; m^2, m rad, rad^2; positive definite; null: exact",
+        "pose in that one's frame; m^2, m rad, rad^2, deviations of 10 m and 10 rad at most; null: exact",
     )
     relative_to: Annotated[int, Field(ge=0)] | None = Field(
         None, description="index of the view that `covariance` is relative to; null: the scan's frame itself"

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from analysis import Analysis, Robot, standing_places
-from association import AssociationOptions, Deadline, HardPrior, MapIndex, Scan, SoftPrior, associate
+from association import (
+    AssociationOptions,
+    Deadline,
+    HardPrior,
+    MapIndex,
+    Scan,
+    SoftPrior,
+    View,
+    assemble,
+    associate,
+)
 from association.checking import check_map, try_sample
 from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
@@ -60,6 +70,7 @@ def warm_up() -> None:
         (Scan(measured), None, AssociationOptions()),
         (beams, SoftPrior(pose, np.eye(3)), AssociationOptions()),
         (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
+        (assemble([View(Scan(measured)), View(Scan(measured), pose, 1e-4 * np.eye(3))]), None, AssociationOptions()),
     ):
         associate(index, scan, prior, how, Deadline())
     symmetric = Segments.from_array(SYMMETRIC_ROOM)

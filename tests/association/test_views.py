@@ -164,7 +164,7 @@ def on_walls(rng: np.random.Generator, views: Views) -> SeenOnWalls:
             one["spread"], one["variance"] = rng.uniform(0.1, 1.0), rng.uniform(1e-6, 1e-4)
             sights.append((one, w))
     of_wall = np.array([w for _, w in sights])
-    return SeenOnWalls(views, np.concatenate([one for one, _ in sights]), walls[of_wall], of_wall)
+    return SeenOnWalls.of(views, np.concatenate([one for one, _ in sights]), walls, of_wall)
 
 
 @pytest.mark.parametrize("chained", [True, False])
@@ -196,7 +196,7 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
     jacobian = np.vstack([by_pose, np.tile([0.0, 0.0, 1.0], (len(rows), 1))])
     of_views = np.vstack([by_views, [turn for turn, _ in rows]])
     together_covariance = np.diag([*noise, *(angle for _, angle in rows)]) + of_views @ together.covariance @ of_views.T
-    same = shown.of_wall[:, None] == shown.of_wall[None]
+    same = shown.number[:, None] == shown.number[None]
     together_covariance[: len(noise), : len(noise)] += variance * same
     information = jacobian.T @ np.linalg.solve(together_covariance, jacobian) + np.diag([SPRING, SPRING, 0.0])
     np.testing.assert_allclose(settled.covariance, np.linalg.inv(information), rtol=1e-6)

@@ -128,6 +128,13 @@ def test_a_scan_taken_while_turning(client: httpx.Client) -> None:
 
 
 VIEW = {"segments": examples.SEEN, "pose": EXACT}
+
+
+def test_a_step_may_be_exact_in_some_directions_or_all(client: httpx.Client) -> None:
+    for covariance in ([[0, 0, 0], [0, 0, 0], [0, 0, 0]], [[0.01, 0, 0], [0, 0, 0], [0, 0, 0]]):
+        assert_here(asked(client, {"views": [VIEW, {**VIEW, "covariance": covariance}]}))
+
+
 LASER = {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0, 1.0]}
 
 
@@ -140,6 +147,7 @@ LASER = {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0, 1.0]}
         ([VIEW, {**VIEW, "segments": [[0.0, 0.0, 0.0]]}], "/scan/views/1/segments/0"),
         ([VIEW, {**VIEW, "points": [3.0], "sigma": -1.0}], "/scan/views/1/sigma"),
         ([VIEW, {**VIEW, "covariance": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]]}], "/scan/views/1/covariance"),
+        ([VIEW, {**VIEW, "covariance": [[200.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]}], "/scan/views/1/covariance"),
         ([VIEW, {**VIEW, "relative_to": 2}], "/scan/views/1/relative_to"),
         ([VIEW, {**VIEW, "relative_to": 1}], "/scan/views/1/relative_to"),
         ([VIEW, {"laser": {**LASER, "angle_increment": 2.0}, "pose": EXACT}], "/scan/views/1/laser/angle_increment"),
@@ -147,7 +155,7 @@ LASER = {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0, 1.0]}
         ([VIEW, {"laser": LASER, "segments": [], "pose": EXACT}], "/scan/views/1"),
         ([VIEW, {**VIEW, "pose": {"x": 0.0, "y": 0.0, "theta": 90.0}}], "/scan/views/1/pose/theta"),
     ],
-    ids=range(12),
+    ids=range(13),
 )
 def test_what_is_wrong_is_named_by_view(client: httpx.Client, views: list[Any], pointer: str) -> None:
     problem = asked(client, {"views": views}, 422)

@@ -23,6 +23,19 @@ def around(walls: list[list[float]]) -> list[list[float]]:
     return [[a + k / 40.0 * (c - a), b + k / 40.0 * (d - b)] for a, b, c, d in [*walls, walls[0]] for k in range(40)]
 
 
+def views() -> list[dict[str, Any]]:
+    """Scans of several views, exact and not, upside down, by segments and by ranges."""
+    at: dict[str, Any] = {"pose": {"x": 0, "y": 0, "theta": 0}}
+    unsure = {**at, "covariance": [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}
+    whole, part = {"segments": SEGMENTS}, {"segments": SEGMENTS[:3]}
+    pairs: list[list[dict[str, Any]]] = [
+        [{**whole, **at}, {**part, **at}],
+        [{**whole, **at}, {**whole, **unsure}, {**part, **unsure, "relative_to": 1}],
+        [{"laser": LASER, **at, "flipped": True}, {"laser": LASER, **unsure}],
+    ]
+    return [{"views": pair} for pair in pairs]
+
+
 def associations() -> list[dict[str, Any]]:
     """Requests of every form that a scan, a prior and the options can take."""
     moments = {
@@ -38,6 +51,8 @@ def associations() -> list[dict[str, Any]]:
         {"laser": LASER, "sigma": None},
         {"points": [[3.0 * math.cos(k / 9.0), 3.0] for k in range(40)], "viewpoint": None},
         {"points": around(WALLS)},
+        {"laser": {**LASER, "time_increment": 0.01}, "twist": {"vx": 1, "vy": 0, "omega": 0.5}},
+        *views(),
     ]
     asked: list[dict[str, Any]] = [{"scan": scan} for scan in scans]
     asked += [{"prior": {**AT, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}]
