@@ -173,7 +173,7 @@ function drawUncertainty(answer: Answer, pose: Pose): void {
   context.globalAlpha = 0.25;
   context.beginPath();
   context.moveTo(px, py);
-  context.arc(px, py, 60, -pose.theta - fan, -pose.theta + fan);
+  context.arc(px, py, 90, -pose.theta - fan, -pose.theta + fan);
   context.fill();
   context.globalAlpha = 1;
 }
@@ -211,12 +211,13 @@ function drawRobot(pose: Pose, name: string, handle: boolean): void {
 
 function drawAnalysis(places: Place[], spacing: number): void {
   const side = Math.max(2, spacing * view.scale);
+  // One that does not see all round has a verdict for each direction that it looks in.
+  const directed = places.some((one) => one.pose.theta !== places[0].pose.theta);
   context.globalAlpha = 0.55;
   for (const one of places) {
     const [px, py] = toPixels(one.pose.x, one.pose.y);
     context.fillStyle = colours[kindOf(one)];
-    if (places.some((other) => other !== one && other.pose.x === one.pose.x && other.pose.y === one.pose.y)) {
-      // One that does not see all round has a verdict for each direction that it looks in.
+    if (directed) {
       context.beginPath();
       context.moveTo(px, py);
       context.arc(px, py, side / 2, -one.pose.theta - Math.PI / 4, -one.pose.theta + Math.PI / 4);
