@@ -95,7 +95,9 @@ def rooms() -> Scene:
     pieces = []
     for k in range(3):
         x, y = k * step, 2.15
-        pieces.append(outline([(x + 1.5, y), (x + width, y), (x + width, y + depth), (x, y + depth), (x, y), (x + 0.6, y)])[:-1])
+        pieces.append(
+            outline([(x + 1.5, y), (x + width, y), (x + width, y + depth), (x, y + depth), (x, y), (x + 0.6, y)])[:-1]
+        )
         pieces.append(np.array([[x + 0.6, y, x + 0.6, 2.0], [x + 1.5, 2.0, x + 1.5, y]]))
     doors = [0.6 + k * step for k in range(3)]
     edges = [-1.0, *(e for a in doors for e in (a, a + 0.9)), 12.6]

@@ -4,7 +4,8 @@
 
     entry                          runs a command, and turns what goes wrong into one line and an exit code
     program                        all commands, put together
-    locate, register, vectorize    the commands
+    locate, register, vectorize, analyze   the commands
+    all_cores                      places of an analysis, tried by several processes
     service, in_process, remote    who answers: this process, or a server
     inputs, printing               files to requests, answers to people
 """

@@ -8,7 +8,7 @@ import type { Segment } from "./types";
 const box = document.querySelector<HTMLElement>("#inset")!;
 const canvas = box.querySelector("canvas")!;
 const context = canvas.getContext("2d")!;
-const SIDE = 190; // px
+const SIDE = 150; // px
 
 function draw(): void {
   const { answer, sent } = state;

@@ -97,7 +97,7 @@ for (const [id, by] of [["#before-other", -1], ["#next-other", 1]] as const)
     changed();
   });
 
-function legend(): void {
+export function legend(): void {
   const larger = enlarged();
   const parts: [string, string][] = [];
   if (state.answer?.pose) {

@@ -29,9 +29,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def page(browser: Browser, service: RunningService) -> Iterator[Page]:
     """A new page, at which nothing may go wrong unsaid."""
-    context = browser.new_context(
-        base_url=service.url, viewport={"width": 1400, "height": 860}, accept_downloads=True
-    )
+    context = browser.new_context(base_url=service.url, viewport={"width": 1400, "height": 860}, accept_downloads=True)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     opened, wrong = context.new_page(), []
     opened.on("pageerror", lambda error: wrong.append(str(error)))

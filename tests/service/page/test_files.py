@@ -57,7 +57,11 @@ def test_what_is_served(service: RunningService, client: httpx.Client) -> None:
     policy = page.headers["content-security-policy"]
     assert "default-src 'none'; script-src 'self'; style-src 'self';" in policy
     assert "unsafe" not in policy
-    for path, kind in (("page.js", "text/javascript"), ("page.css", "text/css"), ("examples/flat.json", "application/json")):
+    for path, kind in (
+        ("page.js", "text/javascript"),
+        ("page.css", "text/css"),
+        ("examples/flat.json", "application/json"),
+    ):
         answer = client.get(f"/page/{path}")
         assert (answer.status_code, answer.headers["content-type"].partition(";")[0]) == (200, kind)
     for path in ("manifest.json", "index.html", "__init__.py", "examples/none.json", "examples/..%2f__init__.py"):
