@@ -9,6 +9,7 @@ from registration import wrap_angle
 from .result import AssociationResult, Status
 
 AS_WELL = 5.0  # nats below the best score, within which another pose explains a scan about as well
+MOST = 99.99  # %; nothing is certain
 OTHER_WAY_ROUND = 0.5 * math.pi  # rad
 
 
@@ -19,7 +20,7 @@ def sentence_of(result: AssociationResult) -> str:
     ----------
     result : AssociationResult
     """
-    chance = f"{100.0 * result.probability:.1f} %"
+    chance = f"{min(100.0 * result.probability, MOST):.2f} %"
     if result.status is Status.NO_MATCH or result.pose is None or result.diagnostics is None:
         return "Nothing on this map explains the scan."
     least = result.diagnostics.score - AS_WELL

@@ -17,7 +17,7 @@ from .running import Outcome, Runner
 
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "out" / "mutants"
-PACKAGES = ("registration", "vectorization", "service", "simulation", "association")
+PACKAGES = ("registration", "vectorization", "service", "simulation", "analysis", "association")
 ALL_KILLED = (
     "association/verdict.py",
     "service/admission/",

@@ -46,6 +46,7 @@ SUITES = {
     "association/kernels/": Suite(("tests/association/kernels",), compiled=False),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),
+    "analysis/": Suite(("tests/analysis",)),
     "service/admission/": Suite(("tests/service/admission", "tests/service/http/test_fairness.py")),
     "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py")),
     "service/parsing/": Suite(("tests/service/parsing", "tests/service/http/test_bodies.py")),

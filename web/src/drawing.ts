@@ -4,12 +4,12 @@ import { distance, place, placed, pointsOf } from "./geometry";
 import { state } from "./state";
 import type { Answer, Place, Pose, Scan, Segment } from "./types";
 import { toMetres, toPixels, view } from "./view";
+import { drawWalls } from "./walls";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const context = canvas.getContext("2d")!;
 const NAMES = ["wall", "off", "before", "point", "unmatched", "missing", "ghost", "robot", "hinge", "ok", "ambiguous", "degenerate", "no_match"];
 let colours: Record<string, string> = {};
-let walls: { of: Segment[]; path: Path2D } | null = null;
 let frame = 0;
 export const HANDLE = 46; // px from the robot to its handle
 const SMALLEST = 14; // px; an ellipse that is smaller is drawn larger, and says so
@@ -54,7 +54,8 @@ function draw(): void {
   context.clearRect(0, 0, view.width, view.height);
   context.lineCap = "round";
   if (state.analysis) drawAnalysis(state.analysis.places, state.analysis.spacing);
-  drawWalls();
+  drawWalls(context, colours.wall, redraw);
+  drawTakenOff();
   if (state.log.length) drawLog();
   const { answer, sent } = state;
   const scan = sent?.scan ?? state.scan;
@@ -63,36 +64,10 @@ function draw(): void {
   if (scan || state.virtual) drawRobot(state.robot, "robot", true);
 }
 
-function drawWalls(): void {
-  if (walls?.of !== state.walls) {
-    const path = new Path2D();
-    // About the middle of the map: a browser's paths are single precision.
-    const [ox, oy] = originOf();
-    for (const [x1, y1, x2, y2] of state.walls) {
-      path.moveTo(x1 - ox, y1 - oy);
-      path.lineTo(x2 - ox, y2 - oy);
-    }
-    walls = { of: state.walls, path };
-  }
-  const [ox, oy] = originOf();
-  const [px, py] = toPixels(ox, oy);
-  context.save();
-  context.translate(px, py);
-  context.scale(view.scale, -view.scale);
-  context.lineWidth = 1.6 / view.scale;
-  context.strokeStyle = colours.wall;
-  context.stroke(walls.path);
-  context.restore();
+function drawTakenOff(): void {
   context.setLineDash([3, 5]);
-  for (const k of state.off) {
-    line(state.walls[k], colours.off, 4);
-  }
+  for (const k of state.off) line(state.walls[k], colours.off, 4);
   context.setLineDash([]);
-}
-
-function originOf(): [number, number] {
-  const first = state.walls[0];
-  return first ? [first[0], first[1]] : [0, 0];
 }
 
 function line([x1, y1, x2, y2]: Segment, colour: string, width: number): void {
@@ -173,7 +148,7 @@ function drawUncertainty(answer: Answer, pose: Pose): void {
   context.globalAlpha = 0.25;
   context.beginPath();
   context.moveTo(px, py);
-  context.arc(px, py, 60, -pose.theta - fan, -pose.theta + fan);
+  context.arc(px, py, 90, -pose.theta - fan, -pose.theta + fan);
   context.fill();
   context.globalAlpha = 1;
 }
@@ -211,12 +186,13 @@ function drawRobot(pose: Pose, name: string, handle: boolean): void {
 
 function drawAnalysis(places: Place[], spacing: number): void {
   const side = Math.max(2, spacing * view.scale);
+  // One that does not see all round has a verdict for each direction that it looks in.
+  const directed = places.some((one) => one.pose.theta !== places[0].pose.theta);
   context.globalAlpha = 0.55;
   for (const one of places) {
     const [px, py] = toPixels(one.pose.x, one.pose.y);
     context.fillStyle = colours[kindOf(one)];
-    if (places.some((other) => other !== one && other.pose.x === one.pose.x && other.pose.y === one.pose.y)) {
-      // One that does not see all round has a verdict for each direction that it looks in.
+    if (directed) {
       context.beginPath();
       context.moveTo(px, py);
       context.arc(px, py, side / 2, -one.pose.theta - Math.PI / 4, -one.pose.theta + Math.PI / 4);

@@ -2,6 +2,7 @@
 
 import "./analysis";
 import "./files";
+import "./inset";
 import "./log";
 import "./pointer";
 import "./share";
@@ -14,6 +15,7 @@ import { onChange } from "./state";
 
 const key = document.querySelector<HTMLInputElement>("#key")!;
 key.addEventListener("input", () => setKey(key.value));
+document.querySelector("#key-form")!.addEventListener("submit", (event) => event.preventDefault());
 
 onChange(redraw);
 readColours();

@@ -4,7 +4,7 @@ import { ask, askSoon } from "./asking";
 import { HANDLE, redraw, toldAt, wallAt } from "./drawing";
 import { wrap } from "./geometry";
 import { boundsOf, changed, state } from "./state";
-import { step } from "./verdict";
+import { legend, step } from "./verdict";
 import { fit, toMetres, toPixels, view, zoom } from "./view";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
@@ -66,7 +66,7 @@ canvas.addEventListener(
   (event) => {
     event.preventDefault();
     zoom(Math.exp(-0.0015 * event.deltaY), event.offsetX, event.offsetY);
-    changed();
+    looked();
   },
   { passive: false },
 );
@@ -86,7 +86,12 @@ function move(dx: number, dy: number, turn = 0): void {
 
 function fitPlan(): void {
   fit(boundsOf(state.walls));
-  changed();
+}
+
+/** Draw another part of the plan; the legend says how much larger than they are some things are drawn. */
+function looked(): void {
+  redraw();
+  legend();
 }
 
 const SHIFTED = 10;
@@ -121,7 +126,8 @@ canvas.addEventListener("keydown", (event) => {
     askSoon();
   } else {
     plan[name]();
-    changed();
+    if (name === "n") changed();
+    else looked();
   }
 });
 
@@ -132,7 +138,7 @@ for (const [id, action] of Object.entries({
 }))
   document.querySelector(id)!.addEventListener("click", () => {
     action();
-    changed();
+    looked();
   });
 
 const help = document.querySelector<HTMLButtonElement>("#help")!;

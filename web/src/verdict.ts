@@ -1,7 +1,7 @@
 // The verdict in words and numbers, and the other places.
 
 import { enlarged } from "./drawing";
-import { onChange, state } from "./state";
+import { changed, onChange, state } from "./state";
 
 const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
 const card = element("#verdict");
@@ -91,7 +91,13 @@ export function step(by: number): void {
   if (count) state.other = ((state.other + 1 + by + count + 1) % (count + 1)) - 1;
 }
 
-function legend(): void {
+for (const [id, by] of [["#before-other", -1], ["#next-other", 1]] as const)
+  element(id).addEventListener("click", () => {
+    step(by);
+    changed();
+  });
+
+export function legend(): void {
   const larger = enlarged();
   const parts: [string, string][] = [];
   if (state.answer?.pose) {
@@ -99,7 +105,10 @@ function legend(): void {
     if (state.answer.unmatched_scan.length) parts.push(["unmatched", "on no wall"]);
     if (state.answer.missing_map.length) parts.push(["missing", "not seen, though it should"]);
     if (state.answer.diagnostics?.hinges_on) parts.push(["hinge", "what the pose hinges on"]);
-    if (larger !== null) parts.push(["robot", `3 sigma${larger > 1.05 ? `, drawn ${larger.toFixed(0)} times larger` : ""}`]);
+    parts.push([state.answer.usable ? "ok" : state.answer.status, "where it was found"]);
+    if (state.virtual) parts.push(["robot", "where it stands"]);
+    if (state.answer.unobservable) parts.push(["degenerate", "free along this"]);
+    if (larger !== null) parts.push(["sigma", `3 sigma${larger > 1.05 ? `, drawn ${larger.toFixed(0)} times larger` : ""}`]);
   }
   if (state.other >= 0) parts.push(["ghost", "another place"]);
   if (state.analysis || state.log.length)

@@ -28,6 +28,7 @@ def test_there_are_examples() -> None:
         "/v1/vectorize",
         "/v1/associate",
         "/v1/maps/hq-3:check",
+        "/v1/maps/hq-3:analyze",
     ]
 
 
@@ -41,6 +42,8 @@ def test_an_example_works(client: httpx.Client, path: str, body: str) -> None:
     assert answer.status_code == 200, answer.text
     if path == "/v1/vectorize":
         assert len(answer.json()["segments"]) == 1
+    elif path.endswith(":analyze"):
+        assert answer.json()["summary"]["usable"] > 20
     elif path.endswith(":check"):
         assert (answer.json()["findings"], answer.json()["samples"]["usable"]) == ([], 1)
     else:

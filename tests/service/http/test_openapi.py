@@ -68,6 +68,8 @@ def test_every_route_is_in_it(document: dict[str, Any]) -> None:
         ("GET", "/v1/maps/{map_id}:check"),
         ("POST", "/v1/maps/{map_id}:check"),
         ("POST", "/v1/maps:import"),
+        ("POST", "/v1/maps/{map_id}:analyze"),
+        ("POST", "/v1/analyze"),
         ("GET", "/v1/limits"),
         ("GET", "/version"),
         ("GET", "/livez"),
@@ -116,7 +118,7 @@ def test_every_example_is_answered(document: dict[str, Any], client: httpx.Clien
         for example in content.get("application/json", {}).get("examples", {}).values():
             url = path.replace("{map_id}", "hq-3")
             status = client.request(method, url, json=example["value"]).status_code
-            stored = example["value"].get("map", {}).get("map_id") or path.endswith(":check")
+            stored = example["value"].get("map", {}).get("map_id") or path.endswith((":check", ":analyze"))
             assert status in ((404,) if stored else (200, 201)), (path, status)
             client.delete("/v1/maps/hq-3")
             tried += 1

@@ -1,0 +1,250 @@
+"""The page in a real browser, as a user has it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import httpx
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, expect
+
+from service.schemas import examples
+from tests.running import RunningService
+
+SCAN = {"segments": examples.SEEN, "sigma": 0.02}
+PROBLEM = {"title": "t", "status": 503, "detail": "All places are taken", "code": "overloaded"}
+
+
+def verdict(page: Page, state: str) -> None:
+    expect(page.locator("#verdict")).to_have_attribute("data-state", state, timeout=30_000)
+
+
+def shown(page: Page, example: str, state: str) -> None:
+    page.goto(f"/?example={example}")
+    verdict(page, state)
+
+
+def press(page: Page, key: str, times: int) -> None:
+    for _ in range(times):
+        page.keyboard.press(key)
+
+
+@pytest.mark.parametrize(
+    ("title", "state", "said"),
+    [
+        ("A flat", "usable", "The robot is here"),
+        ("An office", "usable", "The robot is here"),
+        ("Look-alike rooms", "ambiguous", "2 other places explain the scan about as well"),
+        ("A corridor", "degenerate", "cannot know where it is along"),
+        ("A warehouse", "usable", "The robot is here"),
+    ],
+)
+def test_every_example(page: Page, title: str, state: str, said: str) -> None:
+    page.goto("/")
+    page.get_by_label("Example").select_option(label=title)
+    verdict(page, state)
+    expect(page.locator("#sentence")).to_contain_text(said)
+    expect(page.locator("#numbers")).to_contain_text("matched")
+
+
+def test_the_keyboard_alone(page: Page) -> None:
+    """From the top of the page to a robot that is driven out of the room, where it knows again."""
+    shown(page, "rooms", "ambiguous")
+    for _ in range(20):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "plan":
+            break
+    assert page.evaluate("document.activeElement.id") == "plan"
+    press(page, "n", 1)
+    expect(page.locator("#other")).to_contain_text("other place 1 of")
+    press(page, "Shift+ArrowLeft", 2)
+    press(page, "Shift+ArrowDown", 3)
+    press(page, "q", 3)
+    verdict(page, "usable")
+    press(page, "Shift+ArrowUp", 3)
+    verdict(page, "ambiguous")
+
+
+def test_a_robot_is_dragged(page: Page) -> None:
+    shown(page, "rooms", "ambiguous")
+    box = page.locator("#plan").bounding_box()
+    assert box is not None
+    # The plan is 13.6 m wide and fills 88 % of the canvas; the robot stands at (6.75, 4.2), the middle at (5.8, 2.575).
+    scale = 0.88 * box["width"] / 13.6
+    at = [(box["x"] + box["width"] / 2 + (x - 5.8) * scale, box["y"] + box["height"] / 2 - (y - 2.575) * scale)
+          for x, y in ((6.75, 4.2), (4.0, 1.0))]  # fmt: skip
+    page.mouse.move(*at[0])
+    page.mouse.down()
+    page.mouse.move(*at[1], steps=4)
+    page.mouse.up()
+    verdict(page, "usable")
+    expect(page.locator("#numbers")).to_contain_text("4.0")
+
+
+def test_noise_and_walls_that_are_missing(page: Page) -> None:
+    shown(page, "flat", "usable")
+    page.get_by_label("Noise").fill("0.2")
+    expect(page.locator("#noise-value")).to_have_text("20.0 cm")
+    expect(page.locator("#numbers dd").first).not_to_have_text("99.98 %")
+    page.get_by_label("Noise").fill("0")
+    verdict(page, "usable")
+    expect(page.get_by_role("button", name="Put the walls back")).to_be_disabled()
+    page.get_by_label("take walls off").check()
+    box = page.locator("#plan").bounding_box()
+    assert box is not None
+    for share in (0.2, 0.35, 0.5, 0.65, 0.8):
+        for other in range(12):
+            page.mouse.click(box["x"] + (0.1 + 0.066 * other) * box["width"], box["y"] + share * box["height"])
+    expect(page.get_by_role("button", name="Put the walls back")).to_be_enabled()
+    page.get_by_role("button", name="Put the walls back").click()
+    verdict(page, "usable")
+    expect(page.locator("#numbers dd").first).to_have_text("99.98 %")
+
+
+def files(folder: Path, **contents: object) -> list[Path]:
+    for name, content in contents.items():
+        (folder / f"{name}.json").write_text(json.dumps(content))
+    return [folder / f"{name}.json" for name in contents]
+
+
+def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
+    page.goto("/")
+    page.set_input_files("#files", files(tmp_path, room={"segments": examples.WALLS}, scan=SCAN))
+    verdict(page, "usable")
+    expect(page.locator("#numbers")).to_contain_text("1.000 m, 0.500 m")
+    (bad,) = files(tmp_path, bad={"rooms": 3})
+    page.set_input_files("#files", [bad])
+    expect(page.locator("#sentence")).to_contain_text("neither a map nor a scan")
+    (short,) = files(tmp_path, short={"laser": {"angle_min": 0, "angle_increment": 9, "ranges": [1, 2]}})
+    page.set_input_files("#files", [short])
+    expect(page.locator("#sentence")).to_contain_text("/scan/laser/angle_increment")
+
+
+def test_a_service_without_the_formats(page: Page, tmp_path: Path) -> None:
+    page.route("**/v1/maps:import", lambda route: route.fulfill(status=415, json={**PROBLEM, "status": 415}))
+    page.goto("/")
+    (tmp_path / "plan.dxf").write_text("0")
+    page.set_input_files("#files", [tmp_path / "plan.dxf"])
+    expect(page.locator("#sentence")).to_contain_text("JSON only")
+
+
+def test_a_refusal_and_a_lost_connection(page: Page) -> None:
+    shown(page, "flat", "usable")
+    page.route("**/v1/associate", lambda route: route.fulfill(status=503, json=PROBLEM))
+    page.get_by_role("button", name="Ask").click()
+    verdict(page, "problem")
+    expect(page.locator("#sentence")).to_have_text("All places are taken")
+    page.unroute("**/v1/associate")
+    page.route("**/v1/associate", lambda route: route.abort())
+    page.get_by_role("button", name="Ask").click()
+    expect(page.locator("#sentence")).to_contain_text("does not answer")
+    page.unroute("**/v1/associate")
+    page.get_by_role("button", name="Ask").click()
+    verdict(page, "usable")
+
+
+def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
+    page.goto(f"{guarded.url}/?example=flat")
+    verdict(page, "problem")
+    expect(page.locator("#sentence")).to_contain_text("Key")
+    page.locator("#access summary").click()
+    page.locator("#key").fill("sesame")
+    page.get_by_role("button", name="Ask").click()
+    verdict(page, "usable")
+
+
+def test_where_a_map_will_fail(page: Page) -> None:
+    shown(page, "rooms", "ambiguous")
+    page.locator("#analysis summary").click()
+    page.get_by_label("Spacing").fill("1")
+    page.get_by_role("button", name="Analyze").click()
+    expect(page.locator("#analyzed")).to_contain_text("A robot would know where it is at", timeout=60_000)
+    expect(page.locator("#legend")).to_contain_text("ambiguous")
+    page.get_by_role("button", name="Clear").click()
+    expect(page.locator("#analyzed")).to_be_empty()
+    page.get_by_label("Spacing").fill("0.01")
+    page.get_by_role("button", name="Analyze").click()
+    expect(page.locator("#analyzed")).to_contain_text("/spacing")
+
+
+def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
+    lines = [
+        {"stamp": k, "status": "ok" if k else "no_match", "usable": k > 0, "probability": 0.9, "reasons": [],
+         "pose": {"x": 0.1 * k, "y": 0.0, "theta": 0.0} if k else None, "timing_ms": {}}
+        for k in range(4)
+    ]  # fmt: skip
+    (tmp_path / "log.jsonl").write_text("\n".join(json.dumps(line) for line in lines))
+    page.goto("/")
+    page.set_input_files("#files", [*files(tmp_path, room={"segments": examples.WALLS}), tmp_path / "log.jsonl"])
+    told = page.locator("#scan-of-log")
+    expect(told).to_contain_text("Scan 1 of 4: no match, not usable")
+    page.get_by_role("button", name="Play").click()
+    expect(told).to_contain_text("Scan 4 of 4: ok, usable")
+    expect(told).to_contain_text("3 of 4 are usable")
+    expect(page.get_by_role("button", name="Play")).to_be_enabled()
+
+
+def test_stored_maps(page: Page, client: httpx.Client) -> None:
+    shown(page, "flat", "usable")
+    page.locator("#stored summary").click()
+    page.get_by_label("Name").fill("a flat")
+    page.get_by_role("button", name="Store this map").click()
+    expect(page.locator("#findings")).to_contain_text("letters")
+    page.get_by_label("Name").fill("page-flat")
+    page.get_by_role("button", name="Store this map").click()
+    expect(page.locator("#findings")).to_contain_text("page-flat is stored")
+    assert client.get("/v1/maps/page-flat").status_code == 200
+    page.get_by_role("button", name="Open page-flat").click()
+    expect(page.locator("#about")).to_have_text("The stored map page-flat.")
+    page.get_by_role("button", name="Check page-flat").click()
+    expect(page.locator("#findings")).not_to_contain_text("Checking", timeout=30_000)
+    page.once("dialog", lambda dialog: dialog.accept())
+    page.get_by_role("button", name="Delete page-flat").click()
+    expect(page.locator("#findings")).to_contain_text("page-flat is deleted")
+    assert client.get("/v1/maps/page-flat").status_code == 404
+
+
+def test_a_request_is_taken_along(page: Page, client: httpx.Client, tmp_path: Path) -> None:
+    shown(page, "flat", "usable")
+    page.locator("#share summary").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Download the request").click()
+    kept = tmp_path / "request.json"
+    download.value.save_as(kept)
+    assert client.post("/v1/associate", content=kept.read_bytes()).json()["usable"] is True
+    page.get_by_role("button", name="Copy as curl").click()
+    expect(page.locator("#copied")).to_have_text("Copied.")
+    assert page.evaluate("navigator.clipboard.readText()").startswith(f"curl -s {client.base_url}".rstrip("/"))
+    page.get_by_role("button", name="Copy as Python").click()
+    expect(page.locator("#copied")).to_have_text("Copied.")
+    program = page.evaluate("navigator.clipboard.readText()")
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert ran.stdout.startswith("ok True"), ran.stderr
+    page.set_input_files("#files", [kept])
+    verdict(page, "usable")
+
+
+def test_nothing_comes_from_elsewhere(page: Page, service: RunningService) -> None:
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    shown(page, "office", "usable")
+    assert len(asked) >= 5
+    assert [url for url in asked if not url.startswith(service.url)] == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_accessible(browser: Browser, service: RunningService, scheme: str) -> None:
+    """By axe, which a page of this policy does not let in by itself."""
+    context = browser.new_context(base_url=service.url, bypass_csp=True, color_scheme=scheme)  # type: ignore[arg-type]
+    page = context.new_page()
+    shown(page, "office", "usable")
+    for name in ("analysis", "log", "stored", "share", "access"):
+        page.locator(f"#{name} summary").click()
+    page.get_by_role("button", name="Keys").click()
+    found = Axe().run(page).response["violations"]
+    context.close()
+    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found] == []
