@@ -28,7 +28,11 @@ class MaterialsError(Exception):
 def pinned(text: str) -> dict[str, str]:
     """Return the versions of the packages that are pinned for this system."""
     lines = (line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#"))
-    wanted = [requirement for requirement in map(Requirement, lines) if not requirement.marker or requirement.marker.evaluate()]
+    wanted = [
+        requirement
+        for requirement in map(Requirement, lines)
+        if not requirement.marker or requirement.marker.evaluate()
+    ]
     return {canonicalize_name(one.name): str(one.specifier).removeprefix("==") for one in wanted}
 
 
@@ -43,7 +47,9 @@ def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
     components = {canonicalize_name(one["name"]): one for one in bill.get("components", [])}
     if not pins:
         raise MaterialsError("no package is pinned: nothing to check")
-    wrong = [f"{name} {version}" for name, version in pins.items() if components.get(name, {}).get("version") != version]
+    wrong = [
+        f"{name} {version}" for name, version in pins.items() if components.get(name, {}).get("version") != version
+    ]
     if wrong:
         raise MaterialsError(f"not installed in this version: {', '.join(sorted(wrong))}; make clean, and again")
     parts = [components[name] for name in sorted(pins)]
@@ -58,7 +64,10 @@ def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
 
 def licences(component: dict[str, Any]) -> str:
     """Return what a package says of its licence, in one line."""
-    said = [one.get("expression") or one["license"].get("id") or one["license"].get("name") or "" for one in component.get("licenses", [])]
+    said = [
+        one.get("expression") or one["license"].get("id") or one["license"].get("name") or ""
+        for one in component.get("licenses", [])
+    ]
     short = {text.rsplit(" :: ", 1)[-1] for text in said if text and "\n" not in text}
     return "; ".join(sorted(short))
 
@@ -66,14 +75,23 @@ def licences(component: dict[str, Any]) -> str:
 def require_licences(bill: dict[str, Any]) -> None:
     """Raise `MaterialsError` where a package may not be part of this, or does not say."""
     told = {one["name"]: licences(one) for one in bill["components"]}
-    wrong = [f"{name}: {text or 'says nothing'}" for name, text in told.items() if not text or COPYLEFT.search(LESSER.sub("", text))]
+    wrong = [
+        f"{name}: {text or 'says nothing'}"
+        for name, text in told.items()
+        if not text or COPYLEFT.search(LESSER.sub("", text))
+    ]
     if wrong:
         raise MaterialsError("licences that may not be part of it: " + ", ".join(wrong))
 
 
 def main() -> int:
     """Write the bill and print the licences; return the exit code."""
-    command = [str(Path(sys.executable).with_name("cyclonedx-py")), "environment", "--output-reproducible", sys.executable]
+    command = [
+        str(Path(sys.executable).with_name("cyclonedx-py")),
+        "environment",
+        "--output-reproducible",
+        sys.executable,
+    ]
     whole = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
     try:
         bill = kept(whole, pinned(PINS.read_text()))
