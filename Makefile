@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page lock clean
+.PHONY: help demo test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -80,6 +80,12 @@ peers: $(VENV)-peers/.peers  ## print Linefix beside other solvers, installed ap
 page: $(VENV)/.ready  ## build the page from web/ into service/page/ (needs node)
 	cd web && npm ci --no-audit --no-fund && npm run build
 	$(BIN)/python -m examples.scenes
+
+sbom: $(VENV)/.ready  ## write the bill of materials (CycloneDX) and list the licences; no GPL passes
+	$(BIN)/python .ci/materials.py
+
+audit: $(VENV)/.ready  ## look the pinned packages up in the published advisories; fails where there are none to be had
+	BIN=$(BIN) .ci/audit
 
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats pyproject.toml -o requirements/runtime.txt

@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager, suppress
 from functools import partial
 
 from fastapi import FastAPI
+from starlette.middleware.cors import CORSMiddleware
 
 from .admission.budget import ByteBudget
 from .admission.connections import ConnectionLimit, most_connections
@@ -72,6 +73,21 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     for module in (associate, register, batch, vectorize, check, analyze, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
     handle_errors(app)
+    if settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.cors_origins,
+            allow_methods=("GET", "POST", "PUT", "DELETE"),
+            allow_headers=(
+                "Authorization",
+                "Content-Encoding",
+                "Content-Type",
+                "If-Match",
+                "If-None-Match",
+                "X-Request-Id",
+            ),
+            expose_headers=("ETag", "Retry-After", "X-Request-Id"),
+        )
     app.add_middleware(Reception, services=services)
     return app
 
@@ -88,7 +104,7 @@ def _services(settings: Settings, part: Part) -> Services:
     readiness = Readiness()
     keyring = _keyring(settings)
     connections = ConnectionLimit(most_connections(part.share(settings.max_connections)))
-    origins = Origins(settings.hosts, guarded=settings.guarded)
+    origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
     metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)

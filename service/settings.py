@@ -6,6 +6,7 @@ import argparse
 import ipaddress
 import os
 import re
+import ssl
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,9 +35,13 @@ _METAVARS = {
     "jwt_keys": "PATH-OR-URL",
     "jwt_algorithms": "NAME,...",
     "hosts": "NAME,...",
+    "cors_origins": "ORIGIN,...",
+    "tls_cert": "PATH",
+    "tls_key": "PATH",
     "log_level": "LEVEL",
 }
 _DEFAULTS = {"data_dir": "~/.local/share/linefix", "searches": "the cores"}
+_ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:[0-9]+)?|https?://\[[0-9a-f:]+\](:[0-9]+)?")
 _PRINTABLE = re.compile(r"[!-~]+")
 
 
@@ -92,6 +97,11 @@ class Settings(BaseSettings):
     hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         (), description="without keys: names under which the service is asked for, comma separated"
     )
+    cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
+        (), description="sites whose pages may ask, as https://site.example, comma separated"
+    )
+    tls_cert: Path | None = Field(None, description="certificate chain, PEM: then the service speaks HTTPS alone")
+    tls_key: Path | None = Field(None, description="its private key, PEM, without a password")
     allow_anonymous: bool = Field(False, description="without keys, listen on other addresses than loopback")
 
     workers: int = Field(1, ge=1, le=256, description="processes that share the port, the searches and the queue")
@@ -136,7 +146,7 @@ class Settings(BaseSettings):
     )
     log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
 
-    @field_validator("keys", "hosts", "jwt_algorithms", mode="before")
+    @field_validator("keys", "hosts", "jwt_algorithms", "cors_origins", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         items = value.split(",") if isinstance(value, str) else value
@@ -152,6 +162,13 @@ class Settings(BaseSettings):
         if any(isinstance(part, str) and not _PRINTABLE.fullmatch(part) for part in found):
             raise ValueError("one of them holds a space, or a letter that no header can")
         return found
+
+    @field_validator("cors_origins")
+    @classmethod
+    def _named(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
+        if not all(_ORIGIN.fullmatch(origin) for origin in origins):
+            raise ValueError("name each as a browser does: https://site.example, or with a port")
+        return origins
 
     @field_validator("database_url")
     @classmethod
@@ -225,6 +242,7 @@ def read_settings(arguments: Sequence[str]) -> Settings:
             "let anyone who reaches the port use the service"
         )
     _require_usable_keys(settings)
+    _require_usable_certificate(settings)
     if settings.workers > settings.searches:
         raise SettingsError(f"workers: at most as many as searches, of which there are {settings.searches}")
     return settings
@@ -246,6 +264,19 @@ def _require_usable_keys(settings: Settings) -> None:
     where = urlsplit(settings.jwt_keys or "")
     if where.scheme and where.scheme != "https" and not (where.scheme == "http" and is_loopback(where.hostname or "")):
         raise SettingsError("jwt_keys: a path, or a URL that begins with https")
+
+
+def _require_usable_certificate(settings: Settings) -> None:
+    """Refuse a certificate that nobody could be shown."""
+    if (settings.tls_cert is None) != (settings.tls_key is None):
+        raise SettingsError("tls_cert, tls_key: both or none")
+    if settings.tls_cert is not None:
+        try:
+            # Without an answer to that the start would wait for somebody to type one.
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(settings.tls_cert, settings.tls_key, lambda: "")
+        except (OSError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) and error.strerror else "no such certificate and key"
+            raise SettingsError(f"tls_cert, tls_key: {why}") from None
 
 
 def _add_argument(parser: argparse.ArgumentParser, *names: str, **how: Any) -> None:

@@ -89,7 +89,7 @@ def start(data_dir: Path, *, probe: str = "/readyz", port: int | None = None, **
     command = [sys.executable, "-m", "service", "--port", str(port), "--data-dir", str(data_dir)]
     with (data_dir / "log").open("ab") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
-    url = f"http://127.0.0.1:{port}"
+    url = f"{'https' if 'tls_cert' in settings else 'http'}://127.0.0.1:{port}"
     service = RunningService(url, port, data_dir, process, client_of(url))
     give_up = time.monotonic() + START_SECONDS
     while time.monotonic() < give_up:

@@ -64,7 +64,7 @@ class Entrance:
         """
         method, path, headers = head["method"], head["path"], head["headers"]
         self._origins.require(headers)
-        if not path.startswith(GUARDED):
+        if not path.startswith(GUARDED) or self._origins.is_preflight(method, headers):
             grant, searches = Grant(), False
         else:
             asked = asked_of(method, path)

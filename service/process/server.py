@@ -64,6 +64,8 @@ def config_of(settings: Settings, factory: Callable[[], FastAPI]) -> uvicorn.Con
         access_log=False,
         proxy_headers=False,
         server_header=False,
+        ssl_certfile=settings.tls_cert,
+        ssl_keyfile=settings.tls_key,
         headers=[("X-Content-Type-Options", "nosniff")],
         workers=settings.workers,
         timeout_keep_alive=IDLE_SECONDS,

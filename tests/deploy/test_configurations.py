@@ -1,0 +1,139 @@
+"""What is in deploy/: read as those who use it do, and run where the program is there."""
+
+from __future__ import annotations
+
+import configparser
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+import pytest
+import trustme
+from ruamel.yaml import YAML
+
+from service.database_url import database_url
+from service.schemas import examples
+from service.settings import Settings
+from tests.running import JSON, RunningService, free_port, until
+from tests.service.issuing import key_lines
+
+ROOT = Path(__file__).parents[2]
+DEPLOY = ROOT / "deploy"
+SETTING = re.compile(r"LINEFIX_([A-Z_]+)")
+
+
+@pytest.mark.parametrize("name", ["compose.yaml", "linefix.service", "nginx.conf"])
+def test_every_setting_is_one(name: str) -> None:
+    found = {setting.lower() for setting in SETTING.findall((DEPLOY / name).read_text())}
+    assert found
+    assert found - {"kernels"} <= set(Settings.model_fields)
+
+
+def test_compose_names_what_it_uses() -> None:
+    document = YAML(typ="safe").load((DEPLOY / "compose.yaml").read_text())
+    services = document["services"]
+    assert set(services) == {"linefix", "postgres"}
+    for service in services.values():
+        assert set(service["secrets"]) <= set(document["secrets"])
+        named = {volume.split(":")[0] for volume in service.get("volumes", ())}
+        assert named <= set(document["volumes"])
+    for secret in document["secrets"].values():
+        assert (DEPLOY / secret["file"]).resolve().parent == ROOT / "secrets"
+    linefix = services["linefix"]
+    assert (DEPLOY / linefix["build"]).resolve() == ROOT
+    assert linefix["cap_drop"] == ["ALL"]
+    assert linefix["read_only"] is True
+    assert all(port.startswith("127.0.0.1:") for port in linefix["ports"])
+    url = database_url(linefix["environment"]["LINEFIX_DATABASE_URL"])
+    assert url.password is None
+    database = services["postgres"]["environment"]
+    assert (url.host, url.username, url.database) == ("postgres", database["POSTGRES_USER"], database["POSTGRES_DB"])
+
+
+def test_the_unit_is_one() -> None:
+    unit = configparser.RawConfigParser(strict=False)
+    unit.optionxform = str  # type: ignore[method-assign,assignment]
+    unit.read(DEPLOY / "linefix.service")
+    assert unit["Service"]["ExecStart"].split()[1:] == ["serve"]
+    assert unit["Service"]["DynamicUser"] == "yes"
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("no systemd-analyze")
+    command = ["systemd-analyze", "verify", "--man=no", str(DEPLOY / "linefix.service")]
+    told = subprocess.run(command, capture_output=True, text=True, check=False).stderr
+    # That the program is not where the unit expects it is all that may be said of it here.
+    wrong = [line for line in told.splitlines() if "linefix.service" in line and "not executable" not in line]
+    assert wrong == []
+
+
+def nginx(service_port: int, port: int, folder: Path) -> list[str]:
+    """Write its configuration with the test's ports and files; return the command that runs it."""
+    made = trustme.CA().issue_cert("127.0.0.1")
+    (folder / "tls.crt").write_bytes(b"".join(blob.bytes() for blob in made.cert_chain_pems))
+    made.private_key_pem.write_to_path(str(folder / "tls.key"))
+    user = "user root;\n" if os.geteuid() == 0 else ""  # its usual one cannot read the test's folder
+    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    changes = {
+        "127.0.0.1:8000": f"127.0.0.1:{service_port}",
+        "listen 443 ssl": f"listen 127.0.0.1:{port} ssl",
+        "/etc/linefix": str(folder),
+        "events {}": f"events {{}}\n{user}daemon off;\npid {folder}/pid;\nerror_log {folder}/error.log;",
+        "http {": "http {\naccess_log off;\n" + "".join(f"{kind}_temp_path {folder}/{kind};\n" for kind in kinds),
+    }
+    written = _changed(DEPLOY / "nginx.conf", folder, changes)
+    return ["nginx", "-e", str(folder / "error.log"), "-c", str(written)]
+
+
+def caddy(service_port: int, port: int, folder: Path) -> list[str]:
+    """Write its configuration with the test's ports, and a certificate of its own; return the command that runs it."""
+    changes = {
+        "127.0.0.1:8000": f"127.0.0.1:{service_port}",
+        "linefix.example {": f"{{\nadmin off\nskip_install_trust\n}}\nhttps://127.0.0.1:{port} {{\ntls internal",
+    }
+    written = _changed(DEPLOY / "Caddyfile", folder, changes)
+    data = ["env", f"XDG_DATA_HOME={folder}", f"XDG_CONFIG_HOME={folder}", f"HOME={folder}"]
+    return [*data, "caddy", "run", "--adapter", "caddyfile", "--config", str(written)]
+
+
+@pytest.mark.parametrize("proxy", [nginx, caddy])
+def test_a_proxy_stands_in_front(
+    proxy: Callable[[int, int, Path], list[str]], start_service: Callable[..., RunningService], tmp_path: Path
+) -> None:
+    if shutil.which(proxy.__name__) is None:
+        pytest.skip(f"no {proxy.__name__}")
+    keys, port = tmp_path / "keys.toml", free_port()
+    keys.write_text(key_lines("sesame", ["associate"]))
+    running = start_service(keys_file=keys)
+    with (tmp_path / "proxy.log").open("wb") as log:
+        process = subprocess.Popen(proxy(running.port, port, tmp_path), stdout=log, stderr=log)
+    try:
+        with httpx.Client(base_url=f"https://127.0.0.1:{port}", headers=JSON, verify=False, timeout=60) as client:
+            until(lambda: _answers(client))
+            bearer = {"authorization": "Bearer sesame"}
+            assert client.post("/v1/associate", json=examples.ASSOCIATE, headers=bearer).status_code == 200
+            assert client.post("/v1/associate", json=examples.ASSOCIATE).json()["code"] == "unauthorized"
+            assert client.put("/v1/maps/m", json=examples.MAP, headers=bearer).json()["code"] == "forbidden"
+            assert client.post("/v1/associate", content=b" " * 34_000_000, headers=bearer).status_code == 413
+            assert client.get("/metrics").status_code == 200  # from here
+    finally:
+        process.terminate()
+        process.wait(60)
+
+
+def _changed(path: Path, folder: Path, changes: dict[str, str]) -> Path:
+    text = path.read_text()
+    for before, after in changes.items():
+        assert before in text
+        text = text.replace(before, after)
+    (folder / path.name).write_text(text)
+    return folder / path.name
+
+
+def _answers(client: httpx.Client) -> bool:
+    try:
+        return client.get("/livez").status_code == 200
+    except httpx.TransportError:
+        return False

@@ -1,0 +1,97 @@
+"""What may be part of the service, and that nothing passes unseen."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+MATERIALS = runpy.run_path(str(ROOT / ".ci" / "materials.py"))
+Refused = MATERIALS["MaterialsError"]
+
+
+def bill(*licences: object, version: str = "1.0") -> dict[str, Any]:
+    parts = [
+        {"name": f"p{number}", "version": version, "bom-ref": f"p{number}", "licenses": said}
+        for number, said in enumerate(licences)
+    ]
+    return {"components": parts, "dependencies": [{"ref": "p0", "dependsOn": ["p1", "dev"]}, {"ref": "dev"}]}
+
+
+def named(text: str) -> list[dict[str, Any]]:
+    return [{"license": {"name": text}}]
+
+
+@pytest.mark.parametrize("text", ["MIT", "LGPL-3.0-only", "GNU Lesser General Public License v3", "Apache-2.0 OR MIT"])
+def test_licences_that_may_be_part_of_it(text: str) -> None:
+    MATERIALS["require_licences"](bill(named(text)))
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        named("GPL-2.0-or-later"),
+        named("AGPL-3.0-only"),
+        named("License :: OSI Approved :: GNU General Public License v3 (GPLv3)"),
+        [{"expression": "MIT AND GPL-3.0-only"}],
+        [{"license": {"id": "GPL-3.0-only"}}],
+        named("GNU Affero General Public License v3"),
+        [],
+    ],
+    ids=str,
+)
+def test_licences_that_may_not(said: object) -> None:
+    with pytest.raises(Refused, match="p1"):
+        MATERIALS["require_licences"](bill(named("MIT"), said))
+
+
+def test_nothing_to_check_is_no_pass() -> None:
+    with pytest.raises(Refused, match="nothing to check"):
+        MATERIALS["kept"](bill(named("MIT")), {})
+    for pins, there in (({"p0": "1.0", "p9": "1.0"}, "1.0"), ({"p0": "1.0"}, "2.0")):
+        with pytest.raises(Refused, match="not installed in this version"):
+            MATERIALS["kept"](bill(named("MIT"), version=there), pins)
+
+
+def test_a_bill_has_what_is_pinned_and_no_more() -> None:
+    pins = MATERIALS["pinned"]("p0==1.0\np2==1.0 ; python_full_version < '3'\n# nothing\n")
+    assert pins == {"p0": "1.0"}
+    found = MATERIALS["kept"](bill(named("MIT"), named("MIT")), pins)
+    assert [one["name"] for one in found["components"]] == ["p0"]
+    assert found["dependencies"] == [{"ref": "p0", "dependsOn": []}]
+    assert len(MATERIALS["pinned"]((ROOT / "requirements" / "runtime.txt").read_text())) > 40
+
+
+def test_an_audit_that_reaches_nothing_fails(tmp_path: Path) -> None:
+    """As pip-audit does then: it says that everything was skipped, and that all is well."""
+    blind = tmp_path / "pip-audit"
+    blind.write_text('#!/bin/sh\necho \'{"dependencies": [{"name": "pyyaml", "skip_reason": "not found"}]}\'\n')
+    blind.chmod(0o755)
+    environment = {**os.environ, "BIN": str(tmp_path)}
+    ended = subprocess.run([ROOT / ".ci" / "audit"], env=environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "FAILED" in ended.stderr
+
+
+def test_the_version_is_said_once_and_has_its_changes() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_command_line_needs_no_part_of_one_system() -> None:
+    """Libraries and commands are loaded where there are none of these; the service itself is for POSIX."""
+    code = """
+import sys
+for name in ("fcntl", "grp", "pwd", "resource", "termios"):
+    sys.modules[name] = None
+import registration, vectorization, association, simulation, formats
+import service.commands.program
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
