@@ -8,6 +8,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from functools import partial
+from operator import attrgetter
 
 from fastapi import FastAPI
 
@@ -60,6 +61,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
+        generate_unique_id_function=attrgetter("name"),  # generated clients name their functions so
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services
