@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
+.PHONY: help demo client-types test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -59,6 +59,11 @@ endings: $(VENV)/.ready  ## print how soon hang-ups, slow clients, killed worker
 
 mutants: $(VENV)/.ready  ## put 500 mistakes into the code, one at a time, and see which the tests notice (hours; takes up where it was stopped)
 	nice -n 19 $(BIN)/python -m benchmarks.mutants $(ARGS)
+
+client-types: $(VENV)/.ready  ## make the client's types anew from the schema
+	$(BIN)/python -m venv $(VENV)-clients
+	$(VENV)-clients/bin/python -m pip install --quiet --disable-pip-version-check datamodel-code-generator==0.89.0
+	$(BIN)/python -m clients.types $(VENV)-clients/bin/datamodel-codegen
 
 siege: $(VENV)/.ready  ## print what each of many attacks takes from an honest client (25 min)
 	$(BIN)/python -m benchmarks.siege

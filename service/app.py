@@ -8,6 +8,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from functools import partial
+from operator import attrgetter
 
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
@@ -64,6 +65,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
+        generate_unique_id_function=attrgetter("name"),  # generated clients name their functions so
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services

@@ -18,6 +18,7 @@ router = APIRouter(tags=["associate"])
 
 @router.post(
     "/v1/associate",
+    operation_id="associate",
     response_model=AssociateAnswer,
     responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES, "unknown_map", "map_corrupt"),
     openapi_extra=takes(AssociateRequest, {"a room": examples.ASSOCIATE, "a stored map": examples.ASSOCIATE_STORED}),

@@ -29,6 +29,7 @@ router = APIRouter(tags=["associate"])
 
 @router.post(
     "/v1/associate:batch",
+    operation_id="associate_batch",
     response_model=BatchAnswer,
     responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES, "unknown_map", "map_corrupt"),
     openapi_extra=takes(BatchRequest, {"two scans": examples.BATCH}),

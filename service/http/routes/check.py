@@ -30,6 +30,7 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "invalid_request
 
 @router.get(
     "/v1/maps/{map_id}:check",
+    operation_id="check_map",
     response_model=CheckAnswer,
     responses=problems(*_FAILS),
     summary="Check a map",
@@ -49,6 +50,7 @@ async def get_check(
 
 @router.post(
     "/v1/maps/{map_id}:check",
+    operation_id="check_map_with_scans",
     response_model=CheckAnswer,
     responses=problems(*dict.fromkeys((*_FAILS, *READS_BODY))),
     openapi_extra=takes(CheckRequest, {"two scans": examples.CHECK}),

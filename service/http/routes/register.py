@@ -19,6 +19,7 @@ router = APIRouter(tags=["register"])
 
 @router.post(
     "/v1/register",
+    operation_id="register",
     response_model=RegisterAnswer,
     responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES),
     openapi_extra=takes(RegisterRequest, {"a corner": examples.REGISTER}),

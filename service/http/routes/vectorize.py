@@ -19,6 +19,7 @@ router = APIRouter(tags=["vectorize"])
 
 @router.post(
     "/v1/vectorize",
+    operation_id="vectorize",
     response_model=VectorizeAnswer,
     responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES),
     openapi_extra=takes(VectorizeRequest, {"a corner": examples.VECTORIZE}),

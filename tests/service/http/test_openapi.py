@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -76,6 +77,15 @@ def test_every_route_is_in_it(document: dict[str, Any]) -> None:
         ("GET", "/readyz"),
         ("GET", "/metrics"),
     }
+
+
+def test_operations_have_short_names(document: dict[str, Any]) -> None:
+    """Generated clients name their functions so."""
+    names = [operation["operationId"] for _, _, operation in operations(document)]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch("[a-z]+(_[a-z]+){0,3}", name) and len(name) <= 24 for name in names), names
+    assert not any(name.startswith(("get_v", "post_", "put_v", "delete_v")) for name in names), names
+    assert {"associate", "associate_batch", "register", "vectorize", "put_map", "list_maps", "check_map"} <= {*names}
 
 
 def test_every_error_is_a_problem_of_a_known_code(document: dict[str, Any]) -> None:

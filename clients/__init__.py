@@ -1,0 +1,1 @@
+"""Clients of the service, and what is made for them."""

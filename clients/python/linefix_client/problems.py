@@ -1,0 +1,65 @@
+"""What goes wrong, as exceptions.
+
+::
+
+    LinefixError
+    ├── ProblemError         the service refused a request, with a problem document
+    │   └── BusyError        and said when to come again: 429 and 503, after the last try
+    └── UnreachableError     nobody answered
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import httpx
+
+
+class LinefixError(Exception):
+    """Root of what this package raises."""
+
+
+class UnreachableError(LinefixError):
+    """Nobody answered."""
+
+
+class ProblemError(LinefixError):
+    """The service refused a request.
+
+    Attributes
+    ----------
+    status : int
+        As over HTTP.
+    code : str
+        Stable, such as ``invalid_request``; ``unknown`` where something between said no.
+    detail : str
+    errors : list of dict
+        ``pointer`` and ``message`` of each place that is wrong.
+    request_id : str
+        To be found in the service's log.
+    """
+
+    def __init__(self, status: int, problem: dict[str, Any]) -> None:
+        self.status = status
+        self.code = str(problem.get("code", "unknown"))
+        self.detail = str(problem.get("detail", ""))
+        self.errors: list[dict[str, str]] = list(problem.get("errors") or [])
+        self.request_id = str(problem.get("request_id", ""))
+        places = "".join(f"; {item.get('pointer')}: {item.get('message')}" for item in self.errors)
+        super().__init__(f"{status} {self.code}: {self.detail}{places}")
+
+
+class BusyError(ProblemError):
+    """The service has too much to do, or is not ready, and was so at the last try, too."""
+
+
+def problem_of(response: httpx.Response) -> ProblemError:
+    """Return the exception that a refusal stands for; a proxy may have refused without a problem document."""
+    try:
+        told = response.json()
+    except ValueError:
+        told = None
+    problem = told if isinstance(told, dict) else {"detail": response.reason_phrase}
+    kind = BusyError if response.status_code in (429, 503) else ProblemError
+    return kind(response.status_code, problem)

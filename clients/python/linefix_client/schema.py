@@ -1,0 +1,697 @@
+"""Types of requests and answers; `make client-types` makes them from the OpenAPI document."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from typing_extensions import NotRequired, TypedDict
+
+
+class AdviceAnswer(TypedDict):
+    """
+    What the map's properties should be; null where nothing speaks for a value.
+    """
+
+    sigma: float | None
+    oriented: bool | None
+
+
+class AmbiguityAnswer(TypedDict):
+    """
+    The paper's ambiguity, with the weights used.
+    """
+
+    translation: float
+    rotation: float
+    total: float
+
+
+class CorrespondenceAnswer(TypedDict):
+    """
+    A scan segment found on a map segment.
+    """
+
+    scan: int
+    map: int
+    offset: float
+    angle: float
+    weight: float
+    overlap: float
+    alternatives: list[int]
+
+
+class FindingAnswer(TypedDict):
+    """
+    Something doubtful.
+    """
+
+    code: str
+    message: str
+    segments: list[int]
+    count: int
+
+
+class HingeAnswer(TypedDict):
+    """
+    The wall that a pose hinges on.
+    """
+
+    scan: list[int]
+    map: list[int]
+    direction: list[float]
+    moves: float
+
+
+class Limits(TypedDict):
+    """
+    Beyond these a request is refused.
+    """
+
+    max_body_bytes: int
+    max_values: int
+    max_bodies_bytes: int
+    max_answers_bytes: int
+    max_connections: int
+    request_timeout: float
+    max_map_segments: int
+    max_scan_segments: int
+    max_beams: int
+    max_correspondences: int
+    max_batch: int
+    max_deadline_ms: float
+    searches: int
+    queue: int
+    max_magnitude: float
+    min_segment_length: float
+    max_segment_length: float
+    max_map_extent: float
+
+
+class Live(TypedDict):
+    """
+    A probe's answer.
+    """
+
+    status: Literal["ok"]
+
+
+class MapDocument(TypedDict):
+    """
+    A map, as a file of its own or to be stored.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | None]
+    oriented: NotRequired[bool | None]
+    frame_id: NotRequired[str]
+    meta: NotRequired[Any]
+
+
+class MapReference(TypedDict):
+    """
+    Which stored map was searched.
+    """
+
+    map_id: str
+    revision: int
+
+
+class MapSummaryAnswer(TypedDict):
+    """
+    A stored map without its content.
+    """
+
+    map_id: str
+    revision: int
+    segments: int
+    bounds: list[float]
+    sigma: float | None
+    oriented: bool | None
+
+
+class Place(TypedDict):
+    """
+    One wrong place of a request.
+    """
+
+    pointer: str
+    message: str
+
+
+class PoseAnswer(TypedDict):
+    """
+    The scan frame's pose in the map frame.
+    """
+
+    x: float
+    y: float
+    theta: float
+
+
+class Problem(TypedDict):
+    """
+    An error, RFC 9457.
+    """
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    code: str
+    request_id: str
+    errors: NotRequired[list[Place]]
+
+
+class ReasonAnswer(TypedDict):
+    """
+    Why an answer is not usable.
+    """
+
+    code: str
+    message: str
+
+
+class RegistrationDiagnosticsAnswer(TypedDict):
+    """
+    Numbers beside the pose.
+    """
+
+    ambiguity: AmbiguityAnswer
+    ambiguity_before: AmbiguityAnswer
+    ambiguity_at: AmbiguityAnswer | None
+    similarity: float | None
+    reliability: float
+    determinant: float
+    chi2: float
+    dof: int
+    rms_offset: float
+    rms_angle: float
+    n: int
+
+
+class Residual(TypedDict):
+    """
+    How far one pair is from fitting.
+    """
+
+    scan: int
+    map: int
+    offset: float
+    angle: float
+    weight: float
+
+
+class SampleAnswer(TypedDict):
+    """
+    What came of one scan in the map as it is.
+    """
+
+    index: int
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"] | None
+    usable: bool
+    pose: PoseAnswer | None
+
+
+class SamplesAnswer(TypedDict):
+    """
+    What came of the sample scans.
+    """
+
+    usable: int
+    usable_as_advised: int
+    scans: list[SampleAnswer]
+
+
+class SearchAnswer(TypedDict):
+    """
+    How the search went.
+    """
+
+    complete: bool
+    exhaustive: bool
+    confidence: float
+    bases: int
+    hypotheses: int
+    verified: int
+    seed: int
+    sampling: Literal["ordered", "random"]
+    rivals_above: float
+
+
+class SizeAnswer(TypedDict):
+    """
+    How much of a map there is.
+    """
+
+    segments: int
+    walls: int
+    length: float
+    diagonal: float
+
+
+class VectorizeAnswer(TypedDict):
+    """
+    Segments, and what may be sent back with them in a scan.
+    """
+
+    segments: list[list[float]]
+    points: list[int]
+    centroids: list[list[float]]
+    spreads: list[float]
+    sigma: float
+    sigmas: list[float]
+    rms: list[float]
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class Version(TypedDict):
+    """
+    What runs here.
+    """
+
+    name: str
+    version: str
+    api: str
+
+
+class WarningAnswer(TypedDict):
+    """
+    Something to know.
+    """
+
+    code: str
+    message: str
+
+
+class HardPriorFields(TypedDict):
+    """
+    A window that the answer must lie in.
+    """
+
+    x: float
+    y: float
+    theta: float
+    radius: float
+    angle: float
+
+
+class Header(TypedDict):
+    """
+    The header of a LaserScan message: `stamp` and `frame_id` of the scan, where it says nothing of them itself.
+    """
+
+    stamp: NotRequired[Any]
+    frame_id: NotRequired[str]
+    seq: NotRequired[Any]
+
+
+class InlineMap(TypedDict):
+    """
+    A map in the request itself.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | None]
+    oriented: NotRequired[bool | None]
+    frame_id: NotRequired[str]
+    meta: NotRequired[Any]
+
+
+class KnownMap(TypedDict):
+    """
+    The map side of known correspondences.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | None]
+    oriented: NotRequired[bool | None]
+    frame_id: NotRequired[str]
+    meta: NotRequired[Any]
+
+
+class Laser(TypedDict):
+    """
+    One turn of a scanner, as in a LaserScan message.
+    """
+
+    angle_min: float
+    angle_increment: float
+    ranges: list[float | None]
+    range_min: NotRequired[float | None]
+    range_max: NotRequired[float | None]
+    header: NotRequired[Header | None]
+    angle_max: NotRequired[Any]
+    time_increment: NotRequired[Any]
+    scan_time: NotRequired[Any]
+    intensities: NotRequired[Any]
+
+
+class LaserScan(TypedDict):
+    """
+    A scan as ranges.
+    """
+
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
+    laser: Laser
+    sigma: NotRequired[float | None]
+
+
+class MeasuredFields(TypedDict):
+    """
+    Segments of a scan with what is known of the points behind them.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | list[float]]
+    points: NotRequired[list[float] | None]
+    centroids: NotRequired[list[list[float]] | None]
+    spreads: NotRequired[list[float] | None]
+
+
+class PointScan(TypedDict):
+    """
+    A scan as points in scanning order.
+    """
+
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
+    points: list[list[float]]
+    sigma: NotRequired[float | None]
+
+
+class Pose(TypedDict):
+    """
+    The scan frame's pose in the map frame: ``p_map = R(theta) p_scan + [x, y]``.
+    """
+
+    x: float
+    y: float
+    theta: float
+
+
+class SearchOptions(TypedDict):
+    """
+    How to search, and what to put into the answer.
+    """
+
+    max_alternatives: NotRequired[int]
+    confidence: NotRequired[float]
+    exhaustive: NotRequired[bool]
+    seed: NotRequired[int]
+    sampling: NotRequired[Literal["ordered", "random"]]
+    deadline_ms: NotRequired[float | None]
+    oriented: NotRequired[bool | None]
+    offset_tolerance: NotRequired[float | None]
+    angle_tolerance: NotRequired[float | None]
+    min_overlap: NotRequired[float]
+    estimator: NotRequired[Literal["joint", "one_step"]]
+    rotation: NotRequired[Literal["wahba", "mitsuta"]]
+    include: NotRequired[list[Literal["correspondences", "alternatives", "segments", "missing_map", "causes"]]]
+
+
+class SegmentScan(TypedDict):
+    """
+    A scan as segments.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | list[float]]
+    points: NotRequired[list[float] | None]
+    centroids: NotRequired[list[list[float]] | None]
+    spreads: NotRequired[list[float] | None]
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
+
+
+class SoftPriorFields(TypedDict):
+    """
+    A Gaussian over the pose: it scores, and is never fused into pose or covariance.
+    """
+
+    x: float
+    y: float
+    theta: float
+    covariance: list[list[float]]
+
+
+class StoredMap(TypedDict):
+    """
+    A map that was stored with PUT before.
+    """
+
+    map_id: str
+
+
+class VectorizeOptions(TypedDict):
+    """
+    How to cut points into segments.
+    """
+
+    sigma: NotRequired[float | None]
+    min_points: NotRequired[int]
+    min_length: NotRequired[float]
+    max_gap: NotRequired[float | None]
+
+
+class VectorizeRequest(TypedDict):
+    """
+    Ranges or points; exactly one of the two.
+    """
+
+    laser: NotRequired[Laser | None]
+    points: NotRequired[list[list[float]] | None]
+    viewpoint: NotRequired[list[float] | None]
+    options: NotRequired[VectorizeOptions]
+
+
+class AlternativeAnswer(TypedDict):
+    """
+    Another pose that explains part of the scan.
+    """
+
+    pose: PoseAnswer
+    covariance: list[list[float]] | None
+    score: float
+    ambiguity: AmbiguityAnswer
+    reliability: float
+    inlier_fraction: float
+
+
+class AssociationDiagnosticsAnswer(TypedDict):
+    """
+    Numbers beside the pose.
+    """
+
+    ambiguity: AmbiguityAnswer
+    ambiguity_before: AmbiguityAnswer
+    ambiguity_at: AmbiguityAnswer | None
+    similarity: float | None
+    reliability: float
+    determinant: float
+    chi2: float
+    dof: int
+    rms_offset: float
+    rms_angle: float
+    n: int
+    inlier_fraction: float
+    score: float
+    runner_up: float | None
+    margin: float | None
+    significance: float
+    hinges_on: HingeAnswer | None
+
+
+class FoundAnswer(TypedDict):
+    """
+    Where in a map a scan was taken.
+    """
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    usable: bool
+    probability: float
+    pose: PoseAnswer | None
+    covariance: list[list[float]] | None
+    unobservable: list[float] | None
+    frame_id: str
+    child_frame_id: str
+    stamp: Any
+    correspondences: NotRequired[list[CorrespondenceAnswer]]
+    unmatched_scan: list[int]
+    missing_map: NotRequired[list[int]]
+    diagnostics: AssociationDiagnosticsAnswer | None
+    reasons: list[ReasonAnswer]
+    alternatives: NotRequired[list[AlternativeAnswer]]
+    search: SearchAnswer
+    segments: NotRequired[list[list[float]] | None]
+    warnings: list[WarningAnswer]
+
+
+class MapList(TypedDict):
+    """
+    One page of maps, by id.
+    """
+
+    maps: list[MapSummaryAnswer]
+    corrupt: list[str]
+    next: str | None
+
+
+class PlaceAnswer(TypedDict):
+    """
+    A place from which the map shows what it shows elsewhere, too.
+    """
+
+    pose: PoseAnswer
+    look_alike: PoseAnswer
+
+
+class RegisterAnswer(TypedDict):
+    """
+    The pose from known correspondences.
+    """
+
+    status: Literal["ok", "degenerate"]
+    usable: bool
+    pose: PoseAnswer | None
+    covariance: list[list[float]] | None
+    unobservable: list[float] | None
+    residuals: list[Residual]
+    diagnostics: RegistrationDiagnosticsAnswer
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class AssociateRequest(TypedDict):
+    """
+    Unknown correspondences.
+    """
+
+    map: InlineMap | StoredMap
+    scan: SegmentScan | LaserScan | PointScan
+    prior: NotRequired[SoftPriorFields | HardPriorFields | None]
+    options: NotRequired[SearchOptions]
+    client_ref: NotRequired[Any]
+
+
+class BatchRequest(TypedDict):
+    """
+    Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else.
+    """
+
+    map: InlineMap | StoredMap
+    scans: list[Any]
+    priors: NotRequired[list[Any] | None]
+    options: NotRequired[SearchOptions]
+    client_ref: NotRequired[Any]
+
+
+class CheckRequest(TypedDict):
+    """
+    Sample scans to check a map by, and where they were taken, as far as that is known.
+    """
+
+    scans: list[SegmentScan | LaserScan | PointScan]
+    poses: NotRequired[list[Pose | None] | None]
+    deadline_ms: NotRequired[float | None]
+    client_ref: NotRequired[Any]
+
+
+class EstimatorOptions(TypedDict):
+    """
+    How to register.
+    """
+
+    estimator: NotRequired[Literal["joint", "one_step"]]
+    rotation: NotRequired[Literal["wahba", "mitsuta"]]
+    k_translation: NotRequired[float]
+    k_rotation: NotRequired[float]
+    evaluate_at: NotRequired[Pose | None]
+    oriented: NotRequired[bool | None]
+
+
+class RegisterRequest(TypedDict):
+    """
+    Known correspondences.
+    """
+
+    map: KnownMap
+    scan: MeasuredFields
+    correspondences: NotRequired[list[list[int]] | None]
+    weights: NotRequired[list[Literal[0] | float] | None]
+    weighting: NotRequired[Literal["uniform", "shorter_length", "information"]]
+    options: NotRequired[EstimatorOptions]
+
+
+class AssociateAnswer(TypedDict):
+    """
+    The answer of a search.
+    """
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    usable: bool
+    probability: float
+    pose: PoseAnswer | None
+    covariance: list[list[float]] | None
+    unobservable: list[float] | None
+    frame_id: str
+    child_frame_id: str
+    stamp: Any
+    correspondences: NotRequired[list[CorrespondenceAnswer]]
+    unmatched_scan: list[int]
+    missing_map: NotRequired[list[int]]
+    diagnostics: AssociationDiagnosticsAnswer | None
+    reasons: list[ReasonAnswer]
+    alternatives: NotRequired[list[AlternativeAnswer]]
+    search: SearchAnswer
+    segments: NotRequired[list[list[float]] | None]
+    warnings: list[WarningAnswer]
+    map: MapReference | None
+    client_ref: Any
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class BatchResult(TypedDict):
+    """
+    One scan's answer, or why there is none.
+    """
+
+    index: int
+    status_code: int
+    result: NotRequired[FoundAnswer | None]
+    problem: NotRequired[Problem | None]
+
+
+class CheckAnswer(TypedDict):
+    """
+    What is doubtful in a map.
+    """
+
+    findings: list[FindingAnswer]
+    size: SizeAnswer
+    advice: AdviceAnswer
+    places: list[PlaceAnswer]
+    looked_from: int
+    complete: bool
+    samples: SamplesAnswer | None
+    map: MapReference
+    client_ref: Any
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class BatchAnswer(TypedDict):
+    """
+    The answers in the order of the scans.
+    """
+
+    results: list[BatchResult]
+    map: MapReference | None
+    client_ref: Any
+    request_id: str
+    timing_ms: dict[str, float]
