@@ -34,6 +34,7 @@ from .part import WHOLE, Part
 from .settings import Settings
 from .telemetry.metrics import Metrics
 from .telemetry.refusals import RefusalTally
+from .telemetry.traces import traces_of_environment
 from .threads import Threads
 from .version import VERSION
 from .work.association import Associator
@@ -109,6 +110,7 @@ def _services(settings: Settings, part: Part) -> Services:
         associator=Associator(lookup, metrics),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
+        traces=traces_of_environment(),
     )
 
 

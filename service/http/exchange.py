@@ -22,6 +22,7 @@ from ..parsing.parser_process import LARGE
 from ..parsing.unpacking import unpack
 from ..schemas.limits import Limits
 from ..schemas.parts import InlineMap, StoredMap
+from ..telemetry.traces import queued, stage
 from ..work.job import Done, Job, Stopwatch
 from .sending import json_response
 from .services import Services, services_of
@@ -77,17 +78,18 @@ class Exchange:
         async with services.bodies.receiving(self._request, self._state.arrived, self._ticket.holder) as body:
             self._watch = Stopwatch()
             data = body.data
-            if body.gzipped:
-                packed = len(data)
-                data = await services.parse_threads.run(partial(unpack, data, max_bytes, body.account.take))
-                body.data.clear()
-                body.account.give_back(packed)
-            if len(data) <= SMALL:
-                return reader(data, limits)
-            if len(data) <= LARGE:
-                return await services.parse_threads.run(partial(reader, data, limits))
-            call = partial(services.parser.call, reader, data, limits)
-            return await self.search(call, self.job().deadline)
+            with stage("parse"):
+                if body.gzipped:
+                    packed = len(data)
+                    data = await services.parse_threads.run(partial(unpack, data, max_bytes, body.account.take))
+                    body.data.clear()
+                    body.account.give_back(packed)
+                if len(data) <= SMALL:
+                    return reader(data, limits)
+                if len(data) <= LARGE:
+                    return await services.parse_threads.run(partial(reader, data, limits))
+                call = partial(services.parser.call, reader, data, limits)
+                return await self.search(call, self.job().deadline)
 
     def job(self, deadline_ms: float | None = None) -> Job:
         """Return what is to be done for this request; without a deadline of its own it has the service's."""
@@ -134,7 +136,7 @@ class Exchange:
 
         What does not heed the deadline is waited for until then and no longer: see `SearchGate.run`.
         """
-        return await self.services.gate.run(call, deadline, self._ticket, heeds)
+        return await self.services.gate.run(queued(call), deadline, self._ticket, heeds)
 
     async def unless_hung_up(self, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
         """Wait for work, or cancel it when the client is gone first.

@@ -17,6 +17,7 @@ from ..parsing.parser_process import ParserProcess
 from ..settings import Settings
 from ..telemetry.metrics import Metrics
 from ..telemetry.refusals import RefusalTally
+from ..telemetry.traces import Traces
 from ..threads import Threads
 from ..work.association import Associator
 from .bodies import BodyReceiver
@@ -51,6 +52,8 @@ class Services:
         Bytes of stored maps that wait to be indexed.
     associator : Associator
     parse_threads, store_threads : Threads
+    traces : Traces, or None
+        Where they are asked for.
     """
 
     settings: Settings
@@ -70,6 +73,7 @@ class Services:
     associator: Associator
     parse_threads: Threads
     store_threads: Threads
+    traces: Traces | None = None
 
     def close(self) -> None:
         """Give up what still runs and give everything back."""
@@ -80,6 +84,8 @@ class Services:
         for threads in (self.parse_threads, self.store_threads, self.probe):
             threads.close()
         self.store.close()
+        if self.traces is not None:
+            self.traces.close()
 
 
 def services_of(scope: Scope) -> Services:
