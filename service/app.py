@@ -37,6 +37,7 @@ from .part import WHOLE, Part
 from .settings import Settings
 from .telemetry.metrics import Metrics
 from .telemetry.refusals import RefusalTally
+from .telemetry.traces import traces_of_environment
 from .threads import Threads
 from .version import VERSION
 from .work.association import Associator
@@ -135,6 +136,7 @@ def _services(settings: Settings, part: Part) -> Services:
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
         key_threads=Threads(1, "keys"),
+        traces=traces_of_environment(),
     )
 
 

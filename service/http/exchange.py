@@ -22,6 +22,7 @@ from ..parsing.parser_process import LARGE
 from ..parsing.unpacking import unpack
 from ..schemas.limits import Limits
 from ..schemas.parts import InlineMap, StoredMap
+from ..telemetry.traces import queued, stage
 from ..work.job import Done, Job, Stopwatch
 from .sending import json_response
 from .services import Services, services_of
@@ -80,12 +81,13 @@ class Exchange:
         services = self.services
         limits = services.settings.limits()
         async with self.received() as data:
-            if len(data) <= SMALL:
-                return reader(data, limits)
-            if len(data) <= LARGE:
-                return await services.parse_threads.run(partial(reader, data, limits))
-            call = partial(services.parser.call, reader, data, limits)
-            return await self.search(call, self.job().deadline)
+            with stage("parse"):
+                if len(data) <= SMALL:
+                    return reader(data, limits)
+                if len(data) <= LARGE:
+                    return await services.parse_threads.run(partial(reader, data, limits))
+                call = partial(services.parser.call, reader, data, limits)
+                return await self.search(call, self.job().deadline)
 
     @asynccontextmanager
     async def received(self, *, form: bool = False) -> AsyncIterator[bytearray]:
@@ -151,7 +153,7 @@ class Exchange:
 
         What does not heed the deadline is waited for until then and no longer: see `SearchGate.run`.
         """
-        return await self.services.gate.run(call, deadline, self._ticket, heeds)
+        return await self.services.gate.run(queued(call), deadline, self._ticket, heeds)
 
     async def unless_hung_up(self, work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
         """Wait for work, or cancel it when the client is gone first.

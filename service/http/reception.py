@@ -44,6 +44,7 @@ class Reception:
         state = _arrived(scope)
         state.request_id = taken_or_made(scope["headers"])
         started = time.perf_counter()
+        state.trail = None if self._services.traces is None else self._services.traces.begin()
         status = 0
         # Whoever can be read can be asked for its headers: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
@@ -87,6 +88,10 @@ class Reception:
             "ms": round(1e3 * seconds, 3),
         }
         logger.info("request", extra={**usual, **state.noted})
+        if state.trail is not None and self._services.traces is not None:
+            told = {"http.request.method": method, "http.route": route, "http.response.status_code": status}
+            told["linefix.request_id"] = state.request_id
+            self._services.traces.tell(state.trail, scope["headers"], f"{method} {route}", told)
 
 
 def _arrived(scope: Scope) -> RequestState:

@@ -19,6 +19,7 @@ from ..parsing.parser_process import ParserProcess
 from ..settings import Settings
 from ..telemetry.metrics import Metrics
 from ..telemetry.refusals import RefusalTally
+from ..telemetry.traces import Traces
 from ..threads import Threads
 from ..work.association import Associator
 from .bodies import BodyReceiver
@@ -56,6 +57,8 @@ class Services:
     imports : Semaphore
         Of which one is free as long as no map of another tool is read.
     parse_threads, store_threads, key_threads : Threads
+    traces : Traces, or None
+        Where they are asked for.
     """
 
     settings: Settings
@@ -78,6 +81,7 @@ class Services:
     parse_threads: Threads
     store_threads: Threads
     key_threads: Threads
+    traces: Traces | None = None
 
     def close(self) -> None:
         """Give up what still runs and give everything back."""
@@ -88,6 +92,8 @@ class Services:
         for threads in (self.parse_threads, self.store_threads, self.key_threads, self.probe):
             threads.close()
         self.store.close()
+        if self.traces is not None:
+            self.traces.close()
 
 
 def services_of(scope: Scope) -> Services:

@@ -9,6 +9,7 @@ from typing import Any, cast
 from starlette.types import Scope
 
 from ..admission.ticket import Ticket
+from ..telemetry.traces import Trail
 
 _KEY = "request"  # in `scope["state"]`, beside the application's own
 
@@ -27,6 +28,8 @@ class RequestState:
         Empty as long as it has none.
     noted : dict
         What the log is to say of it beside the usual.
+    trail : Trail, or None
+        What it did, where it is traced.
     is_unread : callable
         Tells whether more of the body is left than can be read and dropped: then the answer ends the connection.
     """
@@ -35,6 +38,7 @@ class RequestState:
     ticket: Ticket | None = None
     request_id: str = ""
     noted: dict[str, object] = field(default_factory=dict)
+    trail: Trail | None = None
     is_unread: Callable[[], bool] = bool
 
 

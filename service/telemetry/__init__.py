@@ -1,1 +1,1 @@
-"""What an operator sees: counts and the log."""
+"""What an operator sees: counts, the log, and traces."""

@@ -18,6 +18,7 @@ from ..schemas.encoding import encode
 from ..schemas.parts import InlineMap, SearchOptions
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..telemetry.metrics import Metrics
+from ..telemetry.traces import stage
 from .answers import Json, association_json, segments_json
 from .inputs import association_options_of, prior_of, scanned_of
 from .job import Done, Job
@@ -90,7 +91,8 @@ class Associator:
         InputError
             When it cannot be searched.
         """
-        cached = self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
+        with stage("index"):
+            cached = self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
         if isinstance(on, FoundMap):
             return Target(cached, {"map_id": on.record.map_id, "revision": on.record.revision})
         return Target(cached, None)
@@ -116,7 +118,8 @@ class Associator:
             raise DeadlinePassedError
         prior, how = prior_of(sought.prior), association_options_of(options, oriented=target.cached.oriented)
         begun = time.perf_counter()
-        result = associate(target.cached.index, scanned.scan, prior, how, deadline)
+        with stage("search"):
+            result = associate(target.cached.index, scanned.scan, prior, how, deadline)
         seconds = time.perf_counter() - begun
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
         answer = association_json(result, frozenset(options.include), scanned.starts)
