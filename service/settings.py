@@ -28,7 +28,6 @@ _METAVARS = {
     "host": "ADDRESS",
     "data_dir": "DIRECTORY",
     "database_url": "URL",
-    "keys": "KEY,...",
     "keys_file": "PATH",
     "jwt_issuer": "ISSUER",
     "jwt_audience": "AUDIENCE",
@@ -83,7 +82,7 @@ class Settings(BaseSettings):
         None,
         description="postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory",
     )
-    keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys, comma separated")
+    keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys that may do everything")
     keys_file: Path | None = Field(
         None, description="keys with roles, as digests; a file, or a directory of them; read again when it changes"
     )
@@ -227,6 +226,11 @@ def read_settings(arguments: Sequence[str]) -> Settings:
         When a value is wrong, or the service would listen to the world without keys.
     """
     _require_text(arguments)
+    if any(argument.partition("=")[0] == "--keys" for argument in arguments):
+        # Arguments of a process are seen by everyone on the machine.
+        raise SettingsError(
+            "keys: set LINEFIX_KEYS, or name a file with --keys-file; an argument is no place for a key"
+        )
     parser = argparse.ArgumentParser(prog="linefix serve", description=HELP, allow_abbrev=False)
     try:
         source: CliSettingsSource[argparse.ArgumentParser] = CliSettingsSource(
@@ -284,8 +288,8 @@ def _add_argument(parser: argparse.ArgumentParser, *names: str, **how: Any) -> N
     name = names[0].lstrip("-").replace("-", "_")
     field = Settings.model_fields[name]
     default = _DEFAULTS.get(name, field.default)
-    how["help"] = field.description
-    if default not in (None, (), False):
+    how["help"] = argparse.SUPPRESS if name == "keys" else field.description
+    if name != "keys" and default not in (None, (), False):
         how["help"] += f" (default: {default})"
     if field.annotation is not bool:
         how["metavar"] = _METAVARS.get(name, "N" if field.annotation is int else "X")

@@ -54,6 +54,19 @@ def test_compose_names_what_it_uses() -> None:
     assert (url.host, url.username, url.database) == ("postgres", database["POSTGRES_USER"], database["POSTGRES_DB"])
 
 
+def test_the_forge_runs_what_a_checkout_has_to_pass() -> None:
+    jobs = YAML(typ="safe").load((ROOT / ".github" / "workflows" / "ci.yml").read_text())["jobs"]
+    commands = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
+    assert ".ci/run" in commands
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    made = [word for line in commands if line.startswith("make ") for word in line.split()[1:] if "=" not in word]
+    assert made
+    assert set(made) <= set(targets)
+    for template in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"):
+        assert YAML(typ="safe").load(template.read_text()), template
+    assert YAML(typ="safe").load((ROOT / "CITATION.cff").read_text())["title"] == "Linefix"
+
+
 def test_the_unit_is_one() -> None:
     unit = configparser.RawConfigParser(strict=False)
     unit.optionxform = str  # type: ignore[method-assign,assignment]

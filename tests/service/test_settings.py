@@ -119,9 +119,35 @@ def test_the_help_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     ):
         assert inner not in text, inner
     flat = " ".join(text.split())
-    assert "--keys KEY,..." in flat
+    assert "--keys-file PATH" in flat
+    assert "--keys " not in flat
     assert "--data-dir DIRECTORY" in flat
     assert "(default: ~/.local/share/linefix)" in flat
     assert "(default: the cores)" in flat
     assert "(default: 8000)" in flat
     assert "LINEFIX_" in flat
+
+
+@pytest.mark.parametrize("arguments", [["--keys", "sesame"], ["--keys=sesame"]])
+def test_a_key_is_no_argument(arguments: list[str]) -> None:
+    """Everyone on the machine can see it there."""
+    with pytest.raises(SettingsError, match="LINEFIX_KEYS") as caught:
+        read_settings(arguments)
+    assert "sesame" not in str(caught.value)
+
+
+def test_an_issuer_is_named_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LINEFIX_JWT_ISSUER", "https://issuer.example")
+    with pytest.raises(SettingsError, match="all three or none"):
+        read_settings([])
+    monkeypatch.setenv("LINEFIX_JWT_AUDIENCE", "linefix")
+    for keys, message in (("http://issuer.example/keys", "https"), ("ftp://issuer.example/keys", "https")):
+        monkeypatch.setenv("LINEFIX_JWT_KEYS", keys)
+        with pytest.raises(SettingsError, match=message):
+            read_settings([])
+    monkeypatch.setenv("LINEFIX_JWT_KEYS", "https://issuer.example/keys")
+    assert read_settings(["--host", "0.0.0.0"]).guarded
+    for algorithms in ("HS256", "none", "RS256,HS256"):
+        monkeypatch.setenv("LINEFIX_JWT_ALGORITHMS", algorithms)
+        with pytest.raises(SettingsError, match="jwt_algorithms"):
+            read_settings([])

@@ -44,7 +44,7 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
     responses={
         200: {"description": "A new revision", "headers": ETAG},
         201: {"description": "A new map", "headers": ETAG, "model": MapSummaryAnswer},
-        **problems(*EVERYWHERE, *READS_BODY, *STORE, "revision_conflict", "storage_full", "map_corrupt"),
+        **problems(*EVERYWHERE, *READS_BODY, *STORE, "unknown_map", "revision_conflict", "storage_full", "map_corrupt"),
     },
     openapi_extra={
         **takes(MapDocument, {"a room": examples.MAP}),
