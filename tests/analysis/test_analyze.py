@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from analysis import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
+from analysis.standing import is_free
 from association import CancelledError, Deadline, MapIndex, Status
 from registration import Segments
 from simulation import corridor, l_room, rectangle_room
@@ -72,13 +73,30 @@ def test_a_corridor_leaves_one_direction_free() -> None:
         assert abs(one.unobservable[0]) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_places_outside_and_in_walls_are_not_free() -> None:
-    analysis = analyzed(Segments.from_array(outline(L)), 0.5)
-    for k in range(len(analysis.standing.poses)):
-        pose = analysis.standing.pose(k)
+def test_places_outside_and_near_walls_are_not_free() -> None:
+    segments = Segments.from_array(outline(L))
+    standing = standing_places(segments, Robot(), 0.3)
+    assert standing.poses[:, 1].min() == pytest.approx(0.15)
+    for k in range(len(standing.poses)):
+        pose = standing.pose(k)
         inside = 0.2 < pose.x < 7.8 and 0.2 < pose.y < (2.8 if pose.x > 4.8 else 5.8)
-        verdict = analysis.look(k)
-        assert (verdict is not None) == inside, pose
+        assert is_free(segments, pose, 20.0, oriented=True) == inside, pose
+
+
+def test_a_sure_answer_that_is_another_place_is_a_look_alike() -> None:
+    """As in a building of which another part was mapped."""
+    room = l_room().segments
+    seen = analyzed(room)
+    elsewhere = MapIndex.build(room.shifted(np.array([3.0, 0.0])), 0.0)
+    mistaken = Analysis(elsewhere, room, seen.robot, seen.standing)
+    sure = [one.number for one in looks(seen) if one.usable]
+    for number in sure[::6]:
+        one = mistaken.look(number)
+        assert one is not None
+        assert one.probability > 0.9
+        assert (one.status, one.usable, one.reasons) == (Status.AMBIGUOUS, False, ("twin",))
+        assert one.look_alike is not None
+        assert one.look_alike.x == pytest.approx(one.pose.x + 3.0, abs=0.1)
 
 
 def test_without_directions_a_place_is_free_by_what_is_seen_alone() -> None:

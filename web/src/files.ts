@@ -43,8 +43,8 @@ function take(name: string, text: string): void {
   } else if ("ranges" in told) takeScan({ laser: told } as unknown as Scan);
   else if ("laser" in told || "points" in told) takeScan(told as Scan);
   else if ("segments" in told) {
-    // Both are lists of segments. What there is no map for yet is a map; what says so in its name is a scan.
-    if (state.map && (/scan/i.test(name) || "viewpoint" in told || "stamp" in told)) takeScan(told as Scan);
+    // Both are lists of segments: a scan says so in its name, or by what only scans have.
+    if (/scan/i.test(name) || "viewpoint" in told || "stamp" in told || "points" in told) takeScan(told as Scan);
     else takeMap(told as unknown as MapDocument);
   } else throw new Error(`${name} is neither a map nor a scan: it has none of segments, points, laser and ranges.`);
 }
@@ -53,13 +53,14 @@ function takeMap(map: MapDocument): void {
   if (!Array.isArray(map.segments) || !map.segments.length) throw new Error("The map has no segments.");
   if (!map.segments.every((s) => Array.isArray(s) && s.length === 4 && s.every(Number.isFinite)))
     throw new Error("A segment of the map is not four numbers.");
-  setMap(map);
+  setMap(map); // a scan stays: it may be waiting for this map
   showAll("A map from a file.");
 }
 
 function takeScan(scan: Scan): void {
   Object.assign(state, { scan, virtual: false });
   forget();
+  if (!state.map) document.querySelector("#about")!.textContent = "A scan from a file. Now bring the map to find it in.";
   document.querySelector<HTMLInputElement>("#virtual")!.checked = false;
   changed();
 }

@@ -106,7 +106,7 @@ export function legend(): void {
     if (state.answer.missing_map.length) parts.push(["missing", "not seen, though it should"]);
     if (state.answer.diagnostics?.hinges_on) parts.push(["hinge", "what the pose hinges on"]);
     parts.push([state.answer.usable ? "ok" : state.answer.status, "where it was found"]);
-    if (state.virtual) parts.push(["robot", "where it stands"]);
+    parts.push(state.virtual ? ["robot", "where it stands"] : ["before", "where you put the scan"]);
     if (state.answer.unobservable) parts.push(["degenerate", "free along this"]);
     if (larger !== null) parts.push(["sigma", `3 sigma${larger > 1.05 ? `, drawn ${larger.toFixed(0)} times larger` : ""}`]);
   }

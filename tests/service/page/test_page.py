@@ -113,7 +113,10 @@ def files(folder: Path, **contents: object) -> list[Path]:
 
 def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
     page.goto("/")
-    page.set_input_files("#files", files(tmp_path, room={"segments": examples.WALLS}, scan=SCAN))
+    room, scan = files(tmp_path, room={"segments": examples.WALLS}, scan=SCAN)
+    page.set_input_files("#files", [scan])
+    expect(page.locator("#about")).to_contain_text("Now bring the map")
+    page.set_input_files("#files", [room])
     verdict(page, "usable")
     expect(page.locator("#numbers")).to_contain_text("1.000 m, 0.500 m")
     (bad,) = files(tmp_path, bad={"rooms": 3})
