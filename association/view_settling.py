@@ -32,7 +32,8 @@ from .tuning import (
     VIEW_ROUNDS,
 )
 
-SETTLED_STEP = 1e-7  # m, rad and deviations; a step below it is none
+SETTLED_STEP = 1e-4  # m, rad and deviations; the step after one below it is none,
+SETTLED_SHARE = 0.02  # where the walls' variance changes by less than that
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +93,11 @@ class SeenOnWalls:
         x, variance = begin, USUAL_WALL_ERROR**2 if known is None else known
         for _ in range(VIEW_ROUNDS):
             normal, gradient = self._normal(x, variance)
-            step = np.linalg.solve(normal, -gradient)
+            step, before = np.linalg.solve(normal, -gradient), variance
             x = x + step
             if known is None:
                 variance = self._shown_variance(x, np.asarray(np.linalg.inv(normal), dtype=np.float64), variance)
-            elif np.abs(step).max() < SETTLED_STEP:
+            if np.abs(step).max() < SETTLED_STEP and abs(variance - before) < SETTLED_SHARE * before:
                 break
         far = math.hypot(x[0] - start.x, x[1] - start.y) > MAX_STEP or abs(wrap_angle(x[2] - start.theta)) > MAX_TURN
         if far or not np.isfinite(x).all():

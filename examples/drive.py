@@ -1,6 +1,6 @@
-"""Drive until the verdict is `ok`: every metre one more view, and the places that still explain all of them.
+"""Drive until the verdict is `ok`: every two metres one more view, and the places that still explain all of them.
 
-``python -m examples.drive`` drives through a drawn building of equal rooms; the picture is ``out/drive.png``.
+``python -m examples.drive`` drives along a drawn corridor that repeats itself; the picture is ``out/drive.png``.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ Floats = NDArray[np.float64]
 
 OUT = Path("out") / "drive.png"
 DRIFT = np.array([0.02, 0.02, math.radians(1.0)])  # m, m, rad after a metre; standard deviations of a random walk
-MOST_VIEWS = 12
+MOST_VIEWS = 24
 SHOWN = 6  # pictures at most
+NEARLY = 0.93  # of the best score; places that explain as much are shown
 GREEN, ORANGE, GREY, INK = "#009E73", "#E69F00", "#a9b1ba", "#1b1f24"
 
 
@@ -44,11 +45,11 @@ class Drive:
 
 
 def main() -> int:
-    """Drive, print what each metre tells, draw; the status is 1 where the drive ends without a usable answer."""
+    """Drive, print what each view tells, draw; the status is 1 where the drive ends without a usable answer."""
     ride = drawn_drive()
     print(f"{ride.name}: {len(ride.poses)} places, {len(ride.walls)} segments in the map", flush=True)
     with running_service() as (url, _):
-        call(url, "PUT", "/v1/maps/drive", {"segments": ride.walls.endpoints.tolist(), "oriented": False})
+        call(url, "PUT", "/v1/maps/drive", {"segments": ride.walls.endpoints.tolist()})
         answers = ask_on_the_way(url, ride)
     draw(ride, answers)
     print(f"picture: {OUT}")
@@ -56,18 +57,22 @@ def main() -> int:
 
 
 def drawn_drive() -> Drive:
-    """Return a drive along a corridor with equal rooms on both sides: only its end tells where it is."""
-    rooms, width, depth = 7, 4.0, 4.0
-    end = rooms * width + 3.0
-    walls = [[0.0, 0.0, 0.0, -2.0], [end, -2.0, end, 0.0], [end - 3.0, 0.0, end, 0.0], [end - 3.0, -2.0, end, -2.0]]
-    for near, far in ((0.0, depth), (-2.0, -2.0 - depth)):
-        for x in np.arange(rooms) * width:
-            walls += [
-                [x, near, x + 1.5, near], [x + 2.5, near, x + width, near], [x, near, x, far], [x, far, x + width, far],
-            ]  # fmt: skip
-    segments = Segments.from_array(walls)
-    poses = [RigidTransform(6.0 + k, -1.0 + 0.05 * (k % 3), 0.02 * (k % 5)) for k in range(22)]
-    scanner, rng = Scanner.over(1.5 * math.pi, 541, range_max=8.0), np.random.default_rng(5)
+    """Return a drive along a corridor whose niches repeat every 8 m, up to its last quarter, where they are wider."""
+    length, slots, pitch = 60.0, 12, 4.0
+    lower, upper = [(0.0, -2.0)], [(length, 0.0)]
+    for k in range(0, slots, 2):
+        x = k * pitch + 1.0
+        lower += [(x, -2.0), (x, -2.7), (x + 1.2, -2.7), (x + 1.2, -2.0)]
+    for x in (48.5, 53.5):
+        lower += [(x, -2.0), (x, -3.5), (x + 3.0, -3.5), (x + 3.0, -2.0)]
+    upper += [(57.5, 0.0), (57.5, 1.5), (52.0, 1.5), (52.0, 0.0)]
+    for k in range(slots - 1, 0, -2):
+        x = k * pitch + 2.2
+        upper += [(x, 0.0), (x, 0.7), (x - 1.2, 0.7), (x - 1.2, 0.0)]
+    corners = np.array([*lower, (length, -2.0), *upper, (0.0, 0.0)])
+    segments = Segments.from_array(np.hstack([corners, np.roll(corners, -1, axis=0)]))
+    poses = [RigidTransform(13.0 + 2.0 * k, -1.0 + 0.05 * (k % 3), 0.02 * (k % 5)) for k in range(20)]
+    scanner, rng = Scanner.over(1.5 * math.pi, 541, range_max=6.0), np.random.default_rng(5)
     lasers = []
     for pose in poses:
         ranges = scan(segments, pose, scanner, rng).ranges
@@ -79,11 +84,11 @@ def drawn_drive() -> Drive:
                 "ranges": [round(r, 4) if math.isfinite(r) else 1e3 for r in ranges.tolist()],
             }
         )
-    return Drive("a corridor of equal rooms", segments, lasers, poses)
+    return Drive("a corridor with niches", segments, lasers, poses)
 
 
 def ask_on_the_way(url: str, ride: Drive) -> list[dict[str, Any]]:
-    """Ask after every metre, with all views so far, until the answer is usable."""
+    """Ask at every place, with all views so far, until the answer is usable."""
     rng, steps, answers = np.random.default_rng(1), [], []
     for k, pose in enumerate(ride.poses):
         if k:
@@ -92,9 +97,10 @@ def ask_on_the_way(url: str, ride: Drive) -> list[dict[str, Any]]:
             x, y, theta = (rng.normal(size=3) * DRIFT * math.sqrt(far)).tolist()
             steps.append(RigidTransform(step.x + x, step.y + y, step.theta + theta))
         request = {"views": views_of(ride, steps, k)}
-        answer = call(url, "POST", "/v1/associate", {"map": {"map_id": "drive"}, "scan": request})
+        asked = {"map": {"map_id": "drive"}, "scan": request, "options": {"max_alternatives": 20}}
+        answer = call(url, "POST", "/v1/associate", asked)
         answers.append(answer)
-        others = sum(other["score"] > 0.75 * score_of(answer) for other in answer["alternatives"])
+        others = sum(other["score"] > NEARLY * score_of(answer) for other in answer["alternatives"])
         why = ", ".join(reason["code"] for reason in answer["reasons"]) or "-"
         print(
             f"{k + 1:3d} views: {answer['status']:10s} {others} other places explain nearly as much; {why}", flush=True
@@ -131,14 +137,14 @@ def score_of(answer: dict[str, Any]) -> float:
 
 
 def draw(ride: Drive, answers: list[dict[str, Any]]) -> None:
-    """Draw where the robot may be, after some of the metres, the last among them."""
+    """Draw where the robot may be, after some of the views, the last among them."""
     chosen = sorted({round(k) for k in np.linspace(0, len(answers) - 1, min(SHOWN, len(answers)))})
-    figure = Figure(figsize=(9.0, 1.0 + 2.6 * len(chosen)), dpi=100, facecolor="white", layout="constrained")
+    figure = Figure(figsize=(9.0, 0.5 + 1.2 * len(chosen)), dpi=100, facecolor="white", layout="constrained")
     for axes, k in zip(np.atleast_1d(figure.subplots(len(chosen), 1)), chosen, strict=True):
         answer = answers[k]
         axes.add_collection(LineCollection(list(ride.walls.endpoints.reshape(-1, 2, 2)), colors=GREY, linewidths=1.0))
         for other in answer["alternatives"]:
-            if other["score"] > 0.75 * score_of(answer):
+            if other["score"] > NEARLY * score_of(answer):
                 axes.plot(other["pose"]["x"], other["pose"]["y"], "o", color=ORANGE, markersize=7)
         if answer["pose"] is not None:
             colour, mark = (GREEN, "*") if answer["usable"] else (ORANGE, "o")
