@@ -84,7 +84,7 @@ peers: $(VENV)-peers/.peers  ## print Linefix beside other solvers, installed ap
 
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats pyproject.toml -o requirements/runtime.txt
-	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats --group dev pyproject.toml -o requirements/dev.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group peers -o requirements/peers.txt
 
 # Where LINEFIX_KERNELS or NUMBA_CACHE_DIR name a directory, whoever named it removes it: it may hold other things.

@@ -10,7 +10,7 @@ from .errors import (
 )
 from .line_map import ImportedMap, LineMap
 from .logs.scan import Log, LoggedScan, LogOptions
-from .maps import read_map
+from .maps import map_of_grid, read_map
 from .options import ImportOptions
 from .picture import draw_map
 from .poses import StampedPose, pose_message, write_tum
@@ -35,6 +35,7 @@ __all__ = [
     "TooLargeError",
     "UnsupportedFormatError",
     "draw_map",
+    "map_of_grid",
     "pose_message",
     "read_log",
     "read_map",

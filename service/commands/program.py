@@ -13,11 +13,12 @@ from ..version import VERSION
 from .errors import WrongUseError
 from .locate import locate
 from .register import register
+from .ros2 import ros2
 from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
-for command in (locate, register, vectorize):
+for command in (locate, register, vectorize, ros2):
     app.command()(command)
 
 
