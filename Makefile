@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help demo client-types test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
+.PHONY: help docs demo client-types test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -60,6 +60,10 @@ endings: $(VENV)/.ready  ## print how soon hang-ups, slow clients, killed worker
 mutants: $(VENV)/.ready  ## put 500 mistakes into the code, one at a time, and see which the tests notice (hours; takes up where it was stopped)
 	nice -n 19 $(BIN)/python -m benchmarks.mutants $(ARGS)
 
+docs: $(VENV)/.ready requirements/docs.txt  ## build the documents as pages, into out/docs
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/docs.txt
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+
 client-types: $(VENV)/.ready  ## make the client's types anew from the schema
 	$(BIN)/python -m venv $(VENV)-clients
 	$(VENV)-clients/bin/python -m pip install --quiet --disable-pip-version-check datamodel-code-generator==0.89.0
@@ -94,8 +98,9 @@ audit: $(VENV)/.ready  ## look the pinned packages up in the published advisorie
 
 lock: $(VENV)/.ready  ## pin the dependencies anew
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats pyproject.toml -o requirements/runtime.txt
-	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats --extra batch --extra ray --extra otel --group dev pyproject.toml -o requirements/dev.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group peers -o requirements/peers.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group docs -o requirements/docs.txt
 
 # Where LINEFIX_KERNELS or NUMBA_CACHE_DIR name a directory, whoever named it removes it: it may hold other things.
 clean:  ## remove what the other targets made, compiled kernels too

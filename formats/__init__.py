@@ -10,7 +10,7 @@ from .errors import (
 )
 from .line_map import ImportedMap, LineMap
 from .logs.scan import Log, LoggedScan, LogOptions
-from .maps import MAP_SUFFIXES, read_map
+from .maps import MAP_SUFFIXES, map_of_grid, read_map
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map
 from .poses import StampedPose, pose_message, write_tum
@@ -37,6 +37,7 @@ __all__ = [
     "TooLargeError",
     "UnsupportedFormatError",
     "draw_map",
+    "map_of_grid",
     "pose_message",
     "read_log",
     "read_map",

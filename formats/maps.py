@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from .drawings.drawing import Drawing
 from .drawings.dxf import read_dxf
@@ -20,7 +21,7 @@ from .grids.map_server import read_grid
 from .line_map import ImportedMap, LineMap
 from .logs.bags import SUFFIXES as BAG_SUFFIXES
 from .logs.bags import is_bag
-from .logs.ros import read_bag_grid
+from .logs.ros import grid_of, read_bag_grid
 from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
@@ -82,6 +83,26 @@ def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
     notes = Notes()
     grid, frame, form = read_bag_grid(file, options.topic, notes)
     return ImportedMap(_from_grid(grid, notes, name_of(file), frame), notes.report(form, (name_of(file),)))
+
+
+def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
+    """Return the faces of the walls in a ``nav_msgs/OccupancyGrid`` as a map.
+
+    Parameters
+    ----------
+    message : object
+        With the fields of the message, whatever library it comes from.
+    name : str
+        What errors and the report call it.
+
+    Raises
+    ------
+    FormatError
+        When its fields do not fit each other, or it is too large.
+    """
+    notes = Notes()
+    grid, frame = grid_of(message, name)
+    return ImportedMap(_from_grid(grid, notes, name, frame), notes.report("occupancy_grid", (name,)))
 
 
 def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:

@@ -145,10 +145,17 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, st
             notes.add_read("grids", "grids, of which the last is taken", 1)
         if last is None:
             raise IncompleteFileError("has no OccupancyGrid", argument=bag.name)
-        return _grid(last, bag.name), shown(str(last.header.frame_id)) or "map", bag.format
+        return *grid_of(last, bag.name), bag.format
 
 
-def _grid(message: Any, name: str) -> Grid:
+def grid_of(message: Any, name: str) -> tuple[Grid, str]:
+    """Return the cells of a message, and the frame that they are in.
+
+    Raises
+    ------
+    FormatError
+        When its fields do not fit each other, or it is too large.
+    """
     width, height = int(message.info.width), int(message.info.height)
     resolution = float(np.float32(message.info.resolution))
     if width * height > MAX_CELLS:
@@ -161,4 +168,5 @@ def _grid(message: Any, name: str) -> Grid:
         origin, _ = planar(matrix_of(message.info.origin.position, message.info.origin.orientation))
     except ValueError as error:
         raise MalformedFileError("has a grid without an origin", argument=name) from error
-    return Grid(occupancy, round(resolution, 7), RigidTransform(origin.x, origin.y, origin.theta))
+    grid = Grid(occupancy, round(resolution, 7), RigidTransform(origin.x, origin.y, origin.theta))
+    return grid, shown(str(message.header.frame_id)) or "map"

@@ -18,11 +18,12 @@ from .key import key
 from .locate import locate
 from .register import register
 from .replay import replay
+from .ros2 import ros2
 from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
-for command in (locate, replay, analyze, batch, register, vectorize, key):
+for command in (locate, replay, analyze, batch, register, vectorize, key, ros2):
     app.command()(command)
 app.add_typer(maps.app)
 

@@ -1,0 +1,62 @@
+"""From where the laser is to where the robot is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from linefix_client import Pose, base_from_laser
+
+import linefix
+from bridge import messages
+from bridge.locating import Mount, Mounts, locate
+
+ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
+SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
+TRUTH = linefix.RigidTransform(1.0, 1.5, 0.4)  # of the laser
+MOUNT = linefix.RigidTransform(0.3, -0.1, 2.0)
+
+
+def seen(*, flipped: bool = False) -> messages.LaserScan:
+    walls = linefix.Segments.from_array(ROOM)
+    ranges = linefix.simulation.scan(walls, TRUTH, SCANNER, np.random.default_rng(3)).ranges
+    first, step = SCANNER.angle_min, SCANNER.angle_increment
+    if flipped:  # its own counter-clockwise is clockwise for whoever looks from above
+        first, ranges = -(first + 719 * step), ranges[::-1]
+    return messages.LaserScan(
+        angle_min=first, angle_increment=step, range_min=0.05, range_max=30.0, ranges=ranges.tolist()
+    )
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
+    located = locate(linefix.index_map(ROOM), seen(flipped=flipped), Mount(MOUNT, flipped))
+    expected = TRUTH.compose(MOUNT.inverse())
+    assert located.answer.usable
+    assert located.pose is not None
+    assert math.hypot(located.pose.x - expected.x, located.pose.y - expected.y) < 0.02
+
+
+def test_its_covariance_is_that_of_the_client() -> None:
+    located = locate(linefix.index_map(ROOM), seen(), Mount(MOUNT))
+    pose, covariance = located.answer.pose, located.answer.covariance
+    assert pose is not None
+    assert covariance is not None
+    _, expected = base_from_laser(
+        Pose(pose.x, pose.y, pose.theta), covariance.tolist(), Pose(MOUNT.x, MOUNT.y, MOUNT.theta)
+    )
+    assert located.covariance is not None
+    assert not np.allclose(located.covariance, covariance, rtol=1e-3)
+    np.testing.assert_allclose(located.covariance, np.array(expected), rtol=1e-9, atol=1e-15)
+
+
+def test_a_scanner_upside_down_is_known_by_its_mount() -> None:
+    mounts = Mounts("base_link")
+    assert mounts.of("laser") is None
+    over = messages.Transform(messages.Vector3(0.3, -0.1, 0.5), messages.Quaternion(1.0, 0.0, 0.0, 0.0))
+    mounts.hear(messages.TFMessage([messages.TransformStamped(messages.Header(frame_id="base_link"), "laser", over)]))
+    found = mounts.of("/laser")
+    assert found is not None
+    assert found.flipped
+    assert (found.base_from_laser.x, found.base_from_laser.y) == pytest.approx((0.3, -0.1))
