@@ -16,8 +16,10 @@ from .lookalikes import lookalikes
 from .mistakes import mistakes
 from .parts import parts
 from .peers import peers, versions
+from .plan import plan
 from .queries import DATA, data_found
 from .ranges import ranges
+from .replicas import replicas
 from .sums import sums
 from .table import Row, machine, print_rows
 from .worlds import worlds
@@ -99,6 +101,8 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "worlds": worlds,
     "imports": imports,
     "batch": batch,
+    "replicas": replicas,
+    "plan": plan,
 }
 
 
