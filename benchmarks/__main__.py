@@ -17,8 +17,10 @@ from .lookalikes import lookalikes
 from .mistakes import mistakes
 from .parts import parts
 from .peers import peers, versions
+from .plan import plan
 from .queries import DATA, data_found
 from .ranges import ranges
+from .replicas import replicas
 from .request import request
 from .sums import sums
 from .table import Row, machine, print_rows
@@ -111,6 +113,8 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "imports": imports,
     "batch": batch,
     "views": views,
+    "replicas": replicas,
+    "plan": plan,
 }
 
 

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -142,13 +143,13 @@ def replicas(folder: Path, count: int = 3, **settings: object) -> Iterator[Repli
         line = Line(parts.hostname or "127.0.0.1", parts.port or 5432)
         stack.callback(line.close)
         told = {"database_url": url.replace(f":{parts.port}/", f":{line.port}/"), "drain_seconds": 1, **settings}
-        services = []
-        for number in range(count):
-            place = folder / f"replica-{number}"
+        places = [folder / f"replica-{number}" for number in range(count)]
+        for place in places:
             place.mkdir()
-            services.append(start(place, **told))
+        side_by_side = stack.enter_context(ThreadPoolExecutor(count))
+        services = list(side_by_side.map(lambda place: start(place, **told), places))
         found = Replicas(services, stack.enter_context(_proxy(folder, services)), line, told)
-        stack.callback(lambda: [stop(service) for service in found.services])
+        stack.callback(lambda: list(side_by_side.map(stop, found.services)))
         stack.callback(found.client.close)
         yield found
 

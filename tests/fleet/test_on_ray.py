@@ -14,7 +14,10 @@ from tests.fleet.logs import rows, write_log, write_room
 
 # In a process of its own: Ray warns, leaves threads behind and takes over signals.
 SCRIPT = """
-import sys, logging
+import logging, os, sys
+# Its own agents take long to start on a machine that does much else, and it gives them up after 30 s.
+os.environ |= {"RAY_agent_register_timeout_ms": "300000", "RAY_raylet_start_wait_time_s": "300"}
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
 from ray.cluster_utils import Cluster
 from fleet import FleetOptions, OnRay, associate_many
