@@ -28,11 +28,11 @@ def sentence_of(result: AssociationResult) -> str:
     if result.status is Status.DEGENERATE:
         theta = result.pose.theta
         turned = any(abs(wrap_angle(one.pose.theta - theta)) > OTHER_WAY_ROUND for one in others)
-        which = ", nor which way round it stands" if turned else ""
+        which = ", nor which way round" if turned else ""
         if result.unobservable is None:
             return f"The walls that are seen do not fix where the robot is{which}."
-        dx, dy = result.unobservable
-        return f"The robot cannot know where it is along ({dx:.2f}, {dy:.2f}){which}; across that it is fixed."
+        dx, dy = (round(part, 2) + 0.0 for part in result.unobservable)  # no negative zeros
+        return f"It cannot be told where along ({dx:.2f}, {dy:.2f}) the robot is{which}."
     if result.usable:
         return f"The robot is here, with a chance of {chance}."
     if any(reason.code == "twin" for reason in result.reasons) and others:

@@ -39,7 +39,7 @@ def press(page: Page, key: str, times: int) -> None:
         ("A flat", "usable", "The robot is here"),
         ("An office", "usable", "The robot is here"),
         ("Look-alike rooms", "ambiguous", "2 other places explain the scan about as well"),
-        ("A corridor", "degenerate", "cannot know where it is along"),
+        ("A corridor", "degenerate", "cannot be told where along"),
         ("A warehouse", "usable", "The robot is here"),
     ],
 )
