@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo client-types test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -64,10 +64,17 @@ docs: $(VENV)/.ready requirements/docs.txt  ## build the documents as pages, int
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/docs.txt
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 
-client-types: $(VENV)/.ready  ## make the client's types anew from the schema
+$(VENV)-clients/.ready: $(VENV)/.ready
 	$(BIN)/python -m venv $(VENV)-clients
-	$(VENV)-clients/bin/python -m pip install --quiet --disable-pip-version-check datamodel-code-generator==0.89.0
+	$(VENV)-clients/bin/python -m pip install --quiet --disable-pip-version-check datamodel-code-generator==0.89.0 openapi-python-client==0.29.1
+	@touch $@
+
+client-types: $(VENV)-clients/.ready  ## make the types of clients/python anew from the schema
 	$(BIN)/python -m clients.types $(VENV)-clients/bin/datamodel-codegen
+	-$(BIN)/ruff format --quiet clients/python
+
+clients: $(VENV)-clients/.ready  ## make clients by generators for Python and TypeScript, and ask the README's question with each
+	$(BIN)/python -m clients.trial $(VENV)-clients/bin
 
 siege: $(VENV)/.ready  ## print what each of many attacks takes from an honest client (25 min)
 	$(BIN)/python -m benchmarks.siege
@@ -104,6 +111,6 @@ lock: $(VENV)/.ready  ## pin the dependencies anew
 
 # Where LINEFIX_KERNELS or NUMBA_CACHE_DIR name a directory, whoever named it removes it: it may hold other things.
 clean:  ## remove what the other targets made, compiled kernels too
-	rm -rf $(VENV) $(VENV)-peers out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(VENV)-peers $(VENV)-clients out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -rf "$${XDG_CACHE_HOME:-$${HOME:-/nonexistent}/.cache}/linefix/kernels"
