@@ -28,7 +28,7 @@ from .growth import campus, draw_query
 from .table import Row, at_least, print_rows
 
 MAP_SEGMENTS = 2_000
-DISTINCT = 128  # scans, each of which comes many times
+DISTINCT = 32  # scans, each of which comes many times
 SHORT, LONG = 1_024, 7_168
 ROUNDS = 3
 SEED = 20190901
