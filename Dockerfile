@@ -21,6 +21,8 @@ COPY vectorization vectorization
 COPY association association
 COPY simulation simulation
 COPY formats formats
+COPY linefix linefix
+COPY bridge bridge
 COPY service service
 RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . \
     && /opt/tools/bin/pip --python /opt/linefix/bin/python install --quiet --no-compile --no-deps /wheels/*.whl
@@ -29,7 +31,7 @@ ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.warmup import warm_up; warm_up()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE registration vectorization association simulation formats service \
+    && $COMPILE registration vectorization association simulation formats linefix bridge service \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}
