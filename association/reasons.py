@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from .features import Features
 from .models import USUAL, Model
 from .result import Reason, Status
-from .tuning import TELLING_REASON
+from .tuning import NO_TWIN, TELLING_REASON
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ SENTENCES: Mapping[str, str] = {
     "twin": "Another pose explains the scan about as well.",
     "one_wall_decides": "Without one of the walls the pose would be another, or free.",
     "unexplained": "Much is seen that the map does not show, or the map shows much that is not seen.",
-    "too_little": "Too little of the scan lies on the map.",
+    "too_little": "Too little of what was seen tells this place from others.",
 }
 
 # What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
@@ -92,5 +92,8 @@ def _weighed(features: Features, cautious: Model) -> list[str]:
     lacking = {
         code: cautious.part(USUAL, names) - cautious.part(features, names) for code, names in FEATURES_OF.items()
     }
+    if features.lead > NO_TWIN:
+        # Many places explain a little of the scan, and none explains it about as well.
+        lacking["too_little"] += max(0.0, lacking.pop("twin"))
     ordered = sorted(lacking, key=lambda code: -lacking[code])
     return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]

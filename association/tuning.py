@@ -288,6 +288,7 @@ USABLE_CAUTIOUS_WITH_BEAMS = 0.9  # cross-validated; and where raw beams speak t
 # buildings, and of 10 m in logs, those that were usable and wrong came to 0.92 and 0.945. Measured.
 USABLE_CAUTIOUS_DRIVE = 0.95
 FEW_WALLS = 3  # geometry: a corner, or three sides of a room; as many are never enough if one of them alone decides
+NO_TWIN = 8.0  # nats, tables; an explanation that is so much less worth is no twin
 TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not told
 NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a twin of it, other buildings reckoned with
 ELSEWHERE_PROBABILITY = 0.24  # cross-validated; likewise, below it 2 % of scans of the map and most of others are

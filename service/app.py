@@ -8,9 +8,9 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from functools import partial
-from operator import attrgetter
 
 from fastapi import FastAPI
+from fastapi.routing import APIRoute
 from starlette.middleware.cors import CORSMiddleware
 
 from .admission.budget import ByteBudget
@@ -66,7 +66,6 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
-        generate_unique_id_function=attrgetter("name"),  # generated clients name their functions so
         lifespan=partial(_lifespan, services=services, part=part),
     )
     app.state.services = services
@@ -75,6 +74,9 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     # those of a map. An included router would be one more layer for each of them.
     for module in (associate, register, batch, vectorize, check, analyze, importing, maps, operations, pages):
         app.router.routes.extend(module.router.routes)
+    for route in app.router.routes:
+        if isinstance(route, APIRoute):
+            route.operation_id = route.operation_id or route.name  # generated clients name their functions so
     handle_errors(app)
     if settings.cors_origins:
         app.add_middleware(

@@ -10,7 +10,7 @@ from association import AssociationResult, Deadline, HardPrior, Status, associat
 from association.features import Features
 from association.models import USUAL, as_model
 from association.reasons import FEATURES_OF, SENTENCES, Standing, reasons_of
-from association.tuning import TELLING_REASON
+from association.tuning import NO_TWIN, TELLING_REASON
 
 from .scenes import (
     CORRIDOR,
@@ -80,6 +80,18 @@ def test_several_features_of_a_reason_count_together() -> None:
     features = USUAL_ONE._replace(lead=0.8, solitude=0.8, share=1.2)
     told = reasons_of(Standing(Status.AMBIGUOUS, True, False, False, False, False), features, model)
     assert [reason.code for reason in told] == ["twin", "unexplained"]
+
+
+def test_what_is_far_behind_is_no_twin() -> None:
+    model = as_model({"solitude": [1.0], "root_count": [1.0]})
+    standing = Standing(Status.AMBIGUOUS, True, False, elsewhere=False, thin=False, twin=False)
+
+    def codes_at(lead: float) -> list[str]:
+        told = reasons_of(standing, USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0), model)
+        return [reason.code for reason in told]
+
+    assert codes_at(NO_TWIN) == ["twin", "too_little"]
+    assert codes_at(NO_TWIN + 0.01) == ["too_little"]
 
 
 def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:

@@ -26,6 +26,22 @@ class AmbiguityAnswer(TypedDict):
     total: float
 
 
+class AnalysisSummaryAnswer(TypedDict):
+    """
+    How many of the places are what.
+    """
+
+    places: int
+    usable: int
+    ok: int
+    ambiguous: int
+    degenerate: int
+    no_match: int
+    look_alike: int
+    not_free: int
+    left_out: int
+
+
 class CorrespondenceAnswer(TypedDict):
     """
     A scan segment found on a map segment.
@@ -36,6 +52,7 @@ class CorrespondenceAnswer(TypedDict):
     offset: float
     angle: float
     weight: float
+    view: NotRequired[int | None]
     overlap: float
     alternatives: list[int]
 
@@ -51,15 +68,16 @@ class FindingAnswer(TypedDict):
     count: int
 
 
-class HingeAnswer(TypedDict):
+class ImportedMapAnswer(TypedDict):
     """
-    The wall that a pose hinges on.
+    A map, as it may be stored or sent with a request.
     """
 
-    scan: list[int]
-    map: list[int]
-    direction: list[float]
-    moves: float
+    segments: list[list[float]]
+    sigma: float | None
+    oriented: bool
+    frame_id: str
+    meta: Any
 
 
 class Limits(TypedDict):
@@ -76,6 +94,9 @@ class Limits(TypedDict):
     max_map_segments: int
     max_scan_segments: int
     max_beams: int
+    max_views: int
+    max_beams_together: int
+    max_segments_together: int
     max_correspondences: int
     max_batch: int
     max_deadline_ms: float
@@ -127,6 +148,16 @@ class MapSummaryAnswer(TypedDict):
     bounds: list[float]
     sigma: float | None
     oriented: bool | None
+
+
+class NoteAnswer(TypedDict):
+    """
+    One thing that an import did.
+    """
+
+    code: str
+    message: str
+    count: int
 
 
 class Place(TypedDict):
@@ -189,6 +220,19 @@ class RegistrationDiagnosticsAnswer(TypedDict):
     n: int
 
 
+class ReportAnswer(TypedDict):
+    """
+    What was made of the files.
+    """
+
+    format: str
+    files: list[str]
+    read: list[NoteAnswer]
+    merged: list[NoteAnswer]
+    dropped: list[NoteAnswer]
+    assumed: list[NoteAnswer]
+
+
 class Residual(TypedDict):
     """
     How far one pair is from fitting.
@@ -236,6 +280,15 @@ class SearchAnswer(TypedDict):
     seed: int
     sampling: Literal["ordered", "random"]
     rivals_above: float
+
+
+class SegmentOfView(TypedDict):
+    """
+    A segment of a scan of several views.
+    """
+
+    view: int
+    scan: int
 
 
 class SizeAnswer(TypedDict):
@@ -341,22 +394,10 @@ class Laser(TypedDict):
     range_min: NotRequired[float | None]
     range_max: NotRequired[float | None]
     header: NotRequired[Header | None]
+    time_increment: NotRequired[float | None]
     angle_max: NotRequired[Any]
-    time_increment: NotRequired[Any]
     scan_time: NotRequired[Any]
     intensities: NotRequired[Any]
-
-
-class LaserScan(TypedDict):
-    """
-    A scan as ranges.
-    """
-
-    frame_id: NotRequired[str]
-    stamp: NotRequired[Any]
-    viewpoint: NotRequired[list[float] | None]
-    laser: Laser
-    sigma: NotRequired[float | None]
 
 
 class MeasuredFields(TypedDict):
@@ -391,6 +432,17 @@ class Pose(TypedDict):
     x: float
     y: float
     theta: float
+
+
+class ScannerFields(TypedDict):
+    """
+    The scanner that the robot carries.
+    """
+
+    fov: NotRequired[float]
+    beams: NotRequired[int]
+    range_max: NotRequired[float]
+    sigma: NotRequired[float]
 
 
 class SearchOptions(TypedDict):
@@ -428,6 +480,16 @@ class SegmentScan(TypedDict):
     viewpoint: NotRequired[list[float] | None]
 
 
+class SensorPose(TypedDict):
+    """
+    The sensor's pose in the scan's frame: ``p_scan = R(theta) p_sensor + [x, y]``.
+    """
+
+    x: float
+    y: float
+    theta: float
+
+
 class SoftPriorFields(TypedDict):
     """
     A Gaussian over the pose: it scores, and is never fused into pose or covariance.
@@ -445,6 +507,16 @@ class StoredMap(TypedDict):
     """
 
     map_id: str
+
+
+class Twist(TypedDict):
+    """
+    How a sensor moves while it scans: a constant velocity in its own frame.
+    """
+
+    vx: float
+    vy: NotRequired[float]
+    omega: float
 
 
 class VectorizeOptions(TypedDict):
@@ -482,53 +554,29 @@ class AlternativeAnswer(TypedDict):
     inlier_fraction: float
 
 
-class AssociationDiagnosticsAnswer(TypedDict):
+class AnalyzedPlaceAnswer(TypedDict):
     """
-    Numbers beside the pose.
-    """
-
-    ambiguity: AmbiguityAnswer
-    ambiguity_before: AmbiguityAnswer
-    ambiguity_at: AmbiguityAnswer | None
-    similarity: float | None
-    reliability: float
-    determinant: float
-    chi2: float
-    dof: int
-    rms_offset: float
-    rms_angle: float
-    n: int
-    inlier_fraction: float
-    score: float
-    runner_up: float | None
-    margin: float | None
-    significance: float
-    hinges_on: HingeAnswer | None
-
-
-class FoundAnswer(TypedDict):
-    """
-    Where in a map a scan was taken.
+    What a robot would know at a place.
     """
 
+    pose: PoseAnswer
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
     probability: float
-    pose: PoseAnswer | None
-    covariance: list[list[float]] | None
+    look_alike: PoseAnswer | None
     unobservable: list[float] | None
-    frame_id: str
-    child_frame_id: str
-    stamp: Any
-    correspondences: NotRequired[list[CorrespondenceAnswer]]
-    unmatched_scan: list[int]
-    missing_map: NotRequired[list[int]]
-    diagnostics: AssociationDiagnosticsAnswer | None
-    reasons: list[ReasonAnswer]
-    alternatives: NotRequired[list[AlternativeAnswer]]
-    search: SearchAnswer
-    segments: NotRequired[list[list[float]] | None]
-    warnings: list[WarningAnswer]
+    reasons: list[str]
+
+
+class HingeAnswer(TypedDict):
+    """
+    The wall that a pose hinges on.
+    """
+
+    scan: list[int] | list[SegmentOfView]
+    map: list[int]
+    direction: list[float]
+    moves: float
 
 
 class MapList(TypedDict):
@@ -566,15 +614,16 @@ class RegisterAnswer(TypedDict):
     timing_ms: dict[str, float]
 
 
-class AssociateRequest(TypedDict):
+class AnalyzeRequest(TypedDict):
     """
-    Unknown correspondences.
+    A robot that is to stand all over a map.
     """
 
-    map: InlineMap | StoredMap
-    scan: SegmentScan | LaserScan | PointScan
-    prior: NotRequired[SoftPriorFields | HardPriorFields | None]
-    options: NotRequired[SearchOptions]
+    laser: NotRequired[ScannerFields]
+    spacing: NotRequired[float | None]
+    point: NotRequired[list[float] | None]
+    seed: NotRequired[int]
+    deadline_ms: NotRequired[float | None]
     client_ref: NotRequired[Any]
 
 
@@ -587,17 +636,6 @@ class BatchRequest(TypedDict):
     scans: list[Any]
     priors: NotRequired[list[Any] | None]
     options: NotRequired[SearchOptions]
-    client_ref: NotRequired[Any]
-
-
-class CheckRequest(TypedDict):
-    """
-    Sample scans to check a map by, and where they were taken, as far as that is known.
-    """
-
-    scans: list[SegmentScan | LaserScan | PointScan]
-    poses: NotRequired[list[Pose | None] | None]
-    deadline_ms: NotRequired[float | None]
     client_ref: NotRequired[Any]
 
 
@@ -614,6 +652,62 @@ class EstimatorOptions(TypedDict):
     oriented: NotRequired[bool | None]
 
 
+class LaserScan(TypedDict):
+    """
+    A scan as ranges.
+    """
+
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+    viewpoint: NotRequired[list[float] | None]
+    laser: Laser
+    sigma: NotRequired[float | None]
+    twist: NotRequired[Twist | None]
+
+
+class LaserView(TypedDict):
+    """
+    A view as ranges.
+    """
+
+    pose: SensorPose
+    flipped: NotRequired[bool]
+    covariance: NotRequired[list[list[float]] | None]
+    relative_to: NotRequired[int | None]
+    viewpoint: NotRequired[list[float] | None]
+    laser: Laser
+    sigma: NotRequired[float | None]
+    twist: NotRequired[Twist | None]
+
+
+class MapAnalyzeRequest(TypedDict):
+    """
+    The same on a map of the request's own.
+    """
+
+    laser: NotRequired[ScannerFields]
+    spacing: NotRequired[float | None]
+    point: NotRequired[list[float] | None]
+    seed: NotRequired[int]
+    deadline_ms: NotRequired[float | None]
+    client_ref: NotRequired[Any]
+    map: InlineMap | StoredMap
+
+
+class PointView(TypedDict):
+    """
+    A view as points in scanning order.
+    """
+
+    pose: SensorPose
+    flipped: NotRequired[bool]
+    covariance: NotRequired[list[list[float]] | None]
+    relative_to: NotRequired[int | None]
+    viewpoint: NotRequired[list[float] | None]
+    points: list[list[float]]
+    sigma: NotRequired[float | None]
+
+
 class RegisterRequest(TypedDict):
     """
     Known correspondences.
@@ -627,6 +721,152 @@ class RegisterRequest(TypedDict):
     options: NotRequired[EstimatorOptions]
 
 
+class SegmentView(TypedDict):
+    """
+    A view as segments.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | list[float]]
+    points: NotRequired[list[float] | None]
+    centroids: NotRequired[list[list[float]] | None]
+    spreads: NotRequired[list[float] | None]
+    pose: SensorPose
+    flipped: NotRequired[bool]
+    covariance: NotRequired[list[list[float]] | None]
+    relative_to: NotRequired[int | None]
+    viewpoint: NotRequired[list[float] | None]
+
+
+class ViewsScan(TypedDict):
+    """
+    A scan of several views: of the sensors of a robot, or from places along its way.
+    """
+
+    views: list[SegmentView | LaserView | PointView]
+    frame_id: NotRequired[str]
+    stamp: NotRequired[Any]
+
+
+class AnalyzeAnswer(TypedDict):
+    """
+    Where a map will fail.
+    """
+
+    places: list[AnalyzedPlaceAnswer]
+    summary: AnalysisSummaryAnswer
+    spacing: float
+    complete: bool
+    map: MapReference | None
+    client_ref: Any
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class AssociationDiagnosticsAnswer(TypedDict):
+    """
+    Numbers beside the pose.
+    """
+
+    ambiguity: AmbiguityAnswer
+    ambiguity_before: AmbiguityAnswer
+    ambiguity_at: AmbiguityAnswer | None
+    similarity: float | None
+    reliability: float
+    determinant: float
+    chi2: float
+    dof: int
+    rms_offset: float
+    rms_angle: float
+    n: int
+    inlier_fraction: float
+    score: float
+    runner_up: float | None
+    margin: float | None
+    significance: float
+    hinges_on: HingeAnswer | None
+
+
+class CheckAnswer(TypedDict):
+    """
+    What is doubtful in a map, also beside sample scans.
+    """
+
+    findings: list[FindingAnswer]
+    size: SizeAnswer
+    advice: AdviceAnswer
+    places: list[PlaceAnswer]
+    looked_from: int
+    complete: bool
+    samples: SamplesAnswer | None
+    map: MapReference
+    client_ref: Any
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class FoundAnswer(TypedDict):
+    """
+    Where in a map a scan was taken.
+    """
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    usable: bool
+    probability: float
+    sentence: str
+    pose: PoseAnswer | None
+    covariance: list[list[float]] | None
+    unobservable: list[float] | None
+    frame_id: str
+    child_frame_id: str
+    stamp: Any
+    correspondences: NotRequired[list[CorrespondenceAnswer]]
+    unmatched_scan: list[int] | list[SegmentOfView]
+    missing_map: NotRequired[list[int]]
+    diagnostics: AssociationDiagnosticsAnswer | None
+    reasons: list[ReasonAnswer]
+    alternatives: NotRequired[list[AlternativeAnswer]]
+    search: SearchAnswer
+    segments: NotRequired[list[list[float]] | list[list[list[float]] | None] | None]
+    warnings: list[WarningAnswer]
+
+
+class MapCheckAnswer(TypedDict):
+    """
+    What is doubtful in a map by itself.
+    """
+
+    findings: list[FindingAnswer]
+    size: SizeAnswer
+    advice: AdviceAnswer
+    places: list[PlaceAnswer]
+    looked_from: int
+    complete: bool
+
+
+class AssociateRequest(TypedDict):
+    """
+    Unknown correspondences.
+    """
+
+    map: InlineMap | StoredMap
+    scan: SegmentScan | LaserScan | PointScan | ViewsScan
+    prior: NotRequired[SoftPriorFields | HardPriorFields | None]
+    options: NotRequired[SearchOptions]
+    client_ref: NotRequired[Any]
+
+
+class CheckRequest(TypedDict):
+    """
+    Sample scans to check a map by, and where they were taken, as far as that is known.
+    """
+
+    scans: list[SegmentScan | LaserScan | PointScan | ViewsScan]
+    poses: NotRequired[list[Pose | None] | None]
+    deadline_ms: NotRequired[float | None]
+    client_ref: NotRequired[Any]
+
+
 class AssociateAnswer(TypedDict):
     """
     The answer of a search.
@@ -635,6 +875,7 @@ class AssociateAnswer(TypedDict):
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
     probability: float
+    sentence: str
     pose: PoseAnswer | None
     covariance: list[list[float]] | None
     unobservable: list[float] | None
@@ -642,13 +883,13 @@ class AssociateAnswer(TypedDict):
     child_frame_id: str
     stamp: Any
     correspondences: NotRequired[list[CorrespondenceAnswer]]
-    unmatched_scan: list[int]
+    unmatched_scan: list[int] | list[SegmentOfView]
     missing_map: NotRequired[list[int]]
     diagnostics: AssociationDiagnosticsAnswer | None
     reasons: list[ReasonAnswer]
     alternatives: NotRequired[list[AlternativeAnswer]]
     search: SearchAnswer
-    segments: NotRequired[list[list[float]] | None]
+    segments: NotRequired[list[list[float]] | list[list[list[float]] | None] | None]
     warnings: list[WarningAnswer]
     map: MapReference | None
     client_ref: Any
@@ -667,20 +908,14 @@ class BatchResult(TypedDict):
     problem: NotRequired[Problem | None]
 
 
-class CheckAnswer(TypedDict):
+class ImportAnswer(TypedDict):
     """
-    What is doubtful in a map.
+    A map of another tool.
     """
 
-    findings: list[FindingAnswer]
-    size: SizeAnswer
-    advice: AdviceAnswer
-    places: list[PlaceAnswer]
-    looked_from: int
-    complete: bool
-    samples: SamplesAnswer | None
-    map: MapReference
-    client_ref: Any
+    map: ImportedMapAnswer
+    report: ReportAnswer
+    check: MapCheckAnswer
     request_id: str
     timing_ms: dict[str, float]
 

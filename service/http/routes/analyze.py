@@ -24,6 +24,7 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
 
 @router.post(
     "/v1/maps/{map_id}:analyze",
+    operation_id="analyze_map",
     tags=["maps"],
     response_model=AnalyzeAnswer,
     responses=problems(*_FAILS, *READS_BODY),
@@ -39,6 +40,7 @@ async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
 
 @router.post(
     "/v1/analyze",
+    operation_id="analyze",
     response_model=AnalyzeAnswer,
     responses=problems(*_FAILS, *READS_BODY),
     openapi_extra=takes(MapAnalyzeRequest, {"a room": examples.ANALYZE_ROOM}),

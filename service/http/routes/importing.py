@@ -37,6 +37,7 @@ _TAKES: dict[str, Any] = {
 
 @router.post(
     "/v1/maps:import",
+    operation_id="import_map",
     response_model=ImportAnswer,
     responses=problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES),
     openapi_extra=_TAKES,

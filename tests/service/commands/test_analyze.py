@@ -9,7 +9,9 @@ import pytest
 from PIL import Image
 
 from tests.running import RunningService
-from tests.service.commands.test_asking import ROOM, linefix, refused
+
+from .running import Linefix, refused
+from .test_asking import ROOM
 
 TWO = [*ROOM, *[[a + 20, b, c + 20, d] for a, b, c, d in ROOM]]
 
@@ -21,24 +23,24 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningService) -> None:
+def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningService, linefix: Linefix) -> None:
     """Enough places for several processes."""
     asked = ("analyze", "two.json", "--spacing", "0.9", "--beams", "180", "--json")
-    here = linefix(folder, *asked, LINEFIX_SEARCHES="2")
-    assert (here.returncode, here.stderr) == (0, "")
-    answer = json.loads(here.stdout)
+    here = linefix(*asked, LINEFIX_SEARCHES="2")
+    assert (here.code, here.err) == (0, "")
+    answer = json.loads(here.out)
     assert len(answer["places"]) == answer["summary"]["look_alike"] > 30
-    there = json.loads(linefix(folder, *asked, "--server", service.url).stdout)
+    there = json.loads(linefix(*asked, "--server", service.url).out)
     for name in ("places", "summary", "complete", "spacing", "map"):
         assert answer[name] == there[name]
 
 
-def test_files_of_it(folder: Path) -> None:
+def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     asked = ("analyze", "room.json", "--spacing", "1", "--out", "a.geojson", "--picture", "a.png")
-    ended = linefix(folder, *asked)
-    assert ended.returncode == 0, ended.stderr
-    assert "usable" in ended.stdout
-    assert "(92 %)" in ended.stdout
+    ended = linefix(*asked)
+    assert ended.code == 0, ended.err
+    assert "usable" in ended.out
+    assert "(92 %)" in ended.out
     features = json.loads((folder / "a.geojson").read_text())["features"]
     assert len(features) > 15
     assert features[0]["geometry"]["type"] == "Point"
@@ -48,10 +50,10 @@ def test_files_of_it(folder: Path) -> None:
     assert colours[(46, 125, 70)] > 0.2 * sum(colours.values())
 
 
-def test_little_time(folder: Path) -> None:
-    ended = linefix(folder, "analyze", "two.json", "--deadline-ms", "1", "--json")
-    assert ended.returncode == 0, ended.stderr
-    assert json.loads(ended.stdout)["complete"] is False
+def test_little_time(folder: Path, linefix: Linefix) -> None:
+    ended = linefix("analyze", "two.json", "--deadline-ms", "1", "--json")
+    assert ended.code == 0, ended.err
+    assert json.loads(ended.out)["complete"] is False
 
 
 @pytest.mark.parametrize(
@@ -63,5 +65,5 @@ def test_little_time(folder: Path) -> None:
     ],
     ids=["degrees", "nowhere", "no format"],
 )
-def test_what_is_not_done(folder: Path, more: tuple[str, ...], code: int, said: str) -> None:
-    assert said in refused(linefix(folder, "analyze", "room.json", *more), code)
+def test_what_is_not_done(folder: Path, more: tuple[str, ...], code: int, said: str, linefix: Linefix) -> None:
+    assert said in refused(linefix("analyze", "room.json", *more), code)

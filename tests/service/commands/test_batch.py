@@ -13,24 +13,25 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.fleet.logs import rows, write_log, write_room
-from tests.service.commands.test_asking import linefix, refused
+
+from .running import Linefix, refused
 
 
-def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path) -> None:
+def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 30)
     write_room(tmp_path)
     asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "out/poses.parquet", "--block", "10")
-    ended = linefix(tmp_path, *asked, "--workers", "1")
-    assert (ended.returncode, ended.stderr) == (0, "")  # progress is for terminals
-    assert "scans   30, of which 0 were done before" in ended.stdout
+    ended = linefix(*asked, "--workers", "1")
+    assert (ended.code, ended.err) == (0, "")  # progress is for terminals
+    assert "scans   30, of which 0 were done before" in ended.out
     assert [(row["index"], row["status"]) for row in rows(tmp_path / "out/poses.parquet")] == [
         (k, "ok") for k in range(30)
     ]
-    told = json.loads(linefix(tmp_path, *asked, "--workers", "1", "--json").stdout)
+    told = json.loads(linefix(*asked, "--workers", "1", "--json").out)
     assert told == {"scans": 30, "taken_over": 0, "usable": 30, "errors": 0, "statuses": {"ok": 30}}
 
 
-def test_a_batch_that_was_killed_goes_on(tmp_path: Path) -> None:
+def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 400)
     write_room(tmp_path)
     asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "poses.parquet", "--block", "5", "--workers", "1")
@@ -43,8 +44,8 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path) -> None:
     process.kill()
     process.wait()
     assert not (tmp_path / "poses.parquet").exists()
-    ended = linefix(tmp_path, *asked, "--json")
-    told = json.loads(ended.stdout)
+    ended = linefix(*asked, "--json")
+    told = json.loads(ended.out)
     assert (told["scans"], told["taken_over"] >= 5) == (400, True)
     assert [row["index"] for row in rows(tmp_path / "poses.parquet")] == list(range(400))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "poses.parquet", "room.json"]
@@ -61,14 +62,16 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path) -> None:
     ],
     ids=["no output", "no log", "no map", "workers on Ray", "folder"],
 )
-def test_what_is_not_done_is_told_in_one_line(tmp_path: Path, arguments: tuple[str, ...], code: int, said: str) -> None:
+def test_what_is_not_done_is_told_in_one_line(
+    tmp_path: Path, arguments: tuple[str, ...], code: int, said: str, linefix: Linefix
+) -> None:
     write_log(tmp_path / "a.parquet", 1)
     write_room(tmp_path)
-    assert said in refused(linefix(tmp_path, "batch", *arguments), code)
+    assert said in refused(linefix("batch", *arguments), code)
 
 
-def test_the_output_says_its_columns(tmp_path: Path) -> None:
+def test_the_output_says_its_columns(tmp_path: Path, linefix: Linefix) -> None:
     write_log(tmp_path / "a.parquet", 1)
     write_room(tmp_path)
-    assert linefix(tmp_path, "batch", "a.parquet", "--maps", "room.json", "--out", "o.parquet").returncode == 0
+    assert linefix("batch", "a.parquet", "--maps", "room.json", "--out", "o.parquet").code == 0
     assert pq.read_schema(tmp_path / "o.parquet").names[:5] == ["log", "index", "stamp", "map_id", "status"]

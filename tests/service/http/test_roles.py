@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from service.admission.grants import GUARDED, ROUTES, Role
 from service.schemas import examples
 from tests.running import RunningService, running, until
+from tests.service.importing.forms import TYPE, form
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing, key_lines
 
 ADMIN = "the-key-of-who-may-do-everything"
@@ -33,7 +35,11 @@ CALLS: dict[tuple[str, str], tuple[Role | None, Any]] = {
     ("DELETE", "/v1/maps/{map_id}"): (Role.WRITE, None),
     ("GET", "/v1/maps/{map_id}:check"): (Role.READ, None),
     ("POST", "/v1/maps/{map_id}:check"): (Role.ASSOCIATE, {"scans": [SCAN]}),
+    ("POST", "/v1/maps/{map_id}:analyze"): (Role.ASSOCIATE, {"spacing": 4.0}),
+    ("POST", "/v1/analyze"): (Role.ASSOCIATE, {"map": {"map_id": "{map_id}"}, "spacing": 4.0}),
+    ("POST", "/v1/maps:import"): (Role.ASSOCIATE, {"room.json": examples.MAP}),
 }
+FORMS = frozenset({("POST", "/v1/maps:import")})  # their bodies are files by name
 NAMES_A_MAP = {call for call, (_, body) in CALLS.items() if "{map_id}" in call[1] or "{map_id}" in str(body)}
 TOLD = [(method, path, role) for method, path in CALLS for role in Role]
 
@@ -53,6 +59,9 @@ class Guarded:
     def call(self, method: str, path: str, bearer: str, map_id: str = MINE) -> httpx.Response:
         body = _with_id(CALLS.get((method, path), (None, None))[1], map_id)
         headers = {"authorization": f"Bearer {bearer}"}
+        if (method, path) in FORMS:
+            content = bytes(form({name: json.dumps(document).encode() for name, document in body.items()}))
+            return self.service.client.request(method, path, content=content, headers=headers | {"content-type": TYPE})
         return self.service.client.request(method, path.replace("{map_id}", map_id), json=body, headers=headers)
 
     def put_maps(self) -> None:
