@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo clients client-types test lint types layers unit serve faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -23,7 +23,9 @@ $(VENV)/.ready: pyproject.toml requirements/dev.txt
 demo: $(VENV)/.ready  ## start the service, ask it where a robot is, draw the answer
 	$(BIN)/python -m examples.demo
 
-test: lint types layers unit  ## lint, types, import layers and tests, these in two processes or as JOBS= says
+test: lint layers  ## lint, import layers, types and tests, these in three processes or as JOBS= says
+	$(MAKE) --no-print-directory -j 2 types kernels
+	$(MAKE) --no-print-directory unit
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
@@ -35,15 +37,20 @@ types: $(VENV)/.ready
 layers: $(VENV)/.ready
 	$(BIN)/lint-imports
 
-JOBS ?= 2
-
-# Kernels first: the processes would compile the same ones side by side.
-unit: $(VENV)/.ready
+# Kernels before tests: the processes would compile the same ones side by side.
+kernels: $(VENV)/.ready
 	$(BIN)/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
+
+JOBS ?= 3  # tests of the service wait as much as they work
+
+unit: kernels
 	$(BIN)/python -m pytest -m "not long" -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 serve: $(VENV)/.ready  ## run the service on 127.0.0.1:8000, or as ARGS="--port 8001" says
 	$(BIN)/python -m service $(ARGS)
+
+long: $(VENV)/.ready  ## the long forms of the other tests (10 min)
+	$(BIN)/python -m pytest -m long --ignore tests/faults
 
 faults: $(VENV)/.ready  ## kill, fill, flip, drain and load for hours: the long forms of tests/faults
 	$(BIN)/python -m pytest -s -m long tests/faults --soak-minutes $(or $(MINUTES),30)

@@ -42,6 +42,7 @@ def test_a_peer_finds_what_is_easy(racer: Racer, easy: Cell) -> None:
     assert all(0.0 < a.ms < 30_000.0 for a in found)
 
 
+@pytest.mark.long
 def test_what_runs_out_of_time_is_a_failure_at_the_limit_and_ends_the_cell(easy: Cell) -> None:
     racer = Racer("linefix", limit=1e-9)
     found = list(attempts(racer, Cell("", None, "", easy.queries * 5), limit=1e-9))
@@ -50,6 +51,7 @@ def test_what_runs_out_of_time_is_a_failure_at_the_limit_and_ends_the_cell(easy:
     assert all(a.out_of_time and not a.right and a.ms == pytest.approx(1e-6) for a in found)
 
 
+@pytest.mark.long
 def test_a_map_that_breaks_a_process_is_a_failure_and_the_next_is_answered(easy: Cell) -> None:
     racer = Racer("linefix", limit=30.0)
     query = easy.queries[0]
@@ -60,6 +62,7 @@ def test_a_map_that_breaks_a_process_is_a_failure_and_the_next_is_answered(easy:
     assert found[1].right
 
 
+@pytest.mark.long
 def test_corners_fit_where_they_are_and_not_where_a_segment_would_stick_out() -> None:
     room = np.array([[0.0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]])
     known = MapCorners.of(room, CornerOptions(known_reach=0.1))

@@ -29,9 +29,12 @@ FILES = {
     "unknown": ["unknown.csv", "unknown.png"],
     "basin": ["basin.csv", "basin.png"],
 }  # fmt: skip
+SLOW = {"basin", "hypotheses", "unknown", "sweep", "raw_beams"}  # even in the quick mode
 
 
-@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] if name in SLOW else []) for name in EXPERIMENTS]
+)
 def test_the_quick_mode_writes_tables_without_gaps_and_figures(name, tmp_path):
     run([name], QUICK, tmp_path, 1)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(FILES[name])

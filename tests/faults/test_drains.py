@@ -55,7 +55,7 @@ def logged(path: Path) -> dict[str, int]:
     return {line["request_id"]: line["status"] for line in lines if line["message"] == "request"}
 
 
-@pytest.mark.parametrize("drains", [4, pytest.param(200, marks=pytest.mark.long)])
+@pytest.mark.parametrize("drains", [2, pytest.param(200, marks=pytest.mark.long)])
 def test_what_was_accepted_is_answered(start_service: Callable[..., Any], tmp_path: Path, drains: int) -> None:
     draw = random.Random(drains)
     total: Counter[str] = Counter()

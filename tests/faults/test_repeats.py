@@ -41,7 +41,7 @@ def without_times(answer: Any) -> Any:
     return [without_times(item) for item in answer] if isinstance(answer, list) else answer
 
 
-@pytest.mark.parametrize("repeats", [30, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("repeats", [10, pytest.param(1000, marks=pytest.mark.long)])
 def test_the_same_answer_to_the_bit(
     start_service: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Any, repeats: int
 ) -> None:
