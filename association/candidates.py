@@ -22,6 +22,7 @@ from .tuning import (
     CHUNK,
     DISTINCT_ANGLE,
     DISTINCT_DISTANCE,
+    GUIDE_WORDS,
     KEPT,
     KEPT_FOR_BEAMS,
     KEPT_SHARE,
@@ -170,16 +171,20 @@ def _go_through_bases(context: SearchContext, rules: Records, found: Records, pr
 def _plan(context: SearchContext) -> Plan:
     scan, index = context.lines.rows, context.index
     n = min(len(scan), BASE_SEGMENTS)
+    inliers, guides = _sampled_inliers(n, SAMPLE_WORDS, SAMPLE_SEED), _sampled_inliers(n, GUIDE_WORDS, SAMPLE_SEED + 1)
     return Plan(
         bases=_drawn(plan_bases(scan, n, index.runs, index.area), context.options),
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
         freest=np.argsort(-scan["freedom"], kind="stable"),
-        inliers=_sampled_inliers(n),
+        inliers=inliers,
         missing=np.full((n, SAMPLE_WORDS), ~np.uint64(0)),
+        guides=guides,
+        unhit=np.full((n, GUIDE_WORDS), ~np.uint64(0)),
         fade=0.0 if context.options.sampling == "random" else math.log(REUSE),
         random=context.options.sampling == "random",
+        guided=context.options.sampling == "ordered" and len(index.crossings.rows) > 0,
     )
 
 
@@ -194,13 +199,13 @@ def _drawn(bases: Records, options: AssociationOptions) -> Records:
     return bases
 
 
-@lru_cache(maxsize=BASE_SEGMENTS + 1)
-def _sampled_inliers(n: int) -> NDArray[np.uint64]:
+@lru_cache(maxsize=2 * BASE_SEGMENTS + 2)
+def _sampled_inliers(n: int, words: int, seed: int) -> NDArray[np.uint64]:
     """Sample consensus sets among n segments: ``[m, i]`` says for 64 samples a word whether i is in a set of m + 1.
 
     All sets of a size are as likely. A better consensus set has so many segments at least, whichever they are.
     """
-    draws = np.random.default_rng(SAMPLE_SEED).random((SAMPLE_WORDS * 64, n))
+    draws = np.random.default_rng(seed).random((words * 64, n))
     ranks = np.argsort(np.argsort(draws, axis=1), axis=1).T
     bits = np.packbits(ranks[None] <= np.arange(n)[:, None, None], axis=-1)
     return np.ascontiguousarray(bits).view(np.uint64)

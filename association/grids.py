@@ -49,6 +49,12 @@ def directions_near(walls: Walls, runs: Walls) -> Raster:
     return Raster(shape, direction_raster(as_records(ENDS, both), reach, shape, sectors))
 
 
+def drawn_out(runs: Walls, reach: float) -> Grid:
+    """List in each cell the runs on it when they are drawn out by `reach` metres at both ends."""
+    towards = np.stack([runs.rows["dx"], runs.rows["dy"]], axis=1)
+    return _grid(ends_of(runs) + reach * np.hstack([-towards, towards]), SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+
+
 def _sectors(walls: Walls) -> NDArray[np.int32]:
     """Return the sector of each direction, of `SECTORS`."""
     return np.floor((walls.rows["angle"] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int32) % np.int32(SECTORS)

@@ -99,16 +99,39 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # All of these together.
 TERMS = np.dtype([("gates", GATES), ("rules", RULES), ("prior", PRIOR), ("model", MODEL)])
 
-# Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs.
-BASE = _fields((_I, "sliding crossing"), (_F, "merit"))
+# Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs, in
+# nanoseconds; that cost; what it is worth at most beside the others that are left; whether its pose is good enough to
+# find the rest; how many crossings of the map may fit it, or why that is not known.
+BASE = _fields((_I, "sliding crossing"), (_F, "merit cost hope"), (_I, "telling fits"))
+NOT_LISTED, NOT_COUNTED = -1, -2  # not all that may fit are on the list; nobody has looked yet
+
+# Where the lines of two runs cross near both: the runs, the second turned to the left of the first by the angle (rad);
+# abscissae of their ends from the crossing (m). Rounded: what it tells is tested loosely, and then exactly.
+CROSSING = np.dtype(
+    [
+        ("first", np.int32), ("second", np.int32), ("angle", np.float32),
+        ("first_begin", np.float32), ("first_end", np.float32),
+        ("second_begin", np.float32), ("second_end", np.float32),
+    ]
+)  # fmt: skip
+
+# What some crossings come to at best: their angles; the least of their begins and the greatest of their ends.
+CROSSING_BLOCK = np.dtype(
+    [
+        ("least_angle", np.float32), ("greatest_angle", np.float32),
+        ("first_begin", np.float32), ("first_end", np.float32),
+        ("second_begin", np.float32), ("second_end", np.float32),
+    ]
+)  # fmt: skip
 
 # How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
 # through, poses proposed, poses scored to the end; where to go on: the base or -1, the anchor, the step along it or the
-# item of a cell, and the slide or -inf; bound on the gain of a pose that contains no base so far; chance of having
-# missed a better consensus set; the freedom that any set takes at least whose score would be kept.
+# item of a cell, and the slide or -inf; size of the sets that guide the choice of bases; bound on the gain of a pose
+# that contains no base so far; chance of having missed a better consensus set; the freedom that any set takes at least
+# whose score would be kept.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
-    (_I, "count bases hypotheses verified base anchor step"),
+    (_I, "count bases hypotheses verified base anchor step guide"),
     (_F, "slide bound missed least_freedom"),
 )
 
@@ -221,6 +244,44 @@ class Sweep(NamedTuple):
     sectors: Grid
 
 
+class Crossings(NamedTuple):
+    """All pairs of runs whose lines cross near both, alike ones side by side.
+
+    Attributes
+    ----------
+    rows : (k,) of `CROSSING`
+    blocks, tops : of `CROSSING_BLOCK`, of so many rows each, and of so many blocks
+    reach : float
+        Metres; how far from both the crossings are that are listed; none are where it is 0.
+    """
+
+    rows: Records
+    blocks: Records
+    tops: Records
+    reach: float
+
+
+class Corner(NamedTuple):
+    """What a crossing has to be at which a base may lie, loosely: the two segments on its first and its second run.
+
+    Attributes
+    ----------
+    least_angle, greatest_angle : float
+        Radians.
+    first_begin, second_begin : float
+        Metres from the crossing, where the runs begin at most.
+    first_end, second_end : float
+        Metres from the crossing, where they end at least.
+    """
+
+    least_angle: float
+    greatest_angle: float
+    first_begin: float
+    first_end: float
+    second_begin: float
+    second_end: float
+
+
 class Pieces(NamedTuple):
     """The map's own segments.
 
@@ -241,6 +302,7 @@ class MapTables(NamedTuple):
     place: Place
     sweep: Sweep
     raster: Raster
+    crossings: Crossings
 
 
 class Measured(NamedTuple):
@@ -325,10 +387,14 @@ class Plan(NamedTuple):
     freest : (all scan lines,) those that take most freedom by themselves first
     inliers : (n, n, words) ``[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1
     missing : (n, words) which of these samples have missed all bases so far
+    guides, unhit : likewise
+        Of other samples, by which bases are chosen: those that were chosen to hit `missing` would show too little left.
     fade : float
         What the logarithm of a base's merit loses for each earlier use of one of its segments.
     random : bool
         Whether the bases are drawn at random.
+    guided : bool
+        Whether they are chosen by the samples that they hit.
     """
 
     bases: Records
@@ -338,8 +404,11 @@ class Plan(NamedTuple):
     freest: Integers
     inliers: Words
     missing: Words
+    guides: Words
+    unhit: Words
     fade: float
     random: bool
+    guided: bool
 
 
 class Workspace(NamedTuple):

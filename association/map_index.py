@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
+from .crossings import crossings_of, no_crossings
 from .errors import InvalidMapError
 from .grids import directions_near, near_walls, swept_runs
-from .layout import ENDS, Grid, Integers, MapTables, Pieces, Place, Raster, Sweep, Walls, as_records
-from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
+from .layout import ENDS, Crossings, Grid, Integers, MapTables, Pieces, Place, Raster, Sweep, Walls, as_records
+from .tuning import LISTED_RUNS, MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
 
 Floats = NDArray[np.float64]
@@ -49,6 +50,8 @@ class MapIndex:
         does a sweep meet? Told from the list alone, since a look at a run costs more than all else.
     raster : Raster
         The quickest way to see that a segment cannot lie at a place.
+    crossings : Crossings
+        Where two runs cross near both: where may two scan segments lie that do so?
     """
 
     segments: Segments
@@ -62,6 +65,7 @@ class MapIndex:
     grid: Grid
     sectors: Grid
     raster: Raster
+    crossings: Crossings
 
     @classmethod
     def build(cls, segments: Segments, sigma: float | None = None, *, oriented: bool = True) -> MapIndex:
@@ -103,7 +107,8 @@ class MapIndex:
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
         pieces = Pieces(order, starts, as_records(ENDS, local.endpoints))
         grids = near_walls(walls), swept_runs(runs), directions_near(walls, runs)
-        return cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
+        crossings = crossings_of(runs) if len(runs.rows) >= LISTED_RUNS else no_crossings()
+        return cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids, crossings)
 
     @cached_property
     def undirected(self) -> MapIndex:
@@ -148,11 +153,12 @@ class MapIndex:
     def tables(self) -> MapTables:
         """What the kernels of the search are handed."""
         sweep = Sweep(self.runs.rows, self.runs.bin_starts, self.sectors)
-        return MapTables(Place(self.walls.rows, self.grid), sweep, self.raster)
+        return MapTables(Place(self.walls.rows, self.grid), sweep, self.raster, self.crossings)
 
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        tables: list[Any] = [self.pieces, self.walls, self.runs, self.grid, self.sectors, self.raster]
+        listed = self.crossings[:3]
+        tables: list[Any] = [self.pieces, self.walls, self.runs, self.grid, self.sectors, self.raster, listed]
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
         return sum(array.nbytes for array in [self.wall_of_piece, *lines, *(a for table in tables for a in table)])

@@ -29,6 +29,17 @@ RASTER_CELL = 0.5  # m, tables
 MAX_CELLS = 4_000_000  # memory: some 50 MB
 MAX_SWEEP_CELLS = 1_000_000  # memory
 MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about
+LISTED_RUNS = 1_000  # runs from which on crossings are listed, measured: with fewer a walk costs as little
+CROSSING_REACH = 12.0  # m, measured; how far from both of two runs their lines cross that are listed as a pair,
+LEAST_CROSSING_REACH = (
+    2.0  # m, measured; or less where there would be more than these: nearer ones are not worth a list
+)
+CROSSING_SHRINK = 1.5  # by which it shrinks until they are few enough
+MOST_CROSSINGS = 2_000_000  # memory: some 60 MB
+MOST_CROSSING_TESTS = 40_000_000  # of pairs of runs in one cell, measured: a fifth of a second
+CROSSING_BINS = 64  # of angles by which crossings are sorted, tables
+CROSSING_LEVELS = 16  # of each of their four ends, a power of two, tables
+CROSSING_BLOCK_SIZE = 32  # tables
 CELL_GROWTH = 1.25  # by which cells grow until their lists fit
 
 # --- Scan: what a segment is worth and how far it is to be trusted ----------------------------------------------------
@@ -83,6 +94,11 @@ BASE_SLACK = 0.2  # m, tables; how far a scan segment of a base may stick out at
 BASE_SLACK_SHARE = 0.1  # of its length, tables
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base, tables
 MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base, tables
+CORNER_STEPS = 8  # of the angle between two lines, at which a base's place on them is worked out; tables
+CORNER_ANGLE_SLACK = (
+    1.02  # rounding; a cosine to the second order lets angles up to .35 rad pass that are wider by .5 %
+)
+CORNER_ROUNDING = 1e-5  # m a metre and rad, rounding: crossings are listed in single precision
 WINDOW_MARGIN = 0.5  # m, tables, and
 WINDOW_TURN = 0.1  # rad, tables; what lies farther outside a hard prior's window is not refined into it
 SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
@@ -111,10 +127,13 @@ SINE_POWER = 0.3
 GAIN_POWER = 3.0  # of the lesser gain, tables: long segments are clutter less often
 SAMPLE_WORDS = 160  # of 64 samples, a resolution of 1e-4
 SAMPLE_SEED = 20190901
+GUIDE_WORDS = 32  # of 64 samples by which bases are chosen, others than those that tell when enough were; tables
+GUESSED_SHARE = 0.5  # of the segments that a base can have, tables; in the set that is looked for, before one is found
 # Work between two looks at the clock, in tests of a wall: a few milliseconds. Measured.
 CHUNK = 300_000
 USUAL_CROWD = 8.0  # walls on the list that a place on a wall has
 TESTS_ANCHOR = 5
+TESTS_BLOCK = 4
 TESTS_REJECTED = 10
 TESTS_HYPOTHESIS = 50
 TESTS_REFINED = 800

@@ -5,15 +5,27 @@ import math
 import numpy as np
 
 from registration.compiling import inlined, kernel
-from registration.layout import Floats, Records
+from registration.layout import Floats, Record, Records
 
-from ..layout import BASE, Integers, MapTables, Plan, Question, Walls, Words, Workspace
+from ..layout import (
+    BASE,
+    NOT_COUNTED,
+    Crossings,
+    Integers,
+    MapTables,
+    Plan,
+    Question,
+    Walls,
+    Words,
+    Workspace,
+)
 from ..tuning import (
     COST_ANCHOR,
     COST_BASE,
     COST_HYPOTHESIS,
     COST_SLIDE,
     GAIN_POWER,
+    GUESSED_SHARE,
     HYPOTHESIS_SCALE,
     MIN_CROSSING_BASE,
     SHORT_LENGTH,
@@ -22,6 +34,7 @@ from ..tuning import (
     TELLING,
     UNTELLING,
 )
+from .corners import count_fits, search_corner
 from .proposing import least_length, search_base
 
 
@@ -116,11 +129,25 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
             bases[k].sliding = i if sweep_i <= sweep_j else j
             bases[k].crossing = j if sweep_i <= sweep_j else i
             merit = GAIN_POWER * math.log(min(scan[i].gain, scan[j].gain)) - math.log(cost)
-            if not is_telling(scan, i, j):
+            telling = is_telling(scan, i, j)
+            if not telling:
                 merit += math.log(UNTELLING)
+            bases[k].telling = 1 if telling else 0
+            bases[k].hope = math.inf
             bases[k].merit = merit
+            bases[k].cost = cost
+            bases[k].fits = NOT_COUNTED
             k += 1
     return bases[:k]
+
+
+@inlined
+def ones_of(word: np.uint64) -> int:
+    """Return the number of bits that are set, of 64."""
+    word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
+    word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
 @kernel
@@ -144,6 +171,82 @@ def next_base(bases: Records, uses: Floats, fade: float) -> int:
         bases[best].merit = -math.inf
         uses[bases[best].sliding] += 1
         uses[bases[best].crossing] += 1
+    return best
+
+
+@kernel
+def any_left(missing: Words) -> bool:
+    """Tell whether any sample is left."""
+    left = np.uint64(0)
+    for word in missing:
+        left |= word
+    return left != 0
+
+
+@kernel
+def guided_base(scan: Records, bases: Records, inliers: Words, missing: Words) -> int:
+    """Take the base that hits most of the sampled sets that have missed all bases so far, for what it costs.
+
+    ``inliers[i]`` says for 64 samples a word whether segment i is in the set, `missing` which samples are left. What a
+    base hits can only become less, so that `hope`, what it was worth when it was last looked at, bounds what it is.
+    Returns -1 when no telling base that is left hits any; ties go to the pair that comes first.
+    """
+    best = -1
+    best_worth = 0.0
+    for k in range(len(bases)):
+        if bases[k].merit == -math.inf or bases[k].telling == 0 or bases[k].hope <= best_worth:
+            continue
+        a = bases[k].sliding
+        b = bases[k].crossing
+        hit = 0
+        for w in range(len(missing)):
+            hit += ones_of(missing[w] & inliers[a, w] & inliers[b, w])
+        bases[k].hope = hit * min(scan[a].gain, scan[b].gain) / bases[k].cost
+        if bases[k].hope > best_worth:
+            best_worth = bases[k].hope
+            best = k
+    return best
+
+
+@kernel
+def choose_base(
+    question: Question, crossings: Crossings, plan: Plan, state: Record, needed: float, beyond: float
+) -> int:
+    """Take the next base: guided by sampled sets as large as one that scores `needed`, or smaller where all are hit.
+
+    Before anything is found they are taken for `GUESSED_SHARE` of the segments. What the list says that a base costs is
+    asked when its turn comes by what was expected; it may have to stand back then. What hits no sample, and all bases
+    where they are not guided, come in the order of merit. Returns -1 when no base is left.
+    """
+    bases = plan.bases
+    count = len(plan.best_gains)
+    size = fewest_segments(plan.best_gains, beyond, needed)
+    if state.best_value <= 0.0:
+        size = max(2, int(GUESSED_SHARE * count))
+    best = -1
+    while plan.guided and best < 0 and 2 <= size <= count:
+        if not any_left(plan.unhit[size - 1]):
+            size -= 1
+            continue
+        if size != state.guide:
+            state.guide = size
+            for k in range(len(bases)):
+                bases[k].hope = math.inf
+        best = guided_base(question.scan, bases, plan.guides[size - 1], plan.unhit[size - 1])
+        if best >= 0 and bases[best].fits == NOT_COUNTED:
+            count_fits(question, crossings, bases[best])
+            bases[best].hope = math.inf
+            best = -1
+        else:
+            size -= 1
+    if best < 0:
+        best = next_base(bases, plan.uses, plan.fade)
+        if best >= 0 and bases[best].fits == NOT_COUNTED:
+            count_fits(question, crossings, bases[best])
+        return best
+    bases[best].merit = -math.inf
+    plan.uses[bases[best].sliding] += 1
+    plan.uses[bases[best].crossing] += 1
     return best
 
 
@@ -172,12 +275,7 @@ def strike(missing: Words, inliers: Words, a: int, b: int, fewest: int) -> float
         for k in range(missing.shape[1]):
             missing[m, k] = missing[m, k] & ~(inliers[m, a, k] & inliers[m, b, k])
     for k in range(missing.shape[1]):
-        # Population count of 64 bits.
-        word = missing[fewest - 1, k]
-        word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
-        word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
-        word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-        ones += int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+        ones += ones_of(missing[fewest - 1, k])
     return ones / (64.0 * missing.shape[1])
 
 
@@ -218,6 +316,13 @@ def least_freedom(scan: Records, freest: Integers, needed: float) -> float:
     return 0.0
 
 
+@inlined
+def needed_of(scan: Records, freest: Integers, rules: Record, state: Record) -> float:
+    """Return what the gains of a set come to at least that scores as high as a rival."""
+    needed = rules.rival_share * state.best_value
+    return needed + least_freedom(scan, freest, needed)
+
+
 # Why `advance` came back.
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
@@ -245,23 +350,28 @@ def advance(
     beyond = 0.0
     for i in range(len(plan.best_gains), len(scan)):
         beyond += scan[i].gain
+    needed = needed_of(scan, plan.freest, rules, state)
     spent = 0
     while True:
         if state.base < 0:
-            state.base = next_base(bases, plan.uses, plan.fade)
+            state.base = choose_base(question, tables.crossings, plan, state, needed, beyond)
             if state.base < 0:
                 return EXHAUSTED
         base = bases[state.base]
-        spent += search_base(question, tables, base, found, state, work, budget - spent)
+        if base.fits >= 0:
+            spent += search_corner(question, tables, base, found, state, work, budget - spent)
+        else:
+            spent += search_base(question, tables, base, found, state, work, budget - spent)
         if state.anchor > 0 or state.slide > -math.inf:
             return BUDGET
         state.base = -1
         state.least_freedom = least_freedom(scan, plan.freest, rules.kept_share * state.best_value)
-        needed = rules.rival_share * state.best_value
-        needed += least_freedom(scan, plan.freest, needed)
+        needed = needed_of(scan, plan.freest, rules, state)
         a = base.sliding
         b = base.crossing
-        if is_telling(scan, a, b):
+        if base.telling:
+            if plan.guided:
+                strike(plan.unhit, plan.guides, a, b, 1)
             state.bound -= cover(plan.residual, a, b)
             fewest = fewest_segments(plan.best_gains, beyond, needed)
             if plan.random:

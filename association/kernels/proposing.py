@@ -54,6 +54,13 @@ def anchors(length: float, runs: Records, bin_starts: Integers, out: Integers) -
     return n
 
 
+@inlined
+def base_tolerance(a: Record, b: Record, gates: Record) -> float:
+    """Return by how much the angle between two scan segments may differ from that between their lines, radians."""
+    deviation = math.sqrt(a.angle_variance + b.angle_variance)
+    return min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
+
+
 @kernel
 def base_pose(a: Record, b: Record, wa: Record, wb: Record, pose: Record) -> bool:
     """Write the pose that puts the midpoints of `a` and `b` on the lines `wa` and `wb`.
@@ -153,7 +160,7 @@ def search_base(
     vb = b.angle_variance
     theta_var = va * vb / (va + vb)
     angle_spreads(question.scan, theta_var, gates, work.spreads)
-    tolerance = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(va + vb)))
+    tolerance = base_tolerance(a, b, gates)
     cos_tolerance = 1.0 - 0.5 * tolerance * tolerance
     turn = b.angle - a.angle
     mx = b.x - a.x

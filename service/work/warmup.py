@@ -34,6 +34,8 @@ SYMMETRIC_ROOM = np.array(
     ]
 )
 
+MANY_ROOMS = 250
+
 
 def warm_up() -> None:
     """Register, vectorize, associate and check a map once in each way that has kernels of its own."""
@@ -64,10 +66,16 @@ def warm_up() -> None:
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
+    MapIndex.build(Segments.from_array(rooms(MANY_ROOMS)))  # so large that more of it is listed
     check_map(index)
     one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
     for scan in (beams, one_wall):
         try_sample(index, scan, Deadline(), oriented=True)
+
+
+def rooms(count: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Return the walls of so many rooms in a row, 20 m apart."""
+    return np.vstack([ROOM + np.tile([20.0 * k, 0.0], 2) for k in range(count)])
 
 
 def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

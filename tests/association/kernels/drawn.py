@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
 from association.context import ANY
+from association.crossings import crossings_of
 from association.layout import Indices, Workspace
 from association.scan_lines import gates
 from registration import RigidTransform
@@ -65,6 +66,11 @@ def drawn(seed: int, radius: float = 10.0, clutter: int = 5, index: MapIndex = I
     endpoints, truth = seen(MAZE, at, noise=0.02, cut=0.5, clutter=clutter, seed=seed, radius=radius)
     lines = context_of(index, scan_of(endpoints)).lines
     return Drawn(rng, endpoints, truth, lines.row_of, lines.rows, local(index, at))
+
+
+def listed(index: MapIndex) -> MapIndex:
+    """Return a map with the crossings of its runs, however few these are."""
+    return replace(index, crossings=crossings_of(index.runs))
 
 
 def workspace_of(scan: Records, index: MapIndex = INDEX) -> Workspace:

@@ -11,16 +11,17 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import planning
+from association.kernels.corners import count_fits, search_corner
 from association.kernels.proposing import search_base
-from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, Plan, Question, Words, record
-from association.tuning import REUSE
+from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, MapTables, Plan, Question, Words, record
+from association.tuning import GUESSED_SHARE, REUSE
 from registration.layout import Records
 
 from ..reference import planning as twin
 from ..reference.consensus import Pairs, freedom_taken
 from ..reference.scans import freedom_alone
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, MODEL, SEEDS, TABLES, Drawn, drawn, oblique, workspace_of
+from .drawn import INDEX, MODEL, SEEDS, TABLES, Drawn, drawn, listed, oblique, workspace_of
 
 RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95, enough=np.inf)
 BASES = 8  # segments that bases are made of
@@ -69,6 +70,7 @@ def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
     count = int(d.rng.integers(2, len(scan) + 1))
     bases, expected = planning.plan_bases(scan, count, runs, area), twin.plan_bases(scan, count, runs, area)
     assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
+    assert bases["telling"].tolist() == [twin.is_telling(scan, *base[:2]) for base in expected]
     np.testing.assert_allclose(bases["merit"], [base[2] for base in expected], rtol=1e-9)
     for fade in (math.log(REUSE), 0.0):
         left, uses = bases.copy(), np.zeros(count)
@@ -175,23 +177,7 @@ def test_no_set_takes_less_freedom(seed: int) -> None:
         assert planning.least_freedom(scan, freest, needed) <= least + 1e-9
 
 
-def plan_of(scan: Records, rng: np.random.Generator, *, drawn_by_chance: bool) -> Plan:
-    n = min(len(scan), BASES)
-    return Plan(
-        bases=planning.plan_bases(scan, n, INDEX.runs, INDEX.area),
-        uses=np.zeros(n),
-        residual=scan["gain"].copy(),
-        best_gains=-np.sort(-scan["gain"][:n]),
-        freest=np.argsort(-scan["freedom"], kind="stable"),
-        inliers=sampled(n, 8, rng),
-        missing=np.full((n, 8), ~np.uint64(0)),
-        fade=0.0 if drawn_by_chance else math.log(REUSE),
-        random=drawn_by_chance,
-    )
-
-
-def start_of(scan: Records) -> Records:
-    return record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
+LISTED = listed(INDEX)
 
 
 @dataclass(frozen=True)
@@ -201,6 +187,34 @@ class Effort:
     allowed: float
     enough: float = math.inf
     by_chance: bool = False
+    guided: bool = False
+
+    @property
+    def tables(self) -> MapTables:
+        """With crossings where bases are guided by what these say."""
+        return LISTED.tables if self.guided else TABLES
+
+
+def plan_of(scan: Records, rng: np.random.Generator, effort: Effort) -> Plan:
+    n = min(len(scan), BASES)
+    return Plan(
+        bases=planning.plan_bases(scan, n, INDEX.runs, INDEX.area),
+        uses=np.zeros(n),
+        residual=scan["gain"].copy(),
+        best_gains=-np.sort(-scan["gain"][:n]),
+        freest=np.argsort(-scan["freedom"], kind="stable"),
+        inliers=sampled(n, 8, rng),
+        missing=np.full((n, 8), ~np.uint64(0)),
+        guides=sampled(n, 2, rng),
+        unhit=np.full((n, 2), ~np.uint64(0)),
+        fade=0.0 if effort.by_chance else math.log(REUSE),
+        random=effort.by_chance,
+        guided=effort.guided,
+    )
+
+
+def start_of(scan: Records) -> Records:
+    return record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
 
 
 @dataclass(frozen=True)
@@ -223,19 +237,23 @@ def expected_end(d: Drawn, effort: Effort) -> End:
     """Go through the bases one by one."""
     question, found, state = asked(d, effort), np.zeros(64, FOUND), start_of(d.scan)
     plan, work = (
-        plan_of(question.scan, np.random.default_rng(0), drawn_by_chance=effort.by_chance),
+        plan_of(question.scan, np.random.default_rng(0), effort),
         workspace_of(d.scan),
     )
     gains, beyond = plan.best_gains.tolist(), float(d.scan["gain"][BASES:].sum())
     residual, tried, bound, missed = d.scan["gain"].copy(), [], float(d.scan["gain"].sum()), 1.0
-    order = twin.order_of([base.item() for base in plan.bases], plan.fade)
-    for count, k in enumerate(order, 1):
-        base = plan.bases[k]
-        search_base(question, TABLES, base, found, state[0], work, 10**9)
+    chooser = twin.Chooser(plan, d.scan, lambda base: count_fits(question, effort.tables.crossings, base))
+    size = max(2, int(GUESSED_SHARE * len(gains)))
+    for count in range(1, len(plan.bases) + 1):
+        base = plan.bases[chooser.take(size)]
+        search = search_corner if base["fits"] >= 0 else search_base
+        search(question, effort.tables, base, found, state[0], work, 10**9)
         best = float(state["best_value"][0])
         state["least_freedom"] = twin.least_freedom_sorted(d.scan, 0.65 * best)
         needed = 0.95 * best + twin.least_freedom_sorted(d.scan, 0.95 * best)
         a, b = base["sliding"], base["crossing"]
+        if state["best_value"][0] > 0.0:
+            size = twin.fewest_segments(gains, beyond, needed)
         if twin.is_telling(d.scan, a, b):
             tried.append(base)
             less = min(residual[[a, b]])
@@ -249,19 +267,19 @@ def expected_end(d: Drawn, effort: Effort) -> End:
             return End(planning.CONFIDENT, count, bound, missed)
         if proven:
             return End(planning.PROVEN, count, bound, missed)
-    return End(planning.EXHAUSTED, len(order), bound, missed)
+    return End(planning.EXHAUSTED, len(plan.bases), bound, missed)
 
 
 def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
     """Advance until it ends; return how, what was found, and the number of calls."""
     question, found, progress = asked(d, effort), np.zeros(64, FOUND), start_of(d.scan)
     plan, work = (
-        plan_of(question.scan, np.random.default_rng(0), drawn_by_chance=effort.by_chance),
+        plan_of(question.scan, np.random.default_rng(0), effort),
         workspace_of(d.scan),
     )
     why, calls = planning.BUDGET, 0
     while why == planning.BUDGET:
-        why = planning.advance(question, TABLES, plan, found, progress, work, effort.allowed, budget)
+        why = planning.advance(question, effort.tables, plan, found, progress, work, effort.allowed, budget)
         calls += 1
     state = progress[0]
     end = End(why, int(state["bases"]), float(state["bound"]), float(state["missed"]))
@@ -287,6 +305,15 @@ def test_advance(seed: int) -> None:
     d = drawn(seed, radius=8.0, clutter=seed % 4)
     for allowed in (-1.0, 0.0, 0.02, 0.3):
         assert_ends_alike(d, Effort(allowed))
+
+
+@given(SEEDS)
+@settings(max_examples=8, deadline=None)
+def test_advance_through_bases_that_are_guided(seed: int) -> None:
+    """By the sampled sets that they hit, for what the list of crossings says that they cost."""
+    d = drawn(seed, radius=8.0, clutter=seed % 4)
+    for allowed in (-1.0, 0.0, 0.02, 0.3):
+        assert_ends_alike(d, Effort(allowed, guided=True))
 
 
 @given(SEEDS)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from association.layout import Walls
+from association.layout import NOT_COUNTED, Plan, Walls
 from association.tuning import (
     COST_ANCHOR,
     COST_BASE,
@@ -87,6 +88,60 @@ def order_of(bases: list[Base], fade: float) -> list[int]:
         for segment in bases[best][:2]:
             uses[segment] += 1
     return order
+
+
+class Chooser:
+    """Takes one base after the other.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its bases are not changed, but for what `count` finds.
+    scan : (n,) of `SCAN_LINE`
+    count : callable
+        Writes what a base costs to it.
+    """
+
+    def __init__(self, plan: Plan, scan: Records, count: Callable[[Record], None]) -> None:
+        self.plan, self.scan, self.count = plan, scan, count
+        self.left, self.tried = list(range(len(plan.bases))), list[int]()
+        self.merits = [float(base["merit"]) for base in plan.bases]
+
+    def take(self, size: int) -> int:
+        """Take the one that hits most of the sets of `size`, or of smaller ones, that were missed, for its cost."""
+        best = None
+        while self.plan.guided and best is None and size >= 2:
+            worth = self._worths(size)
+            best = max(worth, key=worth.__getitem__, default=None)
+            if best is not None and self.plan.bases[best]["fits"] == NOT_COUNTED:
+                self.count(self.plan.bases[best])
+                best = None
+            else:
+                size -= 1
+        if best is None:
+            best = max(self.left, key=lambda k: self.merits[k] + self.plan.fade * self._uses(k))
+        self.left.remove(best)
+        self.tried.append(best)
+        return best
+
+    def _uses(self, k: int) -> int:
+        used = [s for t in self.tried for s in self.plan.bases[t].item()[:2]]
+        return sum(used.count(s) for s in self.plan.bases[k].item()[:2])
+
+    def _worths(self, size: int) -> dict[int, float]:
+        bases, bits = self.plan.bases, np.unpackbits(self.plan.guides[size - 1].view(np.uint8), axis=-1).astype(bool)
+        held = {k: bits[bases[k]["sliding"]] & bits[bases[k]["crossing"]] for k in range(len(bases))}
+        missed = np.ones(bits.shape[1], bool)
+        for k in self.tried:
+            if bases[k]["telling"]:
+                missed &= ~held[k]
+        worth = {}
+        for k in self.left:
+            hits = int((held[k] & missed).sum())
+            if bases[k]["telling"] and hits:
+                gains = self.scan["gain"][[bases[k]["sliding"], bases[k]["crossing"]]]
+                worth[k] = hits * float(gains.min()) / float(bases[k]["cost"])
+        return worth
 
 
 def fewest_segments(best_gains: list[float], beyond: float, needed: float) -> int:
