@@ -173,8 +173,9 @@ def search_corner(
     count = fitting(tables.crossings, corner_of(a, b, tolerance), fits)
     spent = 1 + TESTS_BLOCK * len(tables.crossings.tops)
     for k in range(progress.anchor, count):
-        wa = runs[rows[fits[k]].first]
-        wb = runs[rows[fits[k]].second]
+        here = fits[k]
+        wa = runs[rows[here].first]
+        wb = runs[rows[here].second]
         spent += 1
         if math.cos(wb.angle - wa.angle - turn) >= least_cosine and base_pose(a, b, wa, wb, pose):
             c = math.cos(pose.theta)
