@@ -13,12 +13,13 @@ from registration import RegistrationOptions, RegistrationResult, RigidTransform
 
 from .context import SearchContext
 from .kernels.acceptance import accept_matches
-from .layout import ENDS, Lines, as_records
+from .layout import ENDS, as_records
 from .map_index import MapIndex
 from .options import Estimator, Rotation
 from .ranking import Ranked
 from .result import Correspondence
 from .settling import Settled
+from .tables import Lines
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

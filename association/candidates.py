@@ -14,9 +14,10 @@ from registration.layout import Records
 from .context import SearchContext
 from .kernels.planning import BUDGET, EXHAUSTED, PROVEN, advance, plan_bases
 from .kernels.proposing import search_slides
-from .layout import FOUND, PROGRESS, RULES, Plan, record
+from .layout import FOUND, PROGRESS, RULES, record
 from .options import AssociationOptions, CancelledError
 from .result import SearchReport
+from .tables import Plan
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,

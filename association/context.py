@@ -11,25 +11,12 @@ from registration import RigidTransform
 from registration.layout import Records
 
 from .alignment import aligned
-from .layout import (
-    HARD_PRIOR,
-    NO_PRIOR,
-    POINT,
-    PRIOR,
-    RULES,
-    SIGHTING,
-    SOFT_PRIOR,
-    TERMS,
-    Question,
-    Sights,
-    Workspace,
-    as_records,
-    record,
-)
+from .layout import HARD_PRIOR, NO_PRIOR, POINT, PRIOR, RULES, SIGHTING, SOFT_PRIOR, TERMS, as_records, record
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
 from .scan_lines import ScanLines, gates
+from .tables import Question, Sights, Workspace
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 ANY = record(RULES)  # for kernels that keep no poses

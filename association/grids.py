@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from registration.layout import Records
 
 from .kernels.walls import direction_raster, grid_cells
-from .layout import ENDS, GRID_SHAPE, Grid, Raster, Walls, as_records, record
+from .layout import ENDS, GRID_SHAPE, as_records, record
+from .tables import Grid, Raster, Walls
 from .tuning import (
     CELL,
     CELL_GROWTH,

@@ -1,14 +1,12 @@
-"""The records that the kernels speak in, and the tables that they are handed.
+"""The records that the kernels speak in; `tables` has the arrays of them that are handed on together.
 
 Lengths in metres, angles in radians, scores and gains in nats. Poses are in the index frame, from the scan frame. What
-a kernel changes besides arrays is a record of an array of length 1. A `NamedTuple` groups the arrays that are handed
-on together; a kernel binds those that it needs to names once, outside of its loops, because Numba counts references to
-each array that it takes out of a tuple.
+a kernel changes besides arrays is a record of an array of length 1.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,23 +140,6 @@ BLOCKER = _fields((_I, "to_matched to_clutter"))
 BEAM_EVIDENCE = _fields((_F, "read passed"))
 
 
-class Walls(NamedTuple):
-    """Walls or runs, by direction bin and the longest of a bin first.
-
-    Attributes
-    ----------
-    rows : (m,) of `WALL`
-    bin_starts : (bins + 1,) where each bin begins
-    longest : (m,) their lengths, metres
-    summed : (m + 1,) running sum of `longest`
-    """
-
-    rows: Records
-    bin_starts: Integers
-    longest: Floats
-    summed: Floats
-
-
 # What kernels write to while they look at one pose: the pose; the information of its consensus set, its sums, and what
 # it is worth; the end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would
 # outlive the array, whose last use ends it: hence these come from outside.
@@ -173,219 +154,6 @@ SCRATCH = np.dtype(
         ("evidence", BEAM_EVIDENCE),
     ]
 )
-
-
-class Grid(NamedTuple):
-    """A uniform grid with a list for each cell.
-
-    Attributes
-    ----------
-    shape : (1,) of `GRID_SHAPE`
-    starts, items : cell ``c = row * columns + column`` lists ``items[starts[c]:starts[c + 1]]``
-    """
-
-    shape: Records
-    starts: Integers
-    items: Integers
-
-
-class Raster(NamedTuple):
-    """Which directions the walls near a place have.
-
-    Attributes
-    ----------
-    shape : (1,) of `GRID_SHAPE`
-    bits : (columns * rows,) bit s of a cell is set where a wall or a run of direction sector s is near
-    """
-
-    shape: Records
-    bits: Integers
-
-
-class Place(NamedTuple):
-    """The walls, and where they are: what lies at a point, and what a ray meets."""
-
-    walls: Records
-    grid: Grid
-
-
-class Sweep(NamedTuple):
-    """The runs, and where they are: where a base may lie.
-
-    Attributes
-    ----------
-    runs : (m,) of `WALL`
-    bin_starts : (bins + 1,) where each direction bin of the runs begins
-    sectors : Grid
-        Runs on each cell, ``run * SECTORS + sector``.
-    """
-
-    runs: Records
-    bin_starts: Integers
-    sectors: Grid
-
-
-class Pieces(NamedTuple):
-    """The map's own segments.
-
-    Attributes
-    ----------
-    items, starts : wall w consists of segments ``items[starts[w]:starts[w + 1]]``
-    ends : (n,) of `ENDS`
-    """
-
-    items: Integers
-    starts: Integers
-    ends: Records
-
-
-class MapTables(NamedTuple):
-    """All that the search reads of a map."""
-
-    place: Place
-    sweep: Sweep
-    raster: Raster
-
-
-class Measured(NamedTuple):
-    """Scan segments as they were measured: see `registration.MeasuredSegments`; the first two of `POINT`."""
-
-    directions: Records
-    midpoints: Records
-    lengths: Floats
-    centroids: Records
-    spreads: Floats
-    sigma: Floats
-    points: Floats
-
-
-class Lines(NamedTuple):
-    """The lines of a scan, and the segments that they are made of.
-
-    Attributes
-    ----------
-    rows : (n,) of `SCAN_LINE`
-    row_of : (segments,) which row each segment is part of
-    least_overlap : float
-        Share of a segment's length that has to lie on a wall.
-    """
-
-    rows: Records
-    row_of: Indices
-    least_overlap: float
-
-
-class Sights(NamedTuple):
-    """What was seen from each view.
-
-    Attributes
-    ----------
-    places : (v,) of `POINT`, where the sensor of each stood, in the scan frame
-    starts : (v + 1,) view v saw ``seen[starts[v]:starts[v + 1]]``; nothing where lines of sight are no evidence
-    seen : (k,) of `SIGHTING`
-    """
-
-    places: Records
-    starts: Integers
-    seen: Records
-
-
-class Rays(NamedTuple):
-    """Single beams of which something is known.
-
-    Attributes
-    ----------
-    angles : (m,) radians in the scan frame
-    ranges : (m,) metres, inf where nothing was met
-    places : (m,) of `POINT`, where each begins, in the scan frame
-    reach : float
-        Metres; how far a beam without return is known to be free.
-    """
-
-    angles: Floats
-    ranges: Floats
-    places: Records
-    reach: float
-
-
-class Question(NamedTuple):
-    """What is searched for.
-
-    Attributes
-    ----------
-    scan : (n,) of `SCAN_LINE`
-    terms : (1,) of `TERMS`
-    """
-
-    scan: Records
-    terms: Records
-
-
-class Blockers(NamedTuple):
-    """The walls that rays pass through.
-
-    Attributes
-    ----------
-    counts : (m,) of `BLOCKER`, by wall
-    touched : (m,) the walls that any ray passes through, as many as there are
-    """
-
-    counts: Records
-    touched: Integers
-
-
-class Plan(NamedTuple):
-    """The bases of a scan, and what tells when enough of them have been gone through.
-
-    Attributes
-    ----------
-    bases : (k,) of `BASE`
-    uses : (n,) how often each of the first n scan segments was part of a base so far
-    residual : (all scan segments,) what is left of each gain in the bound, nats
-    best_gains : (n,) the gains of the first n, the largest first, nats
-    freest : (all scan lines,) those that take most freedom by themselves first
-    inliers : (n, n, words) ``[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1
-    missing : (n, words) which of these samples have missed all bases so far
-    fade : float
-        What the logarithm of a base's merit loses for each earlier use of one of its segments.
-    random : bool
-        Whether the bases are drawn at random.
-    """
-
-    bases: Records
-    uses: Floats
-    residual: Floats
-    best_gains: Floats
-    freest: Integers
-    inliers: Words
-    missing: Words
-    fade: float
-    random: bool
-
-
-class Workspace(NamedTuple):
-    """What the kernels write to while they look at one pose after the other.
-
-    Attributes
-    ----------
-    matches : (n,) of `MATCH`
-    spreads : (n,) angle gates in sectors
-    held : (n,) which wall of each scan line is in the sums, or -1
-    shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
-    scratch : (1,) of `SCRATCH`
-    """
-
-    matches: Records
-    spreads: Floats
-    held: Integers
-    shares: Records
-    scratch: Records
-
-    @classmethod
-    def of(cls, count: int, walls: int) -> Workspace:
-        """Return one for a scan of `count` lines and a map of that many walls."""
-        held = np.full(count, -1, np.int64)
-        return cls(np.zeros(count, MATCH), np.zeros(count), held, np.zeros(walls, WALL_SHARE), np.zeros(1, SCRATCH))
 
 
 def record(dtype: np.dtype[Any], /, **values: float) -> Records:

@@ -13,7 +13,8 @@ from registration import Segments
 
 from .errors import InvalidMapError
 from .grids import directions_near, near_walls, swept_runs
-from .layout import ENDS, Grid, Integers, MapTables, Pieces, Place, Raster, Sweep, Walls, as_records
+from .layout import ENDS, Integers, as_records
+from .tables import Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
 from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
 

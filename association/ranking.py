@@ -17,8 +17,9 @@ from .context import ANY, SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
-from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, POINT, Rays, as_records
+from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, POINT, as_records
 from .options import CancelledError, Estimator
+from .tables import Rays
 from .tuning import (
     BEAM_FINALISTS,
     BEAMS_PASSED,

@@ -13,9 +13,10 @@ from registration import MeasuredSegments
 from registration.layout import Floats, Records
 
 from .kernels.scans import collinear_segments, describe_lines, join_segments
-from .layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, Measured, as_records, record
+from .layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, as_records, record
 from .options import AssociationOptions
 from .scan import Scan, Views
+from .tables import Measured
 from .tuning import (
     COMMON_ERROR,
     CUT_COSINE,

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from registration import Segments
 
 from .kernels.walls import collinear_groups
-from .layout import ENDS, POINT, WALL, Integers, Walls, as_records
+from .layout import ENDS, POINT, WALL, Integers, as_records
+from .tables import Walls
 from .tuning import DIRECTION_BINS, MERGE_ANGLE, MERGE_LATERAL
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,8 @@ import numpy as np
 
 from association import scan_lines
 from association.kernels.scans import join_segments
-from association.layout import LINE_PARTS, Integers, Measured
+from association.layout import LINE_PARTS, Integers
+from association.tables import Measured
 from registration.layout import Records
 
 from .collection import LEVELS

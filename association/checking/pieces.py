@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from registration.layout import Floats
 
-from ..layout import Grid
 from ..map_index import MapIndex
+from ..tables import Grid
 from .looking import segments_of
 from .result import Finding
 from .tuning import (

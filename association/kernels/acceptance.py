@@ -7,7 +7,8 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
-from ..layout import BLOCKER, Blockers, Indices, Lines, Pieces, Place, Sights, Workspace
+from ..layout import BLOCKER, Indices
+from ..tables import Blockers, Lines, Pieces, Place, Sights, Workspace
 from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT
 from .sight import count_blockers
 

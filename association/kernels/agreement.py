@@ -7,7 +7,8 @@ import numpy as np
 from registration.compiling import kernel
 from registration.layout import Floats, Records
 
-from ..layout import Flags, Place, Sights, Workspace
+from ..layout import Flags
+from ..tables import Place, Sights, Workspace
 from ..tuning import (
     AGREEING,
     AGREEING_SHARE,

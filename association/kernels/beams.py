@@ -6,7 +6,8 @@ from registration.compiling import inlined, kernel
 from registration.kernels import joint_add, joint_solve
 from registration.layout import Record, Records
 
-from ..layout import Integers, Place, Rays, Workspace
+from ..layout import Integers
+from ..tables import Place, Rays, Workspace
 from ..tuning import (
     BEAM_GATES,
     BEHIND,

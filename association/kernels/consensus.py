@@ -11,7 +11,7 @@ from registration.compiling import inlined, kernel
 from registration.kernels import invert3, joint_add, joint_cost, joint_information, joint_solve
 from registration.layout import Record, Records
 
-from ..layout import Place, Workspace
+from ..tables import Place, Workspace
 from ..tuning import MAX_STEP, MAX_TURN, SPRING
 from .matching import match_scan, wrap
 

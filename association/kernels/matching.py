@@ -5,7 +5,7 @@ import math
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import Place, Raster
+from ..tables import Place, Raster
 from ..tuning import BRIDGING, SECTORS
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)

@@ -7,7 +7,8 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
-from ..layout import BASE, Integers, MapTables, Plan, Question, Walls, Words, Workspace
+from ..layout import BASE, Integers, Words
+from ..tables import MapTables, Plan, Question, Walls, Workspace
 from ..tuning import (
     COST_ANCHOR,
     COST_BASE,

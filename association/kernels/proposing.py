@@ -7,7 +7,8 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
-from ..layout import HARD_PRIOR, Integers, MapTables, Place, Question, Raster, Workspace
+from ..layout import HARD_PRIOR, Integers
+from ..tables import MapTables, Place, Question, Raster, Workspace
 from ..tuning import (
     BASE_SLACK,
     BASE_SLACK_SHARE,

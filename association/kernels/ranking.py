@@ -8,7 +8,8 @@ from registration.compiling import kernel
 from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Floats, Records
 
-from ..layout import BLOCKER, Blockers, Integers, Place, Question, Sights, Workspace
+from ..layout import BLOCKER, Integers
+from ..tables import Blockers, Place, Question, Sights, Workspace
 from ..tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
 from .consensus import one_step_cost, refine
 from .matching import wrap

@@ -8,7 +8,8 @@ from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, LEAST_POINTS, Floats, Record, Records
 
-from ..layout import SCAN_LINE, Integers, Measured
+from ..layout import SCAN_LINE, Integers
+from ..tables import Measured
 from ..tuning import (
     GAIN,
     GAIN_LENGTH,

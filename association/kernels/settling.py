@@ -8,7 +8,8 @@ from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import PAIR, Record, Records
 
-from ..layout import ESTIMATE, Integers, Question, Workspace
+from ..layout import ESTIMATE, Integers
+from ..tables import Question, Workspace
 from ..tuning import (
     COMMON_WALL_ERROR,
     FREE_DEVIATION,

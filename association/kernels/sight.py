@@ -5,7 +5,8 @@ import math
 from registration.compiling import kernel
 from registration.layout import Record, Records
 
-from ..layout import Blockers, Integers, Place, Sights
+from ..layout import Integers
+from ..tables import Blockers, Place, Sights
 from ..tuning import (
     BLOCKED,
     BLOCKED_CLUTTER,

@@ -7,7 +7,8 @@ import numpy as np
 from registration.compiling import kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import MATCH, SCAN_LINE, Place, Workspace
+from ..layout import MATCH, SCAN_LINE
+from ..tables import Place, Workspace
 from ..tuning import (
     GAIN,
     GAIN_LENGTH,

@@ -4,9 +4,10 @@
 
     entry                          runs a command, and turns what goes wrong into one line and an exit code
     program                        all commands, put together
-    locate, replay, analyze, batch, register, vectorize, key, maps/    the commands
+    locate, replay, analyze, batch, register, vectorize, key, ros2, maps/    the commands
     logs, tracking                 a log's scans to requests; what is known of the next pose
     all_cores                      places of an analysis, tried by several processes
     service, in_process, remote    who answers: this process, or a server
     inputs, printing               files to requests, answers to people
+    options, grouping              options of several commands; those that belong together
 """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,7 @@ from rich.progress import Progress as Bar
 from registration import Segments
 
 from .errors import WrongUseError
+from .grouping import grouped
 from .inputs import needing_formats, read_map_file, read_map_or_id
 from .options import AsJson, MapArgument, Server
 from .printing import print_json, print_rows
@@ -26,12 +28,20 @@ COLOURS = {"ok": (46, 125, 70), "ambiguous": (214, 130, 20), "degenerate": (150,
 SUFFIXES = (".json", ".geojson")
 
 
+@dataclass(frozen=True, slots=True)
+class ScannerOptions:
+    """The scanner that the robot has, as options."""
+
+    fov: Annotated[float, typer.Option(metavar="RADIANS", help="Field of view of the scanner.")] = 6.283185307179586
+    beams: Annotated[int, typer.Option(metavar="N", help="Over the field of view.")] = 720
+    range_max: Annotated[float, typer.Option(metavar="METRES", help="How far it sees.")] = 20.0
+    sigma: Annotated[float, typer.Option(metavar="METRES", help="Standard deviation of its ranges.")] = 0.02
+
+
+@grouped
 def analyze(
     on: MapArgument,
-    fov: Annotated[float, typer.Option(metavar="RADIANS", help="Field of view of the scanner.")] = 6.283185307179586,
-    beams: Annotated[int, typer.Option(metavar="N", help="Over the field of view.")] = 720,
-    range_max: Annotated[float, typer.Option(metavar="METRES", help="How far it sees.")] = 20.0,
-    sigma: Annotated[float, typer.Option(metavar="METRES", help="Standard deviation of its ranges.")] = 0.02,
+    scanner: ScannerOptions,
     spacing: Annotated[
         float | None, typer.Option(metavar="METRES", help="From place to place; without it some 400 places.")
     ] = None,
@@ -50,8 +60,7 @@ def analyze(
     target = read_map_or_id(on)
     if picture is not None and "map_id" in target:
         raise WrongUseError("--picture: it is drawn over the map of a file; name one instead of an id")
-    laser = {"fov": fov, "beams": beams, "range_max": range_max, "sigma": sigma}
-    body: Json = {"map": target, "laser": laser, "spacing": spacing, "deadline_ms": deadline_ms}
+    body: Json = {"map": target, "laser": asdict(scanner), "spacing": spacing, "deadline_ms": deadline_ms}
     if point is not None:
         body["point"] = list(point)
     with answering(server) as service, _progress() as progress:

@@ -24,7 +24,9 @@ from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLate
 
 READER = "service.importing.reader"
 LOOK_SECONDS = 0.05  # how often it is looked whether somebody still waits
-SECRETS = ("LINEFIX_KEYS", "LINEFIX_KEY", "LINEFIX_DATABASE_URL")
+# What the environment says to the service alone: keys, where they lie, passwords of databases and of collectors.
+PRIVATE = ("LINEFIX_", "PG", "OTEL_")
+SHARED = ("LINEFIX_KERNELS",)
 SHARED_MEMORY = Path("/dev/shm")  # may be written to in a container whose root may not
 
 
@@ -97,7 +99,8 @@ def _report(told: dict[str, Any]) -> dict[str, Any]:
 
 def _ended(command: list[str], content: bytearray, deadline: Deadline) -> tuple[int, bytes, bytes]:
     """Run a process to its end; return its status and what it wrote."""
-    clean = {name: value for name, value in os.environ.items() if name.upper() not in SECRETS}
+    told = {name for name in os.environ if name in SHARED or not name.upper().startswith(PRIVATE)}
+    clean = {name: os.environ[name] for name in told}
     pipe = subprocess.PIPE
     # In a group of its own, so that Ctrl-C is for the service, which then ends this.
     with subprocess.Popen(command, env=clean, process_group=0, stdin=pipe, stdout=pipe, stderr=pipe) as process:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from association.layout import ESTIMATE, POINT, SIGHTING, Rays, Sights, as_records, record
+from association.layout import ESTIMATE, POINT, SIGHTING, as_records, record
+from association.tables import Rays, Sights
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 

@@ -11,7 +11,7 @@ import pytest
 from association import MapIndex, Scan
 from association.acceptance import Accepted, accept, register_accepted
 from association.explain import explain
-from association.layout import Lines
+from association.tables import Lines
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
 from .answers import NO_PAIRS, SCAN, registered_room, settled_of

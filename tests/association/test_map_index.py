@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from association import InvalidMapError, MapIndex
-from association.layout import Walls
+from association.tables import Walls
 from association.tuning import CELL, MAX_CELLS, MAX_ENTRIES, MAX_SWEEP_CELLS, MERGE_LATERAL, REACH, SECTORS, SWEEP_CELL
 from association.walls import ends_of
 from registration import Segments

@@ -264,6 +264,21 @@ def packed(path: Path) -> None:
     path.write_text(path.read_text().replace("compression_mode: ''", "compression_mode: file"))
 
 
+@pytest.mark.parametrize("kind", ["mcap", "sqlite3"])
+def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
+    bag = Recorder(kind, tmp_path)
+    bag.scan(0)
+    path = bag.done()
+    [held] = [file for file in path.iterdir() if file.name != "metadata.yaml"]
+    held.rename(tmp_path / held.name)
+    metadata = path / "metadata.yaml"
+    told = metadata.read_text()
+    for elsewhere in (f"../{held.name}", str(tmp_path / held.name)):
+        metadata.write_text(told.replace(held.name, elsewhere))
+        with pytest.raises(MalformedFileError, match="missing"):
+            scans_of(path)
+
+
 @pytest.mark.parametrize(
     ("kind", "spoilt", "how", "error", "message"),
     [

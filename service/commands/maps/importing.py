@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 
 from ...importing.fields import Fields
 from ..errors import WrongUseError
+from ..grouping import grouped
 from ..inputs import line_map_of, needing_formats
 from ..options import AsJson, Picture, Server
 from ..printing import noted, print_json, print_rows
@@ -20,54 +22,67 @@ from .files import write_document
 IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
 
 
+@dataclass(frozen=True, slots=True)
+class SaidOfFile:
+    """What a file does not say itself, as options."""
+
+    units: Annotated[
+        str | None, typer.Option(help="Of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
+    ] = None
+    layers: Annotated[
+        list[str] | None, typer.Option(metavar="PATTERN", help="Layers of a drawing, such as *WALL*; several times.")
+    ] = None
+    point: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="A free place, metres: directions of walls are found from there."),
+    ] = None
+    drawn: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="What lines are of walls: faces (default) or centres.")
+    ] = None
+    thickness: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Of walls that are drawn by their centre line.")
+    ] = None
+    directions: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="drawn: free space lies on the left of each line; or none.")
+    ] = None
+    local_metres: Annotated[bool, typer.Option("--local-metres", help="The coordinates of a GeoJSON are metres.")] = (
+        False
+    )
+    topic: Annotated[str | None, typer.Option(help="Of the grid in a bag.")] = None
+
+    @property
+    def fields(self) -> Fields:
+        """The same as fields of a form."""
+        once = {
+            "units": self.units,
+            "drawn": self.drawn,
+            "thickness": self.thickness,
+            "directions": self.directions,
+            "local_metres": "true" if self.local_metres else None,
+            "topic": self.topic,
+        }
+        found: dict[str, list[str]] = {name: [str(value)] for name, value in once.items() if value is not None}
+        found |= {"layers": self.layers} if self.layers else {}
+        found |= {"point": [f"{self.point[0]} {self.point[1]}"]} if self.point else {}
+        return found
+
+
+@grouped
 def import_map(
     file: Annotated[
         Path,
         typer.Argument(help="yaml of map_server, dxf, svg, geojson, csv, json, or a bag with an OccupancyGrid."),
     ],
+    said: SaidOfFile,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the map there: json, dxf, svg, geojson or csv.")
     ] = None,
     picture: Picture = None,
-    units: Annotated[
-        str | None, typer.Option(help="Of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
-    ] = None,
-    layers: Annotated[
-        list[str] | None, typer.Option(metavar="PATTERN", help="Layers of a drawing, such as *WALL*; several times.")
-    ] = None,
-    point: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="X Y", help="A free place, metres: directions of walls are found from there."),
-    ] = None,
-    drawn: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="What lines are of walls: faces (default) or centres.")
-    ] = None,
-    thickness: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Of walls that are drawn by their centre line.")
-    ] = None,
-    directions: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="drawn: free space lies on the left of each line; or none.")
-    ] = None,
-    local_metres: Annotated[
-        bool, typer.Option("--local-metres", help="The coordinates of a GeoJSON are metres.")
-    ] = False,
-    topic: Annotated[str | None, typer.Option(help="Of the grid in a bag.")] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Read a map of another tool, say what was made of it and what is doubtful in it, and write it as a map file."""
-    said = {
-        "units": units,
-        "drawn": drawn,
-        "thickness": thickness,
-        "directions": directions,
-        "local_metres": "true" if local_metres else None,
-        "topic": topic,
-    }
-    fields: dict[str, list[str]] = {name: [str(value)] for name, value in said.items() if value is not None}
-    fields |= {"layers": layers} if layers else {}
-    fields |= {"point": [f"{point[0]} {point[1]}"]} if point else {}
-    answer = imported(file, fields, server)
+    answer = imported(file, said.fields, server)
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
 from association.context import ANY
-from association.layout import Indices, Workspace
+from association.layout import Indices
 from association.scan_lines import gates
+from association.tables import Workspace
 from registration import RigidTransform
 from registration.layout import Floats, Records
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import acceptance
-from association.layout import ENDS, MATCH, SCAN_LINE, Lines, as_records
+from association.layout import ENDS, MATCH, SCAN_LINE, as_records
+from association.tables import Lines
 from association.tuning import MAX_RIVALS
 
 from ..records import estimate_of, sights_of

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import agreement as comparing
-from association.layout import Workspace
+from association.tables import Workspace
 from association.tuning import RAYS
 from registration import RigidTransform
 from registration.layout import Records

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import beams
-from association.layout import BEAM_EVIDENCE, POINT, RAY, Rays, Workspace, as_records
+from association.layout import BEAM_EVIDENCE, POINT, RAY, as_records
+from association.tables import Rays, Workspace
 from registration import RigidTransform
 
 from ..records import estimate_of, pose_of, rays_of

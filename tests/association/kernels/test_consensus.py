@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from association import Scan
 from association.kernels import consensus
-from association.layout import MATCH, Integers, Workspace, record
+from association.layout import MATCH, Integers, record
+from association.tables import Workspace
 from association.tuning import MAX_STEP, MAX_TURN, ROUNDS, SPRING
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.kernels import joint_cost, joint_information

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 
 from association.kernels import planning
 from association.kernels.proposing import search_base
-from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, Plan, Question, Words, record
+from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, Words, record
+from association.tables import Plan, Question
 from association.tuning import REUSE
 from registration.layout import Records
 

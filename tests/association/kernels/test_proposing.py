@@ -12,7 +12,8 @@ from hypothesis import example, given, settings
 
 from association import HardPrior
 from association.kernels import proposing
-from association.layout import BASE, ESTIMATE, FOUND, PROGRESS, RULES, Question, record
+from association.layout import BASE, ESTIMATE, FOUND, PROGRESS, RULES, record
+from association.tables import Question
 from association.tuning import ROUNDS, TESTS_HYPOTHESIS, TESTS_REFINED, TESTS_REJECTED
 from registration.layout import Records
 

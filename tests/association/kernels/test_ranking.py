@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import ranking
-from association.layout import MATCH, MERIT, Place, Question, Sights, Workspace
+from association.layout import MATCH, MERIT
+from association.tables import Place, Question, Sights, Workspace
 from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_FAMILY
 from registration import RigidTransform
 from registration.layout import Records

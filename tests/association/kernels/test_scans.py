@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from numpy.typing import ArrayLike
 
 from association.kernels import scans
-from association.layout import LINE_PARTS, POINT, VARIANCES, Integers, Measured, as_records, record
+from association.layout import LINE_PARTS, POINT, VARIANCES, Integers, as_records, record
+from association.tables import Measured
 from association.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
 from registration import MeasuredSegments, Segments
 from registration.layout import LEAST_POINTS, Floats, Records

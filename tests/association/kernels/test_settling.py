@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels.settling import settle, weakest
-from association.layout import HINGE, SETTLED, WALL, Integers, Question, Workspace
+from association.layout import HINGE, SETTLED, WALL, Integers
+from association.tables import Question, Workspace
 from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, UNSEEN_ERROR
 from registration import RigidTransform
 from registration.layout import Record, Records

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import sight
-from association.layout import BLOCKER, MATCH, RAY, Blockers, record
+from association.layout import BLOCKER, MATCH, RAY, record
+from association.tables import Blockers
 from registration import RigidTransform
 from registration.layout import Records
 

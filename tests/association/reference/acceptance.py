@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from association.layout import Lines, Pieces
+from association.tables import Lines, Pieces
 from association.tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS
 from registration import RigidTransform
 from registration.layout import Floats, Records

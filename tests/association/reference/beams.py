@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from association.layout import Place, Rays
+from association.tables import Place, Rays
 from association.tuning import (
     BEAM_GATES,
     BEHIND,

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from association.layout import MATCH, MODEL, Integers, Place
+from association.layout import MATCH, MODEL, Integers
+from association.tables import Place
 from association.tuning import MAX_STEP, MAX_TURN, SPRING
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from association.layout import Grid
+from association.tables import Grid
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 

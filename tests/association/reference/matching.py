@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from association.layout import MATCH, Place, Raster
+from association.layout import MATCH
+from association.tables import Place, Raster
 from association.tuning import BRIDGING, SECTORS
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records

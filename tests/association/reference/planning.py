@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from association.layout import Walls
+from association.tables import Walls
 from association.tuning import (
     COST_ANCHOR,
     COST_BASE,

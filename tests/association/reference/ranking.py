@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from association.layout import MERIT, Place
+from association.layout import MERIT
+from association.tables import Place
 from association.tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
 from registration import RigidTransform
 from registration.layout import Floats, Records

@@ -74,7 +74,8 @@ def test_it_is_told_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         "raise ModuleNotFoundError('contourpy')"
     )
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{Path(__file__).parents[3]}")
-    for name in ("LINEFIX_KEYS", "LINEFIX_KEY", "LINEFIX_DATABASE_URL"):
+    private = "LINEFIX_KEYS LINEFIX_KEYS_FILE LINEFIX_DATABASE_URL PGPASSWORD OTEL_EXPORTER_OTLP_HEADERS"
+    for name in private.split():
         monkeypatch.setenv(name, "sesame")
     with pytest.raises(FormatsMissingError):
         read({"a.csv": SQUARE})

@@ -3,67 +3,23 @@
 from __future__ import annotations
 
 import logging
-import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
-from sqlalchemy import Engine, event, text
 
 from service.database_url import database_url
 from service.maps import MapOutline, MapRecord, MapStore, MapSummary, Preconditions
-from service.maps import database as connections
-from service.maps.database import open_engine
 from service.maps.errors import (
-    BusyStoreError,
     CorruptMapError,
     ReadOnlyStoreError,
     RevisionConflictError,
-    StoreAwayError,
     StoreFullError,
     UnknownMapError,
 )
 
-BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
-ANY = Preconditions()
-
-
-@contextmanager
-def opened(url: str) -> Iterator[MapStore]:
-    store = MapStore(database_url(url))
-    try:
-        store.open()
-        yield store
-    finally:
-        store.close()
-
-
-@contextmanager
-def engine_of(url: str) -> Iterator[Engine]:
-    engine = open_engine(database_url(url))
-    try:
-        yield engine
-    finally:
-        engine.dispose()
-
-
-def alter(url: str, statement: str, **values: object) -> None:
-    """Change the database behind the store's back."""
-    with engine_of(url) as engine, engine.begin() as connection:
-        assert connection.execute(text(statement), values).rowcount > 0
-
-
-@contextmanager
-def on_every(name: str, function: Callable[..., None]) -> Iterator[None]:
-    """Have SQLAlchemy call a function at every event of a kind, whatever the engine."""
-    event.listen(Engine, name, function)
-    try:
-        yield
-    finally:
-        event.remove(Engine, name, function)
+from .stores import ANY, BOX, alter, opened
 
 
 def test_a_map_lives_through_its_revisions(store: MapStore) -> None:
@@ -303,107 +259,3 @@ def test_all_maps_together_take_no_more_than_they_may(database: str) -> None:
                 store.put(f"c{number}", b"", BOX, ANY)
     finally:
         store.close()
-
-
-def test_a_full_store_leaves_what_was_there(tmp_path: Path) -> None:
-    def fill(connection: Any, _: object) -> None:
-        connection.execute("PRAGMA max_page_count=12")
-
-    with on_every("connect", fill), opened(f"sqlite:///{tmp_path / 'maps.sqlite3'}") as store:
-        store.put("m", b"before", BOX, ANY)
-        with pytest.raises(StoreFullError):
-            store.put("m", b"x" * 1_000_000, BOX, ANY)
-        assert store.load("m").document == b"before"
-
-
-def test_a_read_only_store_still_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "maps.sqlite3"
-    url = f"sqlite:///{path}"
-    with opened(url) as writable:
-        writable.put("m", b"before", BOX, ANY)
-        writable.put("damaged", b"before", BOX, ANY)
-        alter(url, "UPDATE map_documents SET document = :value WHERE map_id = 'damaged'", value=b"after")
-    monkeypatch.chdir(tmp_path)
-    with opened(f"sqlite:///file:{path}?mode=ro&uri=true") as store:
-        with pytest.raises(ReadOnlyStoreError):
-            store.put("m", b"after", BOX, ANY)
-        with pytest.raises(ReadOnlyStoreError):
-            store.delete("m", ANY)
-        assert store.load("m").document == b"before"
-        with pytest.raises(CorruptMapError):
-            store.load("damaged")
-    assert [item.name for item in tmp_path.iterdir()] == ["maps.sqlite3"]
-
-
-def test_a_postgresql_that_takes_no_writes(database: str) -> None:
-    if database.startswith("sqlite"):
-        pytest.skip("PostgreSQL only")
-    with opened(database) as store:
-        store.put("m", b"before", BOX, ANY)
-    with opened(database + "%20-cdefault_transaction_read_only%3Don") as store:
-        with pytest.raises(ReadOnlyStoreError):
-            store.put("m", b"after", BOX, ANY)
-        assert store.load("m").document == b"before"
-
-
-def test_commits_wait_for_the_disk(database: str) -> None:
-    def said(url: str, *questions: str) -> list[object]:
-        with engine_of(url) as engine, engine.connect() as connection:
-            return [connection.exec_driver_sql(question).scalar() for question in questions]
-
-    if database.startswith("sqlite"):
-        with opened(database):
-            pass
-        mode, sync = said(database, "PRAGMA journal_mode", "PRAGMA synchronous")
-        assert (mode, sync) in (("wal", 2), ("delete", 3))
-        assert (mode == "wal") == (sqlite3.sqlite_version_info >= (3, 51, 3))
-        return
-    assert said(database + "%20-csynchronous_commit%3Doff", "SHOW synchronous_commit") == ["on"]
-    assert said(database + "%20-csynchronous_commit%3Dremote_apply", "SHOW synchronous_commit") == ["remote_apply"]
-
-
-def test_a_sqlite_that_may_write_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "SAFE_WAL", (3, 0, 0))
-    url = f"sqlite:///{tmp_path / 'maps.sqlite3'}"
-    with opened(url) as store:
-        store.put("m", b"one", BOX, ANY)
-        with engine_of(url) as engine, engine.connect() as connection:
-            assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
-            assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == 2
-    monkeypatch.undo()
-    with opened(url) as store:
-        assert store.load("m").document == b"one"
-
-
-def test_a_database_that_is_none(tmp_path: Path) -> None:
-    (tmp_path / "maps.sqlite3").write_bytes(b"this is no database at all" * 100)
-    with pytest.raises(CorruptMapError), opened(f"sqlite:///{tmp_path / 'maps.sqlite3'}"):
-        pass
-
-
-def test_a_database_that_is_away() -> None:
-    with pytest.raises(StoreAwayError), opened("postgresql://nobody@127.0.0.1:9/none"):
-        pass
-
-
-def test_a_busy_database_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "BUSY_SECONDS", 0.05)
-    path = tmp_path / "maps.sqlite3"
-    with opened(f"sqlite:///{path}") as store, closing(sqlite3.connect(path)) as other:
-        other.execute("BEGIN IMMEDIATE")
-        with pytest.raises(BusyStoreError):
-            store.put("m", b"one", BOX, ANY)
-        other.rollback()
-        assert store.put("m", b"one", BOX, ANY) == (1, True)
-
-
-@pytest.mark.parametrize("text", ["mysql://u:sesame@h/d", "nothing", "postgresql+asyncpg://u:sesame@h/d", ""])
-def test_a_url_that_is_of_no_use(text: str) -> None:
-    with pytest.raises(ValueError, match="expected a URL") as caught:
-        database_url(text)
-    assert "sesame" not in str(caught.value)
-
-
-@pytest.mark.parametrize("begin", ["postgres", "postgresql", "postgresql+psycopg"])
-def test_postgresql_by_any_name(begin: str) -> None:
-    assert database_url(f"{begin}://u@h/d").drivername == "postgresql+psycopg"

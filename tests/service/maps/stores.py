@@ -1,0 +1,50 @@
+"""Stores opened for a test, and changed behind their back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import Engine, event, text
+
+from service.database_url import database_url
+from service.maps import MapOutline, MapStore, Preconditions
+from service.maps.database import open_engine
+
+BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
+ANY = Preconditions()
+
+
+@contextmanager
+def opened(url: str) -> Iterator[MapStore]:
+    store = MapStore(database_url(url))
+    try:
+        store.open()
+        yield store
+    finally:
+        store.close()
+
+
+@contextmanager
+def engine_of(url: str) -> Iterator[Engine]:
+    engine = open_engine(database_url(url))
+    try:
+        yield engine
+    finally:
+        engine.dispose()
+
+
+def alter(url: str, statement: str, **values: object) -> None:
+    """Change the database behind the store's back."""
+    with engine_of(url) as engine, engine.begin() as connection:
+        assert connection.execute(text(statement), values).rowcount > 0
+
+
+@contextmanager
+def on_every(name: str, function: Callable[..., None]) -> Iterator[None]:
+    """Have SQLAlchemy call a function at every event of a kind, whatever the engine."""
+    event.listen(Engine, name, function)
+    try:
+        yield
+    finally:
+        event.remove(Engine, name, function)
