@@ -163,8 +163,10 @@ LEAST_WALL_ERROR = 0.003  # m, tables
 ROUGH_SHARE = 0.1  # of a wall's variance, tables; what differs along it
 SETTLING_ROUNDS = 4  # tables
 FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
-LOOSE_WALLS = 0.025  # m, tables; from which on explanations are scored again with gates as wide as walls are off,
-LOOSE_FACTOR = 2.0  # tables; times as wide as that
+# Explanations are scored again with gates as wide as walls may be off: by so much at least,
+LOOSE_WALLS = 0.05  # m, tables
+LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
+LOOSE_BEAMS = 0.25  # tables; and with that share of what beams say, which read centimetres
 LOOSE_RIVALS = 8  # tables; the best and that many others
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 

@@ -16,51 +16,28 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import minimize
 
 import association
 from association.features import Features
-from association.models import FILE, FITTED_ON, MODELS, USUAL, Curve, Model, as_document
+from association.models import FILE, FITTED_ON, MODELS, USUAL, Model, as_document
 from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
 
+from .curves import Fitted, Task, fit, log_loss
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
 from .reliability import print_bins
 from .table import print_table
 
-RIDGE = 0.5  # on slopes of standardised features, in units of one answer; cross-validated
 TEMPERATURES = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)  # nats
 THRESHOLDS = (0.8, 0.85, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99)
 GROUPS = ("scan", "scan_30", "scan_50", "logs", DRAWN, STRANGERS)
-AWAY = ("unmapped", "other_type", "sister", "mirrored")  # conditions of drawn strangers
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """A model to be fitted.
-
-    Attributes
-    ----------
-    name : str
-        As in the file.
-    strangers : float
-        Weight of a scan of another building.
-    current : Model
-        The one in the file.
-    names : tuple of str
-        The features of the new one.
-    bends : tuple of float
-        Quantiles of each at which its curve may bend.
-    """
-
-    name: str
-    strangers: float
-    current: Model
-    names: tuple[str, ...]
-    bends: tuple[float, ...]
+AWAY = (
+    "unmapped", "other_type", "sister", "mirrored", "rough_unmapped", "rough_sister", "rough_mirrored",
+)  # fmt: skip
+KEPT = ("clean", "clutter_33", "clutter_66", "changed", "scaled_1", "walls_5cm", "rough")
+"""Conditions of drawn worlds that are shown by themselves: of strangers, and of scans in the map."""
 
 
 BEAMS = ("read", "passed", "root_farther", "root_nearer")
@@ -92,83 +69,6 @@ TASKS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Fitted:
-    """A model with the temperature of the twins, nats."""
-
-    model: Model
-    temperature: float
-
-    def probabilities(self, examples: Sequence[Example]) -> np.ndarray:
-        """Return the chance that each answer is right."""
-        logits = np.array([self.model.logit(e.features) for e in examples])
-        return np.asarray(_shares(examples, self.temperature) / (1.0 + np.exp(-logits)))
-
-
-def _shares(examples: Sequence[Example], temperature: float) -> np.ndarray:
-    return np.array([1.0 / (1.0 + (e.counted * np.exp(e.gaps / temperature)).sum()) for e in examples])
-
-
-def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:
-    return np.array([strangers if e.stranger else 1.0 for e in examples])
-
-
-def log_loss(probabilities: np.ndarray, examples: Sequence[Example], strangers: float) -> float:
-    """Return the mean of minus the log of the chance given to what happened, nats."""
-    p = np.clip(probabilities, 1e-12, 1.0 - 1e-12)
-    right = np.array([e.right for e in examples])
-    weights = _weights(examples, strangers)
-    return float(-(weights * np.where(right, np.log(p), np.log1p(-p))).sum() / weights.sum())
-
-
-def knots(values: np.ndarray, quantiles: Sequence[float]) -> tuple[float, ...]:
-    """Return where the curve of a feature may bend: at quantiles of its values, if it has so many."""
-    found = np.unique(np.quantile(values, quantiles))
-    return tuple(float(k) for k in found if values.min() < k < values.max())
-
-
-def fit(examples: Sequence[Example], task: Task, temperature: float) -> Fitted:
-    """Find the curves of greatest likelihood, with a pull towards 0 on the slopes of standardised features."""
-    columns: list[np.ndarray] = []
-    whose: list[tuple[str, float | None]] = []
-    for name in task.names:
-        values = np.array([getattr(e.features, name) for e in examples])
-        columns.append(values)
-        whose.append((name, None))
-        for knot in knots(values, task.bends):
-            columns.append(np.maximum(0.0, values - knot))
-            whose.append((name, knot))
-    raw = np.array(columns).T
-    middle, scale = raw.mean(axis=0), raw.std(axis=0)
-    constant = scale < 1e-12
-    middle[constant], scale[constant] = 0.0, 1.0
-    z, shares = (raw - middle) / scale, _shares(examples, temperature)
-    right = np.array([e.right for e in examples])
-    weights = _weights(examples, task.strangers)
-    first = [name for name, _ in whose].index("constant")
-
-    def loss(w: np.ndarray) -> tuple[float, np.ndarray]:
-        s = 1.0 / (1.0 + np.exp(-np.clip(z @ w, -500.0, 500.0)))
-        p = np.clip(s * shares, 1e-12, 1.0 - 1e-12)
-        total = -(weights * np.where(right, np.log(p), np.log1p(-p))).sum() + RIDGE * (w[~constant] ** 2).sum()
-        # With p = s share: d log(p) = 1 - s, d log(1 - p) = -p (1 - s) / (1 - p), by the logit.
-        slope = -weights * np.where(right, 1.0 - s, -p * (1.0 - s) / (1.0 - p))
-        return float(total), z.T @ slope + 2.0 * RIDGE * np.where(constant, 0.0, w)
-
-    w = minimize(loss, np.zeros(z.shape[1]), jac=True, method="L-BFGS-B", options={"maxiter": 500}).x / scale
-    # What standardising took off goes to the constant feature.
-    w[constant & (np.arange(len(w)) != first)] = 0.0
-    w[first] -= float(w[~constant] @ middle[~constant])
-    curves = {
-        name: Curve(
-            float(w[whose.index((name, None))]),
-            tuple((knot, float(w[k])) for k, (n, knot) in enumerate(whose) if n == name and knot is not None),
-        )
-        for name in task.names
-    }
-    return Fitted(Model(curves), temperature)
-
-
 def cross_validated(examples: Sequence[Example], task: Task, temperature: float) -> np.ndarray:
     """Return for each answer the probability by a fit to the other folds."""
     folds = np.array([e.fold for e in examples])
@@ -179,12 +79,18 @@ def cross_validated(examples: Sequence[Example], task: Task, temperature: float)
     return out
 
 
+def told_loss(probabilities: np.ndarray, examples: Sequence[Example], task: Task) -> float:
+    """Return the log-loss over those answers that could be told."""
+    of_those = [k for k, e in enumerate(examples) if e.told or not e.stranger]
+    return log_loss(probabilities[of_those], [examples[k] for k in of_those], task.strangers)
+
+
 def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: Sequence[Example]) -> None:
     """Print for several thresholds of the cautious model the usable share by group and how many of those are wrong.
 
     Of drawn strangers, the share that is usable although the scan shows that it is wrong.
     """
-    cells = []
+    cells, kept = [], []
     for threshold in THRESHOLDS:
         usable = (p >= USABLE_PROBABILITY) & (careful >= threshold) & ~np.array([e.degenerate for e in examples])
         row = [f"{threshold:g}"]
@@ -198,7 +104,12 @@ def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: S
             told = [usable[k] and examples[k].told for k in mine]
             row.append(f"{100.0 * np.mean(told):.2f} %" if mine else "")
         cells.append(row)
+        kept.append([f"{threshold:g}"])
+        for condition in KEPT:
+            passed = [usable[k] for k, e in enumerate(examples) if e.condition == condition and e.group == DRAWN]
+            kept[-1].append(f"{100.0 * np.mean(passed):.1f} %" if passed else "")
     print_table(title, ("usable from", *GROUPS, *AWAY), cells)
+    print_table(f"{title}, drawn worlds", ("usable from", *KEPT), kept)
 
 
 def print_changes(old: np.ndarray, new: np.ndarray, examples: Sequence[Example]) -> None:
@@ -225,7 +136,7 @@ def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dic
     print(f"\n## Scans as {form}: {len(examples)} answers")
     cells: list[tuple[str, ...]] = []
     for temperature in TEMPERATURES:
-        losses = [log_loss(cross_validated(examples, t, temperature), examples, t.strangers) for t in tasks]
+        losses = [told_loss(cross_validated(examples, t, temperature), examples, t) for t in tasks]
         cells.append((f"{temperature:g}", *(f"{v:.4f}" for v in losses)))
     print_table("Temperature of the twins, cross-validated log-loss", ("nats", *(t.name for t in tasks)), cells)
     own = np.array([not e.stranger for e in examples])
@@ -233,7 +144,7 @@ def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dic
     tried = [cross_validated(examples, t, TWIN_TEMPERATURE) for t in tasks]
     present = [Fitted(t.current, TWIN_TEMPERATURE).probabilities(examples) for t in tasks]
     for title, found in (("cross-validated", tried), ("present", present)):
-        told = (f"{t.name} {log_loss(p, examples, t.strangers):.4f}" for t, p in zip(tasks, found, strict=True))
+        told = (f"{t.name} {told_loss(p, examples, t):.4f}" for t, p in zip(tasks, found, strict=True))
         print(f"\nLog-loss, {title}: {', '.join(told)}")
         print_bins(f"Scans as {form} in their own map, {title}", found[0][own], right[own])
         print_thresholds(f"Usable share of scans as {form}, {title}", found[0], found[-1], examples)

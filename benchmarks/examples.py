@@ -31,7 +31,7 @@ from .worlds.tables import TOLD
 SEGMENTS, RANGES = "segments", "ranges"
 STRANGERS, DRAWN, DRAWN_STRANGERS = "strangers", "drawn", "drawn strangers"
 # Of each drawn world and condition, of those worlds that are fitted on.
-HERE, AWAY = 16, 64
+HERE, AWAY = 32, 128
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
 LEFT_OUT = ("window",)  # a window is a prior, of which the verdict has rules of its own
 

@@ -18,7 +18,8 @@ import numpy as np
 from association.models import MODELS
 from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_CAUTIOUS_WITH_BEAMS, USABLE_PROBABILITY
 
-from .calibration import TASKS, Fitted
+from .calibration import TASKS
+from .curves import Fitted
 from .examples import RANGES, SEGMENTS, Example, collected, world_cases
 from .pictures import COLOURS, panels, save
 from .table import print_table

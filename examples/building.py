@@ -20,7 +20,7 @@ ROOMS = 3  # equal ones at its end
 ROOM_WIDTH, ROOM_DEPTH, DOOR = 4.0, 3.0, (0.6, 1.5)  # m; the door from and to, along the width
 OFFICES = OfficePlan(rooms=4, corridors=2)
 LOW, HIGH = OFFICES.depth + OFFICES.wall, OFFICES.depth + OFFICES.wall + OFFICES.corridor_width  # m; the bridge's walls
-BOXES_IN_OFFICES, BOXES_IN_ROOMS = 25, 5  # furniture that no map knows
+BOXES_IN_OFFICES, BOXES_IN_ROOMS = 30, 5  # furniture that no map knows
 
 
 @dataclass(frozen=True)

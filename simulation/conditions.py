@@ -89,6 +89,12 @@ def _off_by(sigma: float) -> Callable[[Segments, np.random.Generator], DrawnMap]
     return lambda segments, rng: walls_off(segments, rng, sigma)
 
 
+def _with_some_error(segments: Segments, rng: np.random.Generator) -> DrawnMap:
+    """Draw a map that is wrong in one of the ways that maps are."""
+    errors = (_to_scale(0.01), _sheared, _off_by(0.02), _off_by(0.05), lambda s, r: in_pieces(s, r, 0.02))
+    return errors[rng.integers(len(errors))](segments, rng)
+
+
 def _biased(scanner: Scanner, rng: np.random.Generator) -> Scanner:
     return replace(scanner, bias=_sign(rng) * 0.02)
 
@@ -146,5 +152,16 @@ CONDITIONS: dict[str, Condition] = {
     "sister": Condition("in another building of the same style", stranger=Stranger.SISTER),
     "other_type": Condition("in another kind of building", stranger=Stranger.OTHER_TYPE),
     "mirrored": Condition("from a laser mounted upside down", laser=_upside_down, stranger=Stranger.MIRRORED),
+    # Where only strangers come with exact maps, an error of the map looks like a proof that the robot is in it.
+    "rough": Condition("the map has one of the errors above, and the building has changed", today=rearranged,
+                       draw_map=_with_some_error),
+    "rough_unmapped": Condition("unmapped, and rough", today=rearranged, draw_map=_with_some_error,
+                                stranger=Stranger.UNMAPPED),
+    "rough_sister": Condition("sister, and rough", today=rearranged, draw_map=_with_some_error,
+                              stranger=Stranger.SISTER),
+    "rough_other_type": Condition("other_type, and rough", today=rearranged, draw_map=_with_some_error,
+                                  stranger=Stranger.OTHER_TYPE),
+    "rough_mirrored": Condition("mirrored, and rough", today=rearranged, draw_map=_with_some_error,
+                                laser=_upside_down, stranger=Stranger.MIRRORED),
     "window": Condition("in a window that does not hold the truth", stranger=Stranger.WINDOW),
 }  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from association import HardPrior, SoftPrior, reasons, verdict
+from association import HardPrior, SoftPrior, loosening, reasons, verdict
 from association.context import SearchContext
 from association.explain import Explanations
 from association.models import USUAL, as_model
@@ -58,12 +58,16 @@ PLAIN: dict[str, dict[str, list[float]]] = {
 
 @contextmanager
 def judged_by(models: dict[str, dict[str, list[float]]], **bars: float) -> Iterator[None]:
-    """Let these models decide, and these bars in place of those of `association.verdict`."""
+    """Let these models decide, and these bars in place of those of `association.verdict`.
+
+    Without the second look at the rivals, which scores them anew: these are made by hand.
+    """
     usual = USUAL._replace(deviation=USUAL_DEVIATION)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(verdict, "MODELS", {name: as_model(curves) for name, curves in models.items()})
         for module in (verdict, reasons):
             patch.setattr(module, "USUAL", usual)
+        patch.setattr(loosening, "LOOSE_RIVALS", 0)
         for name, value in bars.items():
             patch.setattr(verdict, name, value)
         yield

@@ -166,14 +166,17 @@ def test_a_corner_is_too_little() -> None:
 
 
 @pytest.mark.usefixtures("fitted")
-@pytest.mark.parametrize("seed", [3, 4, 5, 6, 7])
-def test_a_scan_of_another_building_is_elsewhere(seed: int) -> None:
-    """Most of it does not fit, wherever it is laid."""
-    ends = seen(maze(seed), pose(15.0, 14.0, 0.5), noise=0.01, radius=7.0, seed=seed)[0]
-    result = answer_of(index_of(maze(1)), scan_of(ends))
-    assert result.status is Status.NO_MATCH or codes(result)[0] == "elsewhere"
-    if result.status is Status.AMBIGUOUS:
-        assert "unexplained" in codes(result)
+def test_a_scan_of_another_building_is_elsewhere() -> None:
+    """Most of it does not fit, wherever it is laid: three in four are told so, and none is usable."""
+    told = 0
+    for seed in range(2, 18):
+        ends = seen(maze(seed), pose(15.0, 14.0, 0.5), noise=0.01, radius=7.0, seed=seed)[0]
+        result = answer_of(index_of(maze(1)), scan_of(ends))
+        assert not result.usable
+        if result.status is Status.AMBIGUOUS:
+            assert "unexplained" in codes(result)
+        told += result.status is Status.NO_MATCH or codes(result)[0] == "elsewhere"
+    assert told >= 12
 
 
 @pytest.mark.usefixtures("fitted")

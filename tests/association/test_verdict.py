@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from association import HardPrior, Status, null, tuning, verdict
+from association import HardPrior, Status, loosening, null, tuning, verdict
 from association.context import SearchContext
 from association.ranking import Ranked
 from association.verdict import Verdict, judge
@@ -52,6 +52,17 @@ def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar
     chance = share / (1.0 + math.exp(3.0 - 0.2 * high))
     assert chance == pytest.approx(bar)
     assert usable.probability == pytest.approx(chance if model.startswith("probability") else share)
+
+
+def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is said to be 40 nats behind, and is at the same place: scored anew, it is worth as much."""
+    with judged_by(SURE):
+        assert leading(40.0).verdict.usable
+        monkeypatch.setattr(loosening, "LOOSE_RIVALS", tuning.LOOSE_RIVALS)
+        got = leading(40.0).verdict
+    assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
+    assert got.probability == pytest.approx(0.5)
+    assert "twin" in [reason.code for reason in got.reasons]
 
 
 def test_the_probability_is_that_for_scans_of_the_map() -> None:

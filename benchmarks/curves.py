@@ -1,0 +1,155 @@
+"""The curves of a verdict's model: fitted by likelihood, each rising or falling throughout where its feature speaks so.
+
+More of what speaks for an answer must not make the verdict less sure of it. Free curves do so where few examples hold
+them, and what they win on the buildings that they were fitted on they lose on others.
+
+Left out of a fit are strangers that nobody could tell: where the scan reads what the map shows although it was taken
+elsewhere. All that these would teach is to mistrust a scan that fits without fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from association.models import Curve, Model
+
+from .examples import DRAWN, DRAWN_STRANGERS, Example
+
+RIDGE = 3.0  # on slopes of standardised features, in units of one answer; cross-validated
+LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
+LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
+# A log is worth that many drawn scans, of which there are as many as one cares to draw.
+REAL = 3.0
+FOR = ("lead", "solitude", "share", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
+AGAINST = (
+    "inverse_count", "longest_unmatched", "passed", "root_nearer", "chance", "null", "null_better", "blocked",
+    "root_unmatched",
+)  # fmt: skip
+# These say as much of how far the walls are off as of the place: a rough map is no sign of being elsewhere. And
+# what is matched in all goes, beside the share that is, with what is not.
+EITHER = ("deviation", "misfit", "misfit_of_many", "hinge_moves", "hinge_deviation", "root_farther", "root_length")
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A model to be fitted.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    strangers : float
+        Weight of a scan of another building.
+    current : Model
+        The one in the file.
+    names : tuple of str
+        The features of the new one.
+    bends : tuple of float
+        Quantiles of each at which its curve may bend.
+    """
+
+    name: str
+    strangers: float
+    current: Model
+    names: tuple[str, ...]
+    bends: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A model with the temperature of the twins, nats."""
+
+    model: Model
+    temperature: float
+
+    def probabilities(self, examples: Sequence[Example]) -> np.ndarray:
+        """Return the chance that each answer is right."""
+        logits = np.array([self.model.logit(e.features) for e in examples])
+        return np.asarray(_shares(examples, self.temperature) / (1.0 + np.exp(-logits)))
+
+
+def _shares(examples: Sequence[Example], temperature: float) -> np.ndarray:
+    return np.array([1.0 / (1.0 + (e.counted * np.exp(e.gaps / temperature)).sum()) for e in examples])
+
+
+def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:
+    drawn = np.array([e.group in (DRAWN, DRAWN_STRANGERS) for e in examples])
+    away = np.array([e.stranger for e in examples])
+    return np.where(drawn, 1.0, REAL) * np.where(away, strangers, 1.0)
+
+
+def tellable(examples: Sequence[Example]) -> list[Example]:
+    """Return the answers but those of strangers that nobody could tell."""
+    return [e for e in examples if e.told or not e.stranger]
+
+
+def log_loss(probabilities: np.ndarray, examples: Sequence[Example], strangers: float) -> float:
+    """Return the mean of minus the log of the chance given to what happened, nats."""
+    p = np.clip(probabilities, 1e-12, 1.0 - 1e-12)
+    right = np.array([e.right for e in examples])
+    weights = _weights(examples, strangers)
+    return float(-(weights * np.where(right, np.log(p), np.log1p(-p))).sum() / weights.sum())
+
+
+def knots(values: np.ndarray, quantiles: Sequence[float]) -> tuple[float, ...]:
+    """Return where the curve of a feature may bend: at quantiles of its values that have enough on either side."""
+    least, greatest = float(values.min()), float(values.max())
+    apart, found = LEAST_PIECE * (greatest - least), [least]
+    for k in np.unique(np.quantile(values, quantiles)).tolist():
+        enough = min(np.mean(values < k), np.mean(values > k)) >= LEAST_BESIDE
+        if enough and k - found[-1] >= apart and greatest - k >= apart:
+            found.append(k)
+    return tuple(found[1:])
+
+
+def pieces(values: np.ndarray, bends: Sequence[float]) -> np.ndarray:
+    """Return how far values go into each piece of the axis between bends: (n, bends + 1), their sum the value."""
+    edges = np.array([-np.inf, *bends, np.inf])
+    starts = np.where(np.isfinite(edges[:-1]), edges[:-1], 0.0)
+    return np.asarray(np.clip(values[:, None], edges[:-1], edges[1:]) - starts)
+
+
+def fit(examples: Sequence[Example], task: Task, temperature: float) -> Fitted:
+    """Find the curves of greatest likelihood, with a pull towards 0 on the slopes of standardised pieces."""
+    examples = tellable(examples)
+    bends: dict[str, tuple[float, ...]] = {}
+    columns, bounds = [np.ones((len(examples), 1))], [(-np.inf, np.inf)]
+    for name in task.names:
+        if name == "constant":
+            continue
+        values = np.array([getattr(e.features, name) for e in examples])
+        bends[name] = knots(values, task.bends)
+        columns.append(pieces(values, bends[name]))
+        bounds += [(-np.inf if name not in FOR else 0.0, np.inf if name not in AGAINST else 0.0)] * (
+            len(bends[name]) + 1
+        )
+    raw = np.hstack(columns)
+    middle, scale = raw.mean(axis=0), raw.std(axis=0)
+    middle[0], scale[0] = 0.0, 1.0
+    scale[scale < 1e-9] = np.inf  # what never changes says nothing
+    z, shares = (raw - middle) / scale, _shares(examples, temperature)
+    right = np.array([e.right for e in examples])
+    weights = _weights(examples, task.strangers)
+    pulled = np.arange(z.shape[1]) > 0
+
+    def loss(w: np.ndarray) -> tuple[float, np.ndarray]:
+        s = 1.0 / (1.0 + np.exp(-np.clip(z @ w, -500.0, 500.0)))
+        p = np.clip(s * shares, 1e-12, 1.0 - 1e-12)
+        total = -(weights * np.where(right, np.log(p), np.log1p(-p))).sum() + RIDGE * (w[pulled] ** 2).sum()
+        # With p = s share: d log(p) = 1 - s, d log(1 - p) = -p (1 - s) / (1 - p), by the logit.
+        slope = -weights * np.where(right, 1.0 - s, -p * (1.0 - s) / (1.0 - p))
+        return float(total), z.T @ slope + 2.0 * RIDGE * np.where(pulled, w, 0.0)
+
+    start = np.zeros(z.shape[1])
+    w = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 1000}).x / scale
+    curves, at = {"constant": Curve(float(w[0] - w[1:] @ middle[1:]))}, 1
+    for name, places in bends.items():
+        slopes = w[at : at + len(places) + 1]
+        changes = np.diff(slopes).tolist()
+        curves[name] = Curve(float(slopes[0]), tuple(zip(places, changes, strict=True)))
+        at += len(slopes)
+    return Fitted(Model(curves), temperature)

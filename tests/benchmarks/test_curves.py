@@ -1,0 +1,103 @@
+"""The fit of a verdict's model on drawn answers of known odds."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from association.models import MODELS, USUAL, Curve
+from benchmarks.curves import AGAINST, EITHER, FOR, Task, fit, knots, log_loss, pieces
+from benchmarks.examples import DRAWN_STRANGERS, SEGMENTS, Example
+
+NONE = np.zeros(0)
+
+
+def answers(share: np.ndarray, deviation: np.ndarray, right: np.ndarray) -> list[Example]:
+    return [
+        Example(
+            SEGMENTS, "drawn", "clean", "world", USUAL._replace(share=float(s), deviation=float(d)), NONE, NONE,
+            bool(r), degenerate=False, told=not r,
+        )
+        for s, d, r in zip(share, deviation, right, strict=True)
+    ]  # fmt: skip
+
+
+def drawn(slope: float, count: int = 4000) -> list[Example]:
+    """Answers whose log-odds rise by `slope` per unit of the share from -2 on, and do not depend on the deviation."""
+    rng = np.random.default_rng(5)
+    share, deviation = rng.uniform(0.0, 1.0, count), rng.uniform(0.0, 0.2, count)
+    return answers(share, deviation, rng.uniform(size=count) < 1.0 / (1.0 + np.exp(2.0 - slope * share)))
+
+
+def task(bends: tuple[float, ...]) -> Task:
+    return Task("cautious", 1.0, MODELS["cautious"], ("constant", "share", "deviation"), bends)
+
+
+def slopes(curve: Curve) -> Sequence[float]:
+    return [float(s) for s in np.cumsum([curve.slope, *(more for _, more in curve.bends)])]
+
+
+def test_the_fit_finds_the_odds_that_answers_were_drawn_with() -> None:
+    found = fit(drawn(6.0), task(()), 1.0).model.curves
+    assert found["share"].slope == pytest.approx(6.0, rel=0.1)
+    assert found["constant"].slope == pytest.approx(-2.0, abs=0.3)
+    assert abs(found["deviation"].slope) < 1.5  # of 0.2 that it may be: less than 0.3 nats
+
+
+def test_a_curve_never_falls_where_its_feature_speaks_for_an_answer() -> None:
+    found = fit(drawn(-6.0), task((0.2, 0.5, 0.8)), 1.0).model.curves
+    assert len(found["share"].bends) == 3
+    assert slopes(found["share"]) == pytest.approx([0.0] * 4, abs=1e-12)
+
+
+def test_strangers_that_nobody_could_tell_teach_nothing() -> None:
+    scans, ones = drawn(6.0), np.ones(2000)
+    perfect = [
+        replace(e, group=DRAWN_STRANGERS, right=False, told=False) for e in answers(ones, 0.0 * ones, 0.0 * ones)
+    ]
+    assert fit([*scans, *perfect], task((0.5,)), 1.0) == fit(scans, task((0.5,)), 1.0)
+    told = [replace(e, told=True) for e in perfect]
+    assert fit([*scans, *told], task((0.5,)), 1.0) != fit(scans, task((0.5,)), 1.0)
+
+
+def test_a_curve_follows_odds_that_bend() -> None:
+    rng = np.random.default_rng(6)
+    share = rng.uniform(0.0, 1.0, 6000)
+    logit = -1.0 + 8.0 * np.maximum(0.0, share - 0.5)
+    found = fit(answers(share, 0.0 * share, rng.uniform(size=6000) < 1.0 / (1.0 + np.exp(-logit))), task((0.5,)), 1.0)
+    below, above = slopes(found.model.curves["share"])
+    assert below == pytest.approx(0.0, abs=0.8)
+    assert above == pytest.approx(8.0, rel=0.1)
+
+
+def test_pieces_between_bends_add_up_to_the_value() -> None:
+    values = np.array([-1.0, 0.3, 0.7, 2.0])
+    found = pieces(values, (0.0, 0.5, 1.0))
+    np.testing.assert_allclose(found.sum(axis=1), values)
+    np.testing.assert_allclose(found[2], [0.0, 0.5, 0.2, 0.0])
+
+
+def test_no_bend_has_next_to_nothing_beside_it() -> None:
+    capped = np.array([12.0] * 40 + list(range(60)))  # four in ten at a value that is none of a few quantiles
+    assert 12.0 in knots(capped, (0.4,))
+    assert knots(np.array([0.0] * 99 + [1.0]), (0.2, 0.5, 0.8, 0.99)) == ()
+
+
+def test_what_every_feature_that_is_fitted_speaks_for_is_said() -> None:
+    assert not set(FOR) & set(AGAINST) | set(EITHER) & {*FOR, *AGAINST}
+    fitted = {name for model in MODELS.values() for name in model.curves}
+    assert fitted <= {"constant", *FOR, *AGAINST, *EITHER}
+
+
+@pytest.mark.parametrize("name", ["cautious", "cautious_with_beams"])
+def test_the_models_in_use_never_go_the_wrong_way(name: str) -> None:
+    for feature, curve in MODELS[name].curves.items():
+        if feature in (*FOR, *AGAINST):
+            sign = 1.0 if feature in FOR else -1.0
+            assert min(sign * s for s in slopes(curve)) > -1e-3 * max(1.0, *map(abs, slopes(curve))), feature
+
+
+def test_log_loss_counts_strangers_by_their_weight() -> None:
+    here = answers(np.array([0.5]), np.array([0.0]), np.array([True]))
+    assert log_loss(np.array([0.5]), here, 1.0) == pytest.approx(np.log(2.0))
