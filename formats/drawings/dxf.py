@@ -14,6 +14,7 @@ from ezdxf import recover
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.insert import Insert
 from ezdxf.entities.lwpolyline import LWPolyline
+from ezdxf.entities.polyline import Polyline
 from ezdxf.enums import InsertUnits
 from ezdxf.lldxf.const import DXFError
 from ezdxf.units import conversion_factor
@@ -119,6 +120,14 @@ def _expanded(
             yield from _expanded(one.virtual_entities(), within, depth + 1, drawing)
 
 
+def _width(entity: DXFEntity) -> float:
+    """Return how wide a polyline is drawn, where it begins; units of the drawing."""
+    if isinstance(entity, LWPolyline):
+        told = entity.dxf.get("const_width", 0.0) or next((start for _, _, start, _, _ in entity.get_points()), 0.0)
+        return float(told)
+    return float(entity.dxf.default_start_width) if isinstance(entity, Polyline) else 0.0
+
+
 def _add(entity: DXFEntity, drawing: Drawing, sagitta: float) -> None:
     kind = entity.dxftype()
     if kind == "INSERT":
@@ -130,6 +139,5 @@ def _add(entity: DXFEntity, drawing: Drawing, sagitta: float) -> None:
     points = [(p.x, p.y) for p in islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1)]
     if len(points) > MAX_CURVE_POINTS:
         raise TooLargeError(f"expected at most {MAX_CURVE_POINTS} points of a curve", argument=drawing.name)
-    width = float(entity.dxf.get("const_width", 0.0)) if isinstance(entity, LWPolyline) else 0.0
-    drawing.add(points, width=max(0.0, width))
+    drawing.add(points, width=max(0.0, _width(entity)))
     drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
