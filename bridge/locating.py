@@ -106,11 +106,6 @@ def locate(index: linefix.MapIndex, message: LaserScan, mount: Mount) -> Located
     stamp = message.header.stamp
     if answer.pose is None:
         return Located(stamp, answer, None, None)
-    pose = answer.pose.compose(mount.base_from_laser.inverse())
-    covariance = answer.covariance
-    if covariance is not None:
-        # A small turn moves the robot about the laser, 90 degrees on from where it is.
-        about = np.eye(3)
-        about[0, 2], about[1, 2] = answer.pose.y - pose.y, pose.x - answer.pose.x
-        covariance = about @ covariance @ about.T
-    return Located(stamp, answer, pose, covariance)
+    laser_from_base = mount.base_from_laser.inverse()
+    covariance = None if answer.covariance is None else answer.pose.carry(answer.covariance, laser_from_base)
+    return Located(stamp, answer, answer.pose.compose(laser_from_base), covariance)
