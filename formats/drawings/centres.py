@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,15 +9,13 @@ from numpy.typing import NDArray
 
 from ..options import ImportOptions
 from .drawing import Drawing
+from .meeting import AT_ONCE, MEETS, in_frame, parallel_to
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 MOST_LINES = 3000  # that are compared with each other; larger drawings are taken for faces
-AT_ONCE = 200  # lines that are compared with all others at a time; memory
-PARALLEL = math.sin(math.radians(3.0))
 FACE_APART = (0.03, 0.6)  # m; how far the other face of a wall lies
-MEETS = 0.05  # m; an end as near to another line meets it
 FEW_FACES = 0.15  # of the length; that has another face beside it where walls are drawn by their centre lines
 MOST_MEET = 0.5  # of the length; of lines that take part in a T or a crossing there
 THINNEST, THICKEST = 0.03, 1.5  # m; a width that a wall may have, and no pen
@@ -97,12 +94,11 @@ def _neighbours(endpoints: Floats, lengths: Floats) -> tuple[Floats, Flags]:
     for low in range(0, len(lengths), AT_ONCE):
         some = np.arange(low, min(low + AT_ONCE, len(lengths)))
         own = some[:, None] == np.arange(len(lengths))
-        parallel = np.abs(d[some, :1] * d[None, :, 1] - d[some, 1:] * d[None, :, 0]) < PARALLEL
-        a0, o0 = _in_frame(endpoints[:, :2], endpoints[some, :2], d[some])
-        a1, o1 = _in_frame(endpoints[:, 2:], endpoints[some, :2], d[some])
+        a0, o0 = in_frame(endpoints[:, :2], endpoints[some, :2], d[some])
+        a1, o1 = in_frame(endpoints[:, 2:], endpoints[some, :2], d[some])
         shared = np.minimum(lengths[some, None], np.maximum(a0, a1)) - np.maximum(0.0, np.minimum(a0, a1))
         apart = 0.5 * np.abs(o0 + o1)
-        other_face = parallel & ~own & (shared > 0.0) & (apart > FACE_APART[0]) & (apart < FACE_APART[1])
+        other_face = parallel_to(d[some], d) & ~own & (shared > 0.0) & (apart > FACE_APART[0]) & (apart < FACE_APART[1])
         beside[some] = np.minimum(lengths[some], np.where(other_face, shared, 0.0).sum(axis=1))
         for place in (endpoints[some, :2], endpoints[some, 2:]):
             arms = _arms(place, endpoints[:, :2], d, lengths) * ~own
@@ -120,10 +116,3 @@ def _arms(places: Floats, begins: Floats, d: Floats, lengths: Floats) -> NDArray
     on = (off < MEETS) & (along > -MEETS) & (along < lengths + MEETS)
     middle = (along > MEETS) & (along < lengths - MEETS)
     return np.where(on, np.where(middle, 2, 1), 0)
-
-
-def _in_frame(points: Floats, origins: Floats, d: Floats) -> tuple[Floats, Floats]:
-    """Return where n points lie along and to the left of k lines, ``(k, n)`` each, metres."""
-    x = points[None, :, 0] - origins[:, None, 0]
-    y = points[None, :, 1] - origins[:, None, 1]
-    return d[:, :1] * x + d[:, 1:] * y, d[:, :1] * y - d[:, 1:] * x

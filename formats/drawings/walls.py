@@ -13,6 +13,7 @@ from ..options import ImportOptions
 from .centres import are_centres, walls_of
 from .drawing import Drawing
 from .inside import Sides, sides_seen
+from .solid import outline
 
 Floats = NDArray[np.float64]
 
@@ -93,10 +94,8 @@ def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: Im
     walls = walls_of(widths, options)
     drawing.notes.add_assumed(walls.code, walls.told)
     drawing.notes.add_merged("faces", "centre lines made into two faces", len(endpoints))
-    lines, aside = _segments(endpoints, drawing), 0.5 * walls.thickness
-    both = np.vstack([one.moved_left(aside).endpoints for one in (lines, lines.reversed())])
     drawing.meta |= {"thickness": f"{float(np.median(walls.thickness)):.3g}"}
-    return both
+    return outline(_segments(endpoints, drawing).endpoints, walls.thickness)
 
 
 def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Floats:

@@ -32,21 +32,32 @@ def assumed(imported: ImportedMap) -> dict[str, str]:
     return {note.code: note.message for note in imported.report.assumed}
 
 
-def apart(imported: ImportedMap) -> list[float]:
-    """Return how far the faces of each wall are apart, free space on their left, metres."""
-    one, other = np.split(imported.map.segments.midpoints, 2)
-    normals = imported.map.segments.normals[: len(one)]
-    found: list[float] = np.round(np.einsum("ij,ij->i", one - other, normals), 6).tolist()
-    return found
+def thickness(imported: ImportedMap, lines: Lines = HOUSE) -> list[float]:
+    """Return how far the two faces of each wall are apart near its begin, metres; free space is on their left."""
+    faces, found = imported.map.segments, []
+    for x1, y1, x2, y2 in lines:
+        at = np.array([x1 + 0.15 * (x2 - x1), y1 + 0.15 * (y2 - y1)])
+        normal = np.array([y1 - y2, x2 - x1]) / np.hypot(x2 - x1, y2 - y1)
+        along = np.einsum("ij,ij->i", at - faces.endpoints[:, :2], faces.directions)
+        beside = (along > 0.0) & (along < faces.lengths)
+        off = (faces.midpoints - at) @ normal
+        facing = faces.normals @ normal
+        near = np.abs(off) < 0.5
+        found.append(min(off[beside & near & (facing > 0.9)]) - max(off[beside & near & (facing < -0.9)]))
+    return [round(float(value), 6) for value in found]
 
 
 def test_lines_that_meet_in_the_middle_of_others_are_centre_lines(tmp_path: Path) -> None:
     imported = read_map(csv(tmp_path, HOUSE))
     assert imported.map.oriented
-    assert apart(imported) == [0.2] * len(HOUSE)
+    assert thickness(imported) == [0.2] * len(HOUSE)
     assert list(assumed(imported)) == ["centres", "thickness_usual"]
     assert "0.2 m thick" in assumed(imported)["thickness_usual"]
     assert "drawn faces" in assumed(imported)["centres"]
+    # Outside four faces, four in a room, in the two that the door parts five, and two ends at the door.
+    assert len(imported.map.segments) == 4 + 4 + 2 * 5 + 2
+    corners = {tuple(point) for point in imported.map.segments.endpoints.round(4).reshape(-1, 2).tolist()}
+    assert len(corners) == len(imported.map.segments)  # each ends where another begins
     assert imported.map.meta == {"source": "plan.csv", "thickness": "0.2"}
 
 
@@ -92,7 +103,7 @@ def test_a_map_of_our_own_stays_as_it_is(tmp_path: Path) -> None:
 
 def test_a_thickness_that_is_given(tmp_path: Path) -> None:
     imported = read_map(csv(tmp_path, HOUSE), ImportOptions(thickness=0.3))
-    assert apart(imported) == [0.3] * len(HOUSE)
+    assert thickness(imported) == [0.3] * len(HOUSE)
     assert list(assumed(imported)) == ["centres", "thickness_given"]
 
 
@@ -104,7 +115,7 @@ def test_widths_of_polylines_old_and_new(tmp_path: Path) -> None:
     space.add_polyline2d([(500, 300), (500, 600)], dxfattribs={"default_start_width": 10, "default_end_width": 10})
     document.saveas(tmp_path / "plan.dxf")
     imported = read_map(tmp_path / "plan.dxf")
-    assert apart(imported) == [0.36] * 4 + [0.12, 0.1]
+    assert thickness(imported, [*OUTLINE, [0, 3, 8, 3], [5, 3, 5, 6]]) == [0.36] * 4 + [0.12, 0.1]
     assert list(assumed(imported)) == ["centres", "thickness_drawn"]
 
 
@@ -119,7 +130,8 @@ def test_lines_of_an_svg_as_wide_as_walls(tmp_path: Path) -> None:
         f'<g stroke-width="0.4">{body}</g>{inner}{rest}</g></svg>'
     )
     imported = read_map(path, ImportOptions(units="cm"))
-    assert apart(imported) == [0.4, 0.4, 0.4, 0.4, 0.3, 0.4, 0.4]  # those without a number get the median
+    upright = [[x1, -y1, x2, -y2] for x1, y1, x2, y2 in HOUSE]
+    assert thickness(imported, upright) == [0.4] * 4 + [0.3, 0.4, 0.4]  # those without a number get the median
     assert "2 lines without a width" in assumed(imported)["thickness_drawn"]
 
 
@@ -143,4 +155,4 @@ def test_the_thickness_that_a_geojson_has(tmp_path: Path) -> None:
     features += [feature(line, {"width": 0.1, "thickness": "thin"}) for line in INNER]
     path = tmp_path / "plan.geojson"
     path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    assert apart(read_map(path, ImportOptions(local_metres=True))) == [0.24] * 4 + [0.1] * 3
+    assert thickness(read_map(path, ImportOptions(local_metres=True))) == [0.24] * 4 + [0.1] * 3
