@@ -94,6 +94,14 @@ def test_what_the_caller_says_goes_first(tmp_path: Path, said: ImportOptions) ->
     assert "centres" not in assumed(read_map(csv(tmp_path, HOUSE), said))
 
 
+def test_walls_that_go_on_straight_are_drawn_once(tmp_path: Path) -> None:
+    """An outer wall in two pieces, where an inner one meets it."""
+    pieces = [[0, 0, 5, 0], [5, 0, 8, 0], *OUTLINE[1:], [5, 0, 5, 6], [5, 3, 8, 3]]
+    faces = read_map(csv(tmp_path, pieces)).map.segments
+    lower = [sorted((begin, end)) for begin, y, end, other in faces.endpoints.round(4) if y == other == -0.1]
+    assert sorted(lower) == [[-0.1, 5.0], [5.0, 8.1]]
+
+
 def test_a_map_of_our_own_stays_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "own.json"
     path.write_text(json.dumps({"segments": HOUSE, "oriented": False}))
