@@ -73,14 +73,14 @@ docs: $(VENV)/.ready requirements/docs.txt  ## build the documents as pages, int
 
 $(VENV)-clients/.ready: $(VENV)/.ready
 	$(BIN)/python -m venv $(VENV)-clients
-	$(VENV)-clients/bin/python -m pip install --quiet --disable-pip-version-check datamodel-code-generator==0.89.0 openapi-python-client==0.29.1
+	$(VENV)-clients/bin/python -m pip install --quiet --disable-pip-version-check datamodel-code-generator==0.89.0 nlohmann-json==3.12.0 openapi-python-client==0.29.1
 	@touch $@
 
 client-types: $(VENV)-clients/.ready  ## make the types of clients/python anew from the schema
 	$(BIN)/python -m clients.types $(VENV)-clients/bin/datamodel-codegen
 	-$(BIN)/ruff format --quiet clients/python
 
-clients: $(VENV)-clients/.ready  ## make clients by generators for Python and TypeScript, and ask the README's question with each
+clients: $(VENV)-clients/.ready  ## make clients by generators for Python, TypeScript and C++, and ask the README's question with each
 	$(BIN)/python -m clients.trial $(VENV)-clients/bin
 
 siege: $(VENV)/.ready  ## print what each of many attacks takes from an honest client (25 min)

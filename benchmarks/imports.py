@@ -20,6 +20,7 @@ from formats import ImportOptions, LineMap, read_map, write_map
 from registration import RigidTransform, Segments
 from vectorization import vectorize
 
+from .centre_lines import drawn_plans
 from .collection import LEVELS, Collection
 from .grid_scans import GRIDS, LOG_OF, PosedScan, grid_path, logged, opencv_faces, simulated
 from .outcomes import OPTIONS, offset
@@ -32,6 +33,7 @@ LOG_STRIDES = {"intel": 4, "freiburg-079": 8}
 NEAR = (0.3, 3.0)  # m and degrees that an answer to a simulated scan may be off,
 NEAR_IN_LOG = (0.5, 5.0)  # and one to a scan of a log
 AGREED = 0.5  # m
+CENTRES = 10  # of each plan that is drawn by centre lines
 DRAWN = ("dxf", "svg", "geojson")
 SAME = 1e-6  # m and rad; poses of the same verdict
 
@@ -56,7 +58,7 @@ def imports(quick: int) -> list[Row]:
     if not data_found() or not all(grid_path(name).is_file() for name in GRIDS):
         print("\nImports: skipped, for the grids are not there.")
         return []
-    rows = _grids(quick) + _logs(quick) + _drawings(quick)
+    rows = _grids(quick) + _logs(quick) + _drawings(quick) + _centre_lines(quick)
     print_rows("Imported maps", rows)
     return rows
 
@@ -172,6 +174,21 @@ def _drawings(quick: int) -> list[Row]:
     head = ("plans", "right", "usable", "of these wrong")
     print_table(f"Drawings of {len(keys)} plans, {len(drawn.queries)} scans, levels {', '.join(LEVELS)}", head, cells)
     return rows
+
+
+def _centre_lines(quick: int) -> list[Row]:
+    """Compare what may be said of plans that are drawn by the centre lines of their walls."""
+    found: dict[str, list[Found]] = {}
+    for plan in drawn_plans(max(3, CENTRES // quick)):
+        for said, line_map in plan.imports().items():
+            found.setdefault(said, []).extend(_located(line_map, list(plan.scans)))
+    cells = [(said, str(len(some)), *_cells(some)) for said, some in found.items()]
+    print_table("Plans drawn by centre lines, as DXF", ("said of it", "scans", *HEAD), cells)
+    unsaid = found["nothing is said"]
+    return [
+        at_least("centre lines, nothing said: usable", mean(f.usable for f in unsaid), USABLE),
+        at_least("centre lines, nothing said: right of these", mean(f.right for f in unsaid if f.usable), RIGHT),
+    ]
 
 
 def _written_and_read(segments: Segments, path: Path) -> Segments:

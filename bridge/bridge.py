@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +13,7 @@ import linefix
 from formats import map_of_grid
 from registration import InputError
 
+from .gathering import Gathering, looks_of
 from .locating import Located, Mounts, locate
 from .messages import (
     DiagnosticArray,
@@ -19,14 +21,17 @@ from .messages import (
     LaserScan,
     MarkerArray,
     OccupancyGrid,
+    Odometry,
     PoseWithCovarianceStamped,
     TFMessage,
     Time,
 )
+from .odometry import Heard as Driven
 from .reporting import answer_marker, complaint, diagnosis, map_marker, stamped_pose
-from .wire import LATCHED, RELIABLE, SENSOR, Heard, Told, Waiting
+from .wire import LATCHED, RELIABLE, SENSOR, STREAM, Heard, Told, Waiting
 
 BEAT = 0.5  # s, after which it is looked anyway whether to end
+LITTLE = 1e-3  # s; so that the time is over when it is looked again
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,11 @@ class BridgeOptions:
     Attributes
     ----------
     scans : tuple of str
-        Topics of scans; each is answered by itself.
+        Topics of scans.
+    together : float
+        Seconds; scans of several topics that are taken no farther apart are answered as one. 0: each by itself.
+    odometry : str
+        Topic that says how the robot moved between such scans.
     map_topic : str or None
         Of an OccupancyGrid, for a bridge that was given no map.
     base_frame : str
@@ -49,6 +58,8 @@ class BridgeOptions:
     """
 
     scans: tuple[str, ...] = ("/scan",)
+    together: float = 0.1
+    odometry: str = "/odom"
     map_topic: str | None = None
     base_frame: str = "base_link"
     when: Literal["lost", "always"] = "lost"
@@ -69,10 +80,12 @@ class Bridge:
 
     def __init__(self, options: BridgeOptions, index: linefix.MapIndex | None = None, frame: str = "map") -> None:
         self._options, self._index, self._frame = options, index, frame
-        self._mounts = Mounts(options.base_frame)
+        self._mounts, self._driven = Mounts(options.base_frame), Driven()
+        self._gathering = Gathering(len(options.scans), options.together)
         self._lost, self._ended = True, False
         net = DomainParticipant(options.domain)
         self._scans = [Heard(net, topic, LaserScan, SENSOR) for topic in options.scans]
+        self._odometry = Heard(net, options.odometry, Odometry, STREAM)
         self._mounted = Heard(net, "/tf_static", TFMessage, LATCHED)
         self._asked = Heard(net, "/linefix/locate", Empty, RELIABLE)
         self._maps = [Heard(net, options.map_topic, OccupancyGrid, LATCHED)] if options.map_topic else []
@@ -87,7 +100,8 @@ class Bridge:
     def run(self) -> None:
         """Answer scans until `end` is called."""
         while not self._ended:
-            self._waiting.wait(BEAT)
+            left = self._gathering.left
+            self._waiting.wait(BEAT if left is None else min(BEAT, left + LITTLE))
             self.turn()
 
     def end(self) -> None:
@@ -96,17 +110,25 @@ class Bridge:
         self._waiting.end()
 
     def turn(self) -> None:
-        """Take what has come, and answer the newest scan of each topic."""
+        """Take what has come, and answer the newest scan of each topic; those that belong together as one."""
         for message in self._mounted.take():
             self._hear_mounts(message)
-        for topic in self._maps:
-            for grid in topic.take():
+        for maps in self._maps:
+            for grid in maps.take():
                 self._hear_map(grid)
         if self._asked.take():
             self._lost = True
-        for scans in self._scans:
+        for message in self._odometry.take():
+            self._hear_odometry(message)
+        for topic, scans in enumerate(self._scans):
             for scan in scans.take()[-1:]:
-                self._hear_scan(scan)
+                if self._options.together > 0.0:
+                    self._gathering.take(topic, scan)
+                else:
+                    self._hear_scans([scan])
+        ready = self._gathering.ready()
+        if ready:
+            self._hear_scans(ready)
 
     def _hear_mounts(self, message: TFMessage) -> None:
         try:
@@ -124,18 +146,25 @@ class Bridge:
         self._lost = True
         self._markers.say(map_marker(self._index, self._frame))
 
-    def _hear_scan(self, scan: LaserScan) -> None:
-        mount, stamp = self._mounts.of(scan.header.frame_id), scan.header.stamp
+    def _hear_odometry(self, message: Odometry) -> None:
+        try:
+            self._driven.hear(message)
+        except ValueError as error:
+            self._diagnostics.say(complaint(message.header.stamp, f"odometry is not taken: {error}"))
+
+    def _hear_scans(self, scans: Sequence[LaserScan]) -> None:
+        stamp = scans[0].header.stamp
         if self._index is None:
             self._diagnostics.say(complaint(stamp, "no map has come yet"))
             return
-        if mount is None:
-            missing = f"/tf_static does not say where {scan.header.frame_id} is in {self._options.base_frame}"
-            self._diagnostics.say(complaint(stamp, missing))
+        looks, missing = looks_of(scans, self._mounts, self._driven)
+        for one in missing:
+            self._diagnostics.say(complaint(stamp, one))
+        if not looks:
             return
         begun = time.perf_counter()
         try:
-            located = locate(self._index, scan, mount)
+            located = locate(self._index, looks)
         except InputError as error:
             self._diagnostics.say(complaint(stamp, f"a scan is not taken: {error}"))
             return

@@ -1,7 +1,8 @@
-"""One scan to the pose of the robot."""
+"""Scans to the pose of the robot."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from formats.logs.transforms import Transforms, matrix_of, planar
 from registration import RigidTransform
 
 from .messages import LaserScan, TFMessage, Time
+
+HERE = RigidTransform(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +32,7 @@ class Located:
     Attributes
     ----------
     stamp : Time
-        Of the scan.
+        Of the scan, of several the newest.
     answer : AssociationResult
     pose : RigidTransform or None
         map_from_base.
@@ -53,7 +56,7 @@ class Mounts:
     """
 
     def __init__(self, base: str) -> None:
-        self._base = base.strip("/")
+        self.base = base.strip("/")
         self._frames = Transforms("tf_static")
 
     def hear(self, message: TFMessage) -> None:
@@ -70,9 +73,9 @@ class Mounts:
 
     def of(self, frame: str) -> Mount | None:
         """Return where a scanner sits; None where nobody has said so yet."""
-        if frame.strip("/") == self._base:
-            return Mount(RigidTransform(0.0, 0.0, 0.0))
-        matrix = self._frames.lookup(self._base, frame, 0)
+        if frame.strip("/") == self.base:
+            return Mount(HERE)
+        matrix = self._frames.lookup(self.base, frame, 0)
         return None if matrix is None else Mount(*planar(matrix))
 
 
@@ -94,23 +97,41 @@ def laser_of(message: LaserScan, *, flipped: bool) -> linefix.LaserScan:
     )
 
 
-def locate(index: linefix.MapIndex, message: LaserScan, mount: Mount) -> Located:
-    """Find where the robot is by one scan.
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """A scan, and from where it was taken.
+
+    Attributes
+    ----------
+    message : LaserScan
+    mount : Mount
+    base_from_then : RigidTransform
+        Where the robot was at that time, as seen from where it was at the time that is asked about.
+    """
+
+    message: LaserScan
+    mount: Mount
+    base_from_then: RigidTransform = HERE
+
+
+def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
+    """Find where the robot is by one scan, or by several scanners together, at the time of the first.
 
     Raises
     ------
     InputError
-        When the message is no scan.
+        When a message is no scan.
     """
-    answer = linefix.locate(index, laser_of(message, flipped=mount.flipped))
-    stamp = message.header.stamp
+    stamp = looks[0].message.header.stamp
+    lasers = [laser_of(look.message, flipped=look.mount.flipped) for look in looks]
+    if len(looks) > 1:
+        places = [look.base_from_then.compose(look.mount.base_from_laser) for look in looks]
+        views = [linefix.View(linefix.scan_of(laser), at) for laser, at in zip(lasers, places, strict=True)]
+        together = linefix.locate(index, linefix.assemble(views))
+        return Located(stamp, together, together.pose, together.covariance)
+    answer = linefix.locate(index, lasers[0])
     if answer.pose is None:
         return Located(stamp, answer, None, None)
-    pose = answer.pose.compose(mount.base_from_laser.inverse())
-    covariance = answer.covariance
-    if covariance is not None:
-        # A small turn moves the robot about the laser, 90 degrees on from where it is.
-        about = np.eye(3)
-        about[0, 2], about[1, 2] = answer.pose.y - pose.y, pose.x - answer.pose.x
-        covariance = about @ covariance @ about.T
-    return Located(stamp, answer, pose, covariance)
+    laser_from_base = looks[0].mount.base_from_laser.inverse()
+    covariance = None if answer.covariance is None else answer.pose.carry(answer.covariance, laser_from_base)
+    return Located(stamp, answer, answer.pose.compose(laser_from_base), covariance)

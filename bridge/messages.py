@@ -83,6 +83,26 @@ class PoseWithCovarianceStamped(IdlStruct, typename=_type("geometry_msgs", "Pose
 
 
 @dataclass
+class Twist(IdlStruct, typename=_type("geometry_msgs", "Twist")):
+    linear: Vector3 = field(default_factory=Vector3)
+    angular: Vector3 = field(default_factory=Vector3)
+
+
+@dataclass
+class TwistWithCovariance(IdlStruct, typename=_type("geometry_msgs", "TwistWithCovariance")):
+    twist: Twist = field(default_factory=Twist)
+    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
+
+
+@dataclass
+class Odometry(IdlStruct, typename=_type("nav_msgs", "Odometry")):
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
+
+
+@dataclass
 class Transform(IdlStruct, typename=_type("geometry_msgs", "Transform")):
     translation: Vector3 = field(default_factory=Vector3)
     rotation: Quaternion = field(default_factory=Quaternion)

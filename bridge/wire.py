@@ -19,6 +19,8 @@ Message = TypeVar("Message", bound=IdlStruct)
 
 # What ROS calls sensor data: the newest counts, and what is lost is lost.
 SENSOR = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1))
+# Of what each message counts, though some may be lost.
+STREAM = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(100))
 # What is said once and holds: maps and mounts, also for those who come later.
 LATCHED = Qos(
     Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(10)

@@ -36,10 +36,10 @@ class ImportOptions:
         file says.
     layers : tuple of str
         Patterns such as ``*WALL*``, without regard to case; empty: all layers that are drawn.
-    drawn : "faces" or "centres"
-        Whether the lines of a drawing are the faces of walls, or run in their middle.
+    drawn : "faces", "centres" or None
+        Whether the lines of a drawing are the faces of walls, or run in their middle; None: found from how they lie.
     thickness : float or None
-        Of walls that are drawn by their centre line, metres, 0 to 10; None: as the drawing says, else 0.
+        Of walls that are drawn by their centre line, metres, 0 to 10; None: as the drawing says, else 0.2.
     inside : tuple of (x, y)
         Free places, metres in the map frame: directions are found from there.
     directions : "drawn", "none" or None
@@ -58,7 +58,7 @@ class ImportOptions:
 
     units: str | float | None = None
     layers: tuple[str, ...] = ()
-    drawn: Drawn = "faces"
+    drawn: Drawn | None = None
     thickness: float | None = None
     inside: tuple[tuple[float, float], ...] = ()
     directions: Directions | None = None
@@ -70,7 +70,7 @@ class ImportOptions:
             raise InvalidOptionError(f"expected one of {', '.join(UNITS)}, or metres per unit", argument="units")
         if isinstance(self.units, int | float) and not 1e-6 <= self.units <= 1e4:
             raise InvalidOptionError(f"expected 1e-6 to 1e4 metres per unit, got {self.units!r}", argument="units")
-        if self.drawn not in ("faces", "centres"):
+        if self.drawn not in (None, "faces", "centres"):
             raise InvalidOptionError("expected faces or centres", argument="drawn")
         if self.directions not in (None, "drawn", "none"):
             raise InvalidOptionError("expected drawn or none", argument="directions")

@@ -26,6 +26,8 @@ from association import (
     Scan,
     SoftPrior,
     Status,
+    View,
+    assemble,
     associate,
 )
 from registration import (
@@ -69,6 +71,8 @@ __all__ = [
     "Status",
     "Vectorization",
     "VectorizationOptions",
+    "View",
+    "assemble",
     "associate",
     "draw_map",
     "index_map",

@@ -120,6 +120,11 @@ class Segments:
         """Return the same segments with begin and end exchanged."""
         return Segments.derived(self.endpoints[:, [2, 3, 0, 1]])
 
+    def moved_left(self, by: ArrayLike) -> Segments:
+        """Return the segments moved along their left normals, by one distance or one for each, metres."""
+        aside = self.normals * np.broadcast_to(np.asarray(by, dtype=np.float64), len(self))[:, None]
+        return Segments.derived(self.endpoints + np.tile(aside, 2))
+
     def shifted(self, by: ArrayLike) -> Segments:
         """Return the segments moved by a vector of 2 metres, to work near the origin."""
         offset = np.asarray(by, dtype=np.float64)

@@ -58,6 +58,26 @@ class RigidTransform:
         c, s = math.cos(self.theta), math.sin(self.theta)
         return RigidTransform(-c * self.x - s * self.y, s * self.x - c * self.y, -self.theta)
 
+    def carry(self, covariance: ArrayLike, by: RigidTransform) -> NDArray[np.float64]:
+        """Return the covariance of ``self.compose(by)``, where `by` is known exactly.
+
+        Parameters
+        ----------
+        covariance : (3, 3)
+            Of this pose: additive (x, y, theta); m^2, m rad, rad^2.
+        by : RigidTransform
+
+        Returns
+        -------
+        (3, 3)
+        """
+        there = self.compose(by)
+        # A small turn moves what is fixed to this frame about its origin, 90 degrees on from where it is.
+        about = np.eye(3)
+        about[0, 2], about[1, 2] = self.y - there.y, there.x - self.x
+        carried: NDArray[np.float64] = about @ np.asarray(covariance, dtype=np.float64) @ about.T
+        return carried
+
     def apply(self, points: ArrayLike) -> NDArray[np.float64]:
         """Transform points, shape (..., 2), metres."""
         p = np.asarray(points, dtype=np.float64)

@@ -7,6 +7,7 @@ from .check import check_map
 from .judging import judge_samples
 from .result import Advice, Finding, MapCheck, Place, SampleReport, Size
 from .samples import Sample, try_sample
+from .thickness import find_thickness, fit_better_mirrored, thickness_finding
 
 __all__ = [
     "Advice",
@@ -17,6 +18,9 @@ __all__ = [
     "SampleReport",
     "Size",
     "check_map",
+    "find_thickness",
+    "fit_better_mirrored",
     "judge_samples",
+    "thickness_finding",
     "try_sample",
 ]

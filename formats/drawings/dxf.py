@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import io
 import logging
 from collections.abc import Iterable, Iterator
@@ -14,6 +15,7 @@ from ezdxf import recover
 from ezdxf.entities.dxfentity import DXFEntity
 from ezdxf.entities.insert import Insert
 from ezdxf.entities.lwpolyline import LWPolyline
+from ezdxf.entities.polyline import Polyline
 from ezdxf.enums import InsertUnits
 from ezdxf.lldxf.const import DXFError
 from ezdxf.units import conversion_factor
@@ -22,7 +24,7 @@ from ..errors import FormatError, MalformedFileError, TooLargeError, Unsupported
 from ..files import name_of, read_bounded
 from ..limits import MAX_BLOCK_DEPTH, MAX_CURVE_POINTS, MAX_ENTITIES, MAX_MAP_BYTES
 from ..options import ImportOptions
-from ..report import Notes
+from ..report import Notes, shown
 from .drawing import Drawing
 
 if TYPE_CHECKING:
@@ -33,6 +35,10 @@ logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
 # The layer of lines that have free space on their left; the one way in which a DXF says so.
 FREE_LEFT = "FREE_LEFT"
+
+# Of layers, in some languages of drawings.
+NAMES_OF_WALLS = ("*wall*", "*wand*", "*mauer*", "*muro*", "*pared*", "*mur", "*murs*")
+MOST_NAMED = 10  # layers
 
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 SAGITTA = 0.01  # m; how far a chord may lie from its arc
@@ -54,9 +60,10 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     """
     name = name_of(path)
     document = _document(read_bounded(path, MAX_MAP_BYTES), name, notes)
-    drawing = Drawing(name, "dxf", options.layers, notes, _metres(document))
-    metres = options.metres or drawing.metres or 1.0
     hidden = {layer.dxf.name.casefold() for layer in document.layers if layer.is_off() or layer.is_frozen()}
+    layers = options.layers or _layers_of_walls(document, hidden, notes)
+    drawing = Drawing(name, "dxf", layers, notes, _metres(document))
+    metres = options.metres or drawing.metres or 1.0
     directed = 0
     try:
         for count, (entity, layers) in enumerate(_expanded(document.modelspace(), (), 0, drawing)):
@@ -81,6 +88,8 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 def _document(content: bytes, name: str, notes: Notes) -> Document:
     if content[:4] == b"AC10":
         raise UnsupportedFormatError("is a DWG; save it as DXF", argument=name)
+    if not content.strip():
+        raise MalformedFileError("is empty", argument=name)
     try:
         document, auditor = recover.read(io.BytesIO(content))
     except (DXFError, OSError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError) as error:
@@ -88,6 +97,23 @@ def _document(content: bytes, name: str, notes: Notes) -> Document:
     if auditor.fixes or auditor.errors:
         notes.add_assumed("repairs", "broken places that were repaired", len(auditor.fixes) + len(auditor.errors))
     return document
+
+
+def _layers_of_walls(document: Document, hidden: set[str], notes: Notes) -> tuple[str, ...]:
+    """Return patterns of the layers that hold walls by their names, where there are others; else none."""
+    names = {str(entity.dxf.get("layer", "0")) for entity in document.modelspace()}
+    shown_names = sorted(name for name in names if name.casefold() not in hidden)
+    walls = [n for n in shown_names if any(fnmatch.fnmatchcase(n.casefold(), pattern) for pattern in NAMES_OF_WALLS)]
+    others = [name for name in shown_names if name not in walls]
+    if len(shown_names) < 2 or not others:
+        return ()
+    listed = ", ".join(shown(name) for name in others[:MOST_NAMED]) + (" ..." if len(others) > MOST_NAMED else "")
+    if not walls:
+        notes.add_assumed("layers", f"lines of all layers are walls: {listed}; say layers where some are not")
+        return ()
+    taken = ", ".join(shown(name) for name in walls[:MOST_NAMED])
+    notes.add_assumed("layers", f"walls are on {taken}, by the name, and not on {listed}; say layers for others")
+    return NAMES_OF_WALLS
 
 
 def _metres(document: Document) -> float | None:
@@ -119,6 +145,14 @@ def _expanded(
             yield from _expanded(one.virtual_entities(), within, depth + 1, drawing)
 
 
+def _width(entity: DXFEntity) -> float:
+    """Return how wide a polyline is drawn, where it begins; units of the drawing."""
+    if isinstance(entity, LWPolyline):
+        told = entity.dxf.get("const_width", 0.0) or next((start for _, _, start, _, _ in entity.get_points()), 0.0)
+        return float(told)
+    return float(entity.dxf.default_start_width) if isinstance(entity, Polyline) else 0.0
+
+
 def _add(entity: DXFEntity, drawing: Drawing, sagitta: float) -> None:
     kind = entity.dxftype()
     if kind == "INSERT":
@@ -130,6 +164,5 @@ def _add(entity: DXFEntity, drawing: Drawing, sagitta: float) -> None:
     points = [(p.x, p.y) for p in islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1)]
     if len(points) > MAX_CURVE_POINTS:
         raise TooLargeError(f"expected at most {MAX_CURVE_POINTS} points of a curve", argument=drawing.name)
-    width = float(entity.dxf.get("const_width", 0.0)) if isinstance(entity, LWPolyline) else 0.0
-    drawing.add(points, width=max(0.0, width))
+    drawing.add(points, width=max(0.0, _width(entity)))
     drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)

@@ -27,7 +27,8 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     ----------
     path : Path
     options : ImportOptions
-        `local_metres` has to be set for any file but our own; layers are the properties ``layer`` and ``name``.
+        `local_metres` has to be set for any file but our own; layers are the properties ``layer`` and ``name``, and
+        ``thickness`` or ``width`` are those of a wall drawn by its centre line.
     notes : Notes
 
     Raises
@@ -79,6 +80,8 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
     if geometry is None:
         drawing.drop("feature without geometry")
         return
+    widths = (named.get(key) for key in ("thickness", "width"))
+    width = next((float(told) for told in widths if isinstance(told, int | float)), 0.0)
     for points, closed in _lines(geometry, drawing):
         try:
             pairs = [(p[0], p[1]) for p in points]
@@ -86,7 +89,7 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
             raise MalformedFileError("has a position that is no [x, y]", argument=drawing.name) from error
         if not all(type(c) in (int, float) for pair in pairs for c in pair):
             raise MalformedFileError("has a coordinate that is no number", argument=drawing.name)
-        drawing.add(pairs, closed=closed)
+        drawing.add(pairs, closed=closed, width=width)
 
 
 def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:

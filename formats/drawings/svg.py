@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder
@@ -14,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import FormatError, MalformedFileError, TooLargeError
 from ..files import name_of, read_bounded
-from ..limits import MAX_DEPTH, MAX_ENTITIES, MAX_MAP_BYTES, MAX_PATH_BYTES
+from ..limits import MAX_DEPTH, MAX_ENTITIES, MAX_MAP_BYTES, MAX_PATH_BYTES, MAX_UNITS
 from ..options import ImportOptions
 from ..report import Notes
 from .drawing import Drawing
@@ -28,6 +32,8 @@ GROUPS = {"g", "a", "switch"}
 
 # Attributes of the root in which our own drawings say what they are.
 METRES, ORIENTED = "data-metres-per-unit", "data-free-space-on-left"
+
+_STROKE_WIDTH = re.compile(r"(?:^|;)\s*stroke-width\s*:([^;]*)")
 
 Floats = NDArray[np.float64]
 Matrix = Any
@@ -67,12 +73,12 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 
 
 def _read_elements(root: Element, drawing: Drawing) -> None:
-    for element, matrix, layers in _all_drawn(root, drawing):
-        if not drawing.wants(*layers):
+    for element, place in _all_drawn(root, drawing):
+        if not drawing.wants(*place.layers):
             drawing.notes.add_dropped("other_layer", "elements on layers that were not asked for", 1)
             continue
         for points, closed in SHAPES[_kind(element)](element):
-            drawing.add(_placed(points, matrix), closed=closed)
+            drawing.add(_placed(points, place.matrix), closed=closed, width=place.width)
         drawing.notes.add_read(f"element_{_kind(element)}", f"{_kind(element)} elements", 1)
 
 
@@ -128,15 +134,40 @@ def _kind(element: Element) -> str:
     return tag.removeprefix(NAMESPACE + "}")
 
 
-def _all_drawn(root: Element, drawing: Drawing) -> Iterator[tuple[Element, Matrix, tuple[str, ...]]]:
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """What an element has of those that it is in: their names, the matrix to the root's units, and the pen."""
+
+    layers: tuple[str, ...] = ()
+    matrix: Matrix = field(default_factory=svgelements.Matrix)
+    stroke: float = 0.0  # the element's own units
+
+    @property
+    def width(self) -> float:
+        """Of a line, the root's units."""
+        m = self.matrix
+        return self.stroke * math.sqrt(abs(m.a * m.d - m.b * m.c))
+
+
+def _all_drawn(root: Element, drawing: Drawing) -> Iterator[tuple[Element, _Place]]:
     for child in root:
-        yield from _drawn(child, svgelements.Matrix(), (), drawing)
+        yield from _drawn(child, _Place(stroke=_stroke(root, 0.0)), drawing)
 
 
-def _drawn(
-    element: Element, outer: Matrix, layers: tuple[str, ...], drawing: Drawing
-) -> Iterator[tuple[Element, Matrix, tuple[str, ...]]]:
-    """Yield what is drawn, with the matrix to the root's units and the names of its layers."""
+def _stroke(element: Element, inherited: float) -> float:
+    """Return how wide lines are drawn; what is no plain number, such as a share of the picture, is taken for none."""
+    styled = _STROKE_WIDTH.search(element.get("style", ""))
+    told = styled[1] if styled else element.get("stroke-width")
+    if told is None:
+        return inherited
+    with suppress(ValueError):
+        width = float(told.strip().removesuffix("px"))
+        return width if 0.0 <= width <= MAX_UNITS else 0.0
+    return 0.0
+
+
+def _drawn(element: Element, outer: _Place, drawing: Drawing) -> Iterator[tuple[Element, _Place]]:
+    """Yield what is drawn, with where it stands."""
     kind = _kind(element)
     if kind in NOT_DRAWN:
         return
@@ -144,13 +175,13 @@ def _drawn(
         drawing.notes.add_dropped("hidden", "elements that are not displayed", 1)
         return
     names = [element.get(key, "") for key in ("id", "class", INKSCAPE_LABEL)]
-    within = (*layers, *filter(None, names))
-    matrix = svgelements.Matrix(element.get("transform", "")) * outer
+    matrix = svgelements.Matrix(element.get("transform", "")) * outer.matrix
+    place = _Place((*outer.layers, *filter(None, names)), matrix, _stroke(element, outer.stroke))
     if kind in GROUPS:
         for child in element:
-            yield from _drawn(child, matrix, within, drawing)
+            yield from _drawn(child, place, drawing)
     elif kind in SHAPES:
-        yield element, matrix, within
+        yield element, place
     else:
         drawing.drop(kind)
 

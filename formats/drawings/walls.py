@@ -10,8 +10,10 @@ from registration import InputError, Segments
 from ..errors import IncompleteFileError, MalformedFileError
 from ..line_map import LineMap
 from ..options import ImportOptions
+from .centres import are_centres, walls_of
 from .drawing import Drawing
 from .inside import Sides, sides_seen
+from .solid import outline
 
 Floats = NDArray[np.float64]
 
@@ -47,9 +49,9 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     oriented = _means_directions(drawing, options)
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
-    endpoints, made = _with_faces(endpoints, widths, drawing, options)
-    oriented = oriented or made
-    if options.inside and not made:
+    if are_centres(endpoints, drawing, options):
+        endpoints, oriented = _with_faces(endpoints, widths, drawing, options), True
+    elif options.inside:
         endpoints, oriented = _directed(endpoints, drawing, options), True
     if not oriented:
         drawing.notes.add_assumed(
@@ -58,7 +60,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
             "run in the middle of walls their thickness (drawn centres, thickness)",
         )
     drawing.notes.add_read("segments", "faces of walls" if oriented else "lines", len(endpoints))
-    meta = drawing.meta or {"source": drawing.name}
+    meta = drawing.meta if drawing.format == "json" and drawing.meta else {"source": drawing.name} | drawing.meta
     return LineMap(_segments(endpoints, drawing), drawing.sigma, oriented, drawing.frame_id, meta)
 
 
@@ -87,24 +89,13 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
     return endpoints[first], widths[first]
 
 
-def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: ImportOptions) -> tuple[Floats, bool]:
-    """Return both faces of walls drawn by their centre line, free space on the left, and whether they were so drawn."""
-    if options.drawn == "faces":
-        return endpoints, False
-    if options.thickness is not None:
-        thickness = np.full(len(endpoints), options.thickness)
-    else:
-        thickness = widths
-        found = int((widths > 0.0).sum())
-        drawing.notes.add_assumed(
-            "thickness",
-            f"{found} of {len(widths)} lines have a width; the others are taken for walls without thickness",
-        )
-    span = endpoints[:, 2:] - endpoints[:, :2]
-    normals = np.stack([-span[:, 1], span[:, 0]], axis=1) / np.hypot(span[:, 0], span[:, 1])[:, None]
-    aside = np.tile(normals * (0.5 * thickness)[:, None], 2)
+def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: ImportOptions) -> Floats:
+    """Return both faces of walls drawn by their centre line, free space on the left."""
+    walls = walls_of(widths, options)
+    drawing.notes.add_assumed(walls.code, walls.told)
     drawing.notes.add_merged("faces", "centre lines made into two faces", len(endpoints))
-    return np.vstack([endpoints + aside, (endpoints - aside)[:, [2, 3, 0, 1]]]), True
+    drawing.meta |= {"thickness": f"{float(np.median(walls.thickness)):.3g}"}
+    return outline(_segments(endpoints, drawing).endpoints, walls.thickness)
 
 
 def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Floats:

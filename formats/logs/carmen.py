@@ -122,7 +122,9 @@ def _logged(
     # At the greatest range nothing came back: it has to lie above what counts as a return.
     scan = LaserScan(angles.first, angles.step, ranges, 0.0, math.nextafter(angles.range_max, 0.0))
     stamp = round(float(time) * 1e9)
-    return LoggedScan(stamp, kind, kind, scan, 0.0, laser, "odom" if laser else "", mount)
+    return LoggedScan(
+        stamp, kind, kind, scan, 0.0, laser, "odom" if laser else "", mount, base_frame="robot" if mount else ""
+    )
 
 
 def _count(word: str) -> int:

@@ -118,7 +118,7 @@ def _scan(topic: str, message: Any, frames: Transforms, options: LogOptions) -> 
     mount, upside_down = planar(mounted) if mounted is not None else (None, flipped)
     return LoggedScan(
         stamp, topic, shown(frame), laser, float(message.time_increment), pose, outer if pose else "", mount,
-        flipped or upside_down,
+        flipped or upside_down, base if base and mount else "",
     )  # fmt: skip
 
 

@@ -45,6 +45,8 @@ class LoggedScan:
     pose_frame : str
     mount : RigidTransform or None
         base_from_sensor; None: not known.
+    base_frame : str
+        The robot's own frame, which `mount` is in.
     flipped : bool
         Whether the sensor is mounted upside down: y becomes -y in its data before `pose` or `mount` apply.
     """
@@ -58,6 +60,7 @@ class LoggedScan:
     pose_frame: str = ""
     mount: RigidTransform | None = None
     flipped: bool = False
+    base_frame: str = ""
 
     @property
     def stamp(self) -> float:

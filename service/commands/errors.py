@@ -31,9 +31,20 @@ class WrongUseError(CommandError):
 
 
 class RefusedError(CommandError):
-    """A file, or what is in it, is not taken."""
+    """A file, or what is in it, is not taken.
+
+    Parameters
+    ----------
+    message : str
+    pointer : str
+        The place in the request that is wrong; empty: none in particular.
+    """
 
     exit_code = 3
+
+    def __init__(self, message: str, pointer: str = "") -> None:
+        super().__init__(message)
+        self.pointer = pointer
 
 
 class NoSuchMapError(RefusedError):
@@ -105,5 +116,5 @@ def error_of(
         if len(faults) > 1:
             message += f" (and {len(faults) - 1} more)"
     if 400 <= status < 500 and status not in BUSY:
-        return RefusedError(message)
+        return RefusedError(message, faults[0]["pointer"] if faults else "")
     return NoServerError(message)

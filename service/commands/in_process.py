@@ -32,7 +32,7 @@ from ..telemetry.metrics import Metrics
 from ..work.analyzing import analysis_json, analysis_of, reference_to
 from ..work.answers import outline_json
 from ..work.association import Associator
-from ..work.checking import check, check_done, sample
+from ..work.checking import check, check_done, conclude, sample
 from ..work.compiling import compile_kernels, is_compiled
 from ..work.importing import answer_import
 from ..work.job import Done, Job, Stopwatch
@@ -101,8 +101,11 @@ class InProcess:
             job = self._job(watch, None if asked is None else asked.deadline_ms)
             line_map = None if map_id else read_model(InlineMap, orjson.dumps(on), self._limits)
             checked = check(self._lookup, line_map or self._lookup.find(str(map_id), oriented=True), asked, job)
-            tried = None if asked is None else [sample(checked, asked, k, job) for k in range(len(asked.scans))]
-            return _json(check_done(checked, tried, asked, job))
+            judged = None
+            if asked is not None:
+                tried = [sample(checked, asked, number, job) for number in range(len(asked.scans))]
+                judged = conclude(checked, tried, job)
+            return _json(check_done(checked, judged, asked, job))
 
     def put(self, map_id: str, document: Json) -> Json:
         """Store a map where a service with these settings would."""

@@ -38,11 +38,20 @@ class ReplayedScan:
         As in a request.
     odometry : RigidTransform or None
         odom_from_sensor; None where the log does not say.
+    frame : str
+        The sensor's.
+    mount : RigidTransform or None
+        base_from_sensor; None where the log does not say.
+    base : str
+        The robot's own frame, which `mount` is in.
     """
 
     stamp_ns: int
     scan: Json
     odometry: RigidTransform | None
+    frame: str
+    mount: RigidTransform | None
+    base: str
 
 
 def opened(path: Path, topic: str | None) -> Log:
@@ -63,7 +72,7 @@ def scans_of(log: Log) -> Iterator[ReplayedScan]:
     """Give the scans of a log one by one; raises `RefusedError` where it is broken."""
     with needing_formats(f"reading {log.name}"):
         for one in log:
-            yield ReplayedScan(one.stamp_ns, _scan(one), one.pose)
+            yield ReplayedScan(one.stamp_ns, _scan(one), one.pose, one.frame_id, one.mount, one.base_frame)
 
 
 def spread(found: Sequence[T], most: int) -> list[T]:

@@ -19,6 +19,8 @@ from rich.progress import track
 
 from registration import RigidTransform
 
+from .errors import CommandError, NoSuchMapError, RefusedError
+from .frames import Frames
 from .inputs import document_at, line_map_of, needing_formats, read_map_or_id
 from .logs import ReplayedScan, Topic, opened, scans_of
 from .options import AsJson, Server
@@ -28,6 +30,20 @@ from .tracking import Tracker
 
 if TYPE_CHECKING:
     from formats import Log, StampedPose
+
+
+# What is told of a scan, and of one that is not taken.
+REFUSED: Json = {
+    "status": None,
+    "usable": False,
+    "probability": None,
+    "pose": None,
+    "reasons": [],
+    "timing_ms": None,
+}
+
+
+HOPELESS = 20  # scans from the first on
 
 
 class Mode(StrEnum):
@@ -46,11 +62,21 @@ class Tally:
     times: list[float] = field(default_factory=list)  # ms
     usable: list[StampedPose] = field(default_factory=list)
     others: list[RigidTransform] = field(default_factory=list)
+    refused: CommandError | None = None  # the last
 
-    def take(self, stamp_ns: int, answer: Json) -> None:
+    @property
+    def count(self) -> int:
+        """How many scans there were."""
+        return sum(self.verdicts.values())
+
+    def take(self, stamp_ns: int, answer: Json | CommandError) -> None:
         """Count an answer, and keep its pose."""
         from formats import StampedPose
 
+        if isinstance(answer, CommandError):
+            self.verdicts["refused"] += 1
+            self.refused = answer
+            return
         self.verdicts[answer["status"] + (", usable" if answer["usable"] else ", not usable")] += 1
         self.reasons.update(one["code"] for one in answer["reasons"][:1])
         self.times.append(answer["timing_ms"]["total"])
@@ -76,44 +102,79 @@ def replay(
         Path | None,
         typer.Option(metavar="FILE", help="Draw map and poses there, as png: usable ones red, others grey."),
     ] = None,
+    mount: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y THETA", help="Where the laser sits on the robot, metres and radians."),
+    ] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Locate the scans of a log one after the other; poses are those of the laser. With --json one line a scan."""
+    """Locate the scans of a log one after the other. With --json one line a scan.
+
+    Poses are those of the robot where --mount or the log says how the laser is mounted, else those of the laser.
+    """
     told, source = read_map_or_id(on), opened(log, topic)
-    tally = Tally()
+    tally, frames = Tally(), Frames.of(mount)
+    broken: RefusedError | None = None
     with answering(server) as service:
         scans = _shown(islice(scans_of(source), 0, None, every), source, every)
-        for one, answer in located(service, told, scans, mode):
-            tally.take(one.stamp_ns, answer)
-            if as_json:
-                print_json(_line(one, answer))
+        try:
+            for one, answer in located(service, told, scans, mode):
+                found = answer if isinstance(answer, CommandError) else frames.answer(one, answer)
+                tally.take(one.stamp_ns, found)
+                if as_json:
+                    print_json(_line(one, found, frames))
+        except RefusedError as error:  # the rest of the log cannot be read; what came before it counts
+            if not tally.count:
+                raise
+            broken = error
     if out is not None:
         from formats import write_tum
 
         write_tum(tally.usable, out)
     if picture is not None:
         _draw(document_at(on, server), tally, picture)
-    _tell_log(source, sys.stderr if as_json else sys.stdout)
+    _tell_log(source, frames, sys.stderr if as_json else sys.stdout)
     if not as_json:
         _tell(tally)
+    if broken is not None:
+        raise broken
+    if tally.refused is not None and tally.count == tally.verdicts["refused"]:
+        raise tally.refused
 
 
 def located(
     service: Service, on: Json, scans: Iterator[ReplayedScan], mode: Mode
-) -> Iterator[tuple[ReplayedScan, Json]]:
-    """Give each scan with the answer to it; in mode track the prior comes from the answers before and odometry."""
+) -> Iterator[tuple[ReplayedScan, Json | RefusedError]]:
+    """Give each scan with the answer to it, or why it is not taken.
+
+    In mode track the prior comes from the answers before and odometry.
+    """
     tracker = Tracker() if mode is Mode.TRACK else None
+    refusals: list[str] | None = []  # None: one was taken
     packed = orjson.Fragment(orjson.dumps(on)) if "map_id" not in on else on
     for one in scans:
         body: Json = {"map": packed, "scan": one.scan, "options": {"include": [], "max_alternatives": 0}}
         prior = None if tracker is None else tracker.prior(one.odometry)
         if prior is not None:
             body["prior"] = prior
-        answer = service.ask("associate", body)
+        try:
+            answer = service.ask("associate", body)
+        except RefusedError as error:
+            refusals = None if refusals is None else [*refusals, str(error)]
+            if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or _hopeless(refusals):
+                raise
+            yield one, error
+            continue
+        refusals = None
         if tracker is not None:
             tracker.learn(answer, one.odometry)
         yield one, answer
+
+
+def _hopeless(refusals: list[str] | None) -> bool:
+    """Tell whether all scans so far, and some of them, were refused in the same words: it may be for the map."""
+    return refusals is not None and len(refusals) == HOPELESS and len(set(refusals)) == 1
 
 
 def _shown(scans: Iterator[ReplayedScan], log: Log, every: int) -> Iterator[ReplayedScan]:
@@ -123,9 +184,11 @@ def _shown(scans: Iterator[ReplayedScan], log: Log, every: int) -> Iterator[Repl
     yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
 
 
-def _line(one: ReplayedScan, answer: Json) -> Json:
-    names = ("status", "usable", "probability", "pose", "reasons", "timing_ms")
-    return {"stamp": one.scan["stamp"], **{name: answer[name] for name in names}}
+def _line(one: ReplayedScan, answer: Json | CommandError, frames: Frames) -> Json:
+    refused = answer if isinstance(answer, CommandError) else None
+    told = REFUSED if isinstance(answer, CommandError) else answer
+    line = {"stamp": one.scan["stamp"], **{name: told[name] for name in REFUSED}}
+    return {**line, "child_frame_id": frames.name, "error": None if refused is None else str(refused)}
 
 
 def _draw(document: Json, tally: Tally, picture: Path) -> None:
@@ -135,18 +198,21 @@ def _draw(document: Json, tally: Tally, picture: Path) -> None:
         draw_map(line_map_of(document), picture, [one.pose for one in tally.usable], tally.others)
 
 
-def _tell_log(log: Log, where: TextIO) -> None:
-    """Say what was taken of the log and what was not."""
+def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
+    """Say what was taken of the log and what was not, and whose poses are told."""
     for kind in ("assumed", "dropped"):
         for note in getattr(log.report, kind):
             print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)
+    print(f"{'poses':10}{plain(frames.told)}", file=where)
 
 
 def _tell(tally: Tally) -> None:
-    count = max(1, len(tally.times))
+    count = max(1, tally.count)
     table = [(verdict, number, f"{100.0 * number / count:.1f} %") for verdict, number in tally.verdicts.most_common()]
     print_table(("verdict", "scans", "share"), table)
     if tally.reasons:
         print_table(("why not usable", "scans"), tally.reasons.most_common())
+    if tally.refused is not None:
+        print_rows([("refused", str(tally.refused))])
     if tally.times:
         print_rows([("time", f"{median(tally.times):.1f} ms a scan in the median, {max(tally.times):.1f} ms at most")])

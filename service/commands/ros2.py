@@ -22,6 +22,18 @@ def ros2(
     ] = None,
     map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Of an OccupancyGrid, without --map.")] = "/map",
     scan: Annotated[list[str] | None, typer.Option(metavar="TOPIC", help="Of scans; may be given again.")] = None,
+    together: Annotated[
+        float,
+        typer.Option(
+            metavar="SECONDS",
+            min=0.0,
+            max=5.0,
+            help="Scans of several topics so near in time are one; 0: each by itself.",
+        ),
+    ] = 0.1,
+    odom: Annotated[
+        str, typer.Option(metavar="TOPIC", help="Of odometry: how the robot moves between them.")
+    ] = "/odom",
     base: Annotated[str, typer.Option(metavar="FRAME", help="The robot's own frame.")] = "base_link",
     when: Annotated[
         Literal["lost", "always"],
@@ -38,7 +50,15 @@ def ros2(
         raise RefusedError('linefix ros2 needs more packages: pip install "linefix[formats,ros2]"') from None
     import linefix
 
-    options = BridgeOptions(tuple(scan or ("/scan",)), None if on else map_topic, base, when, _domain())
+    options = BridgeOptions(
+        scans=tuple(scan or ("/scan",)),
+        together=together,
+        odometry=odom,
+        map_topic=None if on else map_topic,
+        base_frame=base,
+        when=when,
+        domain=_domain(),
+    )
     index, frame = None, "map"
     if on is not None:
         document = read_map_file(on)

@@ -56,6 +56,7 @@ class SamplesAnswer(Answer):
 
     usable: Index = Field(description="of them, in the map as it is")
     usable_as_advised: Index = Field(description="with the map's properties as advised")
+    thicker: float | None = Field(description="metres by which walls are thicker than drawn; null: nothing says so")
     scans: list[SampleAnswer]
 
 

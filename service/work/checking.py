@@ -12,8 +12,12 @@ from association.checking import (
     Finding,
     MapCheck,
     Sample,
+    SampleReport,
     check_map,
+    find_thickness,
+    fit_better_mirrored,
     judge_samples,
+    thickness_finding,
     try_sample,
 )
 from registration import InputError
@@ -29,6 +33,7 @@ from .inputs import scanned_of, transform_of
 from .job import Done, Job
 
 MOST_INDICES = 1000  # of one finding
+HIDES_THICKNESS = {"reversed", "scale"}  # what such a map's walls seem to be is no thickness
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,19 +100,72 @@ def sample(checked: Checked, asked: CheckRequest, number: int, job: Job) -> Samp
     return try_sample(checked.cached.index, checked.scans[number], job.deadline, oriented=checked.oriented, said=said)
 
 
-def check_done(checked: Checked, samples: Sequence[Sample | None] | None, asked: CheckRequest | None, job: Job) -> Done:
-    """Return the answer of a check; `samples` None where there were none to try."""
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What all samples say of a map.
+
+    Attributes
+    ----------
+    samples : sequence of Sample or None
+        None where no time was left for one.
+    report : SampleReport
+    thicker : float or None
+        By how much walls are thicker than drawn, metres; None where nothing speaks for it.
+    """
+
+    samples: Sequence[Sample | None]
+    report: SampleReport
+    thicker: float | None
+
+    @property
+    def findings(self) -> list[Finding]:
+        """The weightiest first."""
+        thick = [] if self.thicker is None else [thickness_finding(self.thicker, oriented=self.directed)]
+        return [*thick, *self.report.findings]
+
+    @property
+    def directed(self) -> bool:
+        """Whether directions of the map mean something, as far as the samples say."""
+        return self.report.advice.oriented is not False
+
+
+def conclude(checked: Checked, samples: Sequence[Sample | None], job: Job) -> Judged:
+    """Conclude from all samples together, and find how thick walls are; raises `CancelledError`."""
+    tried = [one for one in samples if one is not None]
+    index = checked.cached.index
+    report = judge_samples(tried, sigma=index.sigma, oriented=checked.oriented)
+    judged = Judged(samples, report, None)
+    codes = {one.code for one in report.findings}
+    if codes & HIDES_THICKNESS or job.deadline.passed:
+        return judged
+    scans = [scan for scan, one in zip(checked.scans, samples, strict=True) if one is not None]
+    thicker = find_thickness(index, scans, job.deadline, oriented=judged.directed)
+    if thicker is None or "mirrored" not in codes:
+        return replace(judged, thicker=thicker)
+    # What fits badly may fit a little better mirrored.
+    if not judged.directed or fit_better_mirrored(index, scans, job.deadline):
+        return judged
+    others = tuple(one for one in report.findings if one.code != "mirrored")
+    return Judged(samples, replace(report, findings=others), thicker)
+
+
+def check_done(checked: Checked, judged: Judged | None, asked: CheckRequest | None, job: Job) -> Done:
+    """Return the answer of a check; `judged` None where there were no samples."""
     job.watch.lap("search")
     found, findings, advice = checked.found, list(checked.found.findings), checked.found.advice
     complete, told = found.complete, None
-    if samples is not None:
-        tried = [one for one in samples if one is not None]
-        report = judge_samples(tried, sigma=checked.cached.index.sigma, oriented=checked.oriented)
-        findings = [*report.findings, *findings]
+    if judged is not None:
+        report = judged.report
+        findings = [*judged.findings, *findings]
         advice = _first(report.advice, advice)
-        complete = complete and len(tried) == len(samples) and not job.deadline.passed
-        scans = [_sample_json(number, one) for number, one in enumerate(samples)]
-        told = {"usable": report.usable, "usable_as_advised": report.usable_as_advised, "scans": scans}
+        complete = complete and None not in judged.samples and not job.deadline.passed
+        scans = [_sample_json(number, one) for number, one in enumerate(judged.samples)]
+        told = {
+            "usable": report.usable,
+            "usable_as_advised": report.usable_as_advised,
+            "thicker": judged.thicker,
+            "scans": scans,
+        }
     answer = {
         **check_json(replace(found, findings=tuple(findings), advice=advice, complete=complete)),
         "samples": told,

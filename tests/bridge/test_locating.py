@@ -10,7 +10,7 @@ from linefix_client import Pose, base_from_laser
 
 import linefix
 from bridge import messages
-from bridge.locating import Mount, Mounts, locate
+from bridge.locating import Look, Mount, Mounts, locate
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
@@ -31,7 +31,7 @@ def seen(*, flipped: bool = False) -> messages.LaserScan:
 
 @pytest.mark.parametrize("flipped", [False, True])
 def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
-    located = locate(linefix.index_map(ROOM), seen(flipped=flipped), Mount(MOUNT, flipped))
+    located = locate(linefix.index_map(ROOM), [Look(seen(flipped=flipped), Mount(MOUNT, flipped))])
     expected = TRUTH.compose(MOUNT.inverse())
     assert located.answer.usable
     assert located.pose is not None
@@ -39,7 +39,7 @@ def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
 
 
 def test_its_covariance_is_that_of_the_client() -> None:
-    located = locate(linefix.index_map(ROOM), seen(), Mount(MOUNT))
+    located = locate(linefix.index_map(ROOM), [Look(seen(), Mount(MOUNT))])
     pose, covariance = located.answer.pose, located.answer.covariance
     assert pose is not None
     assert covariance is not None

@@ -195,8 +195,8 @@ def test_lines_drawn_twice_are_merged_and_specks_dropped(tmp_path: Path) -> None
 def test_centre_lines_become_two_faces_apart_by_the_thickness(tmp_path: Path) -> None:
     path = text(tmp_path, "a.csv", "0,0,4,0\n")
     imported = read_map(path, ImportOptions(drawn="centres", thickness=0.2))
-    # Free space on the left of each: the upper face runs along +x, the lower one back.
-    assert rows(imported) == [[0, 0.1, 4, 0.1], [4, -0.1, 0, -0.1]]
+    # Free space on the left of each: the upper face runs along +x, the lower one back, and both ends are closed.
+    assert rows(imported) == [[0, 0.1, 4, 0.1], [4, -0.1, 0, -0.1], [0, -0.1, 0, 0.1], [4, 0.1, 4, -0.1]]
     assert imported.map.oriented
 
 
@@ -204,7 +204,7 @@ def test_the_thickness_is_found_where_a_polyline_has_a_width(tmp_path: Path) -> 
     document = new(units=units.CM)
     document.modelspace().add_lwpolyline([(0, 0), (400, 0)], dxfattribs={"const_width": 30})
     imported = read_map(dxf(tmp_path, document), ImportOptions(drawn="centres"))
-    assert rows(imported) == [[0, 0.15, 4, 0.15], [4, -0.15, 0, -0.15]]
+    assert rows(imported)[:2] == [[0, 0.15, 4, 0.15], [4, -0.15, 0, -0.15]]
 
 
 def test_directions_are_found_from_a_place_inside(tmp_path: Path) -> None:
@@ -240,6 +240,7 @@ DEEP = '{"type": "GeometryCollection", "geometries": [' * 8 + "]}" * 8
 @pytest.mark.parametrize(
     ("name", "content", "kind", "message"),
     [
+        ("a.dxf", "  \n", MalformedFileError, "is empty"),
         ("a.dxf", "nothing of the kind", MalformedFileError, "is no DXF"),
         ("a.dxf", "AC1032\0\0\0", UnsupportedFormatError, "save it as DXF"),
         ("a.svg", "<svg", MalformedFileError, "is no XML"),

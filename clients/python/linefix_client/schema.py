@@ -263,6 +263,7 @@ class SamplesAnswer(TypedDict):
 
     usable: int
     usable_as_advised: int
+    thicker: float | None
     scans: list[SampleAnswer]
 
 

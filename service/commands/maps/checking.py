@@ -29,15 +29,18 @@ def check(
     as_json: AsJson = False,
 ) -> None:
     """Say what is doubtful in a map; beside scans taken there, also whether they fit better mirrored, scaled, moved."""
-    samples = [read_scan(name) for name in scan or []]
-    if log is not None:
-        samples += [one.scan for one in spread(list(scans_of(opened(log, topic))), SAMPLES)]
+    samples = [read_scan(name) for name in scan or []] + ([] if log is None else samples_of(log, topic))
     with answering(server) as service:
         answer = service.check(read_map_or_id(on), {"scans": samples} if samples else None)
     if as_json:
         print_json(answer)
     else:
         print_rows(check_rows(answer))
+
+
+def samples_of(log: Path, topic: str | None) -> list[Json]:
+    """Return some scans of a log, spread over all of it; raises `RefusedError` when it cannot be read."""
+    return [one.scan for one in spread(list(scans_of(opened(log, topic))), SAMPLES)]
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:

@@ -16,7 +16,7 @@ from ..inputs import line_map_of, needing_formats
 from ..options import AsJson, Picture, Server
 from ..printing import noted, print_json, print_rows
 from ..service import Json, answering
-from .checking import check_rows
+from .checking import check_rows, samples_of
 from .files import write_document
 
 IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
@@ -78,11 +78,21 @@ def import_map(
         Path | None, typer.Option(metavar="FILE", help="Write the map there: json, dxf, svg, geojson or csv.")
     ] = None,
     picture: Picture = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="A bag or a CARMEN log of scans taken there: how thick walls are is found from some."
+        ),
+    ] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Read a map of another tool, say what was made of it and what is doubtful in it, and write it as a map file."""
+    if log is not None and server is not None:
+        raise WrongUseError("--log looks at scans here: leave --server out, and put the map there afterwards")
     answer = imported(file, said.fields, server)
+    if log is not None:
+        answer = beside_log(answer, file, said.fields, log)
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
@@ -109,6 +119,36 @@ def imported(file: Path, fields: Fields, server: str | None) -> Json:
     files = [file] if server is None else _with_what_it_names(file)
     with answering(server) as service:
         return service.import_map(files, fields)
+
+
+def beside_log(answer: Json, file: Path, fields: Fields, log: Path) -> Json:
+    """Check what was imported beside some scans of a log, and import it again where walls are thicker than assumed.
+
+    Returns
+    -------
+    dict
+        As of `imported`; ``check`` tells of the scans too.
+    """
+    scans = samples_of(log, None)
+    checked = _checked(answer["map"], scans)
+    thicker, line_map = checked["samples"]["thicker"], answer["map"]
+    drawn = float(line_map["meta"].get("thickness", 0.0)) if line_map["oriented"] else 0.0
+    made_of_centres = "thickness" in line_map["meta"] or not line_map["oriented"]
+    said = "thickness" in fields or fields.get("drawn") == ["faces"]
+    if thicker is None or not made_of_centres or said:
+        return {**answer, "check": checked}
+    thickness = f"{max(0.0, drawn + thicker):.2f}"
+    again = imported(file, {**fields, "drawn": ["centres"], "thickness": [thickness]}, None)
+    message = f"walls are {thickness} m thick, found from scans of {log.name}"
+    kept = [note for note in again["report"]["assumed"] if note["code"] != "thickness_given"]
+    found = {"code": "thickness_found", "message": message, "count": 0}
+    again["report"]["assumed"] = [*kept, found]
+    return {**again, "check": _checked(again["map"], scans)}
+
+
+def _checked(line_map: Json, scans: list[Json]) -> Json:
+    with answering(None) as service:
+        return service.check(line_map, {"scans": scans})
 
 
 def _with_what_it_names(file: Path) -> list[Path]:

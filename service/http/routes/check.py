@@ -18,7 +18,7 @@ from ...schemas import examples
 from ...schemas.checks import CheckAnswer
 from ...schemas.parts import StoredMap
 from ...schemas.requests import CheckRequest
-from ...work.checking import check, check_done, sample
+from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
 from ..exchange import Exchange, searching
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
@@ -71,11 +71,15 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
         work = partial(check, lookup, on, asked, job)
         checked = await exchange.take_turn(work, job.deadline, job.searching.is_set)
-    samples = None
+    judged = None
     if asked is not None:
         calls = [partial(sample, checked, asked, number, job) for number in range(len(asked.scans))]
         samples = await _try_all(exchange, calls, job)
-    return await exchange.services.parse_threads.run(partial(check_done, checked, samples, asked, job))
+        try:
+            judged = await exchange.take_turn(partial(conclude, checked, samples, job), job.deadline)
+        except DeadlinePassedError:  # no turn is left: it then concludes from what it has, and searches nothing
+            judged = await exchange.services.parse_threads.run(partial(conclude, checked, samples, job))
+    return await exchange.services.parse_threads.run(partial(check_done, checked, judged, asked, job))
 
 
 async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | None]], job: Job) -> list[Sample | None]:

@@ -13,6 +13,7 @@ from tests.association.checking.drawn import faces
 
 BEAMS = 360
 SCANNER = Scanner(beams=BEAMS, angle_increment=math.tau / BEAMS)
+CENTRE = RigidTransform(0.0, 0.0, 0.0)
 ODOM_FROM_MAP = RigidTransform(-5.0, 3.0, 0.7)  # where odometry has begun
 
 
@@ -21,7 +22,7 @@ def drive(count: int) -> list[RigidTransform]:
     return [RigidTransform(x, 0.9 + 0.1 * math.sin(x), 0.1 * math.cos(x)) for x in np.linspace(3.0, 19.0, count)]
 
 
-def write_log(path: Path, count: int, *, drift: float = 1.02) -> list[RigidTransform]:
+def write_log(path: Path, count: int, *, drift: float = 1.02, mount: RigidTransform = CENTRE) -> list[RigidTransform]:
     """Write a log of the drive, odometry too long by a factor; return where the scans were taken."""
     rng, walls = np.random.default_rng(5), Segments.from_array(faces())
     poses, lines = drive(count), ["# a log"]
@@ -31,9 +32,9 @@ def write_log(path: Path, count: int, *, drift: float = 1.02) -> list[RigidTrans
         begun = poses[0]
         driven = RigidTransform(begun.x + drift * (pose.x - begun.x), pose.y, pose.theta)
         odom = ODOM_FROM_MAP.compose(driven)
-        laser = f"{odom.x:.6f} {odom.y:.6f} {odom.theta:.6f}"
+        laser, robot = (f"{at.x:.6f} {at.y:.6f} {at.theta:.6f}" for at in (odom, odom.compose(mount.inverse())))
         head = f"ROBOTLASER1 0 {SCANNER.angle_min:.6f} {math.tau:.6f} {SCANNER.angle_increment:.9f}"
         head += f" {SCANNER.range_max} 0.01 0 {BEAMS}"
-        lines.append(f"{head} {told} 0 {laser} {laser} 0 0 0 0 0 {100 + 0.5 * k} host {100 + 0.5 * k}")
+        lines.append(f"{head} {told} 0 {laser} {robot} 0 0 0 0 0 {100 + 0.5 * k} host {100 + 0.5 * k}")
     path.write_text("\n".join(lines) + "\n")
     return poses

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from formats import read_map
-from tests.association.checking.drawn import faces
+from tests.association.checking.drawn import THICK, centre_lines, faces
 from tests.running import RunningService
 from tests.service.importing.forms import SQUARE, room_grid
 
@@ -102,6 +103,24 @@ def test_a_check_beside_the_scans_of_a_log(linefix: Linefix, folder: Path) -> No
     told = linefix("map", "check", "mirrored.json", "--log", "drive.log", LINEFIX_MAX_DEADLINE_MS="600000").out
     assert "finding  mirrored" in told
     assert "of 5 usable" in told
+
+
+def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path) -> None:
+    write_log(folder / "drive.log", 5)
+    walls = [{"type": "LineString", "coordinates": [line[:2], line[2:]]} for line in centre_lines().tolist()]
+    features = [{"type": "Feature", "properties": {"thickness": 2 * THICK}, "geometry": wall} for wall in walls]
+    (folder / "floor.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    asked = ("map", "import", "floor.geojson", "--local-metres", "--log", "drive.log")
+    answer = json.loads(linefix(*asked, "--json").out)
+    assert float(answer["map"]["meta"]["thickness"]) == pytest.approx(THICK, abs=0.02)
+    assert [note["code"] for note in answer["report"]["assumed"]] == ["thickness_found"]
+    assert "from scans of drive.log" in answer["report"]["assumed"][0]["message"]
+    told = linefix(
+        *asked, "--thickness", str(2 * THICK)
+    ).out  # who says how thick they are is not contradicted, but told
+    assert re.search("finding  thickness: The scans fit better where walls are (19|20) cm thinner", told)
+    assert "of 5 usable" in told
+    assert "leave --server out" in refused(linefix(*asked, "--server", "http://127.0.0.1:9"), 2)
 
 
 def test_a_server_checks_stored_maps_alone(linefix: Linefix, service: RunningService) -> None:

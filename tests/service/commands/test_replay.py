@@ -48,7 +48,8 @@ def test_a_line_a_scan(linefix: Linefix, truth: list[RigidTransform], mode: str)
     ended = linefix("replay", "drive.log", "--map", "floor.json", "--mode", mode, "--json")
     found = lines(ended)
     assert [line["stamp"] for line in found] == [100 + 0.5 * k for k in range(SCANS)]
-    assert list(found[0]) == ["stamp", "status", "usable", "probability", "pose", "reasons", "timing_ms"]
+    told = ["stamp", "status", "usable", "probability", "pose", "reasons", "timing_ms", "child_frame_id", "error"]
+    assert list(found[0]) == told
     assert sum(line["usable"] for line in found) >= SCANS // 2
     assert_right(found, truth)
     assert "ROBOTLASER1" in ended.err  # which of the topics was taken

@@ -12,6 +12,7 @@ from service.http.problems import TABLE
 
 ROOT = Path(__file__).parents[3]
 TEXT = (ROOT / "docs" / "http.md").read_text()
+OPERATIONS = (ROOT / "docs" / "operations.md").read_text()
 README = (ROOT / "README.md").read_text()
 STORED = re.findall(
     r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT
@@ -78,8 +79,15 @@ def test_every_finding_of_a_check_is_described() -> None:
 def test_the_named_settings_exist() -> None:
     from service.settings import Settings
 
-    for name in re.findall(r"LINEFIX_([A-Z_]+)", TEXT):
-        assert name.lower() in Settings.model_fields, name
+    for name in re.findall(r"LINEFIX_([A-Z_]+)", TEXT + OPERATIONS):
+        assert name.lower() in (*Settings.model_fields, "kernels"), name
+
+
+def test_the_counts_that_an_operator_is_told_to_watch_are_there(client: httpx.Client) -> None:
+    metrics = client.get("/metrics").text
+    watched = set(re.findall(r"`(linefix_\w+)`", OPERATIONS))
+    assert len(watched) >= 6
+    assert {name for name in watched if f"# TYPE {name} " not in metrics} == set()
 
 
 ROW = re.compile(r"\| `(\w+)` \| (\S+)[^|]*\| (above )?(\d+)[^|]*\| (\d*)[^|]*\|")

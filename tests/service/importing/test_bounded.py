@@ -42,8 +42,10 @@ def test_more_memory_than_it_may_have() -> None:
 
 
 def test_more_of_a_processor_than_it_may_have() -> None:
+    """Curves that take some twenty seconds."""
+    curves = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * 200_000 + b'"/></svg>'
     with pytest.raises(FileTooLargeError, match="processor"):
-        read({"a.csv": SQUARE}, Bounds(1_000_000_000, 32_000_000, 200_000, cpu_seconds=1))
+        read({"a.svg": curves}, Bounds(4_000_000_000, 32_000_000, 200_000, cpu_seconds=1))
 
 
 def test_more_segments_than_a_map_may_have() -> None:

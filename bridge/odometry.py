@@ -1,0 +1,68 @@
+"""How the robot moved between two times, by what its odometry said."""
+
+from __future__ import annotations
+
+import bisect
+from collections import deque
+
+import numpy as np
+
+from formats.logs.transforms import NS, matrix_of, planar, stamp_of
+from registration import RigidTransform
+
+from .messages import Odometry, Time
+
+KEPT = 2000  # messages; 20 s at 100 Hz
+STALE_NS = NS // 2  # a robot is not known to be where it was longer ago than this
+
+
+def nanoseconds(stamp: Time) -> int:
+    """Return a time as one number."""
+    return int(stamp.sec) * NS + int(stamp.nanosec)
+
+
+class Heard:
+    """What odometry said of late."""
+
+    def __init__(self) -> None:
+        self._stamps: deque[int] = deque(maxlen=KEPT)
+        self._poses: deque[RigidTransform] = deque(maxlen=KEPT)
+
+    def hear(self, message: Odometry) -> None:
+        """Take what was said; when the clock goes back, as when a bag is played again, all before is forgotten.
+
+        Raises
+        ------
+        ValueError
+            When it is no pose.
+        """
+        pose = message.pose.pose
+        found, _ = planar(matrix_of(pose.position, pose.orientation))
+        stamp = stamp_of(message.header)
+        if self._stamps and stamp <= self._stamps[-1]:
+            self._stamps.clear()
+            self._poses.clear()
+        self._stamps.append(stamp)
+        self._poses.append(found)
+
+    def step(self, begin: Time, end: Time) -> RigidTransform | None:
+        """Return where the robot was at `end` as seen from where it was at `begin`; None where nobody said."""
+        if begin == end:
+            return RigidTransform(0.0, 0.0, 0.0)
+        places = [self._at(nanoseconds(stamp)) for stamp in (begin, end)]
+        if places[0] is None or places[1] is None:
+            return None
+        return places[0].inverse().compose(places[1])
+
+    def _at(self, stamp: int) -> RigidTransform | None:
+        if not self._stamps:
+            return None
+        after = bisect.bisect_left(self._stamps, stamp)
+        if after in (0, len(self._stamps)):
+            end = min(after, len(self._stamps) - 1)
+            return self._poses[end] if abs(self._stamps[end] - stamp) <= STALE_NS else None
+        a, b = self._poses[after - 1], self._poses[after]
+        share = (stamp - self._stamps[after - 1]) / (self._stamps[after] - self._stamps[after - 1])
+        step = a.inverse().compose(b)
+        x, y, theta = np.array([step.x, step.y, step.theta]) * share
+        return a.compose(RigidTransform(float(x), float(y), float(theta)))

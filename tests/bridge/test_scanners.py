@@ -1,0 +1,143 @@
+"""Several scanners are one scan, and odometry says how the robot moved between them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import linefix
+from bridge import messages
+from bridge.gathering import Gathering, looks_of
+from bridge.locating import Mounts, locate
+from bridge.odometry import Heard as Driven
+from bridge.wire import SENSOR, Told
+
+from .robot import MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, quaternion
+
+HERE = linefix.RigidTransform(0.0, 0.0, 0.0)
+FRONT, BACK = linefix.RigidTransform(0.3, 0.1, 0.0), linefix.RigidTransform(-0.3, -0.1, math.pi)
+NARROW = linefix.simulation.Scanner(beams=200, angle_min=-0.7, angle_increment=0.007, sigma=0.01)
+DRIVEN = linefix.RigidTransform(0.25, 0.02, 0.15)  # between the scans of the two
+AT = {"front": 80_000_000, "back": 0}  # ns; when each was taken
+
+
+def mounts() -> messages.TFMessage:
+    return messages.TFMessage(
+        [
+            messages.TransformStamped(
+                messages.Header(frame_id="base_link"),
+                name,
+                messages.Transform(messages.Vector3(at.x, at.y, 0.2), quaternion(at.theta)),
+            )
+            for name, at in (("front", FRONT), ("back", BACK))
+        ]
+    )
+
+
+def seen(name: str, second: int, *, moved: bool = True) -> messages.LaserScan:
+    """Return what a scanner sees; that behind before the robot has `moved` on to where it is asked about."""
+    then = MAP_FROM_BASE.compose(DRIVEN.inverse()) if name == "back" and moved else MAP_FROM_BASE
+    truth = then.compose(FRONT if name == "front" else BACK)
+    rng = np.random.default_rng(second)
+    ranges = linefix.simulation.scan(linefix.Segments.from_array(ROOM), truth, NARROW, rng).ranges
+    return messages.LaserScan(
+        messages.Header(messages.Time(second, AT[name]), name),
+        NARROW.angle_min, -NARROW.angle_min, NARROW.angle_increment,
+        range_min=0.05, range_max=30.0, ranges=ranges.tolist(),
+    )  # fmt: skip
+
+
+def odometry(second: int, nanosec: int, at: linefix.RigidTransform) -> messages.Odometry:
+    message = messages.Odometry(messages.Header(messages.Time(second, nanosec), "odom"), "base_link")
+    message.pose.pose = messages.Pose(messages.Point(at.x, at.y, 0.0), quaternion(at.theta))
+    return message
+
+
+def test_two_scanners_find_together_what_neither_finds(domain: int, map_file: str) -> None:
+    with bridge("--map", map_file, "--scan", "/front", "--scan", "/back"):
+        robot = Robot(domain)
+        front, back = (Told(robot.net, f"/{name}", messages.LaserScan, SENSOR) for name in AT)
+        driven = Told(robot.net, "/odom", messages.Odometry, SENSOR)
+        robot.mounts.say(mounts())
+        for told in (front, back):
+            name = "front" if told is front else "back"
+            robot.until(
+                robot.diagnostics,
+                lambda name=name, told=told: told.say(seen(name, 1)),  # type: ignore[misc]
+                lambda one: one.status[0].message != "" and "tf_static" not in one.status[0].message,
+            )
+        assert robot.initial.take() == []  # neither alone
+
+        def play(second: list[int] = [1]) -> None:  # noqa: B006
+            second[0] += 1
+            driven.say(odometry(second[0], 0, HERE))
+            driven.say(odometry(second[0], 90_000_000, DRIVEN))
+            back.say(seen("back", second[0]))
+            front.say(seen("front", second[0]))
+
+        found = robot.until(robot.initial, play)
+    assert found.header.stamp.nanosec == AT["front"]  # the newest
+    assert is_at_truth(found)
+
+
+def gathered(*names: str, moved: bool = True, told: Driven | None = None) -> tuple[Any, list[str]]:
+    """Answer scans as the bridge does."""
+    where = Mounts("base_link")
+    where.hear(mounts())
+    looks, missing = looks_of([seen(name, 3, moved=moved) for name in names], where, told or Driven())
+    return locate(linefix.index_map(ROOM), looks), missing
+
+
+def test_odometry_says_how_the_robot_moved_between_them() -> None:
+    told = Driven()
+    for nanosec, at in ((0, HERE), (40_000_000, linefix.RigidTransform(0.12, 0.01, 0.07)), (90_000_000, DRIVEN)):
+        told.hear(odometry(3, nanosec, at))
+    alone, _ = gathered("front", told=told)
+    assert not alone.answer.usable
+    found, missing = gathered("front", "back", told=told)
+    assert missing == []
+    assert found.answer.usable
+    assert math.hypot(found.pose.x - MAP_FROM_BASE.x, found.pose.y - MAP_FROM_BASE.y) < 0.03
+
+
+def test_without_odometry_the_older_scan_is_left_out_and_that_is_told() -> None:
+    found, missing = gathered("front", "back")
+    assert missing == ["no odometry says how the robot moved since the scan of back"]
+    assert not found.answer.usable
+
+
+def test_odometry_is_interpolated_and_forgotten() -> None:
+    told = Driven()
+    begin, end = messages.Time(5, 0), messages.Time(5, 500_000_000)
+    assert told.step(begin, begin) == HERE
+    assert told.step(begin, end) is None
+    told.hear(odometry(5, 0, HERE))
+    told.hear(odometry(6, 0, linefix.RigidTransform(1.0, 0.0, 0.4)))
+    half = told.step(begin, end)
+    assert half is not None
+    assert (half.x, half.y, half.theta) == pytest.approx((0.5, 0.0, 0.2))
+    assert told.step(begin, messages.Time(7, 0)) is None  # nobody said for a second
+    told.hear(odometry(2, 0, HERE))  # the clock went back
+    assert told.step(begin, end) is None
+    broken = messages.Odometry()
+    broken.pose.pose.orientation = messages.Quaternion(0.0, 0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="none"):
+        told.hear(broken)
+
+
+def test_scans_wait_for_one_another_for_a_while() -> None:
+    gathering = Gathering(2, 0.1)
+    gathering.take(0, seen("front", 1))
+    assert gathering.ready() == []
+    gathering.take(1, seen("back", 1))
+    assert [one.header.frame_id for one in gathering.ready()] == ["front", "back"]
+    assert gathering.left is None
+    gathering.take(1, seen("back", 2))
+    gathering.take(0, seen("front", 3))  # a second later: no longer of one moment
+    assert [one.header.frame_id for one in gathering.ready()] == ["front"]
+    patient = Gathering(2, 0.0)
+    patient.take(1, seen("back", 2))
+    assert [one.header.frame_id for one in patient.ready()] == ["back"]

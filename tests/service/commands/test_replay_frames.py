@@ -1,0 +1,138 @@
+"""linefix replay: whose poses are told, and logs of which some cannot be taken."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from registration import RigidTransform
+from service.commands.frames import Frames
+from service.commands.logs import ReplayedScan
+from service.commands.replay import HOPELESS
+from tests.association.checking.drawn import faces
+
+from .drives import write_log
+from .running import Ended, Linefix, refused
+
+SCANS = 4
+MOUNT = RigidTransform(0.4, -0.2, 1.2)
+ASKED = ("replay", "drive.log", "--map", "floor.json", "--mode", "global")
+
+
+@pytest.fixture(autouse=True)
+def truth(folder: Path) -> list[RigidTransform]:
+    (folder / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
+    return write_log(folder / "drive.log", SCANS, mount=MOUNT)
+
+
+def lines(ended: Ended, code: int = 0) -> list[dict[str, Any]]:
+    assert ended.code == code, ended.err
+    return [json.loads(line) for line in ended.out.splitlines()]
+
+
+def assert_at(found: dict[str, Any], expected: RigidTransform) -> None:
+    pose = found["pose"]
+    assert math.hypot(pose["x"] - expected.x, pose["y"] - expected.y) < 0.1
+    assert abs(math.remainder(pose["theta"] - expected.theta, math.tau)) < 0.02
+
+
+def test_poses_are_those_of_the_robot_where_the_log_has_its_mount(
+    linefix: Linefix, folder: Path, truth: list[RigidTransform]
+) -> None:
+    ended = linefix(*ASKED, "--out", "poses.tum", "--json")
+    found = lines(ended)
+    assert {line["child_frame_id"] for line in found} == {"robot"}
+    usable = [(line, pose) for line, pose in zip(found, truth, strict=True) if line["usable"]]
+    assert len(usable) >= SCANS // 2
+    for line, pose in usable:
+        assert_at(line, pose.compose(MOUNT.inverse()))
+    first = [float(number) for number in (folder / "poses.tum").read_text().split()[:3]]
+    assert first[1:] == pytest.approx([usable[0][0]["pose"]["x"], usable[0][0]["pose"]["y"]])
+    assert "of robot, the robot, with ROBOTLASER1 mounted at (0.400, -0.200) m, 68.8 degrees, as the log says" in (
+        ended.err
+    )
+
+
+def test_a_mount_that_is_given_goes_first(linefix: Linefix, truth: list[RigidTransform]) -> None:
+    ended = linefix(*ASKED, "--mount", "-1.0", "0.5", "0.3", "--json")
+    (line, pose), *_ = ((line, pose) for line, pose in zip(lines(ended), truth, strict=True) if line["usable"])
+    assert_at(line, pose.compose(RigidTransform(-1.0, 0.5, 0.3).inverse()))
+    assert line["child_frame_id"] == "base_link"
+    assert "as --mount says" in ended.err
+    assert "--mount" in refused(linefix(*ASKED, "--mount", "0", "nan", "0"), 2)
+
+
+def test_without_a_mount_they_are_those_of_the_laser(
+    linefix: Linefix, folder: Path, truth: list[RigidTransform]
+) -> None:
+    # RAWLASER1 says as much of the scan, and nothing of where anything was.
+    told = [row.split() for row in (folder / "drive.log").read_text().splitlines()[1:]]
+    rows = [" ".join(["RAWLASER1", *words[1:-13], words[-1], *words[-2:]]) for words in told]
+    (folder / "drive.log").write_text("\n".join(rows) + "\n")
+    ended = linefix(*ASKED, "--json")
+    (line, pose), *_ = ((line, pose) for line, pose in zip(lines(ended), truth, strict=True) if line["usable"])
+    assert_at(line, pose)
+    assert line["child_frame_id"] == "RAWLASER1"
+    assert "--mount X Y THETA would give those of the robot" in ended.err
+
+
+def test_a_scan_that_is_refused_is_a_row_and_the_replay_goes_on(linefix: Linefix, folder: Path) -> None:
+    rows = (folder / "drive.log").read_text().splitlines()
+    words = rows[2].split()
+    beams = int(words[8])
+    rows[2] = " ".join([*words[:4], "0.01", *words[5:8], str(beams + 9), *["1.0"] * 9, *words[9:]])
+    (folder / "drive.log").write_text("\n".join(rows) + "\n")
+    found = lines(linefix(*ASKED, "--json", LINEFIX_MAX_BEAMS=str(beams)))
+    assert [line["error"] is None for line in found] == [True, False, True, True]
+    assert (found[1]["status"], found[1]["usable"], found[1]["pose"]) == (None, False, None)
+    assert "ranges" in found[1]["error"]
+    told = linefix(*ASKED, LINEFIX_MAX_BEAMS=str(beams))
+    assert told.code == 0
+    assert "refused" in told.out
+    assert "25.0 %" in told.out
+
+
+def test_where_every_scan_is_refused_so_is_the_log(linefix: Linefix) -> None:
+    ended = linefix(*ASKED, "--json", LINEFIX_MAX_BEAMS="100")
+    assert [line["usable"] for line in lines(ended, 3)] == [False] * SCANS
+    assert "linefix: at most 100 ranges" in ended.err
+
+
+def test_a_map_that_is_refused_ends_it_soon(linefix: Linefix, folder: Path) -> None:
+    write_log(folder / "drive.log", HOPELESS + 5)
+    ended = linefix(*ASKED, "--json", LINEFIX_MAX_MAP_SEGMENTS="10")
+    assert len(lines(ended, 3)) == HOPELESS - 1
+    assert "linefix: at most 10 map segments" in ended.err
+    (folder / "broken.json").write_text('{"segments": [[0, 0, 0, 0]]}')
+    assert "/map/segments/0" in refused(linefix("replay", "drive.log", "--map", "broken.json"), 3)
+
+
+def test_what_comes_before_the_place_where_a_log_is_broken_counts(linefix: Linefix, folder: Path) -> None:
+    with (folder / "drive.log").open("a") as log:
+        log.write("FLASER " + "1" * 3_000_000)
+    ended = linefix(*ASKED, "--out", "poses.tum")
+    assert ended.code == 3
+    assert "ok, usable" in ended.out
+    assert (folder / "poses.tum").read_text()
+    assert "linefix: drive.log: line 6: expected at most" in ended.err
+
+
+def test_one_scan_without_a_mount_among_others_is_not_taken() -> None:
+    answer = {"pose": {"x": 1.0, "y": 2.0, "theta": 0.5}, "covariance": np.diag([1e-4, 4e-4, 1e-4]).tolist()}
+    frames = Frames.of(None)
+    told = frames.answer(ReplayedScan(0, {}, None, "laser", MOUNT, "base_link"), answer)
+    assert isinstance(told, dict)
+    expected = RigidTransform(1.0, 2.0, 0.5).compose(MOUNT.inverse())
+    assert_at(told, expected)
+    # The robot is farther from the laser along one axis than the other: its turn moves it so far.
+    away = math.hypot(expected.x - 1.0, expected.y - 2.0)
+    assert sum(told["covariance"][k][k] for k in (0, 1)) == pytest.approx(5e-4 + 1e-4 * away**2)
+    assert "does not say where laser was" in str(frames.answer(ReplayedScan(1, {}, None, "laser", None, ""), answer))
+    of_laser = Frames.of(None)
+    assert of_laser.answer(ReplayedScan(0, {}, None, "laser", None, ""), answer) is answer
+    assert of_laser.answer(ReplayedScan(1, {}, None, "laser", MOUNT, "base_link"), answer) is answer
