@@ -1,6 +1,6 @@
 // Requests to the service that this page comes from.
 
-import type { Analysis, Answer, MapDocument, Scan, StoredMap } from "./types";
+import type { Analysis, Answer, Imported, MapDocument, Scan, StoredMap } from "./types";
 
 export class Problem extends Error {
   constructor(
@@ -71,12 +71,12 @@ export const checkMap = (id: string) =>
   call<{ findings: { code: string; message: string; count: number }[] }>("GET", `${pathOf(id)}:check`);
 
 /** Have files of another tool read; nothing is stored. */
-export async function importMap(files: File[]): Promise<MapDocument> {
+export async function importMap(files: File[], units: string): Promise<Imported> {
   const form = new FormData();
   for (const file of files) form.append("files", file, file.name);
+  if (units) form.append("units", units);
   try {
-    const answer = await call<{ map: MapDocument }>("POST", "/v1/maps:import", form);
-    return answer.map;
+    return await call<Imported>("POST", "/v1/maps:import", form);
   } catch (error) {
     if (error instanceof Problem && [404, 405, 415].includes(error.status))
       throw new Problem("This service reads maps as JSON only: the packages for other formats are not installed.", error.status, error.code);
