@@ -1,7 +1,7 @@
 // What was made of the files of another tool: read, merged, left out, assumed, and what is doubtful in it.
 
 import { onChange, state } from "./state";
-import type { Imported, MapDocument } from "./types";
+import type { Imported, MapDocument, Note } from "./types";
 import { list } from "./verdict";
 
 const box = document.querySelector<HTMLDetailsElement>("#imported")!;
@@ -19,13 +19,14 @@ function section(title: string, lines: string[]): HTMLElement[] {
 /** Show it beside the map that came of it, opened where somebody should look at it. */
 export function tellImport({ map, report, check }: Imported): void {
   const { read, merged, dropped, assumed } = report;
+  const lines = (notes: Note[]) => notes.map(({ message, count }) => (count ? `${message}: ${count}` : message));
   const doubts = check.findings.map((one) => one.message);
   const parts: [string, string[]][] = [
     ["Doubtful", doubts],
-    ["Read", read.map((one) => one.message)],
-    ["Made one", merged.map((one) => one.message)],
-    ["Left out", dropped.map((one) => one.message)],
-    ["Assumed", assumed.map((one) => one.message)],
+    ["Read", lines(read)],
+    ["Made one", lines(merged)],
+    ["Left out", lines(dropped)],
+    ["Assumed", lines(assumed)],
   ];
   of = map;
   document.querySelector("#about")!.textContent = `${map.segments.length} walls, read of ${report.files.join(", ")} (${report.format}).`;

@@ -17,7 +17,8 @@ const NAMES: Record<string, string> = {
 const chooser = document.querySelector<HTMLSelectElement>("#example")!;
 const virtual = document.querySelector<HTMLInputElement>("#virtual")!;
 
-export function showAll(about: string): void {
+export function showAll(about: string, example = ""): void {
+  chooser.value = example;
   document.querySelector("#about")!.textContent = about;
   virtual.checked = state.virtual;
   for (const [id, value] of Object.entries({ "#fov": (180 / Math.PI) * state.laser.fov, "#beams": state.laser.beams, "#range": state.laser.range_max }))
@@ -36,7 +37,7 @@ export async function choose(name: string): Promise<void> {
   }
   setMap(found.map);
   Object.assign(state, { boxes: found.boxes, robot: found.pose, laser: found.laser, virtual: true, scan: null });
-  showAll(found.about);
+  showAll(found.about, name);
   askSoon();
 }
 

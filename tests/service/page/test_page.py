@@ -224,14 +224,17 @@ def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
     shown(page, "flat", "usable")
     about = page.locator("#about").inner_text()
     page.set_input_files("#files", [tmp_path / "plan.svg"])
-    expect(page.locator("#sentence")).to_contain_text("does not say its unit", timeout=60_000)
+    expect(page.locator("#sentence")).to_contain_text("plan.svg: does not say its unit", timeout=60_000)
+    expect(page.locator("#numbers")).to_be_empty()  # of an answer to something else
     expect(page.locator("#about")).to_have_text(about)
     page.get_by_label("Unit of a drawing").select_option("metres")
     expect(page.locator("#about")).to_contain_text("read of plan.svg (svg)", timeout=60_000)
     report = page.locator("#report")
     expect(report).to_be_visible()
-    for title in ("Read", "Assumed"):
+    for title in ("Doubtful", "Read", "Left out", "Assumed"):
         expect(report.get_by_role("heading", name=title)).to_be_visible()
+    expect(report).to_contain_text("text is not read: 1")
+    expect(page.get_by_label("Example")).to_have_value("")
     page.get_by_label("Example").select_option(label="A flat")
     verdict(page, "usable")
     expect(report).to_be_hidden()
