@@ -35,7 +35,7 @@ button.addEventListener("click", async () => {
   try {
     const found = await analyze({ map, laser, spacing, drive, added, deadline_ms: drive ? LONG_TIME : TIME });
     if (of !== state.walls) return; // another map is shown by now
-    state.analysis = found;
+    Object.assign(state, { analysis: found, pointed: null });
     state.show = added.length ? "added" : drive ? "driven" : "now";
     told.textContent = sentence(found, drive);
   } catch (error) {
@@ -46,13 +46,14 @@ button.addEventListener("click", async () => {
   }
 });
 
-function sentence({ summary, complete }: Analysis, drive: number): string {
+function sentence({ places: found, summary, complete }: Analysis, drive: number): string {
   const { places, usable, look_alike, left_out, knows_within, usable_with_added } = summary;
   const rest = complete ? "" : ` There was no time for ${left_out} more.`;
   if (!places) return `There is no place where a robot could stand.${rest}`;
   const driven = knows_within === null ? "" : ` After a drive of up to ${drive} m it would at ${knows_within}.`;
   const added = usable_with_added === null ? "" : ` With the boxes that you put up it would at ${usable_with_added}.`;
-  return `A robot would know where it is at ${usable} of ${places} places; ${look_alike} look like another.${driven}${added}${rest}`;
+  const each = found.some((one) => one.pose.theta !== found[0].pose.theta) ? "places, four headings at each" : "places";
+  return `A robot would know where it is at ${usable} of ${places} ${each}; ${look_alike} look like another.${driven}${added}${rest}`;
 }
 
 show.addEventListener("change", () => {
@@ -61,7 +62,7 @@ show.addEventListener("change", () => {
 });
 
 clear.addEventListener("click", () => {
-  state.analysis = null;
+  state.analysis = state.pointed = null;
   changed();
 });
 

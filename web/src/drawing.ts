@@ -1,6 +1,6 @@
 // Everything on the canvas, from the state alone.
 
-import { distance, place, placed, pointsOf } from "./geometry";
+import { distance, place, placed, pointsOf, wrap } from "./geometry";
 import { state } from "./state";
 import type { Answer, Place, Pose, Scan, Segment } from "./types";
 import { toMetres, toPixels, view } from "./view";
@@ -56,6 +56,7 @@ function draw(): void {
   if (state.analysis) drawAnalysis(state.analysis.places, state.analysis.spacing);
   drawWalls(context, colours.wall, redraw);
   drawPutUp();
+  if (state.analysis && state.pointed?.look_alike) drawLikeness(state.pointed.pose, state.pointed.look_alike);
   drawTakenOff();
   if (state.log.length) drawLog();
   const { answer, sent } = state;
@@ -209,6 +210,14 @@ function drawAnalysis(places: Place[], spacing: number): void {
   context.globalAlpha = 1;
 }
 
+/** From a place to another that looks like it. */
+function drawLikeness(from: Pose, to: Pose): void {
+  context.setLineDash([6, 5]);
+  line([from.x, from.y, to.x, to.y], colours.ghost, 2);
+  context.setLineDash([]);
+  drawRobot(to, "ghost", false);
+}
+
 /** What is shown of a place: at once, after a drive, or with what was put up; null where no robot can stand then. */
 export function shownOf(one: Place): { status: Answer["status"]; usable: boolean; probability: number } | null {
   if (state.show === "added") return one.with_added;
@@ -253,10 +262,18 @@ export function toldAt(px: number, py: number): string {
     for (const k of answer.missing_map)
       if (distance(x, y, state.walls[state.sentTo[k]]) < near) return `wall ${state.sentTo[k]}: should have been seen, and was not`;
   }
-  for (const one of state.analysis?.places ?? [])
-    if (Math.max(Math.abs(one.pose.x - x), Math.abs(one.pose.y - y)) < (state.analysis?.spacing ?? 0) / 2) return toldOf(one);
+  const place = placeAt(x, y);
+  if (place) return toldOf(place);
   const wall = wallAt(x, y, near);
   return wall < 0 ? "" : `wall ${wall}${wall >= state.own ? ", put up" : ""}${state.off.has(wall) ? ", taken off" : ""}`;
+}
+
+/** Which place of the analysis is there; of several headings that which looks there. */
+export function placeAt(x: number, y: number): Place | null {
+  const half = (state.analysis?.spacing ?? 0) / 2;
+  const here = (state.analysis?.places ?? []).filter((one) => Math.max(Math.abs(one.pose.x - x), Math.abs(one.pose.y - y)) < half);
+  const away = (one: Place) => Math.abs(wrap(Math.atan2(y - one.pose.y, x - one.pose.x) - one.pose.theta));
+  return here.length > 1 ? here.reduce((a, b) => (away(b) < away(a) ? b : a)) : (here[0] ?? null);
 }
 
 function toldOf(one: Place): string {

@@ -1,7 +1,7 @@
 // Mouse, touch and keyboard on the plan.
 
 import { ask, askSoon } from "./asking";
-import { HANDLE, redraw, toldAt, wallAt } from "./drawing";
+import { HANDLE, placeAt, redraw, toldAt, wallAt } from "./drawing";
 import { wrap } from "./geometry";
 import { boundsOf, changed, putUp, state } from "./state";
 import { legend, step } from "./verdict";
@@ -32,6 +32,11 @@ canvas.addEventListener("pointermove", (event) => {
   const [px, py] = [event.offsetX, event.offsetY];
   if (!drag) {
     const told = toldAt(px, py);
+    const pointed = placeAt(...toMetres(px, py));
+    if (pointed !== state.pointed) {
+      state.pointed = pointed;
+      redraw();
+    }
     hover.hidden = !told;
     hover.textContent = told;
     hover.style.translate = `${Math.min(px + 14, view.width - 260)}px ${py + 14}px`;

@@ -1,6 +1,6 @@
 // What is on the page. Modules read it; `changed` says that something is to be drawn anew.
 
-import type { Analysis, Answer, Example, LogLine, MapDocument, Pose, Scan, Segment } from "./types";
+import type { Analysis, Answer, Example, LogLine, MapDocument, Place, Pose, Scan, Segment } from "./types";
 
 export interface State {
   map: MapDocument | null;
@@ -20,6 +20,7 @@ export interface State {
   other: number; // which other place is shown, -1 for none
   analysis: Analysis | null;
   show: Shown; // of the analysis
+  pointed: Place | null; // at which place of the analysis the mouse is
   log: LogLine[];
   logAt: number;
 }
@@ -44,6 +45,7 @@ export const state: State = {
   other: -1,
   analysis: null,
   show: "now",
+  pointed: null,
   log: [],
   logAt: 0,
 };
@@ -63,7 +65,7 @@ export function setMap(map: MapDocument, mapId: string | null = null): void {
   const own = map.segments.length;
   Object.assign(state, { map, mapId, walls: map.segments, own, off: new Set(), boxes: [], log: [], logAt: 0 });
   forget();
-  state.analysis = null;
+  state.analysis = state.pointed = null;
   const box = boundsOf(map.segments);
   state.robot = { x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2, theta: 0 };
 }

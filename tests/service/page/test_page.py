@@ -167,6 +167,14 @@ def test_where_a_map_will_fail(page: Page) -> None:
     page.get_by_role("button", name="Analyze").click()
     expect(page.locator("#analyzed")).to_contain_text("A robot would know where it is at", timeout=60_000)
     expect(page.locator("#legend")).to_contain_text("ambiguous")
+    box = page.locator("#plan").bounding_box()
+    assert box is not None
+    scale = 0.88 * box["width"] / 13.6
+    # As in `test_a_robot_is_dragged`; in the upper part of the right room.
+    page.mouse.move(
+        box["x"] + box["width"] / 2 + (9.3 - 5.8) * scale, box["y"] + box["height"] / 2 - (4.3 - 2.575) * scale
+    )
+    expect(page.locator("#hover")).to_contain_text("looks like (")
     page.get_by_role("button", name="Clear").click()
     expect(page.locator("#analyzed")).to_be_empty()
     page.get_by_label("Spacing").fill("0.01")
@@ -247,11 +255,12 @@ def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
         for k in range(4)
     ]  # fmt: skip
     (tmp_path / "log.jsonl").write_text("\n".join(json.dumps(line) for line in lines))
-    page.goto("/")
+    shown(page, "flat", "usable")  # with a virtual robot, which goes
     page.set_input_files("#files", [*files(tmp_path, room={"segments": examples.WALLS}), tmp_path / "log.jsonl"])
     told = page.locator("#scan-of-log")
     expect(told).to_contain_text("Scan 1 of 4: no match, not usable")
     page.get_by_role("button", name="Play").click()
+    expect(page.get_by_label("a virtual robot")).not_to_be_checked()
     expect(told).to_contain_text("Scan 4 of 4: ok, usable")
     expect(told).to_contain_text("3 of 4 are usable")
     expect(page.get_by_role("button", name="Play")).to_be_enabled()
