@@ -15,6 +15,13 @@ const BOX = [1, 0.6]; // m; of a box that is put up
 const GRIP = 18; // px about the robot
 let drag: { what: "plan" | "robot" | "turn"; x: number; y: number; moved: boolean } | null = null;
 
+/** Put what is said beside the mouse, whole. */
+function besides(px: number, py: number): void {
+  hover.style.translate = "0 0"; // at the edge it would be squeezed
+  const [x, y] = [Math.min(px + 14, view.width - hover.offsetWidth - 8), Math.min(py + 14, view.height - hover.offsetHeight - 8)];
+  hover.style.translate = `${Math.max(0, x)}px ${Math.max(0, y)}px`;
+}
+
 function whatAt(px: number, py: number): "plan" | "robot" | "turn" {
   if (!state.scan && !state.virtual) return "plan";
   const [rx, ry] = toPixels(state.robot.x, state.robot.y);
@@ -39,7 +46,7 @@ canvas.addEventListener("pointermove", (event) => {
     }
     hover.hidden = !told;
     hover.textContent = told;
-    hover.style.translate = `${Math.min(px + 14, view.width - 260)}px ${py + 14}px`;
+    if (told) besides(px, py);
     canvas.style.cursor = { plan: erase.checked || build.checked ? "crosshair" : "grab", robot: "move", turn: "alias" }[whatAt(px, py)];
     return;
   }

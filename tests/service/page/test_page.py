@@ -175,6 +175,9 @@ def test_where_a_map_will_fail(page: Page) -> None:
         box["x"] + box["width"] / 2 + (9.3 - 5.8) * scale, box["y"] + box["height"] / 2 - (4.3 - 2.575) * scale
     )
     expect(page.locator("#hover")).to_contain_text("looks like (")
+    told = page.locator("#hover").bounding_box()
+    assert told is not None
+    assert told["x"] + told["width"] < box["x"] + box["width"]
     page.get_by_role("button", name="Clear").click()
     expect(page.locator("#analyzed")).to_be_empty()
     page.get_by_label("Spacing").fill("0.01")
@@ -256,6 +259,7 @@ def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
     ]  # fmt: skip
     (tmp_path / "log.jsonl").write_text("\n".join(json.dumps(line) for line in lines))
     shown(page, "flat", "usable")  # with a virtual robot, which goes
+    expect(page.get_by_label("a virtual robot")).to_be_checked()
     page.set_input_files("#files", [*files(tmp_path, room={"segments": examples.WALLS}), tmp_path / "log.jsonl"])
     told = page.locator("#scan-of-log")
     expect(told).to_contain_text("Scan 1 of 4: no match, not usable")
