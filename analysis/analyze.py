@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from registration import RigidTransform, Segments, wrap_angle
 from simulation import scan
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
+from .drive import STEP, seen_on_the_way, ways_from
 from .robot import Robot
 from .standing import Standing, is_free
 
@@ -48,6 +50,11 @@ class PlaceVerdict:
         Along which the position stays free; a unit vector in the map frame.
     reasons : tuple of str
         Codes of why it is not usable, the weightiest first.
+    knows_after : float or None
+        How far it drives until it knows where it is, metres, on the better of the two ways of `analysis.drive`; 0
+        where it knows at once, None where it does not within what was asked for, or nothing was.
+    with_added : PlaceVerdict or None
+        What it would know with what was added; None where nothing was, or it stands in the way.
     """
 
     number: int
@@ -58,6 +65,8 @@ class PlaceVerdict:
     look_alike: RigidTransform | None
     unobservable: tuple[float, float] | None
     reasons: tuple[str, ...]
+    knows_after: float | None = None
+    with_added: PlaceVerdict | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +85,10 @@ class Analysis:
         Whether directions mean something.
     seed : int
         Of the noise.
+    drive : float
+        How far the robot may drive from a place where it does not know where it is, metres; 0: not at all.
+    added : Analysis or None
+        The same of a map with something added.
     """
 
     index: MapIndex
@@ -84,6 +97,21 @@ class Analysis:
     standing: Standing
     oriented: bool = True
     seed: int = 0
+    drive: float = 0.0
+    added: Analysis | None = None
+
+    def with_segments(self, added: Segments) -> Analysis:
+        """Return the same, which also says what would be known with more segments, on the map and in the building.
+
+        Parameters
+        ----------
+        added : Segments
+            In the map frame; such as a box, its free side outside.
+        """
+        ends = np.vstack([self.segments.endpoints, added.endpoints])
+        segments = Segments.derived(ends)
+        index = MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+        return replace(self, added=replace(self, index=index, segments=segments, drive=0.0, added=None))
 
     def look(self, number: int, deadline: Deadline | None = None) -> PlaceVerdict | None:
         """Take a scan at one of the poses and search it; None where a robot cannot stand there.
@@ -96,13 +124,37 @@ class Analysis:
         pose = self.standing.pose(number)
         if not is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented):
             return None
-        options = AssociationOptions(oriented=self.oriented)
-        return _verdict(number, pose, associate(self.index, self._scan(number, pose), None, options, deadline))
+        seen = self._scan(pose, number)
+        found = _verdict(number, pose, self._search(seen, deadline))
+        if self.drive:
+            found = replace(found, knows_after=0.0 if found.usable else self._knows_after(number, pose, seen, deadline))
+        if self.added is not None:
+            found = replace(found, with_added=self.added.look(number, deadline))
+        return found
 
-    def _scan(self, number: int, pose: RigidTransform) -> Scan:
+    def _search(self, seen: Scan, deadline: Deadline | None) -> AssociationResult:
+        return associate(self.index, seen, None, AssociationOptions(oriented=self.oriented), deadline)
+
+    def _knows_after(self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None) -> float | None:
+        """Return how far it drives until all that it has seen is told to be where it is by then; metres."""
+        ways = ways_from(self.segments, pose, self.drive, self.robot.range_max)
+        seen_so_far = [[(pose, seen)] for _ in ways]
+        for step in zip_longest(*ways):
+            for way, (there, views) in enumerate(zip(step, seen_so_far, strict=True)):
+                if there is None:
+                    continue
+                if deadline is not None and deadline.passed:
+                    return None
+                views.append((there, self._scan(there, number, way, len(views))))
+                result = self._search(seen_on_the_way(views, np.random.default_rng((self.seed, number))), deadline)
+                if result.usable and result.pose is not None and _is_same(result.pose, there):
+                    return STEP * (len(views) - 1)
+        return None
+
+    def _scan(self, pose: RigidTransform, *number: int) -> Scan:
         """Return what the robot would send from there; the noise of a place is the same whenever it is tried."""
         scanner = self.robot.scanner
-        ranges = scan(self.segments, pose, scanner, np.random.default_rng((self.seed, number))).ranges
+        ranges = scan(self.segments, pose, scanner, np.random.default_rng((self.seed, *number))).ranges
         laser = LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max)
         found = vectorize(laser, VectorizationOptions(sigma=self.robot.sigma))
         return Scan(found.measured, (0.0, 0.0), found.beams)

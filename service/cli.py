@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import logging
 import logging.config
 import os
@@ -25,6 +26,7 @@ NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
 
 def serve(arguments: Sequence[str]) -> int:
     """Read the settings and run the service."""
+    gc.disable()  # until the service is ready
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     from .settings import SettingsError, read_settings

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from registration.layout import Floats
 
@@ -162,6 +161,8 @@ def _overlapping(index: MapIndex, sides: Beside) -> Iterator[Finding]:
 
 def _gaping(index: MapIndex) -> Iterator[Finding]:
     """Tell where an end nearly meets another segment: at no other end, on no other line, and yet near one."""
+    from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
+
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
     # The nearest is the end itself; what is as near as this to its own begin is too short to tell.
     nearest = np.asarray(cKDTree(ends).query(ends, k=2)[0])[:, 1]

@@ -33,8 +33,10 @@ class Task:
     ----------
     endpoints : (n, 4)
         The map as sent, metres.
-    sigma, oriented, robot, standing, seed
+    sigma, oriented, robot, standing, seed, drive
         As in `MapIndex` and `Analysis`.
+    added : (k, 4)
+        Segments to be added, metres.
     ends_at : float or None
         Of the machine's monotonic clock.
     """
@@ -45,6 +47,8 @@ class Task:
     robot: Robot
     standing: Standing
     seed: int
+    drive: float
+    added: NDArray[np.float64]
     ends_at: float | None
 
 
@@ -71,8 +75,10 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
         return found
     # Spawned, never forked: this process has threads.
     context = multiprocessing.get_context("spawn")
-    task = Task(analysis.segments.endpoints, analysis.index.sigma, analysis.oriented, analysis.robot,
-                analysis.standing, analysis.seed, deadline.at)  # fmt: skip
+    own = analysis.segments.endpoints
+    added = np.empty((0, 4)) if analysis.added is None else analysis.added.segments.endpoints[len(own) :]
+    task = Task(own, analysis.index.sigma, analysis.oriented, analysis.robot, analysis.standing, analysis.seed,
+                analysis.drive, added, deadline.at)  # fmt: skip
     with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (task,)) as pool:
         todo, running = iter(portions), set[Future[Looks]]()
         while True:
@@ -102,7 +108,9 @@ def _begin(task: Task) -> None:
     global _analysis, _deadline
     segments = Segments.derived(task.endpoints)
     index = MapIndex.build(segments, task.sigma, oriented=task.oriented)
-    _analysis = Analysis(index, segments, task.robot, task.standing, task.oriented, task.seed)
+    _analysis = Analysis(index, segments, task.robot, task.standing, task.oriented, task.seed, task.drive)
+    if len(task.added):
+        _analysis = _analysis.with_segments(Segments.derived(task.added))
     _deadline = Deadline(task.ends_at)
 
 

@@ -38,10 +38,23 @@ class ScannerOptions:
     sigma: Annotated[float, typer.Option(metavar="METRES", help="Standard deviation of its ranges.")] = 0.02
 
 
+@dataclass(frozen=True, slots=True)
+class FurtherOptions:
+    """What else is to be found out of each place, as options."""
+
+    drive: Annotated[
+        float, typer.Option(metavar="METRES", help="How far it may drive until it knows where it is, 30 at most.")
+    ] = 0.0
+    added: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Walls that might be put up; what would be known with them?")
+    ] = None
+
+
 @grouped
 def analyze(
     on: MapArgument,
     scanner: ScannerOptions,
+    further: FurtherOptions,
     spacing: Annotated[
         float | None, typer.Option(metavar="METRES", help="From place to place; without it some 400 places.")
     ] = None,
@@ -61,6 +74,9 @@ def analyze(
     if picture is not None and "map_id" in target:
         raise WrongUseError("--picture: it is drawn over the map of a file; name one instead of an id")
     body: Json = {"map": target, "laser": asdict(scanner), "spacing": spacing, "deadline_ms": deadline_ms}
+    body["drive"] = further.drive
+    if further.added is not None:
+        body["added"] = read_map_file(further.added)["segments"]
     if point is not None:
         body["point"] = list(point)
     with answering(server) as service, _progress() as progress:
@@ -123,6 +139,10 @@ def _rows(answer: Json) -> Iterator[tuple[str, str]]:
     share = 100.0 * counts["usable"] / counts["places"] if counts["places"] else 0.0
     yield "places", f"{counts['places']} poses, {answer['spacing']:g} m apart, {counts['not_free']} more are not free"
     yield "usable", f"{counts['usable']} ({share:.0f} %)"
+    if counts.get("knows_within") is not None:
+        yield "driven", f"{counts['knows_within']} know where they are at once or on the way"
+    if counts.get("usable_with_added") is not None:
+        yield "added", f"{counts['usable_with_added']} usable with what is added"
     for status in ("ambiguous", "degenerate", "no_match"):
         if counts[status]:
             twins = f", {counts['look_alike']} of them look like another" if status == "ambiguous" else ""

@@ -6,10 +6,8 @@ whichever process.
 
 from __future__ import annotations
 
-import sqlite3
 from typing import Any
 
-import psycopg
 from sqlalchemy import Engine
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -28,7 +26,10 @@ class RecordReader:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        mark = "?" if engine.dialect.name == "sqlite" else "%s"
+        self._on_sqlite = engine.dialect.name == "sqlite"
+        # Of the driver in use: another need not be loaded, nor be there.
+        self._driver_error: type[Exception] = engine.dialect.loaded_dbapi.Error
+        mark = "?" if self._on_sqlite else "%s"
         self._statement = f"SELECT {', '.join(SEALED)}, seal, quarantined FROM {maps.name} WHERE map_id = {mark}"
         self._idle: list[Any] = []
 
@@ -43,7 +44,7 @@ class RecordReader:
         try:
             connection = idle.pop() if idle else self._connect()
             rows = connection.execute(self._statement, (map_id,)).fetchall()
-        except (SQLAlchemyError, sqlite3.Error, psycopg.Error, UnicodeDecodeError):
+        except (SQLAlchemyError, self._driver_error, UnicodeDecodeError):
             if connection is not None:
                 connection.close()
             return None
@@ -63,10 +64,10 @@ class RecordReader:
         opened = self._engine.raw_connection()
         connection: Any = opened.driver_connection
         opened.detach()
-        if isinstance(connection, psycopg.Connection):
-            connection.autocommit = True
-        else:
+        if self._on_sqlite:
             connection.execute("PRAGMA busy_timeout=0")  # whoever asks next waits for writers
+        else:
+            connection.autocommit = True
         return connection
 
 

@@ -77,6 +77,7 @@ def config_of(settings: Settings, factory: Callable[[], FastAPI]) -> uvicorn.Con
 
 def build(settings: Settings, part: Part) -> FastAPI:
     """Prepare this process, and return the application; called by uvicorn in its event loop."""
+    gc.disable()  # until the service is ready
     # Imported here: the supervisor imports this module, and needs neither Numba nor SciPy.
     from ..app import create_app
 

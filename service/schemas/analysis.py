@@ -11,7 +11,11 @@ from .errors import TooManyError
 from .limits import Limits
 from .parts import AnyMap
 from .replies import Index, MapReference, Milliseconds, PoseAnswer, Row2, Share
-from .strict import Answer, FreeJson, Point, Strict, in_radians
+from .strict import Answer, Coordinate, FreeJson, Point, Strict, in_radians
+
+Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
+MOST_ADDED = 100
+MOST_DRIVE = 30.0
 
 
 class ScannerFields(Strict):
@@ -37,6 +41,14 @@ class AnalyzeRequest(Strict):
     point: Point | None = Field(
         None, description="metres in the map; only places that can be reached from there without crossing a wall"
     )
+    drive: Annotated[float, Field(ge=0.0, le=MOST_DRIVE)] = Field(
+        0.0, description="metres that the robot may drive from where it does not know where it is; 0: not at all"
+    )
+    added: Annotated[list[Row], Field(max_length=MOST_ADDED)] = Field(
+        default=[],
+        description="segments of what might be put up, in the map frame: each place is also tried with these, "
+        "in the building and on the map; the free side of a box is outside",
+    )
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of the scanner's noise")
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
         None, description="milliseconds; what it leaves no time for is left out"
@@ -57,6 +69,14 @@ class MapAnalyzeRequest(AnalyzeRequest):
     map: AnyMap
 
 
+class WithAddedAnswer(Answer):
+    """What a robot would know with what was added."""
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    usable: bool
+    probability: Share
+
+
 class AnalyzedPlaceAnswer(Answer):
     """What a robot would know at a place."""
 
@@ -69,6 +89,13 @@ class AnalyzedPlaceAnswer(Answer):
     look_alike: PoseAnswer | None = Field(description="another place that explains the scan about as well")
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
     reasons: list[str] = Field(description="codes of why it is not usable, as of /v1/associate")
+    knows_after: float | None = Field(
+        description="metres to drive until it knows where it is: 0 where it knows at once, null where it does not "
+        "within `drive`, or none was asked for"
+    )
+    with_added: WithAddedAnswer | None = Field(
+        description="null where nothing was added, or it leaves the robot no room there"
+    )
 
 
 class AnalysisSummaryAnswer(Answer):
@@ -81,6 +108,10 @@ class AnalysisSummaryAnswer(Answer):
     degenerate: Index
     no_match: Index
     look_alike: Index = Field(description="places for which another one is named")
+    knows_within: Index | None = Field(
+        description="places at which it knows where it is at once or within `drive`; null where none was asked for"
+    )
+    usable_with_added: Index | None = Field(description="null where nothing was added")
     not_free: Index = Field(description="poses of the grid at which no robot can stand")
     left_out: Index = Field(description="poses of the grid for which no time was left")
 

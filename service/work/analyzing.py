@@ -60,6 +60,8 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     ------
     AnalysisError
         When the places asked for cannot be had.
+    InputError
+        When a segment that is added is too short or too long.
     """
     # Of a map without directions the index holds each segment twice.
     index = cached.index
@@ -67,7 +69,10 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     laser = asked.laser
     robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
     standing = standing_places(segments, robot, asked.spacing, asked.point)
-    return Analysis(index, segments, robot, standing, cached.oriented, asked.seed)
+    analysis = Analysis(index, segments, robot, standing, cached.oriented, asked.seed, asked.drive)
+    if not asked.added:
+        return analysis
+    return analysis.with_segments(Segments.from_array(asked.added, argument="added"))
 
 
 def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:
@@ -79,8 +84,8 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
         When the map cannot be had.
     ParserEndedError
         When it is large and could not be read.
-    AnalysisError
-        When the places asked for cannot be had.
+    AnalysisError, InputError
+        When the places asked for cannot be had, or what is added is none.
     DeadlinePassedError
         When the deadline has passed before.
     """
@@ -130,6 +135,10 @@ def analysis_json(analysis: Analysis, found: dict[int, PlaceVerdict | None]) -> 
         "places": [_place_json(one) for one in verdicts],
         "summary": {
             **_counts(verdicts),
+            "knows_within": sum(one.knows_after is not None for one in verdicts) if analysis.drive else None,
+            "usable_with_added": None
+            if analysis.added is None
+            else sum(one.with_added is not None and one.with_added.usable for one in verdicts),
             "not_free": len(found) - len(verdicts),
             "left_out": tried - len(found),
         },
@@ -159,4 +168,12 @@ def _place_json(one: PlaceVerdict) -> Json:
         "look_alike": pose_json(one.look_alike),
         "unobservable": direction_json(one.unobservable),
         "reasons": list(one.reasons),
+        "knows_after": one.knows_after,
+        "with_added": _with_added_json(one.with_added),
     }
+
+
+def _with_added_json(one: PlaceVerdict | None) -> Json | None:
+    if one is None:
+        return None
+    return {"status": str(one.status), "usable": one.usable, "probability": one.probability}

@@ -76,6 +76,11 @@ class SmallPackage:
         assert old in path.read_text()
         path.write_text(path.read_text().replace(old, new))
 
+    def kept(self) -> Path:
+        """Return where the one run before has kept what it compiled."""
+        (directory,) = (self.home / "kernels" / "__pycache__").iterdir()
+        return directory
+
     def run(self, **environment: object) -> Ran:
         """Run the kernel in a process of its own, which obeys the permissions of files whoever started the tests."""
         left = ("LINEFIX_KERNELS", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
@@ -103,26 +108,41 @@ def small(tmp_path: Path) -> SmallPackage:
     return SmallPackage.write(tmp_path)
 
 
-def test_unchanged_source_is_loaded_and_not_compiled(small: SmallPackage) -> None:
-    first, second = small.run(), small.run()
+@pytest.fixture(scope="module")
+def ran_once(tmp_path_factory: pytest.TempPathFactory) -> SmallPackage:
+    package = SmallPackage.write(tmp_path_factory.mktemp("ran"))
+    first = package.run()
     assert (first.answer, first.loaded, first.compiled_before, first.compiled_after) == (22.0, False, False, True)
-    assert (second.answer, second.loaded, second.compiled_before, second.compiled_after) == (22.0, True, True, True)
-    assert first.directory.parent == small.home / "kernels" / "__pycache__"
+    assert first.directory.parent == package.home / "kernels" / "__pycache__"
     assert not first.log
+    return package
+
+
+@pytest.fixture
+def compiled(ran_once: SmallPackage, tmp_path: Path) -> SmallPackage:
+    """The small package, and beside it what was kept of it: to compile it takes a second."""
+    return SmallPackage(shutil.copytree(ran_once.home, tmp_path / "small"))
+
+
+def test_unchanged_source_is_loaded_and_not_compiled(compiled: SmallPackage) -> None:
+    again = compiled.run()
+    assert (again.answer, again.loaded, again.compiled_before, again.compiled_after) == (22.0, True, True, True)
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "answer"),
     [("kernels/inner.py", "+ 1.0", "+ 3.0", 26.0), ("layout.py", "10.0", "20.0", 42.0)],
 )
-def test_an_edited_callee_changes_the_answer(small: SmallPackage, file: str, old: str, new: str, answer: float) -> None:
-    before = small.run()
-    small.edit(file, old, new)
-    edited = small.run()
+def test_an_edited_callee_changes_the_answer(
+    compiled: SmallPackage, file: str, old: str, new: str, answer: float
+) -> None:
+    before = compiled.kept()
+    compiled.edit(file, old, new)
+    edited = compiled.run()
     assert (edited.answer, edited.loaded, edited.compiled_before) == (answer, False, False)
-    small.edit(file, new, old)
-    again = small.run()
-    assert (again.answer, again.loaded, again.directory) == (22.0, True, before.directory)
+    compiled.edit(file, new, old)
+    again = compiled.run()
+    assert (again.answer, again.loaded, again.directory) == (22.0, True, before)
 
 
 def test_what_cannot_be_written_is_loaded_from(small: SmallPackage, tmp_path: Path) -> None:
@@ -142,14 +162,14 @@ def test_what_cannot_be_written_is_loaded_from(small: SmallPackage, tmp_path: Pa
     assert sorted(directory.iterdir()) == files
 
 
-def test_kept_beside_by_another_user(small: SmallPackage, tmp_path: Path) -> None:
-    directory = small.run().directory
+def test_kept_beside_by_another_user(compiled: SmallPackage, tmp_path: Path) -> None:
+    directory = compiled.kept()
     for path in (directory, directory.parent):
         path.chmod(0o500)
-    ran = small.run(XDG_CACHE_HOME=tmp_path / "cache")
+    ran = compiled.run(XDG_CACHE_HOME=tmp_path / "cache")
     assert (ran.loaded, ran.directory) == (True, directory)
-    small.edit("kernels/inner.py", "+ 1.0", "+ 3.0")
-    edited = small.run(XDG_CACHE_HOME=tmp_path / "cache")
+    compiled.edit("kernels/inner.py", "+ 1.0", "+ 3.0")
+    edited = compiled.run(XDG_CACHE_HOME=tmp_path / "cache")
     assert (edited.answer, edited.directory.parent) == (26.0, tmp_path / "cache" / "linefix" / "kernels")
     assert edited.directory.parent.stat().st_mode & 0o777 == 0o700
     assert edited.compiled_after
@@ -174,14 +194,13 @@ def test_without_a_place_of_its_own(small: SmallPackage, tmp_path: Path) -> None
     assert homeless.directory.parent.parent == tmp_path
 
 
-def test_a_broken_file_is_compiled_anew(small: SmallPackage) -> None:
-    directory = small.run().directory
-    for path, content in zip(sorted(directory.iterdir()), (b"", b"\x80\x05}"), strict=True):
+def test_a_broken_file_is_compiled_anew(compiled: SmallPackage) -> None:
+    for path, content in zip(sorted(compiled.kept().iterdir()), (b"", b"\x80\x05}"), strict=True):
         path.write_bytes(content)
-    broken = small.run()
+    broken = compiled.run()
     assert (broken.answer, broken.loaded) == (22.0, False)
     assert broken.log.count("compiling anew") == 2
-    mended = small.run()
+    mended = compiled.run()
     assert (mended.answer, mended.loaded, mended.log) == (22.0, True, "")
 
 

@@ -1,21 +1,23 @@
 // Where the map will fail, as a heat map over the plan.
 
 import { analyze } from "./api";
-import { changed, onChange, state } from "./state";
-import type { MapDocument } from "./types";
+import { asStored, changed, kept, onChange, state, type Shown } from "./state";
+import type { Analysis } from "./types";
 
 const value = (id: string) => document.querySelector<HTMLInputElement>(id)!.value;
 const button = document.querySelector<HTMLButtonElement>("#analyze")!;
 const clear = document.querySelector<HTMLButtonElement>("#clear")!;
 const told = document.querySelector<HTMLElement>("#analyzed")!;
+const show = document.querySelector<HTMLSelectElement>("#show")!;
 const TIME = 20_000; // ms
+const LONG_TIME = 30_000; // ms; a drive takes many searches
 
 button.addEventListener("click", async () => {
   if (!state.map) {
     told.textContent = "There is no map yet.";
     return;
   }
-  const map: MapDocument = { ...state.map, segments: state.walls.filter((_, k) => !state.off.has(k)) };
+  const { own, added } = kept();
   const laser = {
     fov: Math.min(2 * Math.PI, (Math.PI / 180) * Number(value("#fov"))),
     beams: Math.round(Number(value("#beams"))),
@@ -23,19 +25,19 @@ button.addEventListener("click", async () => {
     sigma: state.laser.sigma,
   };
   const spacing = value("#spacing") === "" ? null : Number(value("#spacing"));
-  const target = state.mapId !== null && !state.off.size ? { map_id: state.mapId } : map;
+  const drive = Number(value("#drive"));
+  // What was put up is told apart from the map: with it and without it.
+  const stored = asStored() || (state.mapId !== null && own.length === state.own);
+  const map = stored ? { map_id: state.mapId } : { ...state.map, segments: own };
   button.disabled = true;
-  told.textContent = "Looking about ...";
+  told.textContent = drive || added.length ? "Looking about, which may take half a minute ..." : "Looking about ...";
   const of = state.walls;
   try {
-    const found = await analyze({ map: target, laser, spacing, deadline_ms: TIME });
+    const found = await analyze({ map, laser, spacing, drive, added, deadline_ms: drive ? LONG_TIME : TIME });
     if (of !== state.walls) return; // another map is shown by now
-    state.analysis = found;
-    const { places, usable, look_alike, left_out } = found.summary;
-    const rest = found.complete ? "" : ` There was no time for ${left_out} more.`;
-    told.textContent = places
-      ? `A robot would know where it is at ${usable} of ${places} places; ${look_alike} look like another.${rest}`
-      : `There is no place where a robot could stand.${rest}`;
+    Object.assign(state, { analysis: found, pointed: null });
+    state.show = added.length ? "added" : drive ? "driven" : "now";
+    told.textContent = sentence(found, drive);
   } catch (error) {
     told.textContent = error instanceof Error ? error.message : String(error);
   } finally {
@@ -44,12 +46,33 @@ button.addEventListener("click", async () => {
   }
 });
 
+function sentence({ places: found, summary, complete }: Analysis, drive: number): string {
+  const { places, usable, look_alike, left_out, knows_within, usable_with_added } = summary;
+  const rest = complete ? "" : ` There was no time for ${left_out} more.`;
+  if (!places) return `There is no place where a robot could stand.${rest}`;
+  const driven = knows_within === null ? "" : ` After a drive of up to ${drive} m it would at ${knows_within}.`;
+  const added = usable_with_added === null ? "" : ` With the boxes that you put up it would at ${usable_with_added}.`;
+  const each = found.some((one) => one.pose.theta !== found[0].pose.theta) ? "places, four headings at each" : "places";
+  return `A robot would know where it is at ${usable} of ${places} ${each}; ${look_alike} look like another.${driven}${added}${rest}`;
+}
+
+show.addEventListener("change", () => {
+  state.show = show.value as Shown;
+  changed();
+});
+
 clear.addEventListener("click", () => {
-  state.analysis = null;
+  state.analysis = state.pointed = null;
   changed();
 });
 
 onChange(() => {
   if (clear.disabled !== !state.analysis && !state.analysis && !button.disabled) told.textContent = "";
   clear.disabled = !state.analysis;
+  const { knows_within, usable_with_added } = state.analysis?.summary ?? { knows_within: null, usable_with_added: null };
+  const there: Record<Shown, boolean> = { now: true, driven: knows_within !== null, added: usable_with_added !== null };
+  if (!there[state.show]) state.show = "now";
+  for (const option of show.options) option.disabled = !there[option.value as Shown];
+  show.disabled = !there.driven && !there.added;
+  show.value = state.show;
 });

@@ -1,6 +1,6 @@
 // Requests to the service that this page comes from.
 
-import type { Analysis, Answer, MapDocument, Scan, StoredMap } from "./types";
+import type { Analysis, Answer, Imported, MapDocument, Scan, StoredMap } from "./types";
 
 export class Problem extends Error {
   constructor(
@@ -44,8 +44,8 @@ async function call<T>(method: string, path: string, body?: BodyInit, type?: str
 function problemOf(status: number, answer: unknown): Problem {
   const { detail, code, errors } = answer as { detail?: string; code?: string; errors?: { pointer: string; message: string }[] };
   if (status === 401 || status === 403) return new Problem("The service asks for a key, or for another one: see Key below.", status, code ?? "");
-  const where = errors?.length ? ` (${errors[0].pointer}: ${errors[0].message})` : "";
-  return new Problem(`${detail ?? "The request was refused"}${where}`, status, code ?? "");
+  const told = errors?.length ? `${errors[0].pointer}: ${errors[0].message}` : (detail ?? "The request was refused");
+  return new Problem(told, status, code ?? "");
 }
 
 const JSON_TYPE = "application/json";
@@ -71,15 +71,22 @@ export const checkMap = (id: string) =>
   call<{ findings: { code: string; message: string; count: number }[] }>("GET", `${pathOf(id)}:check`);
 
 /** Have files of another tool read; nothing is stored. */
-export async function importMap(files: File[]): Promise<MapDocument> {
+export async function importMap(files: File[], units: string): Promise<Imported> {
   const form = new FormData();
   for (const file of files) form.append("files", file, file.name);
+  if (units) form.append("units", units);
   try {
-    const answer = await call<{ map: MapDocument }>("POST", "/v1/maps:import", form);
-    return answer.map;
+    return await call<Imported>("POST", "/v1/maps:import", form);
   } catch (error) {
     if (error instanceof Problem && [404, 405, 415].includes(error.status))
       throw new Problem("This service reads maps as JSON only: the packages for other formats are not installed.", error.status, error.code);
+    if (error instanceof Problem) error.message = named(error.message, files);
     throw error;
   }
+}
+
+/** Say which file is wrong, and where its unit can be chosen. */
+function named(message: string, files: File[]): string {
+  const told = message.replace(/^\/files\/(\d+)/, (whole, k: string) => files[Number(k)]?.name ?? whole);
+  return told.includes("does not say its unit") ? `${told}. Choose it below.` : told;
 }

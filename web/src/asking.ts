@@ -2,7 +2,7 @@
 
 import { associate, Problem, type Asked } from "./api";
 import { noisy, takeScan } from "./geometry";
-import { changed, forget, state } from "./state";
+import { asStored, changed, forget, state } from "./state";
 import { tellProblem } from "./verdict";
 
 const NEAR = { radius: 1, angle: Math.PI / 6 };
@@ -19,8 +19,7 @@ export function request(): { asked: Asked; sentTo: number[] } | null {
     : state.scan;
   if (!scan) return null;
   const kept = state.walls.map((_, k) => k).filter((k) => !state.off.has(k));
-  const whole = state.mapId !== null && !state.off.size;
-  const map = whole ? { map_id: state.mapId! } : { ...state.map, segments: kept.map((k) => state.walls[k]) };
+  const map = asStored() ? { map_id: state.mapId! } : { ...state.map, segments: kept.map((k) => state.walls[k]) };
   const asked: Asked = { map, scan: noisy(scan, state.noise) };
   if (checked("#near")) asked.prior = { ...state.robot, ...NEAR };
   return { asked, sentTo: kept };

@@ -1,6 +1,6 @@
 // Everything on the canvas, from the state alone.
 
-import { distance, place, placed, pointsOf } from "./geometry";
+import { distance, place, placed, pointsOf, wrap } from "./geometry";
 import { state } from "./state";
 import type { Answer, Place, Pose, Scan, Segment } from "./types";
 import { toMetres, toPixels, view } from "./view";
@@ -55,6 +55,8 @@ function draw(): void {
   context.lineCap = "round";
   if (state.analysis) drawAnalysis(state.analysis.places, state.analysis.spacing);
   drawWalls(context, colours.wall, redraw);
+  drawPutUp();
+  if (state.analysis && state.pointed?.look_alike) drawLikeness(state.pointed.pose, state.pointed.look_alike);
   drawTakenOff();
   if (state.log.length) drawLog();
   const { answer, sent } = state;
@@ -62,6 +64,10 @@ function draw(): void {
   if (scan && !state.virtual) drawScan(scan, state.robot, "before", 0.5);
   if (answer && sent) drawAnswer(answer, sent.scan);
   if (scan || state.virtual) drawRobot(state.robot, "robot", true);
+}
+
+function drawPutUp(): void {
+  for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.robot, 3);
 }
 
 function drawTakenOff(): void {
@@ -190,8 +196,10 @@ function drawAnalysis(places: Place[], spacing: number): void {
   const directed = places.some((one) => one.pose.theta !== places[0].pose.theta);
   context.globalAlpha = 0.55;
   for (const one of places) {
+    const shown = shownOf(one);
+    if (!shown) continue;
     const [px, py] = toPixels(one.pose.x, one.pose.y);
-    context.fillStyle = colours[kindOf(one)];
+    context.fillStyle = colours[kindOf(shown)];
     if (directed) {
       context.beginPath();
       context.moveTo(px, py);
@@ -200,6 +208,21 @@ function drawAnalysis(places: Place[], spacing: number): void {
     } else context.fillRect(px - side / 2, py - side / 2, side, side);
   }
   context.globalAlpha = 1;
+}
+
+/** From a place to another that looks like it. */
+function drawLikeness(from: Pose, to: Pose): void {
+  context.setLineDash([6, 5]);
+  line([from.x, from.y, to.x, to.y], colours.ghost, 2);
+  context.setLineDash([]);
+  drawRobot(to, "ghost", false);
+}
+
+/** What is shown of a place: at once, after a drive, or with what was put up; null where no robot can stand then. */
+export function shownOf(one: Place): { status: Answer["status"]; usable: boolean; probability: number } | null {
+  if (state.show === "added") return one.with_added;
+  if (state.show === "driven" && one.knows_after !== null) return { ...one, status: "ok", usable: true };
+  return one;
 }
 
 /** How a place is told; one that is ok but not usable is as good as ambiguous. */
@@ -239,13 +262,28 @@ export function toldAt(px: number, py: number): string {
     for (const k of answer.missing_map)
       if (distance(x, y, state.walls[state.sentTo[k]]) < near) return `wall ${state.sentTo[k]}: should have been seen, and was not`;
   }
-  for (const one of state.analysis?.places ?? [])
-    if (Math.max(Math.abs(one.pose.x - x), Math.abs(one.pose.y - y)) < (state.analysis?.spacing ?? 0) / 2) {
-      const like = one.look_alike ? `, looks like (${one.look_alike.x.toFixed(1)}, ${one.look_alike.y.toFixed(1)})` : "";
-      return `(${one.pose.x.toFixed(1)}, ${one.pose.y.toFixed(1)}): ${one.status}, ${(100 * one.probability).toFixed(1)} %${like}`;
-    }
+  const place = placeAt(x, y);
+  if (place) return toldOf(place);
   const wall = wallAt(x, y, near);
-  return wall < 0 ? "" : `wall ${wall}${state.off.has(wall) ? ", taken off" : ""}`;
+  return wall < 0 ? "" : `wall ${wall}${wall >= state.own ? ", put up" : ""}${state.off.has(wall) ? ", taken off" : ""}`;
+}
+
+/** Which place of the analysis is there; of several headings that which looks there. */
+export function placeAt(x: number, y: number): Place | null {
+  const half = (state.analysis?.spacing ?? 0) / 2;
+  const here = (state.analysis?.places ?? []).filter((one) => Math.max(Math.abs(one.pose.x - x), Math.abs(one.pose.y - y)) < half);
+  const away = (one: Place) => Math.abs(wrap(Math.atan2(y - one.pose.y, x - one.pose.x) - one.pose.theta));
+  return here.length > 1 ? here.reduce((a, b) => (away(b) < away(a) ? b : a)) : (here[0] ?? null);
+}
+
+function toldOf(one: Place): string {
+  const at = ({ x, y }: Pose) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;
+  const told = ({ status, usable, probability }: { status: string; usable: boolean; probability: number }) =>
+    `${status.replace("_", " ")}, ${usable ? "" : "not "}usable, ${(100 * probability).toFixed(1)} %`;
+  const like = one.look_alike ? `, looks like ${at(one.look_alike)}` : "";
+  const drive = one.knows_after ? `; knows after ${one.knows_after} m` : "";
+  const added = one.with_added ? `; with the boxes: ${told(one.with_added)}` : "";
+  return `${at(one.pose)}: ${told(one)}${like}${drive}${added}`;
 }
 
 /** Which wall is within some metres of a place, -1 for none. */

@@ -1,12 +1,17 @@
 // Files that a user brings: what they are is told by what is in them.
 
 import { importMap } from "./api";
+import { tellImport } from "./imported";
 import { askSoon } from "./asking";
 import { openLog } from "./log";
 import { changed, forget, setMap, state } from "./state";
 import type { MapDocument, Scan } from "./types";
 import { showAll } from "./scene";
 import { tellProblem } from "./verdict";
+
+const about = document.querySelector<HTMLElement>("#about")!;
+const units = document.querySelector<HTMLSelectElement>("#units")!;
+let drawing: File[] = []; // as it was brought last
 
 export async function open(files: File[]): Promise<void> {
   const foreign: File[] = [];
@@ -15,12 +20,26 @@ export async function open(files: File[]): Promise<void> {
       if (/\.(json|jsonl|ndjson)$/i.test(file.name)) take(file.name, await file.text());
       else foreign.push(file);
     }
-    if (foreign.length) takeMap(await importMap(foreign));
+    if (foreign.length) await read(foreign);
   } catch (error) {
     tellProblem(error instanceof Error ? error.message : String(error));
     return;
   }
   askSoon();
+}
+
+async function read(files: File[]): Promise<void> {
+  drawing = files;
+  const before = about.textContent;
+  about.textContent = "Reading the map ...";
+  try {
+    const found = await importMap(files, units.value);
+    takeMap(found.map);
+    tellImport(found);
+  } catch (error) {
+    about.textContent = before;
+    throw error;
+  }
 }
 
 function take(name: string, text: string): void {
@@ -60,7 +79,7 @@ function takeMap(map: MapDocument): void {
 function takeScan(scan: Scan): void {
   Object.assign(state, { scan, virtual: false });
   forget();
-  if (!state.map) document.querySelector("#about")!.textContent = "A scan from a file. Now bring the map to find it in.";
+  if (!state.map) about.textContent = "A scan from a file. Now bring the map to find it in.";
   document.querySelector<HTMLInputElement>("#virtual")!.checked = false;
   changed();
 }
@@ -69,6 +88,10 @@ const input = document.querySelector<HTMLInputElement>("#files")!;
 input.addEventListener("change", () => {
   void open([...(input.files ?? [])]);
   input.value = "";
+});
+// Whoever is told that a drawing does not say its unit need not bring it again.
+units.addEventListener("change", () => {
+  if (drawing.length) void open(drawing);
 });
 document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {

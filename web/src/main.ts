@@ -2,6 +2,7 @@
 
 import "./analysis";
 import "./files";
+import "./imported";
 import "./inset";
 import "./log";
 import "./pointer";

@@ -1,17 +1,26 @@
 // Mouse, touch and keyboard on the plan.
 
 import { ask, askSoon } from "./asking";
-import { HANDLE, redraw, toldAt, wallAt } from "./drawing";
+import { HANDLE, placeAt, redraw, toldAt, wallAt } from "./drawing";
 import { wrap } from "./geometry";
-import { boundsOf, changed, state } from "./state";
+import { boundsOf, changed, putUp, state } from "./state";
 import { legend, step } from "./verdict";
 import { fit, toMetres, toPixels, view, zoom } from "./view";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const hover = document.querySelector<HTMLElement>("#hover")!;
 const erase = document.querySelector<HTMLInputElement>("#erase")!;
+const build = document.querySelector<HTMLInputElement>("#build")!;
+const BOX = [1, 0.6]; // m; of a box that is put up
 const GRIP = 18; // px about the robot
 let drag: { what: "plan" | "robot" | "turn"; x: number; y: number; moved: boolean } | null = null;
+
+/** Put what is said beside the mouse, whole. */
+function besides(px: number, py: number): void {
+  hover.style.translate = "0 0"; // at the edge it would be squeezed
+  const [x, y] = [Math.min(px + 14, view.width - hover.offsetWidth - 8), Math.min(py + 14, view.height - hover.offsetHeight - 8)];
+  hover.style.translate = `${Math.max(0, x)}px ${Math.max(0, y)}px`;
+}
 
 function whatAt(px: number, py: number): "plan" | "robot" | "turn" {
   if (!state.scan && !state.virtual) return "plan";
@@ -30,10 +39,15 @@ canvas.addEventListener("pointermove", (event) => {
   const [px, py] = [event.offsetX, event.offsetY];
   if (!drag) {
     const told = toldAt(px, py);
+    const pointed = placeAt(...toMetres(px, py));
+    if (pointed !== state.pointed) {
+      state.pointed = pointed;
+      redraw();
+    }
     hover.hidden = !told;
     hover.textContent = told;
-    hover.style.translate = `${Math.min(px + 14, view.width - 260)}px ${py + 14}px`;
-    canvas.style.cursor = { plan: erase.checked ? "crosshair" : "grab", robot: "move", turn: "alias" }[whatAt(px, py)];
+    if (told) besides(px, py);
+    canvas.style.cursor = { plan: erase.checked || build.checked ? "crosshair" : "grab", robot: "move", turn: "alias" }[whatAt(px, py)];
     return;
   }
   const [dx, dy] = [px - drag.x, py - drag.y];
@@ -56,6 +70,7 @@ canvas.addEventListener("pointermove", (event) => {
 
 canvas.addEventListener("pointerup", (event) => {
   if (drag && !drag.moved && erase.checked) toggleWall(event.offsetX, event.offsetY);
+  if (drag && !drag.moved && build.checked) putBox(...toMetres(event.offsetX, event.offsetY));
   drag = null;
 });
 canvas.addEventListener("pointercancel", () => (drag = null));
@@ -76,6 +91,15 @@ function toggleWall(px: number, py: number): void {
   if (wall < 0) return;
   if (state.off.has(wall)) state.off.delete(wall);
   else if (state.off.size < state.walls.length - 1) state.off.add(wall); // a map has one wall at least
+  askSoon();
+}
+
+/** Put a box up about a place; its free side is outside. */
+function putBox(x: number, y: number): void {
+  if (!state.map) return;
+  const [w, h] = [BOX[0] / 2, BOX[1] / 2];
+  const corners: [number, number][] = [[x - w, y - h], [x - w, y + h], [x + w, y + h], [x + w, y - h]];
+  putUp(corners.map((one, k) => [...one, ...corners[(k + 1) % 4]]));
   askSoon();
 }
 
@@ -116,6 +140,7 @@ canvas.addEventListener("keydown", (event) => {
     a: () => (view.x -= pixels),
     d: () => (view.x += pixels),
     n: () => step(1),
+    b: () => putBox(state.robot.x + 1.5 * Math.cos(state.robot.theta), state.robot.y + 1.5 * Math.sin(state.robot.theta)),
     Enter: () => void ask(),
   };
   const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -127,6 +152,7 @@ canvas.addEventListener("keydown", (event) => {
   } else {
     plan[name]();
     if (name === "n") changed();
+    else if (name === "b") return;
     else looked();
   }
 });

@@ -2,7 +2,7 @@
 
 import { example } from "./api";
 import { askSoon } from "./asking";
-import { boundsOf, changed, setMap, state } from "./state";
+import { boundsOf, changed, onChange, setMap, state } from "./state";
 import type { Example } from "./types";
 import { tellProblem } from "./verdict";
 import { fit } from "./view";
@@ -17,9 +17,9 @@ const NAMES: Record<string, string> = {
 const chooser = document.querySelector<HTMLSelectElement>("#example")!;
 const virtual = document.querySelector<HTMLInputElement>("#virtual")!;
 
-export function showAll(about: string): void {
+export function showAll(about: string, example = ""): void {
+  chooser.value = example;
   document.querySelector("#about")!.textContent = about;
-  virtual.checked = state.virtual;
   for (const [id, value] of Object.entries({ "#fov": (180 / Math.PI) * state.laser.fov, "#beams": state.laser.beams, "#range": state.laser.range_max }))
     document.querySelector<HTMLInputElement>(id)!.value = String(Math.round(100 * value) / 100);
   fit(boundsOf(state.walls));
@@ -36,7 +36,7 @@ export async function choose(name: string): Promise<void> {
   }
   setMap(found.map);
   Object.assign(state, { boxes: found.boxes, robot: found.pose, laser: found.laser, virtual: true, scan: null });
-  showAll(found.about);
+  showAll(found.about, name);
   askSoon();
 }
 
@@ -48,4 +48,9 @@ virtual.addEventListener("change", () => {
   state.virtual = virtual.checked && state.map !== null;
   virtual.checked = state.virtual;
   askSoon();
+});
+
+onChange(() => {
+  virtual.checked = state.virtual;
+  document.querySelector<HTMLElement>("#hint")!.hidden = state.map !== null || state.scan !== null || state.log.length > 0;
 });

@@ -2,7 +2,7 @@
 
 import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
 import { askSoon } from "./asking";
-import { setMap, state } from "./state";
+import { kept, setMap, state } from "./state";
 import { showAll } from "./scene";
 import { list } from "./verdict";
 
@@ -86,8 +86,8 @@ async function remove(id: string): Promise<void> {
 async function upload(): Promise<void> {
   if (!state.map) throw new Error("There is no map yet.");
   if (!name.value || !name.checkValidity()) throw new Error("A name has letters, digits, dots, dashes and underscores only.");
-  const kept = { ...state.map, segments: state.walls.filter((_, k) => !state.off.has(k)) };
-  const told = await putMap(name.value, kept);
+  const { own, added } = kept();
+  const told = await putMap(name.value, { ...state.map, segments: [...own, ...added] });
   await load("");
   tell(`${told.map_id} is stored, revision ${told.revision}.`);
 }

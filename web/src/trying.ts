@@ -1,7 +1,7 @@
 // What a user may change about the scan and the map.
 
 import { ask, askSoon } from "./asking";
-import { onChange, state } from "./state";
+import { onChange, restore as restoreMap, state } from "./state";
 
 const noise = document.querySelector<HTMLInputElement>("#noise")!;
 const told = document.querySelector<HTMLOutputElement>("#noise-value")!;
@@ -12,13 +12,17 @@ noise.addEventListener("input", () => {
   askSoon();
 });
 restore.addEventListener("click", () => {
-  state.off = new Set();
+  restoreMap();
   askSoon();
 });
+// A click does one thing or the other.
+const [erase, build] = ["#erase", "#build"].map((id) => document.querySelector<HTMLInputElement>(id)!);
+erase.addEventListener("change", () => (build.checked &&= !erase.checked));
+build.addEventListener("change", () => (erase.checked &&= !build.checked));
 document.querySelector("#near")!.addEventListener("change", askSoon);
 document.querySelector("#run")!.addEventListener("click", () => void ask());
 
 onChange(() => {
   told.textContent = `${(100 * state.noise).toFixed(1)} cm`;
-  restore.disabled = state.off.size === 0;
+  restore.disabled = state.off.size === 0 && state.walls.length === state.own;
 });

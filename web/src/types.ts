@@ -78,11 +78,13 @@ export interface Place {
   probability: number;
   look_alike: Pose | null;
   reasons: string[];
+  knows_after: number | null;
+  with_added: { status: Answer["status"]; usable: boolean; probability: number } | null;
 }
 
 export interface Analysis {
   places: Place[];
-  summary: Record<string, number>;
+  summary: Record<string, number> & { knows_within: number | null; usable_with_added: number | null };
   spacing: number;
   complete: boolean;
 }
@@ -103,6 +105,28 @@ export interface LogLine {
   probability: number;
   pose: Pose | null;
   reasons: (Reason | string)[];
+}
+
+export interface Note {
+  code: string;
+  message: string;
+  count: number;
+}
+
+/** What was made of the files of another tool. */
+export interface Report {
+  format: string;
+  files: string[];
+  read: Note[];
+  merged: Note[];
+  dropped: Note[];
+  assumed: Note[];
+}
+
+export interface Imported {
+  map: MapDocument;
+  report: Report;
+  check: { findings: { code: string; message: string; count: number }[] };
 }
 
 export interface StoredMap {

@@ -16,10 +16,10 @@ export function tellProblem(message: string): void {
 function show(): void {
   const { answer } = state;
   card.dataset.state = problem ? "problem" : answer ? (answer.usable ? "usable" : answer.status) : "none";
-  element("#verdict-title").textContent = problem ? "No answer" : answer ? title() : "Verdict";
+  element("#verdict-title").textContent = problem ? "That did not work" : answer ? title() : "Verdict";
   if (problem || answer) element("#sentence").textContent = problem || answer!.sentence;
   else if (state.map) element("#sentence").textContent = "Not asked yet.";
-  list(element("#reasons"), answer ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
+  list(element("#reasons"), answer && !problem ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
   numbers();
   others();
   legend();
@@ -43,7 +43,7 @@ export function list(into: HTMLElement, lines: string[]): void {
 function numbers(): void {
   const { answer } = state;
   const rows: [string, string][] = [];
-  if (answer) {
+  if (answer && !problem) {
     rows.push(["chance", `${(100 * answer.probability).toFixed(2)} %`]);
     if (answer.pose) {
       const { x, y, theta } = answer.pose;
@@ -75,7 +75,7 @@ function numbers(): void {
 
 function others(): void {
   const count = state.answer?.alternatives.length ?? 0;
-  element("#others").hidden = count === 0;
+  element("#others").hidden = count === 0 || problem !== "";
   element("#other").textContent =
     state.other < 0 ? `${count} other ${count === 1 ? "place" : "places"}` : `other place ${state.other + 1} of ${count}${share()}`;
 }

@@ -38,6 +38,8 @@ class AnalysisSummaryAnswer(TypedDict):
     degenerate: int
     no_match: int
     look_alike: int
+    knows_within: int | None
+    usable_with_added: int | None
     not_free: int
     left_out: int
 
@@ -338,6 +340,16 @@ class WarningAnswer(TypedDict):
     message: str
 
 
+class WithAddedAnswer(TypedDict):
+    """
+    What a robot would know with what was added.
+    """
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    usable: bool
+    probability: float
+
+
 class HardPriorFields(TypedDict):
     """
     A window that the answer must lie in.
@@ -567,6 +579,8 @@ class AnalyzedPlaceAnswer(TypedDict):
     look_alike: PoseAnswer | None
     unobservable: list[float] | None
     reasons: list[str]
+    knows_after: float | None
+    with_added: WithAddedAnswer | None
 
 
 class HingeAnswer(TypedDict):
@@ -623,6 +637,8 @@ class AnalyzeRequest(TypedDict):
     laser: NotRequired[ScannerFields]
     spacing: NotRequired[float | None]
     point: NotRequired[list[float] | None]
+    drive: NotRequired[float]
+    added: NotRequired[list[list[float]]]
     seed: NotRequired[int]
     deadline_ms: NotRequired[float | None]
     client_ref: NotRequired[Any]
@@ -689,6 +705,8 @@ class MapAnalyzeRequest(TypedDict):
     laser: NotRequired[ScannerFields]
     spacing: NotRequired[float | None]
     point: NotRequired[list[float] | None]
+    drive: NotRequired[float]
+    added: NotRequired[list[list[float]]]
     seed: NotRequired[int]
     deadline_ms: NotRequired[float | None]
     client_ref: NotRequired[Any]

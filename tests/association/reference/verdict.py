@@ -26,7 +26,7 @@ def worth(one: Ranked) -> float:
     Their variance over the supposed one, e to the t, is a scaled inverse chi-square of so many degrees of freedom.
     """
     n, k = sum(wall >= 0 for wall in one.matches["wall"]), tuning.USUAL_WALLS
-    t = np.linspace(-60.0, 60.0, 24_001)
+    t = np.linspace(-60.0, 60.0, 2_401)  # ten times as many change less than 1e-11
     density = 0.5 * k * (math.log(0.5 * k) - t - np.exp(-t)) - math.lgamma(0.5 * k)
     logs = density - 0.5 * n * t - 0.5 * one.cost * np.exp(-t)
     return one.value + 0.5 * one.cost + float(logs.max() + np.log(np.exp(logs - logs.max()).sum() * (t[1] - t[0])))

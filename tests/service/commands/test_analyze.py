@@ -13,6 +13,7 @@ from tests.running import RunningService
 from .running import Linefix, refused
 from .test_asking import ROOM
 
+BOX = [[1, 1, 1, 2], [1, 2, 2, 2], [2, 2, 2, 1], [2, 1, 1, 1]]
 TWO = [*ROOM, *[[a + 20, b, c + 20, d] for a, b, c, d in ROOM]]
 
 
@@ -20,12 +21,25 @@ TWO = [*ROOM, *[[a + 20, b, c + 20, d] for a, b, c, d in ROOM]]
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "room.json").write_text(json.dumps({"segments": ROOM}))
     (tmp_path / "two.json").write_text(json.dumps({"segments": TWO}))
+    (tmp_path / "box.json").write_text(json.dumps(BOX))
     return tmp_path
 
 
 def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningService, linefix: Linefix) -> None:
     """Enough places for several processes."""
-    asked = ("analyze", "two.json", "--spacing", "0.9", "--beams", "180", "--json")
+    asked = (
+        "analyze",
+        "two.json",
+        "--spacing",
+        "0.9",
+        "--beams",
+        "180",
+        "--drive",
+        "1",
+        "--added",
+        "box.json",
+        "--json",
+    )
     here = linefix(*asked, LINEFIX_SEARCHES="2")
     assert (here.code, here.err) == (0, "")
     answer = json.loads(here.out)
@@ -33,14 +47,18 @@ def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningS
     there = json.loads(linefix(*asked, "--server", service.url).out)
     for name in ("places", "summary", "complete", "spacing", "map"):
         assert answer[name] == there[name]
+    assert answer["summary"]["knows_within"] == 0
+    assert answer["summary"]["usable_with_added"] > answer["summary"]["usable"] == 0
 
 
 def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     asked = ("analyze", "room.json", "--spacing", "1", "--out", "a.geojson", "--picture", "a.png")
-    ended = linefix(*asked)
+    ended = linefix(*asked, "--drive", "2", "--added", "box.json")
     assert ended.code == 0, ended.err
     assert "usable" in ended.out
     assert "(92 %)" in ended.out
+    assert "at once or on the way" in ended.out
+    assert "with what is added" in ended.out
     features = json.loads((folder / "a.geojson").read_text())["features"]
     assert len(features) > 15
     assert features[0]["geometry"]["type"] == "Point"
@@ -61,9 +79,11 @@ def test_little_time(folder: Path, linefix: Linefix) -> None:
     [
         (("--fov", "360"), 3, "/laser/fov"),
         (("--point", "100", "0"), 3, "/point"),
+        (("--drive", "31"), 3, "/drive"),
+        (("--added", "none.json"), 2, "none.json"),
         (("--out", "a.txt"), 2, "--out"),
     ],
-    ids=["degrees", "nowhere", "no format"],
+    ids=["degrees", "nowhere", "far", "nothing", "no format"],
 )
 def test_what_is_not_done(folder: Path, more: tuple[str, ...], code: int, said: str, linefix: Linefix) -> None:
     assert said in refused(linefix("analyze", "room.json", *more), code)

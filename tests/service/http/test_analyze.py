@@ -50,6 +50,31 @@ def test_a_room(client: httpx.Client) -> None:
     assert again["map"] is None
 
 
+def test_a_drive_and_something_added(client: httpx.Client) -> None:
+    """In a rectangle the robot can be at either of two places, wherever it drives; a box in it tells them apart."""
+    rectangle = [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]]
+    box = [[1, 1, 1, 2], [1, 2, 3, 2], [3, 2, 3, 1], [3, 1, 1, 1]]
+    put(client, rectangle)
+    plain = analyzed(client, {"laser": LASER, "spacing": 2.0})
+    assert {(one["knows_after"], one["with_added"]) for one in plain["places"]} == {(None, None)}
+    assert (plain["summary"]["knows_within"], plain["summary"]["usable_with_added"]) == (None, None)
+    more = analyzed(client, {"laser": LASER, "spacing": 2.0, "drive": 2.0, "added": box})
+    assert (more["summary"]["usable"], more["summary"]["knows_within"]) == (0, 0)
+    told = [one["with_added"] for one in more["places"] if one["with_added"]]
+    assert sum(one["usable"] for one in told) == more["summary"]["usable_with_added"] > 0.5 * len(told)
+    assert {"status", "usable", "probability"} == set(told[0])
+    put(client, [*rectangle, *box])
+    there = {
+        (one["pose"]["x"], one["pose"]["y"]): one
+        for one in analyzed(client, {"laser": LASER, "spacing": 2.0})["places"]
+    }
+    for one in more["places"]:
+        told_there = there.get((one["pose"]["x"], one["pose"]["y"]))
+        assert (one["with_added"] is None) == (told_there is None)
+        if told_there:
+            assert one["with_added"] == {name: told_there[name] for name in one["with_added"]}
+
+
 def test_two_equal_rooms_and_a_point_in_one_of_them(client: httpx.Client) -> None:
     put(client, [*examples.WALLS, *[[a + 20, b, c + 20, d] for a, b, c, d in examples.WALLS]])
     answer = analyzed(client, {"laser": LASER, "spacing": 1.0, "point": [0, 0]})
@@ -87,6 +112,10 @@ def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
         ({"point": [100, 0]}, "/point"),
         ({"point": [1]}, "/point"),
         ({"places": 3}, "/places"),
+        ({"drive": 31}, "/drive"),
+        ({"added": [[0, 0, 1]]}, "/added/0"),
+        ({"added": [[0, 0, 1, 0], [1, 1, 1, 1]]}, "/added/1"),
+        ({"added": [[0, 0, 1, 0]] * 101}, "/added"),
     ],
 )
 def test_what_cannot_be_analyzed(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:

@@ -121,8 +121,10 @@ def test_a_role_is_good_for_what_asks_for_it(guarded: Guarded, method: str, path
                 assert (answer.status_code, answer.json()["code"]) == (403, "forbidden")
                 continue
             assert answer.is_success, answer.text
+            if (method, path) not in NAMES_A_MAP:
+                continue
             foreign = guarded.call(method, path, bearer, FOREIGN)
-            if maps and (method, path) in NAMES_A_MAP:
+            if maps:
                 assert (foreign.status_code, foreign.json()["code"]) == (404, "unknown_map")
                 none = guarded.call(method, path, bearer, "lab-none")
                 assert none.json() | {"request_id": ""} == foreign.json() | {"request_id": ""}

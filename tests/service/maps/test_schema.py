@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Column, Engine, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
 
 from service.database_url import database_url
@@ -82,8 +83,22 @@ def differences(database: str) -> list[object]:
 
 
 @pytest.mark.usefixtures("store")
-def test_the_migrations_make_the_tables_that_are_used(database: str) -> None:
+def test_new_tables_are_those_that_are_used(database: str) -> None:
     assert differences(database) == []
+
+
+@pytest.mark.usefixtures("store")
+def test_of_new_tables_alembic_knows_the_version(database: str) -> None:
+    engine = open_engine(database_url(database))
+    with engine.connect() as connection:
+        migrations = MigrationContext.configure(connection, opts={"version_table": schema.VERSION_TABLE})
+        assert migrations.get_current_revision() == schema.NEWEST
+    engine.dispose()
+
+
+def test_the_versions_are_those_of_the_migrations() -> None:
+    scripts = ScriptDirectory(str(Path(schema.__file__).parent / "migrations")).walk_revisions()
+    assert tuple(script.revision for script in scripts)[::-1] == schema.VERSIONS
 
 
 def test_a_database_from_before_migrations(database: str) -> None:

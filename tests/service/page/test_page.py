@@ -92,15 +92,15 @@ def test_noise_and_walls_that_are_missing(page: Page) -> None:
     expect(page.locator("#numbers dd").first).not_to_have_text("99.98 %")
     page.get_by_label("Noise").fill("0")
     verdict(page, "usable")
-    expect(page.get_by_role("button", name="Put the walls back")).to_be_disabled()
+    expect(page.get_by_role("button", name="The map as it came")).to_be_disabled()
     page.get_by_label("take walls off").check()
     box = page.locator("#plan").bounding_box()
     assert box is not None
     for share in (0.2, 0.35, 0.5, 0.65, 0.8):
         for other in range(12):
             page.mouse.click(box["x"] + (0.1 + 0.066 * other) * box["width"], box["y"] + share * box["height"])
-    expect(page.get_by_role("button", name="Put the walls back")).to_be_enabled()
-    page.get_by_role("button", name="Put the walls back").click()
+    expect(page.get_by_role("button", name="The map as it came")).to_be_enabled()
+    page.get_by_role("button", name="The map as it came").click()
     verdict(page, "usable")
     expect(page.locator("#numbers dd").first).to_have_text("99.98 %")
 
@@ -167,11 +167,88 @@ def test_where_a_map_will_fail(page: Page) -> None:
     page.get_by_role("button", name="Analyze").click()
     expect(page.locator("#analyzed")).to_contain_text("A robot would know where it is at", timeout=60_000)
     expect(page.locator("#legend")).to_contain_text("ambiguous")
+    box = page.locator("#plan").bounding_box()
+    assert box is not None
+    scale = 0.88 * box["width"] / 13.6
+    # As in `test_a_robot_is_dragged`; in the upper part of the right room.
+    page.mouse.move(
+        box["x"] + box["width"] / 2 + (9.3 - 5.8) * scale, box["y"] + box["height"] / 2 - (4.3 - 2.575) * scale
+    )
+    expect(page.locator("#hover")).to_contain_text("looks like (")
+    told = page.locator("#hover").bounding_box()
+    assert told is not None
+    assert told["x"] + told["width"] < box["x"] + box["width"]
     page.get_by_role("button", name="Clear").click()
     expect(page.locator("#analyzed")).to_be_empty()
     page.get_by_label("Spacing").fill("0.01")
     page.get_by_role("button", name="Analyze").click()
     expect(page.locator("#analyzed")).to_contain_text("/spacing")
+
+
+def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> None:
+    """In a rectangle the robot can be at either of two places; a box tells them apart."""
+    rectangle = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]]}
+    client.put("/v1/maps/page-rectangle", json=rectangle).raise_for_status()
+    page.goto("/")
+    page.locator("#stored summary").click()
+    page.get_by_role("button", name="Open page-rectangle").click()
+    page.get_by_label("a virtual robot").check()
+    verdict(page, "ambiguous")
+    page.get_by_label("put up a box").check()
+    box = page.locator("#plan").bounding_box()
+    assert box is not None
+    scale = 0.88 * box["width"] / 8
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.click(middle[0] + 2.0 * scale, middle[1] - 1.0 * scale)
+    verdict(page, "usable")
+    page.mouse.move(middle[0] + 2.5 * scale, middle[1] - 1.0 * scale)
+    expect(page.locator("#hover")).to_have_text("wall 6, put up")  # 4 are the map's
+    page.locator("#analysis summary").click()
+    page.get_by_label("Spacing").fill("2")
+    page.get_by_label("It may drive").fill("2")
+    page.get_by_role("button", name="Analyze").click()
+    told = page.locator("#analyzed")
+    expect(told).to_contain_text("would know where it is at 0 of 8 places", timeout=60_000)
+    expect(told).to_contain_text("After a drive of up to 2 m it would at 0. With the boxes that you put up it would at")
+    assert "it would at 0." in told.inner_text()
+    assert not told.inner_text().endswith("it would at 0.")
+    show = page.get_by_label("Show")
+    expect(show).to_have_value("added")
+    show.select_option("driven")
+    page.get_by_role("button", name="The map as it came").click()
+    verdict(page, "ambiguous")
+    page.get_by_role("button", name="Clear").click()
+    expect(show).to_be_disabled()
+    page.locator("#plan").focus()
+    press(page, "b", 1)
+    verdict(page, "usable")
+    assert client.get("/v1/maps/page-rectangle").json()["segments"] == rectangle["segments"]
+    client.delete("/v1/maps/page-rectangle")
+
+
+def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
+    svg = (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="6m" height="4m" viewBox="0 0 6 4">'
+        '<path d="M0 0H6V4H0Z"/><text x="1" y="1">Hall</text></svg>'
+    )
+    (tmp_path / "plan.svg").write_text(svg)
+    shown(page, "flat", "usable")
+    about = page.locator("#about").inner_text()
+    page.set_input_files("#files", [tmp_path / "plan.svg"])
+    expect(page.locator("#sentence")).to_contain_text("plan.svg: does not say its unit", timeout=60_000)
+    expect(page.locator("#numbers")).to_be_empty()  # of an answer to something else
+    expect(page.locator("#about")).to_have_text(about)
+    page.get_by_label("Unit of a drawing").select_option("metres")
+    expect(page.locator("#about")).to_contain_text("read of plan.svg (svg)", timeout=60_000)
+    report = page.locator("#report")
+    expect(report).to_be_visible()
+    for title in ("Doubtful", "Read", "Left out", "Assumed"):
+        expect(report.get_by_role("heading", name=title)).to_be_visible()
+    expect(report).to_contain_text("text is not read: 1")
+    expect(page.get_by_label("Example")).to_have_value("")
+    page.get_by_label("Example").select_option(label="A flat")
+    verdict(page, "usable")
+    expect(report).to_be_hidden()
 
 
 def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
@@ -181,11 +258,13 @@ def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
         for k in range(4)
     ]  # fmt: skip
     (tmp_path / "log.jsonl").write_text("\n".join(json.dumps(line) for line in lines))
-    page.goto("/")
+    shown(page, "flat", "usable")  # with a virtual robot, which goes
+    expect(page.get_by_label("a virtual robot")).to_be_checked()
     page.set_input_files("#files", [*files(tmp_path, room={"segments": examples.WALLS}), tmp_path / "log.jsonl"])
     told = page.locator("#scan-of-log")
     expect(told).to_contain_text("Scan 1 of 4: no match, not usable")
     page.get_by_role("button", name="Play").click()
+    expect(page.get_by_label("a virtual robot")).not_to_be_checked()
     expect(told).to_contain_text("Scan 4 of 4: ok, usable")
     expect(told).to_contain_text("3 of 4 are usable")
     expect(page.get_by_role("button", name="Play")).to_be_enabled()
