@@ -1,7 +1,7 @@
 # Linefix as an image: the wheel with its pinned dependencies and kernels compiled ahead, run by a user without rights.
 #   docker build -t linefix .
 #   docker run --rm --read-only -p 127.0.0.1:8000:8000 -v linefix:/data -e LINEFIX_ALLOW_ANONYMOUS=1 linefix
-# For x86-64 and arm64: docker buildx build --platform linux/amd64,linux/arm64 -t linefix .
+# For x86-64 and arm64 (not tried): docker buildx build --platform linux/amd64,linux/arm64 -t linefix .
 ARG BASE_IMAGE=python:3.13-slim
 
 FROM ${BASE_IMAGE} AS build

@@ -123,9 +123,9 @@ def test_the_command_line_needs_no_part_of_one_system() -> None:
     """Libraries and commands are loaded where there are none of these; the service itself is for POSIX."""
     code = """
 import sys
-for name in ("fcntl", "grp", "pwd", "resource", "termios"):
+for name in ("fcntl", "grp", "pwd", "resource", "termios", "uvloop"):
     sys.modules[name] = None
-import registration, vectorization, association, simulation, formats
+import registration, vectorization, association, simulation, analysis, formats, fleet, linefix, bridge
 import service.commands.program
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
