@@ -1,6 +1,7 @@
 # Linefix as an image: the wheel with its pinned dependencies and kernels compiled ahead, run by a user without rights.
 #   docker build -t linefix .
 #   docker run --rm --read-only -p 127.0.0.1:8000:8000 -v linefix:/data -e LINEFIX_ALLOW_ANONYMOUS=1 linefix
+# For x86-64 and arm64 (not tried): docker buildx build --platform linux/amd64,linux/arm64 -t linefix .
 ARG BASE_IMAGE=python:3.13-slim
 
 FROM ${BASE_IMAGE} AS build
@@ -8,13 +9,19 @@ ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=igno
 WORKDIR /src
 # Bytecode is compiled to be used unchecked: copying changes the files' times, and every start would compile it again.
 ENV COMPILE="/opt/linefix/bin/python -m compileall -q -j 0 --invalidation-mode unchecked-hash"
-# The dependencies alone first: a change of the code does not install them again.
-COPY requirements requirements
+# The dependencies alone first: a change of the code does not install them again. Wheels alone, each with its hash, so
+# that nothing of a package is run to install it. Then what never runs goes: their tests, sources, headers, stubs.
+COPY requirements/build.txt requirements/runtime.txt requirements/
 RUN python3 -m venv /opt/tools \
-    && /opt/tools/bin/pip install --quiet --constraint requirements/dev.txt hatchling \
+    && /opt/tools/bin/pip install --quiet --require-hashes --only-binary :all: --requirement requirements/build.txt \
     && python3 -m venv --without-pip /opt/linefix \
-    && /opt/tools/bin/pip --python /opt/linefix/bin/python install --quiet --no-compile --requirement requirements/runtime.txt \
+    && /opt/tools/bin/pip --python /opt/linefix/bin/python \
+        install --quiet --no-compile --require-hashes --only-binary :all: --requirement requirements/runtime.txt \
+    && find /opt/linefix/lib -depth -type d \( -name tests -o -name test \) -exec rm -r {} + \
+    && find /opt/linefix/lib -type f \
+        \( -name '*.pyi' -o -name '*.pyx' -o -name '*.pxd' -o -name '*.[ach]' -o -name '*.[ch]pp' \) -delete \
     && $COMPILE /opt/linefix/lib
+COPY .ci/materials.py .ci/
 COPY pyproject.toml README.md ./
 COPY registration registration
 COPY vectorization vectorization
@@ -26,9 +33,14 @@ COPY fleet fleet
 COPY linefix linefix
 COPY bridge bridge
 COPY service service
+# Given the time of a commit, the wheel is that of `make wheel`, to the byte.
+ARG SOURCE_DATE_EPOCH
 RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . \
-    && /opt/tools/bin/pip --python /opt/linefix/bin/python install --quiet --no-compile --no-deps /wheels/*.whl
-# For any x86-64 processor: the processor's name is part of a kernel's key, so it has to be the same at run time.
+    && /opt/tools/bin/pip --python /opt/linefix/bin/python install --quiet --no-compile --no-deps /wheels/*.whl \
+    && /opt/tools/bin/python .ci/materials.py /opt/linefix/sbom.cdx.json /opt/linefix/bin/python \
+    && find /opt/linefix/bin -mindepth 1 ! -name 'python*' ! -name linefix -delete \
+    && rm -rf /opt/linefix/include /opt/linefix/share
+# For any processor of its kind, x86-64 or arm64: its name is part of a kernel's key, so it has to be the same at run time.
 ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.warmup import warm_up; warm_up()"
@@ -39,8 +51,11 @@ RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path
 FROM ${BASE_IMAGE}
 LABEL org.opencontainers.image.title="Linefix" \
       org.opencontainers.image.description="Tells a robot where it is from line segments, and says when it cannot"
+# No program of the base gives rights to who runs it, and nothing installs anything.
 RUN useradd --system --uid 10001 --user-group --home-dir /data --no-create-home --shell /usr/sbin/nologin linefix \
-    && install --directory --owner=linefix --group=linefix --mode=0750 /data
+    && install --directory --owner=linefix --group=linefix --mode=0750 /data \
+    && find / -xdev -type f -perm /6000 -exec chmod a-s {} + \
+    && rm -rf /usr/local/bin/pip* /usr/local/lib/python3*/ensurepip /usr/local/lib/python3*/site-packages/pip*
 COPY --from=build /opt/linefix /opt/linefix
 ENV PATH=/opt/linefix/bin:$PATH \
     PYTHONUNBUFFERED=1 \

@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page wheel image-check sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -104,17 +104,26 @@ page: $(VENV)/.ready  ## build the page from web/ into service/page/ (needs node
 	cd web && npm ci --no-audit --no-fund && npm run build
 	$(BIN)/python -m examples.scenes
 
+wheel: $(VENV)/.ready  ## build the wheel of the last commit into dist/, twice: both have to be the same to the byte
+	BIN=$(BIN) .ci/wheel
+
+image-check: $(VENV)/.ready  ## look into a built image and run it without rights: ARCHIVE=image.tar, of `docker save`; as root
+	$(BIN)/python .ci/image.py $(ARCHIVE)
+
 sbom: $(VENV)/.ready  ## write the bill of materials (CycloneDX) and list the licences; no GPL passes
 	$(BIN)/python .ci/materials.py
 
 audit: $(VENV)/.ready  ## look the pinned packages up in the published advisories; fails where there are none to be had
 	BIN=$(BIN) .ci/audit
 
-lock: $(VENV)/.ready  ## pin the dependencies anew
-	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats pyproject.toml -o requirements/runtime.txt
-	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
-	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group peers -o requirements/peers.txt
-	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header -c requirements/dev.txt --group docs -o requirements/docs.txt
+PIN := -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header
+
+lock: $(VENV)/.ready  ## pin the dependencies anew, by hash where the image is made of them
+	$(BIN)/python $(PIN) --generate-hashes --extra formats pyproject.toml -o requirements/runtime.txt
+	$(BIN)/python $(PIN) --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
+	$(BIN)/python $(PIN) --generate-hashes -c requirements/dev.txt --group build -o requirements/build.txt
+	$(BIN)/python $(PIN) -c requirements/dev.txt --group peers -o requirements/peers.txt
+	$(BIN)/python $(PIN) -c requirements/dev.txt --group docs -o requirements/docs.txt
 
 # Where LINEFIX_KERNELS or NUMBA_CACHE_DIR name a directory, whoever named it removes it: it may hold other things.
 clean:  ## remove what the other targets made, compiled kernels too

@@ -1,5 +1,7 @@
 """What the service is made of: a bill of materials (CycloneDX) and the licences, of the packages that it runs with.
 
+    python .ci/materials.py [BILL [PYTHON]]    of this Python's packages into out/sbom.json, if nothing else is said
+
 Fails where there is nothing to check, where a pinned package is not installed in that version, and where one is under
 the GPL or AGPL or does not say. The LGPL is let through: such a package stays one that can be exchanged.
 """
@@ -17,6 +19,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PINS, BILL = Path("requirements/runtime.txt"), Path("out/sbom.json")
+OURS = "linefix"
 COPYLEFT = re.compile(r"(?<!L)(?<!Lesser )\b(A?GPL|(Affero )?General Public License)", re.IGNORECASE)
 LESSER = re.compile(r"LGPL|Lesser General Public License", re.IGNORECASE)
 
@@ -27,17 +30,18 @@ class MaterialsError(Exception):
 
 def pinned(text: str) -> dict[str, str]:
     """Return the versions of the packages that are pinned for this system."""
-    lines = (line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#"))
+    whole = text.replace("\\\n", " ")  # hashes follow in lines of their own
+    lines = (line.split(" --hash=")[0].strip() for line in whole.splitlines() if not line.startswith("#"))
     wanted = [
         requirement
-        for requirement in map(Requirement, lines)
+        for requirement in map(Requirement, filter(None, lines))
         if not requirement.marker or requirement.marker.evaluate()
     ]
     return {canonicalize_name(one.name): str(one.specifier).removeprefix("==") for one in wanted}
 
 
 def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
-    """Return a bill of no more than the pinned packages.
+    """Return a bill of the service, with no more than the pinned packages.
 
     Raises
     ------
@@ -53,13 +57,17 @@ def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
     if wrong:
         raise MaterialsError(f"not installed in this version: {', '.join(sorted(wrong))}; make clean, and again")
     parts = [components[name] for name in sorted(pins)]
-    refs = {one["bom-ref"] for one in parts}
+    metadata = dict(bill.get("metadata", {}))
+    if OURS in components:
+        ours = components[OURS]
+        metadata["component"] = {"type": "application", **{key: ours[key] for key in ("bom-ref", "name", "version")}}
+    refs = {one["bom-ref"] for one in [*parts, metadata.get("component", parts[0])]}
     needs = [
         {**one, "dependsOn": [ref for ref in one.get("dependsOn", []) if ref in refs]}
         for one in bill.get("dependencies", [])
         if one["ref"] in refs
     ]
-    return {**bill, "components": parts, "dependencies": needs}
+    return {**bill, "metadata": metadata, "components": parts, "dependencies": needs}
 
 
 def licences(component: dict[str, Any]) -> str:
@@ -86,11 +94,14 @@ def require_licences(bill: dict[str, Any]) -> None:
 
 def main() -> int:
     """Write the bill and print the licences; return the exit code."""
+    given = sys.argv[1:]
+    path = Path(given[0]) if given else BILL
+    python = given[1] if given[1:] else sys.executable
     command = [
         str(Path(sys.executable).with_name("cyclonedx-py")),
         "environment",
         "--output-reproducible",
-        sys.executable,
+        python,
     ]
     whole = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
     try:
@@ -99,11 +110,11 @@ def main() -> int:
     except MaterialsError as error:
         print(f"materials: {error}", file=sys.stderr)
         return 1
-    BILL.parent.mkdir(exist_ok=True)
-    BILL.write_text(json.dumps(bill, indent=1) + "\n")
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps(bill, indent=1) + "\n")
     for one in bill["components"]:
         print(f"{one['name']:24}{one['version']:14}{licences(one)}")
-    print(f"{len(bill['components'])} packages, none under the GPL; {BILL}")
+    print(f"{len(bill['components'])} packages, none under the GPL; {path}")
     return 0
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
 
@@ -118,7 +119,7 @@ def stop(service: RunningService) -> None:
 
 
 @contextmanager
-def running(data_dir: Path, **settings: object) -> Iterator[RunningService]:
+def running(data_dir: Path, **settings: Any) -> Iterator[RunningService]:
     """Start a service that ends with the block."""
     service = start(data_dir, **{"drain_seconds": 0, **settings})
     try:

@@ -11,6 +11,8 @@ from .fair_queue import Holder
 
 GUARDED = "/v1/"
 """What asks for a key begins so; probes and pages stay open."""
+LONGEST = 256
+"""Of a route's path, letters: an id has at most 128."""
 
 
 class Role(StrEnum):
@@ -108,12 +110,17 @@ class Asked:
     map_id: str | None = None
 
 
-@lru_cache(maxsize=1024)
 def asked_of(method: str, path: str) -> Asked:
     """Return what a request asks for; `path` with its escapes undone."""
+    # Longer ones lead nowhere, and are not kept: whoever has no key can send them, too.
+    return _looked_up(method, path) if len(path) <= LONGEST else Asked()
+
+
+@lru_cache(maxsize=1024)
+def _looked_up(method: str, path: str) -> Asked:
     read_as = "GET" if method == "HEAD" else method
     for access, pattern in _PATTERNS.get(read_as, ()):
-        found = pattern.fullmatch(path)
+        found = pattern.match(path)
         if found is not None:
             return Asked(access, found.groupdict().get("map_id"))
     return Asked()
@@ -122,7 +129,8 @@ def asked_of(method: str, path: str) -> Asked:
 def _patterns() -> dict[str, list[tuple[Access, re.Pattern[str]]]]:
     found: dict[str, list[tuple[Access, re.Pattern[str]]]] = {}
     for access in ROUTES:
-        pattern = re.compile(re.escape(access.path).replace(r"\{map_id\}", "(?P<map_id>[^/]+)"))
+        # As the router has it, a line's end behind the path included: what it takes for a route has to be one here.
+        pattern = re.compile(re.escape(access.path).replace(r"\{map_id\}", "(?P<map_id>[^/]+)") + "$")
         for method in access.methods.split():
             found.setdefault(method, []).append((access, pattern))
     return found

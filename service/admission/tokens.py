@@ -64,9 +64,9 @@ class Tokens:
                 leeway=issuer.leeway,
                 options={"require": REQUIRED},
             )
+            return _grant_of(claims)
         except (jwt.PyJWTError, ValueError, TypeError) as error:
             raise UnknownKeyError from error
-        return _grant_of(claims)
 
     def refresh(self) -> None:
         """Fetch the keys where that is due, off the event loop; what cannot be had leaves them as they were."""

@@ -61,12 +61,41 @@ def test_nothing_to_check_is_no_pass() -> None:
 
 
 def test_a_bill_has_what_is_pinned_and_no_more() -> None:
-    pins = MATERIALS["pinned"]("p0==1.0\np2==1.0 ; python_full_version < '3'\n# nothing\n")
-    assert pins == {"p0": "1.0"}
+    hashed = "p0==1.0 \\\n    --hash=sha256:aa \\\n    --hash=sha256:bb\n"
+    for first in ("p0==1.0\n", hashed):
+        pins = MATERIALS["pinned"](f"{first}p2==1.0 ; python_full_version < '3' \\\n    --hash=sha256:cc\n# nothing\n")
+        assert pins == {"p0": "1.0"}
     found = MATERIALS["kept"](bill(named("MIT"), named("MIT")), pins)
     assert [one["name"] for one in found["components"]] == ["p0"]
     assert found["dependencies"] == [{"ref": "p0", "dependsOn": []}]
+    assert "component" not in found["metadata"]
     assert len(MATERIALS["pinned"]((ROOT / "requirements" / "runtime.txt").read_text())) > 40
+
+
+def test_a_bill_says_whose_it_is() -> None:
+    ours = {"name": "linefix", "version": "9.9", "bom-ref": "linefix", "externalReferences": [{"url": "file:///home"}]}
+    whole = bill(named("MIT"))
+    whole["components"].append(ours)
+    whole["dependencies"].append({"ref": "linefix", "dependsOn": ["p0", "dev"]})
+    found = MATERIALS["kept"](whole, {"p0": "1.0"})
+    assert [one["name"] for one in found["components"]] == ["p0"]
+    told = {"type": "application", "bom-ref": "linefix", "name": "linefix", "version": "9.9"}
+    assert found["metadata"]["component"] == told
+    assert {"ref": "linefix", "dependsOn": ["p0"]} in found["dependencies"]
+
+
+@pytest.mark.parametrize("name", ["runtime", "build"])
+def test_what_the_image_is_made_of_is_pinned_by_hash(name: str) -> None:
+    """And the image takes nothing else: pip refuses what has another hash, or none."""
+    text = (ROOT / "requirements" / f"{name}.txt").read_text()
+    blocks = [block.split() for block in text.replace("\\\n", " ").splitlines() if block]
+    assert blocks
+    assert [block[0] for block in blocks if not any(word.startswith("--hash=sha256:") for word in block)] == []
+    installs = [line for line in (ROOT / "Dockerfile").read_text().splitlines() if " install --quiet " in line]
+    (ours,) = [line for line in installs if "--no-deps" in line and "/wheels/" in line]
+    (said,) = [line for line in installs if f"--requirement requirements/{name}.txt" in line]
+    assert "--require-hashes --only-binary :all:" in said
+    assert len(installs) == 3, ours
 
 
 def test_an_audit_that_reaches_nothing_fails(tmp_path: Path) -> None:
@@ -83,15 +112,20 @@ def test_an_audit_that_reaches_nothing_fails(tmp_path: Path) -> None:
 def test_the_version_is_said_once_and_has_its_changes() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
+    client = tomllib.loads((ROOT / "clients" / "python" / "pyproject.toml").read_text())["project"]["version"]
+    assert client == version
+    # The service reads it from what is installed: another number in a source would be a second place.
+    sources = [path for folder in ("service", "linefix", "bridge") for path in (ROOT / folder).rglob("*.py")]
+    assert [path for path in sources if f'"{version}"' in path.read_text()] == []
 
 
 def test_the_command_line_needs_no_part_of_one_system() -> None:
     """Libraries and commands are loaded where there are none of these; the service itself is for POSIX."""
     code = """
 import sys
-for name in ("fcntl", "grp", "pwd", "resource", "termios"):
+for name in ("fcntl", "grp", "pwd", "resource", "termios", "uvloop"):
     sys.modules[name] = None
-import registration, vectorization, association, simulation, formats
+import registration, vectorization, association, simulation, analysis, formats, fleet, linefix, bridge
 import service.commands.program
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)

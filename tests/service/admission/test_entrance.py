@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 from pydantic import SecretStr
+from starlette.routing import compile_path
 
 from service.admission.entrance import Entrance, search_of
 from service.admission.errors import ForeignHostError, MissingKeyError, QueueFullError, ShareUsedError, UnknownKeyError
+from service.admission.grants import ROUTES, asked_of
 from service.admission.keys import Keyring
 from service.admission.origins import Origins
 from service.admission.ticket import Ticket
@@ -48,6 +50,18 @@ def test_what_needs_a_turn_at_the_gate() -> None:
         assert search_of(method, "/v1/maps/hq-3") is None
     assert search_of("PUT", "/v1/maps/hq-3:check") is None
     assert search_of("GET", "/v2/maps/hq-3:check") is None
+
+
+@pytest.mark.parametrize(
+    "end", ["", "\n", "\n\n", "\r", "\u2028", "/", ":check", ":check\n", "x" * 110 + ":check"], ids=ascii
+)
+def test_the_table_reads_a_path_as_the_router_does(end: str) -> None:
+    """With a line's end behind it a route stood under another line of the table, or under none: no early refusal."""
+    for route in ROUTES:
+        path = route.path.replace("{map_id}", "hq-3") + end
+        for method in route.methods.split():
+            same = (one for one in ROUTES if method in one.methods.split() and compile_path(one.path)[0].match(path))
+            assert asked_of(method, path).access == next(same, None), path
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT"])

@@ -186,8 +186,9 @@ def test_a_foreign_map_is_not_had_in_other_letters(guarded: Guarded, path: str) 
         {"linefix_maps": ["hq-"]},
         {"linefix_maps": "hq-\x00"},
         {"scope": ["linefix:associate"]},
+        {"sub": "\ud800"},
     ],
-    ids=str,
+    ids=ascii,
 )
 def test_a_token_that_is_not_for_this(guarded: Guarded, claims: dict[str, Any]) -> None:
     answer = guarded.call("POST", "/v1/register", guarded.issuing.token(**claims))
