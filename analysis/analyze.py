@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -121,21 +122,41 @@ class Analysis:
         CancelledError
             When the deadline was cancelled.
         """
+        steps = self.looking(number, deadline)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                found: PlaceVerdict | None = done.value
+                return found
+
+    def looking(self, number: int, deadline: Deadline | None = None) -> Generator[None, None, PlaceVerdict | None]:
+        """Do what `look` does, one search at a step, and return the same; between steps others may have their turn.
+
+        Raises
+        ------
+        CancelledError
+            When the deadline was cancelled.
+        """
         pose = self.standing.pose(number)
         if not is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented):
             return None
         seen = self._scan(pose, number)
         found = _verdict(number, pose, self._search(seen, deadline))
         if self.drive:
-            found = replace(found, knows_after=0.0 if found.usable else self._knows_after(number, pose, seen, deadline))
+            metres = 0.0 if found.usable else (yield from self._knows_after(number, pose, seen, deadline))
+            found = replace(found, knows_after=metres)
         if self.added is not None:
+            yield
             found = replace(found, with_added=self.added.look(number, deadline))
         return found
 
     def _search(self, seen: Scan, deadline: Deadline | None) -> AssociationResult:
         return associate(self.index, seen, None, AssociationOptions(oriented=self.oriented), deadline)
 
-    def _knows_after(self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None) -> float | None:
+    def _knows_after(
+        self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None
+    ) -> Generator[None, None, float | None]:
         """Return how far it drives until all that it has seen is told to be where it is by then; metres."""
         ways = ways_from(self.segments, pose, self.drive, self.robot.range_max)
         seen_so_far = [[(pose, seen)] for _ in ways]
@@ -145,6 +166,7 @@ class Analysis:
                     continue
                 if deadline is not None and deadline.passed:
                     return None
+                yield
                 views.append((there, self._scan(there, number, way, len(views))))
                 result = self._search(seen_on_the_way(views, np.random.default_rng((self.seed, number))), deadline)
                 if result.usable and result.pose is not None and _is_same(result.pose, there):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from analysis import Analysis, PlaceVerdict, Robot, standing_places
@@ -35,12 +35,15 @@ class Tally:
         Numbers of the poses that are left to try.
     found : dict of number to PlaceVerdict or None
         None where no robot can stand.
+    looking : (int, generator) or None
+        At which pose a turn ended, and what goes on there.
     """
 
     analysis: Analysis
     reference: Json | None
     todo: Iterator[int]
     found: dict[int, PlaceVerdict | None] = field(default_factory=dict)
+    looking: tuple[int, Generator[None, None, PlaceVerdict | None]] | None = None
 
     @property
     def done(self) -> bool:
@@ -107,16 +110,27 @@ def take_looks(tally: Tally, deadline: Deadline) -> bool:
         When the client has gone.
     """
     until = time.monotonic() + TURN_SECONDS
-    for number in tally.todo:
-        verdict = tally.analysis.look(number, deadline)
+    while True:
+        if tally.looking is None:
+            number = next(tally.todo, None)
+            if number is None:
+                return False
+            tally.looking = number, tally.analysis.looking(number, deadline)
+        number, steps = tally.looking
+        ended, verdict = False, None
+        try:
+            next(steps)
+        except StopIteration as done:
+            ended, verdict = True, done.value
         if deadline.cancelled:
             raise CancelledError
         if deadline.passed:
             return False  # what was found is no answer: the search was cut
-        tally.found[number] = verdict
+        if ended:
+            tally.looking = None
+            tally.found[number] = verdict
         if time.monotonic() >= until:
             return True
-    return False
 
 
 def analysis_done(tally: Tally, asked: AnalyzeRequest, job: Job) -> Done:
