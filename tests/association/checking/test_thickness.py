@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from association import Deadline
+from association import Deadline, Scan
 from association.checking import find_thickness, fit_better_mirrored, thickness_finding
-from registration import Segments
+from registration import MeasuredSegments, Segments
 from registration.layout import Floats
 
 from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled
@@ -46,6 +46,11 @@ def test_which_of_the_two_it_is() -> None:
     scans = [scan for _, scan in sampled()]
     assert fit_better_mirrored(index_of(reversed_ends(faces() * MIRROR)), scans, Deadline())
     assert not fit_better_mirrored(index_of(two_faces(0.4)), scans, Deadline())
+
+
+def test_nothing_by_scans_that_see_nothing() -> None:
+    blind = Scan(MeasuredSegments.from_segments(Segments.from_array([])))
+    assert find_thickness(index_of(faces()), [blind], Deadline(), oriented=True) is None
 
 
 def test_nothing_without_scans_and_without_time() -> None:
