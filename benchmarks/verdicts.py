@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,6 +20,7 @@ from association import AssociationOptions, AssociationResult, HardPrior, MapInd
 from registration import MeasuredSegments, RigidTransform, Segments
 
 FOLDER = Path(__file__).parents[1] / "docs"
+LETTERS = 40  # of a title's line
 # Okabe and Ito's colours, told apart by every kind of colour vision.
 INK, GREY, MAP = "#1b1f24", "#8a929c", "#c3c9d0"
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
@@ -73,7 +75,7 @@ class Scene:
 
     def answer(self) -> AssociationResult:
         """Search it."""
-        options = replace(AssociationOptions(), max_alternatives=5)
+        options = replace(AssociationOptions(), max_alternatives=5, causes=True)
         return associate(MapIndex.build(Segments.from_array(self.walls)), self.scan, self.prior, options)
 
 
@@ -151,10 +153,10 @@ def draw(scene: Scene, scan_axes: Axes, map_axes: Axes) -> None:
         axes.margins(0.08)
         axes.set(aspect="equal", xticks=[], yticks=[])
         axes.spines[:].set_color("#e1e4e8")
-    told = ", ".join(one.code for one in answer.reasons) or "usable"
+    told = fill(", ".join(one.code for one in answer.reasons) or "usable", LETTERS)
     scan_axes.set_title(f"{scene.title}\nas sent", fontsize=8, color=INK)
     warned = "".join(f"\nwarning: {one.code}" for one in answer.warnings)
-    map_axes.set_title(f"{answer.status}: {told}{warned}", fontsize=8, color=colour, weight="bold")
+    map_axes.set_title(f"{answer.status}\n{told}{warned}", fontsize=8, color=colour, weight="bold")
 
 
 def _lay(axes: Axes, sent: np.ndarray, pose: RigidTransform, colour: str, width: float) -> None:
