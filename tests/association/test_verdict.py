@@ -106,7 +106,7 @@ def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
     with judged_by({**SURE, "cautious": cautious}):
         for one in (leading(40.0), replace(leading(40.0), degenerate=True)):
             assert ("elsewhere" in [reason.code for reason in one.verdict.reasons]) is (more < 0.0)
-    with judged_by({**SURE, "cautious": cautious}, USABLE_CAUTIOUS=0.1):
+    with judged_by({**SURE, "cautious": cautious}, USABLE_CAUTIOUS=0.05):
         assert leading(40.0).verdict.reasons == ()
 
 
