@@ -166,7 +166,7 @@ FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
 # Explanations are scored again with gates as wide as walls may be off: by so much at least,
 LOOSE_WALLS = 0.05  # m, tables
 LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
-LOOSE_BEAMS = 0.25  # tables; and with that share of what beams say, which read centimetres
+LOOSE_BEAMS = 0.5  # tables; and with that share of what beams say, which read centimetres
 LOOSE_RIVALS = 8  # tables; the best and that many others
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 
