@@ -26,7 +26,7 @@ from packaging.utils import canonicalize_name
 
 HOME = "opt/linefix/"
 BILL = HOME + "sbom.cdx.json"
-MOST_MB = 620  # of what is added to the base image, unpacked
+MOST_MB = 620  # of the folder of the service, unpacked
 COMPILERS = ("as", "c++", "cargo", "cc", "clang", "cmake", "cpp", "g++", "gcc", "go", "ld", "make", "node", "rustc")
 SOURCES = (".a", ".c", ".cpp", ".h", ".hpp", ".pxd", ".pyi", ".pyx")
 FOLDERS = frozenset(["benchmarks", "docs", "experiments", "test", "tests"])
@@ -138,11 +138,10 @@ def faults(image: Image, most_mb: float) -> Iterator[tuple[str, list[str]]]:
     yield "one program", [str(n) for n, _ in inside if str(n.parent) == f"{HOME}bin" and n.name != "linefix"]
     yield "no secret, and not open, by itself", [name for name in _environment(image) if name in SECRETS]
     yield "a bill of materials of what is installed", unlisted(image)
-    megabytes = sum(size for made, size in image.layers if HOME.strip("/") in made) / 1e6
-    yield (
-        f"{megabytes:.0f} MB in the layer of the service",
-        [] if megabytes <= most_mb else [f"more than {most_mb}"],
-    )
+    # By its folder: how many layers hold it, and what they are called, is up to the engine.
+    megabytes = sum(item.size for _, item in inside) / 1e6
+    too_much = [] if 0.0 < megabytes <= most_mb else [f"expected more than 0 and {most_mb} at most"]
+    yield f"{megabytes:.0f} MB in {HOME}", too_much
 
 
 def unlisted(image: Image) -> list[str]:
@@ -185,7 +184,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("archive", type=Path)
     parser.add_argument("--look", action="store_true", help="do not run it")
-    parser.add_argument("--most-mb", type=float, default=MOST_MB, help="of the layer of the service, unpacked")
+    parser.add_argument("--most-mb", type=float, default=MOST_MB, help="of the folder of the service, unpacked")
     asked = parser.parse_args()
     try:
         image = read(asked.archive)

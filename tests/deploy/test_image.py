@@ -97,7 +97,7 @@ def failed(drawn: Drawn, folder: Path, *options: str) -> str:
 
 def test_an_image_as_it_should_be(tmp_path: Path) -> None:
     assert failed(Drawn(), tmp_path) == ""
-    assert "more than 0.0001" in failed(Drawn(), tmp_path, "--most-mb", "0.0001")
+    assert "0.0001 at most" in failed(Drawn(), tmp_path, "--most-mb", "0.0001")
 
 
 @pytest.mark.parametrize(
