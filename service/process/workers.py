@@ -50,6 +50,16 @@ class Supervisor(Multiprocess):
                 process.process.kill()
         super().join_all()
 
+    def keep_subprocess_alive(self) -> None:
+        """Replace those that died or do not answer.
+
+        A worker's end of the pipe on which it is asked is closed here: one that dies while it is asked is then known to
+        be dead at once, and not when its time to answer is over.
+        """
+        for process in self.processes:
+            process.child_conn.close()
+        super().keep_subprocess_alive()
+
     def handle_hup(self) -> None:
         """End as at SIGTERM; by itself it would start all workers anew, each of which has had the signal, too."""
         self.handle_term()

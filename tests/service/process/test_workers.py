@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -114,6 +115,17 @@ def test_a_worker_that_does_not_answer_is_replaced(pair: RunningService) -> None
     until(lambda: ready(pair) == started + 1)
     assert workers_of(pair) & before == {max(before)}
     assert len(workers_of(pair)) == 2
+
+
+def test_a_worker_that_dies_while_it_is_asked_whether_it_lives_is_replaced_at_once(tmp_path: Path) -> None:
+    """It was only when its time to answer was over."""
+    with running(tmp_path, workers=2, hang_seconds=3600) as service:
+        until(lambda: ready(service) == 2)
+        before = workers_of(service)
+        os.kill(min(before), signal.SIGSTOP)
+        time.sleep(2.0)  # the supervisor asks twice a second
+        os.kill(min(before), signal.SIGKILL)
+        until(lambda: len(workers_of(service) - before) == 1)
 
 
 def test_searches_and_queue_are_limited_over_all_workers(pair: RunningService) -> None:
