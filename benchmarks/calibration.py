@@ -25,7 +25,7 @@ from association.features import Features
 from association.models import FILE, FITTED_ON, MODELS, USUAL, Model, as_document
 from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
 
-from .curves import Fitted, Task, fit, log_loss
+from .curves import Fitted, Task, fit, log_loss, tellable
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
 from .reliability import print_bins
 from .table import print_table
@@ -185,10 +185,11 @@ def main() -> None:
         fitted = report(form, TASKS[form], examples)
         models |= fitted
         usual = usual_of(examples, usual, form)
-        away = sum(e.stranger for e in examples)
+        told = tellable(examples)
+        away = sum(e.stranger for e in told)
         for task in TASKS[form]:
             fitted_on[task.name] = (
-                f"{len(examples) - away} scans as {form} in their own map, {away} in that of another building or part "
+                f"{len(told) - away} scans as {form} in their own map, {away} in that of another building or part "
                 f"of it at a weight of {task.strangers:g}"
             )
     if args.write:

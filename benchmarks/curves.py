@@ -22,7 +22,7 @@ from .examples import DRAWN, DRAWN_STRANGERS, Example
 RIDGE = 3.0  # on slopes of standardised features, in units of one answer; cross-validated
 LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
-# A log is worth that many drawn scans, of which there are as many as one cares to draw.
+# A scan of a real plan or log is worth that many of drawn buildings, of which there are as many as one cares to draw.
 REAL = 3.0
 FOR = ("lead", "solitude", "share", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
 AGAINST = (
