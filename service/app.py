@@ -163,7 +163,7 @@ async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterat
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
     following = asyncio.create_task(_follow_keys(services))
-    if part.replaces:
+    if part.opens_late:
         await getting_ready
     try:
         yield {KEY: services}

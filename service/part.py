@@ -13,13 +13,20 @@ class Part:
     ----------
     index, of : int
     replaces : bool
-        Whether it stands in for one that has died: then it is to be ready before it takes connections, since the
-        others take them meanwhile.
+        Whether it stands in for one that has died.
     """
 
     index: int = 0
     of: int = 1
     replaces: bool = False
+
+    @property
+    def opens_late(self) -> bool:
+        """Whether it takes connections only when it is ready: others take them meanwhile, or the first says why not.
+
+        A service is ready as soon as one of its processes is. No other may take a request that it has to refuse.
+        """
+        return self.replaces or self.index > 0
 
     def share(self, whole: int) -> int:
         """Return this part's share of something; all shares add up to the whole."""

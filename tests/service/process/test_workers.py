@@ -76,6 +76,15 @@ def test_a_part_is_one_process_s_as_long_as_it_lives(tmp_path: Path) -> None:
     more.release()
 
 
+def test_no_worker_takes_a_request_before_it_can_serve_it(tmp_path: Path) -> None:
+    with running(tmp_path, workers=3, searches=3, queue=64) as service, ThreadPoolExecutor(8) as several:
+        body, statuses = orjson.dumps(examples.ASSOCIATE), []
+        while ready(service) < 3 or len(statuses) < 100:
+            asked = [several.submit(anew, service, "POST", "/v1/associate", body) for _ in range(10)]
+            statuses += [one.result().status_code for one in asked]
+    assert set(statuses) == {200}
+
+
 def test_counts_are_of_all_workers_and_never_go_down(pair: RunningService) -> None:
     before = pair.count(POSTS)
     for _ in range(40):
