@@ -45,7 +45,9 @@ class BridgeOptions:
     together : float
         Seconds; scans of several topics that are taken no farther apart are answered as one. 0: each by itself.
     odometry : str
-        Topic that says how the robot moved between such scans.
+        Topic that says how the robot moved between such scans, and during each.
+    motion : bool
+        Take every beam to where the scanner was, where a scan has a `time_increment` and odometry a twist.
     map_topic : str or None
         Of an OccupancyGrid, for a bridge that was given no map.
     base_frame : str
@@ -60,6 +62,7 @@ class BridgeOptions:
     scans: tuple[str, ...] = ("/scan",)
     together: float = 0.1
     odometry: str = "/odom"
+    motion: bool = True
     map_topic: str | None = None
     base_frame: str = "base_link"
     when: Literal["lost", "always"] = "lost"
@@ -157,7 +160,7 @@ class Bridge:
         if self._index is None:
             self._diagnostics.say(complaint(stamp, "no map has come yet"))
             return
-        looks, missing = looks_of(scans, self._mounts, self._driven)
+        looks, missing = looks_of(scans, self._mounts, self._driven, motion=self._options.motion)
         for one in missing:
             self._diagnostics.say(complaint(stamp, one))
         if not looks:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .locating import Look, Mounts
+from .locating import Look, Mounts, seconds_of
 from .messages import LaserScan
 from .odometry import Heard, nanoseconds
 
@@ -49,8 +49,12 @@ class Gathering:
         return [one for one in scans if newest - nanoseconds(one.header.stamp) <= self.seconds * 1e9]
 
 
-def looks_of(scans: Sequence[LaserScan], mounts: Mounts, odometry: Heard) -> tuple[list[Look], list[str]]:
+def looks_of(
+    scans: Sequence[LaserScan], mounts: Mounts, odometry: Heard, *, motion: bool = True
+) -> tuple[list[Look], list[str]]:
     """Return scans with where they were taken, as seen from the robot at the time of the first.
+
+    With `motion` they come with how fast the robot moved meanwhile, as far as odometry says it.
 
     Returns
     -------
@@ -68,5 +72,6 @@ def looks_of(scans: Sequence[LaserScan], mounts: Mounts, odometry: Heard) -> tup
         elif step is None:
             missing.append(f"no odometry says how the robot moved since the scan of {frame}")
         else:
-            looks.append(Look(scan, mount, step))
+            middle = nanoseconds(scan.header.stamp) + round(0.5e9 * seconds_of(scan))
+            looks.append(Look(scan, mount, step, odometry.speed(middle) if motion else None))
     return looks, missing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from formats.logs.transforms import Transforms, matrix_of, planar
 from registration import RigidTransform
 
 from .messages import LaserScan, TFMessage, Time
+from .odometry import Speed
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
 
@@ -79,13 +81,33 @@ class Mounts:
         return None if matrix is None else Mount(*planar(matrix))
 
 
-def laser_of(message: LaserScan, *, flipped: bool) -> linefix.LaserScan:
+def seconds_of(message: LaserScan) -> float:
+    """Return how long a scan took, 0 where the message does not say."""
+    seconds = message.time_increment * len(message.ranges)
+    return seconds if 0.0 < seconds < math.inf else 0.0
+
+
+def motion_of(message: LaserScan, mount: Mount, speed: Speed | None) -> linefix.Motion | None:
+    """Return how a scanner moved while it scanned, by how fast the robot did.
+
+    None where nobody says how fast, or the message does not say how long the scan took.
+    """
+    if speed is None or not seconds_of(message):
+        return None
+    at = mount.base_from_laser
+    # The turn of the robot takes the scanner along.
+    vx, vy = speed.vx - speed.omega * at.y, speed.vy + speed.omega * at.x
+    c, s = math.cos(at.theta), math.sin(at.theta)
+    return linefix.Motion(message.time_increment, c * vx + s * vy, c * vy - s * vx, speed.omega)
+
+
+def laser_of(message: LaserScan, *, flipped: bool, motion: linefix.Motion | None = None) -> linefix.LaserScan:
     """Return a message as a scan; one that is mounted upside down turns the other way.
 
     Raises
     ------
     InputError
-        When it is no scan.
+        When it is no scan, or the scanner turned nearly as fast as it scans.
     """
     sign = -1.0 if flipped else 1.0
     return linefix.LaserScan(
@@ -94,6 +116,7 @@ def laser_of(message: LaserScan, *, flipped: bool) -> linefix.LaserScan:
         np.asarray(message.ranges, dtype=np.float64),
         message.range_min,
         message.range_max,
+        motion,
     )
 
 
@@ -107,15 +130,24 @@ class Look:
     mount : Mount
     base_from_then : RigidTransform
         Where the robot was at that time, as seen from where it was at the time that is asked about.
+    speed : Speed or None
+        Of the robot meanwhile; None: it is taken to stand still.
     """
 
     message: LaserScan
     mount: Mount
     base_from_then: RigidTransform = HERE
+    speed: Speed | None = None
+
+    @property
+    def laser(self) -> linefix.LaserScan:
+        """The scan as the search takes it; raises InputError where it is none."""
+        motion = motion_of(self.message, self.mount, self.speed)
+        return laser_of(self.message, flipped=self.mount.flipped, motion=motion)
 
 
 def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
-    """Find where the robot is by one scan, or by several scanners together, at the time of the first.
+    """Find where the robot is by one scan, or by several scanners together, at the time of the first one's first beam.
 
     Raises
     ------
@@ -123,7 +155,7 @@ def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
         When a message is no scan.
     """
     stamp = looks[0].message.header.stamp
-    lasers = [laser_of(look.message, flipped=look.mount.flipped) for look in looks]
+    lasers = [look.laser for look in looks]
     if len(looks) > 1:
         places = [look.base_from_then.compose(look.mount.base_from_laser) for look in looks]
         views = [linefix.View(linefix.scan_of(laser), at) for laser, at in zip(lasers, places, strict=True)]

@@ -1,9 +1,11 @@
-"""How the robot moved between two times, by what its odometry said."""
+"""How the robot moved between two times, and how fast at one, by what its odometry said."""
 
 from __future__ import annotations
 
 import bisect
+import math
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +15,17 @@ from registration import RigidTransform
 from .messages import Odometry, Time
 
 KEPT = 2000  # messages; 20 s at 100 Hz
-STALE_NS = NS // 2  # a robot is not known to be where it was longer ago than this
+STALE_NS = NS // 2  # a robot is not known to be where it was longer ago than this,
+FRESH_NS = NS // 5  # nor to move as fast
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """How fast the robot moves: m/s and rad/s, in its own frame."""
+
+    vx: float
+    vy: float
+    omega: float
 
 
 def nanoseconds(stamp: Time) -> int:
@@ -27,6 +39,7 @@ class Heard:
     def __init__(self) -> None:
         self._stamps: deque[int] = deque(maxlen=KEPT)
         self._poses: deque[RigidTransform] = deque(maxlen=KEPT)
+        self._speeds: deque[Speed] = deque(maxlen=KEPT)
 
     def hear(self, message: Odometry) -> None:
         """Take what was said; when the clock goes back, as when a bag is played again, all before is forgotten.
@@ -34,16 +47,30 @@ class Heard:
         Raises
         ------
         ValueError
-            When it is no pose.
+            When it is no pose, or no speed.
         """
-        pose = message.pose.pose
+        pose, twist = message.pose.pose, message.twist.twist
         found, _ = planar(matrix_of(pose.position, pose.orientation))
+        speed = Speed(twist.linear.x, twist.linear.y, twist.angular.z)
+        if not all(math.isfinite(one) for one in (speed.vx, speed.vy, speed.omega)):
+            raise ValueError(f"a twist of finite numbers is expected, got {speed}")
         stamp = stamp_of(message.header)
         if self._stamps and stamp <= self._stamps[-1]:
             self._stamps.clear()
             self._poses.clear()
+            self._speeds.clear()
         self._stamps.append(stamp)
         self._poses.append(found)
+        self._speeds.append(speed)
+
+    def speed(self, at: int) -> Speed | None:
+        """Return how fast the robot moved at a time, nanoseconds; None where nobody said."""
+        after = bisect.bisect_left(self._stamps, at)
+        near = range(max(0, after - 1), min(after + 1, len(self._stamps)))
+        nearest = min(near, key=lambda k: abs(self._stamps[k] - at), default=None)
+        if nearest is None or abs(self._stamps[nearest] - at) > FRESH_NS:
+            return None
+        return self._speeds[nearest]
 
     def step(self, begin: Time, end: Time) -> RigidTransform | None:
         """Return where the robot was at `end` as seen from where it was at `begin`; None where nobody said."""

@@ -40,7 +40,7 @@ from registration import (
     Segments,
     register,
 )
-from vectorization import LaserScan, Vectorization, VectorizationOptions, vectorize
+from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .locating import index_map, locate, scan_of
 
@@ -62,6 +62,7 @@ __all__ = [
     "LogOptions",
     "MapIndex",
     "MeasuredSegments",
+    "Motion",
     "RegistrationOptions",
     "RegistrationResult",
     "RigidTransform",

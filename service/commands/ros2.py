@@ -31,9 +31,10 @@ def ros2(
             help="Scans of several topics so near in time are one; 0: each by itself.",
         ),
     ] = 0.1,
-    odom: Annotated[
-        str, typer.Option(metavar="TOPIC", help="Of odometry: how the robot moves between them.")
-    ] = "/odom",
+    odom: Annotated[str, typer.Option(metavar="TOPIC", help="Of odometry: how the robot moves.")] = "/odom",
+    motion: Annotated[
+        bool, typer.Option(help="Take each beam to where the scanner was, by time_increment and the twist of --odom.")
+    ] = True,
     base: Annotated[str, typer.Option(metavar="FRAME", help="The robot's own frame.")] = "base_link",
     when: Annotated[
         Literal["lost", "always"],
@@ -54,6 +55,7 @@ def ros2(
         scans=tuple(scan or ("/scan",)),
         together=together,
         odometry=odom,
+        motion=motion,
         map_topic=None if on else map_topic,
         base_frame=base,
         when=when,

@@ -71,6 +71,12 @@ def test_single_beams_stay_evidence() -> None:
     assert linefix.scan_of(laser().points()).beams is None
 
 
+def test_a_scanner_that_moved_saw_from_the_middle_of_its_way() -> None:
+    motion = linefix.Motion(0.1 / SCANNER.beams, 1.0, 0.0, 0.0)
+    scan = linefix.scan_of(linefix.LaserScan(*ANGLES, ranges(), motion=motion))
+    assert scan.viewpoint == pytest.approx((0.05, 0.0), abs=1e-3)
+
+
 @pytest.mark.parametrize("undirected", ["map", "options"])
 def test_directions_count_only_where_map_and_options_agree(undirected: str) -> None:
     """Every other wall runs the wrong way: found where directions mean nothing, and there alone."""
