@@ -8,6 +8,7 @@ from collections.abc import Callable
 from . import vectorization
 from .analysis import analysis
 from .batch import batch
+from .bridge import bridge
 from .drawn import SCANNER
 from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
@@ -115,6 +116,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "views": views,
     "replicas": replicas,
     "plan": plan,
+    "bridge": bridge,
 }
 
 

@@ -96,7 +96,8 @@ class Bridge:
         self._pose = Told(net, "/linefix/pose", PoseWithCovarianceStamped, RELIABLE)
         self._markers = Told(net, "/linefix/markers", MarkerArray, LATCHED)
         self._diagnostics = Told(net, "/diagnostics", DiagnosticArray, RELIABLE)
-        self._waiting = Waiting(net, [*self._scans, self._mounted, self._asked, *self._maps])
+        # Odometry is read as it comes: twenty messages would keep a scan waiting for 2 ms.
+        self._waiting = Waiting(net, [*self._scans, self._odometry, self._mounted, self._asked, *self._maps])
         if index is not None:
             self._markers.say(map_marker(index, frame))
 
