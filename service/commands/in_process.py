@@ -64,6 +64,7 @@ class InProcess:
             raise WrongUseError(f"LINEFIX_{name.upper()} in the environment: {wrong['msg']}") from None
         self._metrics = Metrics()
         self._parser = ParserProcess()
+        self._has_compiled = False
         self._limits = self._settings.limits()
 
     def close(self) -> None:
@@ -150,11 +151,17 @@ class InProcess:
             return {**analysis_json(analysis, found), **sealed}
 
     def _compile(self) -> None:
-        """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB."""
-        if is_compiled():
+        """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB.
+
+        Once: where nothing can be kept this process compiles what it needs.
+        """
+        if self._has_compiled or is_compiled():
             return
+        self._has_compiled = True
         print("linefix: compiling, which takes a minute; what comes of it is kept for the next time", file=sys.stderr)
-        with suppress(ParserEndedError):  # if that process ends early this one compiles what it needs
+        with suppress(
+            ParserEndedError, OSError
+        ):  # if it ends early or can keep nothing this one compiles what it needs
             self._parser.call(compile_kernels)
         self._parser.close()
 

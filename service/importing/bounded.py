@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ import orjson
 
 from association import CancelledError, Deadline
 
+from ..parsing.own_modules import command_of
 from ..schemas.errors import Fault, InvalidRequestError
 from .bounds import Bounds
 from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
@@ -71,7 +71,7 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
     """
     told = orjson.dumps({"bounds": asdict(bounds), "content_type": content_type}).decode()
     with _folder() as folder:
-        status, said, failure = _ended([sys.executable, "-m", READER, told, folder], content, deadline)
+        status, said, failure = _ended(command_of(READER, told, folder), content, deadline)
     if status == 1:
         raise ReaderFailedError(failure.decode("ascii", "replace")[:100])
     if status in (-signal.SIGXCPU, -signal.SIGKILL):

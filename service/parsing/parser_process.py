@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 from ..memory import return_large_blocks
 from .channel import receive, send
 from .errors import ParserEndedError
+from .own_modules import command_of
 
 T = TypeVar("T")
 LARGE = 500_000  # bytes; parsing more would hold up everything else for too long
@@ -85,7 +86,7 @@ class ParserProcess:
                 # In a group of its own, so that Ctrl-C is for the service, which then ends this.
                 try:
                     self._process = subprocess.Popen(
-                        [sys.executable, "-m", __name__, str(theirs.fileno())],
+                        command_of(__name__, str(theirs.fileno())),
                         pass_fds=[theirs.fileno()],
                         process_group=0,
                         stdin=subprocess.DEVNULL,

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from service.commands.in_process import InProcess
 from tests.running import RunningService, free_port
 
 from .running import Linefix, refused
@@ -103,3 +104,15 @@ def test_a_key_comes_from_the_environment(linefix: Linefix, folder: Path, guarde
 def test_version(linefix: Linefix, folder: Path) -> None:
     ended = linefix("--version")
     assert (ended.code, ended.out.split()[0]) == (0, "linefix")
+
+
+def test_it_compiles_once_where_nothing_can_be_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And not anew for each scan of a log."""
+    (folder / "file").touch()
+    monkeypatch.setenv("LINEFIX_KERNELS", str(folder / "file" / "kernels"))
+    answers = InProcess()
+    for _ in range(2):
+        answers.ask("vectorize", {"points": POINTS})
+    assert capsys.readouterr().err.count("compiling") == 1

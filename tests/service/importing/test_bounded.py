@@ -62,9 +62,18 @@ def test_it_ends_when_nobody_waits_or_the_time_is_over() -> None:
         read({"a.csv": SQUARE}, deadline=gone)
 
 
+def test_what_stands_in_the_working_folder_is_not_taken_for_the_service(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "service").mkdir()
+    (tmp_path / "service" / "__init__.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path)
+    assert read({"a.csv": SQUARE}).report["format"] == "csv"
+
+
 def test_where_the_extra_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "contourpy.py").write_text("raise ModuleNotFoundError('contourpy')")
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{Path(__file__).parents[3]}")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(FormatsMissingError, match=r"linefix\[formats\]"):
         read({"a.csv": SQUARE})
 
@@ -75,7 +84,7 @@ def test_it_is_told_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         f"import os, pathlib\npathlib.Path({str(tmp_path / 'seen')!r}).write_text(repr(dict(os.environ)))\n"
         "raise ModuleNotFoundError('contourpy')"
     )
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{Path(__file__).parents[3]}")
+    monkeypatch.syspath_prepend(tmp_path)
     private = "LINEFIX_KEYS LINEFIX_KEYS_FILE LINEFIX_DATABASE_URL PGPASSWORD OTEL_EXPORTER_OTLP_HEADERS"
     for name in private.split():
         monkeypatch.setenv(name, "sesame")

@@ -7,11 +7,14 @@ import pickle
 import signal
 import threading
 from collections.abc import Iterator
+from importlib.util import find_spec
 from multiprocessing import Pipe
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import registration
 from service.parsing.channel import receive, send
 from service.parsing.errors import NotJsonError, ParserEndedError
 from service.parsing.parser_process import ParserProcess
@@ -28,6 +31,21 @@ def parser() -> Iterator[ParserProcess]:
     yield made
     made.close()
     assert made.pid is None
+
+
+def test_what_stands_in_the_working_folder_is_not_taken_for_the_service(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a checkout, while another `linefix` is installed."""
+    for package in ("service", "registration"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path)
+    made = ParserProcess()
+    try:
+        assert made.call(find_spec, "registration").origin == registration.__file__  # type: ignore[union-attr]
+    finally:
+        made.close()
 
 
 def test_the_other_process_reads_as_this_one_does(parser: ParserProcess) -> None:
