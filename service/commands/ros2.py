@@ -11,14 +11,15 @@ import typer
 
 from ..work.warmup import warm_up
 from .errors import RefusedError, WrongUseError
-from .inputs import needing_formats, read_map_file
+from .inputs import document_at, needing_formats
 
 LEAST_DOMAIN, MOST_DOMAIN = 0, 232
 
 
 def ros2(
     on: Annotated[
-        str | None, typer.Option("--map", metavar="FILE", help="A map file; else it comes over a topic.")
+        str | None,
+        typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map; else it comes over a topic."),
     ] = None,
     map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Of an OccupancyGrid, without --map.")] = "/map",
     scan: Annotated[list[str] | None, typer.Option(metavar="TOPIC", help="Of scans; may be given again.")] = None,
@@ -63,7 +64,7 @@ def ros2(
     )
     index, frame = None, "map"
     if on is not None:
-        document = read_map_file(on)
+        document = document_at(on, None)
         with needing_formats(on):
             segments = linefix.Segments.from_array(document.get("segments", []), argument="map.segments")
             oriented = document.get("oriented", True)

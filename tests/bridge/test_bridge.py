@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from rosbags.rosbag2 import Reader, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bridge import messages
+from service.commands.entry import run
 
 from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, is_at_truth, mount, scan
 
@@ -113,3 +115,14 @@ def test_what_is_broken_is_told_and_the_next_is_answered(domain: int, map_file: 
             robot.diagnostics, lambda: robot.scans.say(broken), lambda one: "scan is not" in one.status[0].message
         )
         robot.until(robot.initial, lambda: robot.scans.say(scan(2)))
+
+
+def test_a_stored_map_is_taken_by_its_id(
+    domain: int, map_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LINEFIX_DATA_DIR", str(tmp_path / "data"))
+    assert run(["map", "put", "hq-3", map_file]) == 0
+    with bridge("--map", "hq-3"):
+        robot = Robot(domain)
+        robot.mounts.say(mount())
+        assert is_at_truth(robot.until(robot.initial, lambda: robot.scans.say(scan(2))))
