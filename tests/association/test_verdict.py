@@ -110,6 +110,21 @@ def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
         assert leading(40.0).verdict.reasons == ()
 
 
+def test_at_every_limit_itself_an_answer_is_usable() -> None:
+    """All chances are one half, and so are the limits."""
+    even = {name: {"constant": [0.0]} for name in PLAIN}
+    names = ("USABLE_PROBABILITY", "USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
+    alone = explanations_of(answer_with(ranked()))
+    with judged_by(even, **dict.fromkeys(names, 0.5)):
+        got = judge(room(), alone)
+        assert (got.status, got.usable, got.probability) == (Status.OK, True, 0.5)
+    for name in names[:2]:
+        with judged_by(even, **dict.fromkeys(names, 0.5) | {name: math.nextafter(0.5, 1.0)}):
+            assert judge(room(), alone).status is Status.AMBIGUOUS
+    with judged_by(even, **dict.fromkeys(names, 0.5) | {"NO_MATCH_PROBABILITY": math.nextafter(0.5, 1.0)}):
+        assert judge(room(), alone).status is Status.NO_MATCH
+
+
 def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> int:
     """Return how often the mirrored scan was searched while an answer was judged."""
     asked = []
@@ -246,8 +261,8 @@ def test_margin_and_runner_up() -> None:
     assert (alone.margin, alone.runner_up) == (None, None)
     below = judge(room(), explanations_of(best, ranked(2.0, -5.0)))
     assert [below.margin, below.runner_up] == pytest.approx([81.0, 0.0])
-    spoken_against = judge(room(), explanations_of(answer_with(ranked(5.0, -6.0)), ranked(2.0, -4.0)))
-    assert spoken_against.margin == pytest.approx(1.0)
+    spoken_against = judge(room(), explanations_of(answer_with(ranked(5.0, -5.5)), ranked(2.0, -4.0)))
+    assert spoken_against.margin == pytest.approx(1.5)
     assert spoken_against.runner_up is None
 
 
