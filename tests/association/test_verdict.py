@@ -55,11 +55,16 @@ def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar
 
 
 def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is said to be 40 nats behind, and is at the same place: scored anew, it is worth as much."""
+    """It is said to be 40 nats behind, and is at the same place: scored anew, it is worth as much.
+
+    Only what would be usable is looked at again.
+    """
     with judged_by(SURE):
         assert leading(40.0).verdict.usable
         monkeypatch.setattr(loosening, "LOOSE_RIVALS", tuning.LOOSE_RIVALS)
         got = leading(40.0).verdict
+        for unusable in (replace(leading(40.0), thin=True), replace(leading(40.0), degenerate=True)):
+            assert unusable.verdict.probability == pytest.approx(1.0)
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
     assert got.probability == pytest.approx(0.5)
     assert "twin" in [reason.code for reason in got.reasons]
