@@ -36,7 +36,21 @@ SUITES = {
     "registration/": Suite(
         tuple(
             f"tests/registration/test_{name}.py"
-            for name in ("degenerate", "joint", "one_step", "public_api", "register", "segments", "statistics")
+            for name in (
+                "beams",
+                "degenerate",
+                "interpreting",
+                "joint",
+                "observability",
+                "one_step",
+                "orientation",
+                "public_api",
+                "register",
+                "register_refusals",
+                "segments",
+                "statistics",
+                "wall_error",
+            )
         )
     ),
     "vectorization/kernels/": Suite(
