@@ -22,6 +22,7 @@ from .tuning import (
     CONTRADICTION,
     ELSEWHERE_PROBABILITY,
     FAR_FROM_PRIOR,
+    LEAST_IN_STEP,
     NO_MATCH_PROBABILITY,
     USABLE_CAUTIOUS,
     USABLE_CAUTIOUS_DRIVE,
@@ -89,6 +90,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
         thin=is_thin(answer.settled),
         twin=chances.share < USABLE_PROBABILITY,
+        out_of_step=_out_of_step(answer),
     )
     return Verdict(
         status=status,
@@ -152,6 +154,11 @@ def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
 
 
+def _out_of_step(answer: Answer) -> bool:
+    """Tell whether the last view of a drive fits far worse than those before it: then its own place is not known."""
+    return answer.beams.in_step < LEAST_IN_STEP
+
+
 def _bar(context: SearchContext) -> float:
     """Return what the cautious probability has to reach."""
     if context.scan.views is not None and context.scan.views.uncertain:
@@ -166,5 +173,5 @@ def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool) -> S
     if is_degenerate(answer.settled):
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= bar and not is_thin(answer.settled)
+    sure = chances.careful >= bar and not is_thin(answer.settled) and not _out_of_step(answer)
     return Status.OK if likely and sure else Status.AMBIGUOUS
