@@ -120,9 +120,13 @@ def test_at_every_limit_itself_an_answer_is_usable() -> None:
     even = {name: {"constant": [0.0]} for name in PLAIN}
     names = ("USABLE_PROBABILITY", "USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
     alone = explanations_of(answer_with(ranked()))
+    assert alone.answer is not None
     with judged_by(even, **dict.fromkeys(names, 0.5)):
         got = judge(room(), alone)
         assert (got.status, got.usable, got.probability) == (Status.OK, True, 0.5)
+        for in_step, usable in ((tuning.LEAST_IN_STEP, True), (tuning.LEAST_IN_STEP - 1e-9, False)):
+            beams = replace(alone.answer.beams, in_step=in_step)
+            assert judge(room(), replace(alone, answer=replace(alone.answer, beams=beams))).usable is usable
     for name in names[:2]:
         with judged_by(even, **dict.fromkeys(names, 0.5) | {name: math.nextafter(0.5, 1.0)}):
             assert judge(room(), alone).status is Status.AMBIGUOUS
