@@ -79,9 +79,7 @@ class SearchGate:
         if self.full:
             self._require_share(holder)
 
-    async def run(
-        self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool] = lambda: True
-    ) -> T:
+    async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool]) -> T:
         """Run a function when its turn comes.
 
         A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns, so that there
@@ -141,7 +139,7 @@ class SearchGate:
 
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False)
 
     def _require_share(self, holder: Holder) -> None:
         """Raise unless a holder has less than its share of a full queue."""
@@ -150,7 +148,7 @@ class SearchGate:
         share = self._places / holders
         if holders > 1 and mine >= share:
             raise ShareUsedError
-        if holders == 1 or mine + 1 > share:
+        if mine + 1 > share:
             raise QueueFullError
 
     def _end(self, over: asyncio.Future[None]) -> None:

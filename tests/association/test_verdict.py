@@ -55,11 +55,16 @@ def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar
 
 
 def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is said to be 40 nats behind, and is at the same place: scored anew, it is worth as much."""
+    """It is said to be 40 nats behind, and is at the same place: scored anew, it is worth as much.
+
+    Only what would be usable is looked at again.
+    """
     with judged_by(SURE):
         assert leading(40.0).verdict.usable
         monkeypatch.setattr(loosening, "LOOSE_RIVALS", tuning.LOOSE_RIVALS)
         got = leading(40.0).verdict
+        for unusable in (replace(leading(40.0), thin=True), replace(leading(40.0), degenerate=True)):
+            assert unusable.verdict.probability == pytest.approx(1.0)
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
     assert got.probability == pytest.approx(0.5)
     assert "twin" in [reason.code for reason in got.reasons]
@@ -108,6 +113,25 @@ def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
             assert ("elsewhere" in [reason.code for reason in one.verdict.reasons]) is (more < 0.0)
     with judged_by({**SURE, "cautious": cautious}, USABLE_CAUTIOUS=0.05):
         assert leading(40.0).verdict.reasons == ()
+
+
+def test_at_every_limit_itself_an_answer_is_usable() -> None:
+    """All chances are one half, and so are the limits."""
+    even = {name: {"constant": [0.0]} for name in PLAIN}
+    names = ("USABLE_PROBABILITY", "USABLE_CAUTIOUS", "NO_MATCH_PROBABILITY", "ELSEWHERE_PROBABILITY")
+    alone = explanations_of(answer_with(ranked()))
+    assert alone.answer is not None
+    with judged_by(even, **dict.fromkeys(names, 0.5)):
+        got = judge(room(), alone)
+        assert (got.status, got.usable, got.probability) == (Status.OK, True, 0.5)
+        for in_step, usable in ((tuning.LEAST_IN_STEP, True), (tuning.LEAST_IN_STEP - 1e-9, False)):
+            beams = replace(alone.answer.beams, in_step=in_step)
+            assert judge(room(), replace(alone, answer=replace(alone.answer, beams=beams))).usable is usable
+    for name in names[:2]:
+        with judged_by(even, **dict.fromkeys(names, 0.5) | {name: math.nextafter(0.5, 1.0)}):
+            assert judge(room(), alone).status is Status.AMBIGUOUS
+    with judged_by(even, **dict.fromkeys(names, 0.5) | {"NO_MATCH_PROBABILITY": math.nextafter(0.5, 1.0)}):
+        assert judge(room(), alone).status is Status.NO_MATCH
 
 
 def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> int:
@@ -246,8 +270,8 @@ def test_margin_and_runner_up() -> None:
     assert (alone.margin, alone.runner_up) == (None, None)
     below = judge(room(), explanations_of(best, ranked(2.0, -5.0)))
     assert [below.margin, below.runner_up] == pytest.approx([81.0, 0.0])
-    spoken_against = judge(room(), explanations_of(answer_with(ranked(5.0, -6.0)), ranked(2.0, -4.0)))
-    assert spoken_against.margin == pytest.approx(1.0)
+    spoken_against = judge(room(), explanations_of(answer_with(ranked(5.0, -5.5)), ranked(2.0, -4.0)))
+    assert spoken_against.margin == pytest.approx(1.5)
     assert spoken_against.runner_up is None
 
 

@@ -85,6 +85,12 @@ def test_what_a_caller_does_not_know_is_filled_in() -> None:
     np.testing.assert_allclose(measured.centroids, np.array([[3, 0], [0, 0.015]]))
 
 
+def test_of_nothing_lists_of_any_form_are_taken() -> None:
+    """NumPy gives an empty list one dimension."""
+    measured = MeasuredSegments.from_segments(Segments.from_array([]), moments=([], []))
+    assert (measured.centroids.shape, measured.spreads.shape) == ((0, 2), (0,))
+
+
 def test_points_that_were_counted_are_told_from_those_that_were_not() -> None:
     segments = Segments.from_array([[0, 0, 0, 0.03]])
     counted = MeasuredSegments.from_segments(segments, points=[1.0])

@@ -25,11 +25,11 @@ class Issuing:
     """An issuer of tokens."""
 
     def __init__(self, key_id: str = "one") -> None:
-        self._private = ec.generate_private_key(ec.SECP256R1())
+        self.private = ec.generate_private_key(ec.SECP256R1())
         self._key_id = key_id
 
     def key_set(self) -> str:
-        public = ECAlgorithm.to_jwk(self._private.public_key(), as_dict=True)
+        public = ECAlgorithm.to_jwk(self.private.public_key(), as_dict=True)
         return json.dumps({"keys": [{**public, "kid": self._key_id, "alg": "ES256", "use": "sig"}]})
 
     def write(self, path: Path) -> None:
@@ -39,4 +39,4 @@ class Issuing:
         """Return a token that is taken, as far as the claims do not say otherwise; None leaves one out."""
         usual = {"iss": ISSUER, "aud": AUDIENCE, "sub": "robot", "exp": time.time() + 600, "scope": "linefix:associate"}
         said = {name: value for name, value in {**usual, **claims}.items() if value is not None}
-        return jwt.encode(said, self._private, algorithm="ES256", headers={"kid": self._key_id})
+        return jwt.encode(said, self.private, algorithm="ES256", headers={"kid": self._key_id})

@@ -50,6 +50,11 @@ def test_nobody_holds_more_than_half() -> None:
         with pytest.raises(ShareHeldError):
             other.take(1)
         again.take(1)
+        for account in (one, again):  # the rest was held all the time
+            with pytest.raises(ShareHeldError):
+                account.take(1)
+    with ByteBudget(1).account() as one, pytest.raises(ShareHeldError):
+        one.take(1)
 
 
 def test_the_largest_piece_may_always_come() -> None:

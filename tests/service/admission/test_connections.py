@@ -6,6 +6,8 @@ import resource
 import subprocess
 import sys
 
+import pytest
+
 from service.admission.connections import RESERVED, ConnectionLimit, Use, most_connections
 
 
@@ -57,6 +59,13 @@ def test_one_address_has_half_and_takes_from_itself() -> None:
     assert limit.add(Line(), b"one")
 
 
+def test_of_one_connection_the_newest_has_it() -> None:
+    limit = ConnectionLimit(1)
+    lines = [Line(), Line(Use.BUSY), Line()]
+    assert [limit.add(line, b"one") for line in lines] == [True, True, False]
+    assert (given_up(lines), len(limit)) == ([0], 1)
+
+
 def test_the_least_useful_goes_first_and_never_what_is_at_work() -> None:
     limit = ConnectionLimit(8)
     lines = [Line(use) for use in (Use.BUSY, Use.SENDING, Use.RECEIVING, Use.IDLE)]
@@ -83,3 +92,13 @@ def test_descriptors_are_asked_for_and_kept_for_the_rest() -> None:
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     assert most_connections(10) == 10
     assert resource.getrlimit(resource.RLIMIT_NOFILE) == before
+
+
+@pytest.mark.parametrize(("soft", "asked"), [(resource.RLIM_INFINITY, []), (64, [(500 + RESERVED, -1)])])
+def test_a_system_that_sets_no_limit(monkeypatch: pytest.MonkeyPatch, soft: int, asked: list[tuple[int, int]]) -> None:
+    """Linux always sets one, so what it says is made up here."""
+    set_to: list[tuple[int, int]] = []
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (soft, resource.RLIM_INFINITY))
+    monkeypatch.setattr(resource, "setrlimit", lambda _, limits: set_to.append(limits))
+    assert most_connections(500) == 500
+    assert set_to == asked

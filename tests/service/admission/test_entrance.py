@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from pydantic import SecretStr
 from starlette.routing import compile_path
 
 from service.admission.entrance import Entrance, search_of
-from service.admission.errors import ForeignHostError, MissingKeyError, QueueFullError, ShareUsedError, UnknownKeyError
+from service.admission.errors import (
+    ForeignHostError,
+    ForeignMapError,
+    MissingKeyError,
+    MissingRoleError,
+    QueueFullError,
+    ShareUsedError,
+    UnknownKeyError,
+)
 from service.admission.grants import ROUTES, asked_of
+from service.admission.key_file import KeyFile
 from service.admission.keys import Keyring
 from service.admission.origins import Origins
 from service.admission.ticket import Ticket
 from service.schemas.errors import BodyTooLargeError
+from tests.service.issuing import key_lines
 
 from .gates import BlockedGate, gate_of, in_loop
 
 LIMIT = 1000
-SEARCHING = ("/v1/associate", "/v1/associate:batch", "/v1/register", "/v1/vectorize")
+SEARCHING = (
+    "/v1/associate",
+    "/v1/associate:batch",
+    "/v1/register",
+    "/v1/vectorize",
+    "/v1/maps:import",
+    "/v1/analyze",
+)
 KEYS = [SecretStr("sesame"), SecretStr("open")]
 
 
@@ -48,6 +67,7 @@ def test_what_needs_a_turn_at_the_gate() -> None:
     for method in ("GET", "HEAD", "POST"):
         assert search_of(method, "/v1/maps/hq-3:check") == "/v1/maps/{map_id}:check"
         assert search_of(method, "/v1/maps/hq-3") is None
+    assert search_of("POST", "/v1/maps/hq-3:analyze") == "/v1/maps/{map_id}:analyze"
     assert search_of("PUT", "/v1/maps/hq-3:check") is None
     assert search_of("GET", "/v2/maps/hq-3:check") is None
 
@@ -62,6 +82,42 @@ def test_the_table_reads_a_path_as_the_router_does(end: str) -> None:
         for method in route.methods.split():
             same = (one for one in ROUTES if method in one.methods.split() and compile_path(one.path)[0].match(path))
             assert asked_of(method, path).access == next(same, None), path
+
+
+def test_the_table_is_asked_for_no_longer_paths_than_a_route_can_have() -> None:
+    path = "/v1/maps/".ljust(256, "x")
+    assert asked_of("GET", path).map_id == path.removeprefix("/v1/maps/")
+    assert asked_of("GET", path + "x").access is None
+
+
+def test_a_lesser_key_is_for_what_was_said_and_no_more(tmp_path: Path) -> None:
+    """Any key may ask how much a request may hold; what is not in the table is for keys that may do everything."""
+    (tmp_path / "keys").write_text(
+        key_lines("reads", ["read"]) + key_lines("all of hq", ["read", "associate", "write"], "hq-")
+    )
+    keyring = Keyring([SecretStr("all")], KeyFile(tmp_path / "keys"))
+
+    async def scenario() -> None:
+        async with gate_of(1, 1) as gate:
+            door = Door(gate, keyring, Origins((), guarded=True), LIMIT)
+            assert door.ask("GET", "/v1/maps/hq-3", key("all of hq")).maps == "hq-"
+            for name in ("reads", "all of hq", "all"):
+                door.ask("GET", "/v1/limits", key(name))
+                door.ask("GET", "/v1/maps", key(name))
+            for name, path in (("reads", "/v1/maps/hq-3"), ("all", "/v1/maps/hq-3"), ("all", "/v1/nothing")):
+                door.ask("GET", path, key(name))
+            for name, method, path in (
+                ("reads", "PUT", "/v1/maps/hq-3"),
+                ("reads", "POST", "/v1/associate"),
+                ("reads", "GET", "/v1/nothing"),
+                ("all of hq", "GET", "/v1/nothing"),
+            ):
+                with pytest.raises(MissingRoleError):
+                    door.ask(method, path, key(name))
+            with pytest.raises(ForeignMapError):
+                door.ask("GET", "/v1/maps/other", key("all of hq"))
+
+    in_loop(scenario)
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT"])

@@ -76,10 +76,14 @@ def test_a_further_turn_waits_however_long_the_queue_is() -> None:
             assert await gate.ask_with(ticket, lambda: 1) == 1
             assert ticket.admitted
             await gate.block()
+            gate.expect(None)
+            assert gate.full, "one runs, and one is on the way"
+            gate.expect_no_longer(None)
             gate.ask(lambda: 2)
             await until(lambda: gate.waiting == 1)
             further = gate.ask_with(ticket, lambda: 3)
             await until(lambda: gate.waiting == 2)
+            assert gate.full, "by more than it has places"
             gate.release.set()
             assert await further == 3
 
@@ -91,8 +95,11 @@ def test_a_deadline_passes_in_the_queue() -> None:
         async with gate_of(1, 1) as gate:
             first = await gate.block()
             begun = time.monotonic()
+            late = gate.ask(lambda: 2, deadline=Deadline(at=begun + 0.05))
+            await asyncio.wait({late, asyncio.ensure_future(asyncio.sleep(0.9))}, return_when=asyncio.FIRST_COMPLETED)
+            assert late.done(), "not waited for any longer"
             with pytest.raises(DeadlinePassedError):
-                await gate.ask(lambda: 2, deadline=Deadline(at=begun + 0.05))
+                late.result()
             assert time.monotonic() - begun >= 0.05
             assert gate.waiting == 0
             gate.release.set()
@@ -206,7 +213,7 @@ def test_what_cannot_be_started_gives_the_slot_back() -> None:
         gate.close()
         for _ in range(2):
             with pytest.raises(RuntimeError, match="shutdown"):
-                await gate.run(lambda: 1, soon(), Ticket())
+                await gate.run(lambda: 1, soon(), Ticket(), lambda: True)
         assert gate.running == 0
 
     in_loop(scenario)
@@ -235,6 +242,38 @@ def test_what_does_not_hear_is_not_waited_for() -> None:
                 await asyncio.wait_for(deaf, 20.0)
             assert time.monotonic() - begun >= HEARING_SECONDS - 0.01
             assert gate.running == 1  # the thread is still at it
+
+    in_loop(scenario)
+
+
+def test_what_hears_soon_is_waited_for() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 0) as gate:
+            deadline = soon()
+
+            def search() -> str:
+                while not deadline.cancelled:
+                    time.sleep(0.001)
+                time.sleep(0.05)
+                return "best so far"
+
+            hearing = gate.ask(search, deadline=deadline)
+            await until(lambda: gate.running == 1)
+            gate.cancel_all()
+            assert await hearing == "best so far"
+
+    in_loop(scenario)
+
+
+def test_to_close_waits_for_nothing() -> None:
+    async def scenario() -> None:
+        async with gate_of(1, 0) as gate:
+            running = await gate.block()
+            threading.Timer(1.0, gate.release.set).start()
+            gate.close()
+            assert not gate.release.is_set()
+            gate.release.set()
+            assert await running
 
     in_loop(scenario)
 

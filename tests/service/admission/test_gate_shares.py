@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 
 import pytest
 
@@ -95,15 +96,60 @@ def test_parts_of_what_was_let_in_are_never_taken_away() -> None:
 def test_a_turn_that_comes_while_its_caller_leaves_goes_on_to_the_next() -> None:
     async def scenario() -> None:
         async with gate_of(1, 5) as gate:
-            first = await gate.block()
-            second, third = gate.ask(lambda: 2), gate.ask(lambda: 3)
+            await gate.block()
+            second, third = gate.ask(lambda: pytest.fail("ran")), gate.ask(lambda: 3)
             await until(lambda: gate.waiting == 2)
             gate.release.set()
-            # As soon as the first has ended, and before the second can take its turn.
-            await asyncio.wait({first})
+            # In the round of the loop in which the first has ended, before the second can take its turn.
+            while gate.waiting == 2:
+                await asyncio.sleep(0)
             second.cancel()
             assert await third == 3
+            assert second.cancelled()
             assert (gate.running, gate.waiting) == (0, 0)
+
+    in_loop(scenario)
+
+
+def test_a_turn_that_was_not_taken_costs_nothing() -> None:
+    """One that left just then is still before another that has used some time."""
+
+    async def scenario() -> None:
+        async with gate_of(1, 9) as gate:
+            order: list[str] = []
+            for active in (b"leaving", b"used"):
+                gate.expect(active)
+            await gate.ask(lambda: time.sleep(0.05), b"used")
+            await gate.block()
+            second = gate.ask(lambda: None, b"leaving")
+            others = [gate.ask(lambda name=name: order.append(name.decode()), name) for name in (b"used", b"leaving")]  # type: ignore[misc]
+            await until(lambda: gate.waiting == 3)
+            gate.release.set()
+            while gate.waiting == 3:  # looks in every round of the loop: its turn has come, and it has not taken it
+                await asyncio.sleep(0)
+            second.cancel()
+            await asyncio.gather(*others)
+            assert order == ["leaving", "used"]
+
+    in_loop(scenario)
+
+
+def test_the_only_place_of_another_is_not_taken() -> None:
+    """What nobody may take fills the gate; who has one place does not lose it to one that has none."""
+
+    async def scenario() -> None:
+        async with gate_of(1, 5) as gate:
+            batch = Ticket(b"batch")
+            await gate.ask_with(batch, lambda: 0)
+            await gate.block(b"batch")
+            for _ in range(4):
+                gate.ask_with(batch, lambda: 1)
+            single = gate.ask(lambda: "single", b"single")
+            await until(lambda: gate.waiting == 5)
+            with pytest.raises(QueueFullError):
+                await gate.ask(lambda: 2, b"third")
+            gate.release.set()
+            assert await single == "single"
 
     in_loop(scenario)
 

@@ -45,6 +45,9 @@ def test_a_key_for_nothing_is_not_made(capsys: pytest.CaptureFixture[str], argum
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = []', "roles"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmaps = "hq/"', "maps"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmap = "hq-"', "map"),
+        (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nmaps = "{"x" * 129}"', "maps"),
+        (f'[[key]]\nname = ""\nsha256 = "{DIGEST}"', "name"),
+        (f'[[key]]\nname = "{"x" * 65}"\nsha256 = "{DIGEST}"', "name"),
         (key_lines("sesame", ["read"]) + key_lines("sesame", ["write"]), "twice"),
     ],
 )
@@ -56,6 +59,48 @@ def test_a_file_that_is_wrong_is_named_and_not_repeated(tmp_path: Path, text: st
     assert str(path) in str(caught.value)
     assert "sesame" not in str(caught.value)
     assert DIGEST not in str(caught.value)
+
+
+def test_names_and_maps_may_be_that_long(tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    path.write_text(f'[[key]]\nname = "{"x" * 64}"\nsha256 = "{DIGEST}"\nmaps = "{"y" * 128}"')
+    assert [grant.maps for grant in read_keys(path).values()] == ["y" * 128]
+    path.write_text(f'[[key]]\nname = "x"\nsha256 = "{DIGEST}"')
+    assert [grant.maps for grant in read_keys(path).values()] == [""]
+
+
+@pytest.mark.parametrize(("name", "message"), [("none", "No such file"), ("x" * 300, "too long")])
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str, message: str) -> None:
+    with pytest.raises(KeyFileError, match=f"{name}.*{message}"):
+        KeyFile(tmp_path / name)
+
+
+def test_the_files_of_a_directory_count_together(tmp_path: Path) -> None:
+    """As secrets are mounted: behind a hidden directory that changes as a whole, with links in front of it."""
+    (tmp_path / "..data").mkdir()
+    (tmp_path / "..data" / "one").write_text(key_lines("one", ["read"]))
+    (tmp_path / "one").symlink_to(tmp_path / "..data" / "one")
+    (tmp_path / "two").write_text(key_lines("two", ["write"]))
+    (tmp_path / ".two.swp").write_text("of an editor")
+    assert [grant.roles for grant in read_keys(tmp_path).values()] == [{Role.READ}, {Role.WRITE}]
+    (tmp_path / "three").write_text(key_lines("one", ["write"]))
+    with pytest.raises(KeyFileError, match="twice"):
+        read_keys(tmp_path)
+
+
+def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    path.write_text(key_lines("sesame", ["read"]))
+    keys = KeyFile(path)
+    first = keys.grants
+    Keyring([], keys).refresh()
+    assert keys.grants is first, "nothing to read"
+    for text, roles in ((key_lines("sesame", ["read", "write"]), {Role.READ, Role.WRITE}), ("[[", None)):
+        path.write_text(text)
+        before = keys.grants
+        Keyring([], keys).refresh()
+        assert (keys.grants is before) is (roles is None), "what is wrong leaves them"
+        assert [grant.roles for grant in keys.grants.values()] == [{Role.READ, Role.WRITE}]
 
 
 def test_an_empty_file_lets_nobody_in(tmp_path: Path) -> None:

@@ -105,6 +105,28 @@ def test_what_a_browser_calls_cross_site_is_refused() -> None:
             OPEN.require(sent(host="localhost:8000", sec_fetch_site=site))
 
 
+NAMED = Origins((), guarded=False, named=("https://page.example",))
+
+
+def test_the_page_of_a_named_origin_may_ask() -> None:
+    for site in ("cross-site", "same-origin"):
+        NAMED.require(sent(host="localhost:8000", origin="https://page.example", sec_fetch_site=site))
+        with pytest.raises(ForeignOriginError):
+            NAMED.require(sent(host="localhost:8000", origin="https://other.example", sec_fetch_site=site))
+    with pytest.raises(ForeignHostError):
+        NAMED.require(sent(host="evil.example", origin="https://page.example"))
+
+
+def test_what_a_browser_asks_first_for_a_named_origin_needs_no_key() -> None:
+    asks = sent(origin="https://page.example", access_control_request_method="POST")
+    assert NAMED.is_preflight("options".upper(), asks)
+    assert not NAMED.is_preflight("GET", asks)
+    assert not OPEN.is_preflight("OPTIONS", asks)
+    assert not NAMED.is_preflight("OPTIONS", asks[:1])
+    assert not NAMED.is_preflight("OPTIONS", asks[1:])
+    assert not NAMED.is_preflight("OPTIONS", sent(origin="https://other.example", access_control_request_method="PUT"))
+
+
 def test_with_keys_all_may_ask() -> None:
     guarded = Origins((), guarded=True)
     guarded.require(sent(host="evil.example", origin="http://evil.example", sec_fetch_site="cross-site"))

@@ -12,13 +12,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
+import jwt
 import pytest
+from pydantic import SecretStr
 
 from service.admission import tokens
 from service.admission.errors import UnknownKeyError
 from service.admission.grants import Role
 from service.admission.issuer import Issuer
+from service.admission.keys import Keyring
 from service.admission.tokens import Tokens
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing
 
@@ -82,6 +86,68 @@ def test_a_token_says_who_and_what(issued: tuple[Issuing, Tokens]) -> None:
     assert checks.grant(issuing.token(scope=None).encode()).roles == frozenset()
 
 
+@pytest.mark.parametrize(
+    "claims",
+    [
+        {"scope": ["linefix:read"]},
+        {"scope": 5},
+        {"linefix_maps": 5},
+        {"linefix_maps": ["hq-"]},
+        {"linefix_maps": "hq/"},
+        {"linefix_maps": "x" * 129},
+    ],
+)
+def test_a_token_that_says_it_in_other_ways_says_nothing(
+    issued: tuple[Issuing, Tokens], claims: dict[str, Any]
+) -> None:
+    issuing, checks = issued
+    with pytest.raises(UnknownKeyError):
+        checks.grant(issuing.token(**claims).encode())
+
+
+def test_of_an_issuer_with_one_key_a_token_need_not_name_it(tmp_path: Path) -> None:
+    issuing, other = Issuing(), Issuing("other")
+    path = tmp_path / "keys.json"
+    token = jwt.encode(jwt.decode(issuing.token(), options={"verify_signature": False}), issuing.private, "ES256")
+    issuing.write(path)
+    assert checking(path).grant(token.encode()).roles
+    path.write_text(
+        json.dumps({"keys": [key for one in (issuing, other) for key in json.loads(one.key_set())["keys"]]})
+    )
+    for checks in (checking(path), Tokens(Issuer(ISSUER, AUDIENCE, str(path)))):  # the latter has none yet
+        with pytest.raises(UnknownKeyError):
+            checks.grant(token.encode())
+
+
+def test_tokens_are_taken_beside_keys(issued: tuple[Issuing, Tokens]) -> None:
+    """What has the form of one and no issuer is a key that is not known."""
+    issuing, checks = issued
+
+    def sent(key: str) -> list[tuple[bytes, bytes]]:
+        return [(b"authorization", b"Bearer " + key.encode())]
+
+    both = Keyring([SecretStr("sesame"), SecretStr("a.b.c")], None, checks)
+    for key in ("sesame", "a.b.c", issuing.token()):
+        assert both.grant(sent(key)).holder
+    for ring in (both, Keyring([SecretStr("sesame")])):
+        for key in ("nothing", "nothing.at.all"):
+            with pytest.raises(UnknownKeyError):
+                ring.grant(sent(key))
+    with pytest.raises(UnknownKeyError):
+        Keyring([], None, checks).grant(sent("sesame"))
+
+
+def test_a_keyring_fetches_the_keys_of_its_issuer(tmp_path: Path) -> None:
+    issuing = Issuing()
+    issuing.write(tmp_path / "keys.json")
+    ring = Keyring([], None, Tokens(Issuer(ISSUER, AUDIENCE, str(tmp_path / "keys.json"))))
+    sent = [(b"authorization", b"Bearer " + issuing.token().encode())]
+    with pytest.raises(UnknownKeyError):
+        ring.grant(sent)
+    ring.refresh()
+    assert ring.grant(sent).roles == {Role.ASSOCIATE}
+
+
 def test_clocks_may_differ_a_little(tmp_path: Path) -> None:
     issuing = Issuing()
     issuing.write(tmp_path / "keys.json")
@@ -89,6 +155,10 @@ def test_clocks_may_differ_a_little(tmp_path: Path) -> None:
     assert checking(tmp_path / "keys.json", leeway=200.0).grant(past).roles
     with pytest.raises(UnknownKeyError):
         checking(tmp_path / "keys.json", leeway=30.0).grant(past)
+    usual = checking(tmp_path / "keys.json")
+    assert usual.grant(issuing.token(exp=time.time() - 20).encode()).roles
+    with pytest.raises(UnknownKeyError):
+        usual.grant(issuing.token(exp=time.time() - 30.5).encode())
 
 
 def test_the_public_key_is_no_shared_secret(issued: tuple[Issuing, Tokens]) -> None:

@@ -18,6 +18,7 @@ from service.maps.errors import (
     StoreFullError,
     UnknownMapError,
 )
+from service.maps.records import columns_of
 
 from .stores import ANY, BOX, alter, opened
 
@@ -259,3 +260,31 @@ def test_all_maps_together_take_no_more_than_they_may(database: str) -> None:
                 store.put(f"c{number}", b"", BOX, ANY)
     finally:
         store.close()
+
+
+def test_one_map_may_take_it_all(database: str) -> None:
+    store = MapStore(database_url(database), most_bytes=10_000)
+    try:
+        with pytest.raises(StoreFullError):
+            store.put("a", bytes(9_501), BOX, ANY)
+        assert store.put("a", bytes(9_500), BOX, ANY) == (1, True)
+    finally:
+        store.close()
+
+
+def test_a_map_that_was_put_a_thousand_times(store: MapStore, database: str) -> None:
+    """Its revision is looked at as a number, whichever object holds it."""
+    store.put("m", b"one", BOX, ANY)
+    row = columns_of(MapRecord("m", 1000, store.record("m").sha256), BOX)
+    alter(database, "UPDATE maps SET revision = 1000, seal = :seal WHERE map_id = 'm'", seal=row["seal"])
+    alter(database, "UPDATE map_documents SET revision = 1000 WHERE map_id = 'm'")
+    assert store.load("m").record.revision == 1000
+    assert store.put("m", b"two", BOX, Preconditions(if_match=frozenset([1000]))) == (1001, False)
+
+
+def test_a_map_that_comes_before_others_is_a_map_of_its_own(store: MapStore) -> None:
+    for name in ("c", "b", "a"):
+        assert store.put(name, name.encode(), BOX, ANY) == (1, True)
+    store.delete("a", ANY)
+    assert [store.load(name).document for name in ("b", "c")] == [b"b", b"c"]
+    assert store.put("b", b"B", BOX, ANY) == (2, False)

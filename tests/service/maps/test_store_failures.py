@@ -32,6 +32,32 @@ def test_a_full_store_leaves_what_was_there(tmp_path: Path) -> None:
         assert store.load("m").document == b"before"
 
 
+def test_what_comes_back_otherwise_than_written_is_not_committed(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'maps.sqlite3'}"
+    with opened(url) as store:
+        store.put("m", b"one", BOX, ANY)
+        with engine_of(url) as engine, engine.begin() as connection:
+            connection.exec_driver_sql(
+                "CREATE TRIGGER spoils AFTER UPDATE ON map_documents "
+                "BEGIN UPDATE map_documents SET document = x'00'; END"
+            )
+        with pytest.raises(CorruptMapError):
+            store.put("m", b"two", BOX, ANY)
+        assert (store.load("m").document, store.record("m").revision) == (b"one", 1)
+
+
+def test_a_table_that_takes_no_row_is_damaged(tmp_path: Path) -> None:
+    """Once it may be that another worker was first, twice it is not."""
+    url = f"sqlite:///{tmp_path / 'maps.sqlite3'}"
+    with opened(url) as store:
+        with engine_of(url) as engine, engine.begin() as connection:
+            connection.exec_driver_sql(
+                "CREATE TRIGGER refuses BEFORE INSERT ON maps BEGIN SELECT RAISE(ABORT, 'never'); END"
+            )
+        with pytest.raises(CorruptMapError):
+            store.put("m", b"one", BOX, ANY)
+
+
 def test_a_read_only_store_still_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "maps.sqlite3"
     url = f"sqlite:///{path}"
