@@ -13,7 +13,7 @@ from .families import is_degenerate, is_thin, place_on_family
 from .features import Features, features_of, twin_share, with_null
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
-from .null import null_of
+from .null import Null, null_of
 from .ranking import Ranked
 from .reasons import Standing, reasons_of
 from .result import Reason, Status
@@ -22,12 +22,17 @@ from .tuning import (
     CONTRADICTION,
     ELSEWHERE_PROBABILITY,
     FAR_FROM_PRIOR,
+    MOST_NULL,
     NO_MATCH_PROBABILITY,
+    NULL_SHARES,
     USABLE_CAUTIOUS,
     USABLE_CAUTIOUS_DRIVE,
     USABLE_CAUTIOUS_WITH_BEAMS,
     USABLE_PROBABILITY,
 )
+
+NULL_FEATURES = ("null", "null_gap", "null_better")
+ROUNDING = 1e-9  # of a chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +80,8 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     best = answer.best
     better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
-    chances = _Chances.of(context, answer, rivals, capped=better_elsewhere)
+    certain = complete and not contradicted and context.window is None
+    chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
     status = _status(answer, chances, _bar(context), capped=better_elsewhere)
     pose = place_on_family(context, answer) if status is Status.DEGENERATE else answer.registered.pose
     if context.window is not None and pose is not None and not context.window.contains(pose):
@@ -117,7 +123,7 @@ class _Chances:
     share : float
         Of the answer among the explanations that are about as good; it is in `right` and `careful`.
     features : Features
-        What these come from, with the null where it was needed.
+        What these come from; with the null where it was needed and might matter.
     cautious : Model
         By which the careful one does.
     """
@@ -130,7 +136,10 @@ class _Chances:
     cautious: Model
 
     @classmethod
-    def of(cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool) -> _Chances:
+    def of(
+        cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool, certain: bool
+    ) -> _Chances:
+        """Work them out; `certain`: whether the answer is usable if they suffice."""
         form = "_with_beams" if context.with_beams else ""
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
         features, share = features_of(context, answer, rivals), twin_share(answer.best, rivals)
@@ -143,13 +152,32 @@ class _Chances:
             share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             # Only what would be usable has to stand up to the mirrored scan, which costs another search.
-            features = with_null(features, answer.best, null_of(context, answer.best))
-            careful = cautious.logit(features)
+            allowed = _allowed_null(cautious, features, answer.best, _bar(context) / share) if certain else 0.0
+            if allowed < MOST_NULL:
+                features = with_null(features, answer.best, null_of(context, answer.best, allowed))
+                careful = cautious.logit(features)
         return cls(_logistic(right) * share, _logistic(careful) * share, explained, share, features, cautious)
 
 
 def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
+
+
+def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float) -> float:
+    """Return what share of the answer's score the mirrored scan may reach, and the cautious chance is `bar` at least.
+
+    Of some shares, one after the other from `NULL_SHARE` on; wherever the map is not symmetric about the place.
+    """
+    if best.score <= 0.0:
+        return 0.0
+    others = cautious.logit(features) - cautious.part(features, NULL_FEATURES)
+    allowed = 0.0
+    for share in NULL_SHARES:
+        with_it = with_null(features, best, Null(share * best.score, 0.0))
+        if _logistic(others + cautious.part(with_it, NULL_FEATURES)) < bar + ROUNDING:
+            break
+        allowed = share
+    return allowed
 
 
 def _bar(context: SearchContext) -> float:
