@@ -242,14 +242,14 @@ def _weigh_beams(context: SearchContext, scored: _Scored) -> _Scored:
     if context.deadline.passed:
         finalists = LATE_FINALISTS
         scored = scored.best(scored.merits["score"] + _prior_values(context, scored.estimates), LATE_CANDIDATES)
-    by_few = scored.merits["score"] + _nats(_beam_evidence(context, scored.estimates, FEW_BEAMS, 0))
+    by_few = scored.merits["score"] + _nats(beam_evidence_at(context, scored.estimates, FEW_BEAMS, 0))
     best = np.argsort(-by_few, kind="stable")[:finalists]
     if context.window is not None:
         # What lies within the window is looked at, however good the poses outside are.
         within = np.argsort(-(by_few + _prior_values(context, scored.estimates)), kind="stable")[:finalists]
         best = np.concatenate([within, best[~np.isin(best, within)]])
     poses = scored.estimates[best]
-    evidence = _beam_evidence(context, poses, MOST_BEAMS, len(poses))
+    evidence = beam_evidence_at(context, poses, MOST_BEAMS, len(poses))
     final = _score(context, poses)
     for name in ("read", "passed"):
         final.merits[name] = evidence[name]
@@ -268,7 +268,7 @@ def _nats(evidence: Records) -> Floats:
     return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])
 
 
-def _beam_evidence(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
+def beam_evidence_at(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
     """Return what at most `most` of the beams say of each pose, (k,) of `BEAM_EVIDENCE`.
 
     Moves the first `refined` of the poses.

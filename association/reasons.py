@@ -26,6 +26,8 @@ class Standing:
         Whether few walls fix the pose, and one of them alone decides.
     twin : bool
         Whether another explanation alone makes the answer too uncertain.
+    out_of_step : bool
+        Whether what is seen from the scan's own place fits far worse than what was seen on the way.
     """
 
     status: Status
@@ -34,6 +36,7 @@ class Standing:
     elsewhere: bool
     thin: bool
     twin: bool
+    out_of_step: bool = False
 
 
 SENTENCES: Mapping[str, str] = {
@@ -82,6 +85,7 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
         codes.append("free_direction")
     elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
         codes += ["too_little"] if standing.thin else []
+        codes += ["unexplained"] if standing.out_of_step else []
         codes += ["twin"] if standing.twin else []
         codes += [code for code in _weighed(features, cautious) if code not in codes]
     return tuple(Reason(code, SENTENCES[code]) for code in codes)

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from registration.layout import Records
 
 from .context import SearchContext
 from .kernels.acceptance import missing_pieces
 from .kernels.agreement import agreement as agreement_at
 from .kernels.beams import beam_shares
 from .layout import ESTIMATE, record
-from .ranking import Ranked, rays_of
+from .ranking import Ranked, beam_evidence_at, rays_of
 from .settling import Settled
 from .tuning import COMPARED_BEAMS, NEUTRAL
 
 
 @dataclass(frozen=True, slots=True)
 class BeamShares:
-    """Shares of the beams that do not read what the map shows; both 0 without beams.
+    """How far the beams do not read what the map shows.
+
+    Shares of them all; both 0 without beams.
 
     Attributes
     ----------
@@ -24,10 +30,14 @@ class BeamShares:
         That read farther than the wall before them: it is not there, or the robot is not.
     nearer : float
         That read nearer: something stands before the wall.
+    in_step : float
+        What the views that are exact read of the map's walls over what all views do; 1 where none is uncertain. Where
+        it is low the others may be placed well, and the scan's frame not.
     """
 
     farther: float = 0.0
     nearer: float = 0.0
+    in_step: float = 1.0
 
 
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
@@ -56,4 +66,21 @@ def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
     pose, place = settled.pose, context.index.tables.place
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
     farther, nearer = beam_shares(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)
-    return BeamShares(farther, nearer)
+    return BeamShares(farther, nearer, _in_step(context, at))
+
+
+def _in_step(context: SearchContext, at: Records) -> float:
+    views, beams = context.scan.views, context.scan.beams
+    if views is None or beams is None or beams.origins is None or not views.uncertain:
+        return 1.0
+    exact = ~views.root.reshape(len(views), -1).any(axis=1)
+    if not exact.any():
+        return 1.0
+    reads = []
+    for view in range(len(views)):
+        own = views.of_beam == view
+        alone = replace(beams, angles=beams.angles[own], ranges=beams.ranges[own], origins=beams.origins[own])
+        of_view = replace(context, scan=replace(context.scan, beams=alone))
+        reads.append(float(beam_evidence_at(of_view, at, COMPARED_BEAMS, 0)["read"][0]))
+    every = float(np.mean(reads))
+    return float(np.mean(np.array(reads)[exact])) / every if every > 0.0 else 1.0

@@ -174,6 +174,23 @@ class Rays(NamedTuple):
     reach: float
 
 
+class SeenByViews(NamedTuple):
+    """What views show of walls.
+
+    Attributes
+    ----------
+    seen : (k,) of `SIGHTING`
+    walls : (k,) of `WALL`, on which each lies
+    number : (k,) which of the walls that is, from 0 up
+    origins : (v,) of `POINT`, where the views' frames begin, as they were said to be, in the scan frame
+    """
+
+    seen: Records
+    walls: Records
+    number: Indices
+    origins: Records
+
+
 class Question(NamedTuple):
     """What is searched for.
 

@@ -22,6 +22,7 @@ from .tuning import (
     CONTRADICTION,
     ELSEWHERE_PROBABILITY,
     FAR_FROM_PRIOR,
+    LEAST_IN_STEP,
     MOST_NULL,
     NO_MATCH_PROBABILITY,
     NULL_SHARES,
@@ -80,7 +81,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     best = answer.best
     better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
-    certain = complete and not contradicted and context.window is None
+    certain = complete and not contradicted and context.window is None and not _out_of_step(answer)
     chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
     status = _status(answer, chances, _bar(context), capped=better_elsewhere)
     pose = place_on_family(context, answer) if status is Status.DEGENERATE else answer.registered.pose
@@ -95,6 +96,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
         thin=is_thin(answer.settled),
         twin=chances.share < USABLE_PROBABILITY,
+        out_of_step=_out_of_step(answer),
     )
     return Verdict(
         status=status,
@@ -151,7 +153,9 @@ class _Chances:
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
-            # Only what would be usable has to stand up to the mirrored scan, which costs another search.
+            # Only what would be usable has to stand up to the mirrored scan, which costs another search. Where it is
+            # usable nothing else is told of the null; where it is not, the reasons go by what it comes to.
+            certain = certain and _logistic(right) * share >= USABLE_PROBABILITY
             allowed = _allowed_null(cautious, features, answer.best, _bar(context) / share) if certain else 0.0
             if allowed < MOST_NULL:
                 features = with_null(features, answer.best, null_of(context, answer.best, allowed))
@@ -180,6 +184,11 @@ def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float)
     return allowed
 
 
+def _out_of_step(answer: Answer) -> bool:
+    """Tell whether the last view of a drive fits far worse than those before it: then its own place is not known."""
+    return answer.beams.in_step < LEAST_IN_STEP
+
+
 def _bar(context: SearchContext) -> float:
     """Return what the cautious probability has to reach."""
     if context.scan.views is not None and context.scan.views.uncertain:
@@ -194,5 +203,5 @@ def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool) -> S
     if is_degenerate(answer.settled):
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= bar and not is_thin(answer.settled)
+    sure = chances.careful >= bar and not is_thin(answer.settled) and not _out_of_step(answer)
     return Status.OK if likely and sure else Status.AMBIGUOUS

@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration import RigidTransform, wrap_angle
-from registration.layout import Floats, Records
+from registration.layout import POSE, Floats, Records
 
+from .kernels.view_settling import add_views
+from .layout import POINT, as_records, record
 from .scan import Views
+from .tables import SeenByViews
 from .tuning import (
     LEAST_WALL_ERROR,
     MAX_STEP,
     MAX_TURN,
-    ROUGH_SHARE,
     SPRING,
     UNSEEN_ERROR,
     USUAL_WALL_ERROR,
@@ -71,18 +72,21 @@ class SeenOnWalls:
     seen : (k,) of `SIGHTING`, view by view
     walls : (k,) of `WALL`, on which each lies
     number : (k,) which of the walls that is, from 0 up
+    origins : (v,) of `POINT`, where the views' frames begin, as they were said to be
     """
 
     views: Views
     seen: Records
     walls: Records
     number: NDArray[np.intp]
+    origins: Records
 
     @classmethod
     def of(cls, views: Views, seen: Records, walls: Records, on: NDArray[np.intp]) -> SeenOnWalls:
         """Take what lies on the walls of a map, `on` which says."""
         _, number = np.unique(on, return_inverse=True)
-        return cls(views, seen, walls[on], number)
+        origins = as_records(POINT, np.array([(pose.x, pose.y) for pose in views.poses]))
+        return cls(views, seen, walls[on], number, origins)
 
     def settle(self, start: RigidTransform, known: float | None) -> ViewsSettled:
         """Solve for the pose and the errors of the views, with the walls' variance or as their residuals show it.
@@ -117,33 +121,19 @@ class SeenOnWalls:
 
     def _shown_variance(self, x: Floats, covariance: Floats, wall_variance: float) -> float:
         """Return the variance of the walls' own errors that their residuals show, as `settling` has it for one view."""
-        shares, sums = self._by_wall(self._rows(x), self._weights(wall_variance))
-        means = shares / sums[:, None]
+        sums = self._sums(x, wall_variance)
+        means = sums.shares / sums.weights[:, None]
         spreads = ((means[:, :-1] @ covariance) * means[:, :-1]).sum(axis=1)
-        free = np.maximum(0.0, 1.0 - spreads / (wall_variance + 1.0 / sums))
-        found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float(np.sum(means[:, -1] ** 2 - free / sums))
+        free = np.maximum(0.0, 1.0 - spreads / (wall_variance + 1.0 / sums.weights))
+        found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float(np.sum(means[:, -1] ** 2 - free / sums.weights))
         count = USUAL_WALLS + float(free.sum())
         unsure = UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0))
         return unsure * max(found / count, LEAST_WALL_ERROR**2)
 
-    def _weights(self, wall_variance: float) -> Floats:
-        return np.asarray(1.0 / (self.seen["variance"] + ROUGH_SHARE * wall_variance))
-
     def _normal(self, x: Floats, wall_variance: float) -> tuple[Floats, Floats]:
-        """Return the normal matrix and the gradient at pose and variates, (3 + 3 u, 3 + 3 u) and (3 + 3 u,).
-
-        First by the pose and the errors of each view by themselves, of which any line has no more than its own.
-        """
-        views, rows, weights = self.views, self._rows(x), self._weights(wall_variance)
-        starts = np.searchsorted(self.seen["sensor"], np.arange(len(views) + 1))
-        offsets, angles = rows.offsets * weights[:, None], rows.angles * (weights * self.seen["spread"])[:, None]
-        own = np.stack(
-            [
-                offsets[a:b].T @ rows.offsets[a:b] + angles[a:b].T @ rows.angles[a:b]
-                for a, b in pairwise(starts.tolist())
-            ]
-        )
-        root, size = views.root, len(x)
+        """Return the normal matrix and the gradient at pose and variates, (3 + 3 u, 3 + 3 u) and (3 + 3 u,)."""
+        views, sums = self.views, self._sums(x, wall_variance)
+        own, root, size = sums.own, views.root, len(x)
         by_view = root.reshape(len(views), 3, -1)
         normal, gradient = np.zeros((size, size)), np.zeros(size)
         normal[:3, :3], gradient[:3] = own[:, :3, :3].sum(axis=0), own[:, :3, 6].sum(axis=0)
@@ -152,63 +142,41 @@ class SeenOnWalls:
         normal[3:, 3:] = root.T @ (own[:, 3:6, 3:6] @ by_view).reshape(root.shape)
         gradient[3:] = own[:, 3:6, 6].reshape(-1) @ root
         if wall_variance > 0.0:
-            shares, sums = self._by_wall(rows, weights)
-            apart = shares / (sums + 1.0 / wall_variance)[:, None]
-            normal -= shares[:, :-1].T @ apart[:, :-1]
-            gradient -= apart[:, :-1].T @ shares[:, -1]
+            apart = sums.shares / (sums.weights + 1.0 / wall_variance)[:, None]
+            normal -= sums.shares[:, :-1].T @ apart[:, :-1]
+            gradient -= apart[:, :-1].T @ sums.shares[:, -1]
         prior = np.arange(3, size)
         normal[prior, prior] += 1.0
         gradient[prior] += x[prior]
         normal[[0, 1], [0, 1]] += SPRING
         return normal, gradient
 
-    def _by_wall(self, rows: _Rows, weights: Floats) -> tuple[Floats, Floats]:
-        """Add up the rows of offsets and the weights wall by wall: (w, 3 + 3 u + 1), the residuals last, and (w,)."""
-        views, count = self.views, int(self.number.max(initial=-1)) + 1
-        weighed, place = rows.offsets * weights[:, None], self.number * len(views) + self.seen["sensor"]
-        by_view = np.empty((count * len(views), 3))
-        for k in range(3):
-            by_view[:, k] = np.bincount(place, weighed[:, 3 + k], count * len(views))
-        shares = np.stack([np.bincount(self.number, weighed[:, k], count) for k in (0, 1, 2, 6)], axis=1)
-        by_variates = by_view.reshape(count, -1) @ views.root
-        together = np.hstack([shares[:, :3], by_variates, shares[:, 3:]])
-        return together, np.bincount(self.number, weights, count).astype(np.float64)
-
-    def _rows(self, x: Floats) -> _Rows:
-        """Return offsets and sines of angles from the walls at pose and variates, with their derivatives."""
-        views, seen, walls = self.views, self.seen, self.walls
-        shifts = (views.root @ (x[3:] - views.found)).reshape(-1, 3)[seen["sensor"]]
-        origins = np.array([[pose.x, pose.y] for pose in views.poses])[seen["sensor"]]
-        levers = _turned(np.stack([seen["centroid_x"], seen["centroid_y"]], axis=1) - origins, shifts[:, 2])
-        there = _turned(origins + shifts[:, :2] + levers, x[2])
-        normals = np.stack([-walls["dy"], walls["dx"]], axis=1)
-        offsets = np.einsum("ij,ij->i", normals, there + x[:2]) - walls["offset"]
-        towards = _turned(np.stack([seen["dx"], seen["dy"]], axis=1), shifts[:, 2] + x[2])
-        sines = walls["dx"] * towards[:, 1] - walls["dy"] * towards[:, 0]
-        cosines = walls["dx"] * towards[:, 0] + walls["dy"] * towards[:, 1]
-        own = _turned(normals, -x[2])  # the normals in the scan frame
-        by_pose, by_view = _lever(normals, there), _lever(own, levers)
-        none = np.zeros(len(seen))
-        return _Rows(
-            np.column_stack([normals, by_pose, own, by_view, offsets]),
-            np.column_stack([none, none, cosines, none, none, cosines, sines]),
-        )
+    def _sums(self, x: Floats, wall_variance: float) -> _Sums:
+        """Add up what all views show at pose and variates."""
+        views, seen, walls = len(self.views), self.seen, int(self.number.max(initial=-1)) + 1
+        shifts = (self.views.root @ (x[3:] - self.views.found)).reshape(-1, 3)
+        pose = record(POSE, x=x[0], y=x[1], theta=x[2])
+        own, weights = np.zeros((views, 7, 7)), np.zeros(walls)
+        shares, of_views = np.zeros((walls, 4)), np.zeros((walls, 3 * views))
+        by_views = SeenByViews(seen, self.walls, self.number, self.origins)
+        add_views(by_views, shifts, pose, wall_variance, own, shares, of_views, weights)
+        return _Sums(own, np.hstack([shares[:, :3], of_views @ self.views.root, shares[:, 3:]]), weights)
 
 
 @dataclass(frozen=True, slots=True)
-class _Rows:
-    """Offsets and sines of angles, (k, 7) each: derivatives by the pose, by that of the own view, and the residual."""
+class _Sums:
+    """Weighted sums over all that views show.
 
-    offsets: Floats
-    angles: Floats
+    Attributes
+    ----------
+    own : (v, 7, 7)
+        By view, of products of the derivatives by the pose, by that of the view, and the residual.
+    shares : (w, 3 + 3 u + 1)
+        By wall, of the derivatives of offsets by pose and variates, the residuals last.
+    weights : (w,)
+        By wall.
+    """
 
-
-def _turned(vectors: Floats, angles: Floats | float) -> Floats:
-    """Rotate vectors (k, 2), by an angle each or by one."""
-    c, s = np.cos(angles), np.sin(angles)
-    return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=1)
-
-
-def _lever(normals: Floats, places: Floats) -> Floats:
-    """Return how offsets along normals (k, 2) change where places (k, 2) turn about the origin."""
-    return np.asarray(normals[:, 1] * places[:, 0] - normals[:, 0] * places[:, 1])
+    own: Floats
+    shares: Floats
+    weights: Floats

@@ -72,6 +72,8 @@ class Case:
         Of the scanner in that frame.
     clutter : float
         Share of the beams that end on people and pallets.
+    shown : Segments
+        What the map should show: of the building, or of part of it, in that frame; of another building in its own.
     """
 
     world: str
@@ -85,6 +87,7 @@ class Case:
     scene: Segments = field(repr=False)
     pose: RigidTransform
     clutter: float
+    shown: Segments = field(repr=False)
 
     @property
     def points(self) -> Floats:
@@ -161,6 +164,7 @@ def _attempt(world: str, condition: str, number: int, rng: np.random.Generator) 
         scene=scene,
         pose=pose,
         clutter=share,
+        shown=known,
     )
 
 

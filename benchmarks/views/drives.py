@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from association import Scan, View, assemble
 from registration import RigidTransform, Segments
-from simulation import Case, Scanner, scan
+from simulation import CONDITIONS, Case, Scanner, scan
+from simulation.conditions import Stranger
 from simulation.places import is_free
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 from ..collection import Query
 from ..ranges import Log
+from ..table import mean
+from ..worlds.outcomes import share_that_reads
+from ..worlds.tables import TOLD
 
 DRIFT_DISTANCE = 0.02  # of a metre, and
 DRIFT_ANGLE = math.radians(1.0)  # rad; standard deviations after a metre, of a random walk
@@ -23,14 +27,34 @@ MOST_STEPS = 8  # views before the last one
 LEAST_STEP = 0.5  # m
 LONGEST_STEP = 3.0  # m; where a log jumps farther there is no drive
 HERE = RigidTransform(0.0, 0.0, 0.0)
+TOUCHING = 1e-6  # m; a beam that reads the same in two scenes meets the same wall
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What was seen from a place, and where that was: in the map, or where the building stands."""
+    """What was seen from a place, and where that was: in the map, or where the building stands.
+
+    Attributes
+    ----------
+    scan : Scan
+    pose : RigidTransform
+    ranges : (m,) metres, or None where nobody asks what they are beside a map
+    """
 
     scan: Scan
     pose: RigidTransform
+    ranges: np.ndarray | None = None
+
+
+def could_be_told(looks: Sequence[Look], scanner: Scanner, shown: Segments, pose: RigidTransform) -> bool:
+    """Tell whether a drive speaks against a pose of its last place: some beams do not read what the map shows."""
+    here = looks[0].pose.inverse()
+    shares = [
+        share_that_reads(shown, scanner, look.ranges, pose.compose(here.compose(look.pose)))
+        for look in looks
+        if look.ranges is not None
+    ]
+    return mean(shares) < TOLD
 
 
 def drive(looks: Sequence[Look], rng: np.random.Generator) -> Scan:
@@ -95,13 +119,31 @@ def way_back(scene: Segments, pose: RigidTransform, length: float, rng: np.rando
 
 
 def world_looks(case: Case, length: float) -> list[Look]:
-    """Return what the scanner of a case sees on its way; its own scan first."""
+    """Return what the scanner of a case sees on its way; its own scan first.
+
+    Where the map is of another part of the building, the way ends before any of that is seen.
+    """
     rng = np.random.default_rng([case.number, 7])
     looks = []
     for k, at in enumerate(way_back(case.scene, case.pose, length, rng)):
+        if CONDITIONS[case.condition].stranger is Stranger.UNMAPPED and _sees(case, at):
+            break
         ranges = case.ranges if k == 0 else scan(case.scene, at, case.scanner, rng).ranges
-        looks.append(Look(seen_by(laser_of(case.scanner, ranges), case.scanner.sigma), at))
+        looks.append(look(case.scanner, ranges, at))
     return looks
+
+
+def look(scanner: Scanner, ranges: np.ndarray, at: RigidTransform) -> Look:
+    """Return what a scanner reports as a look."""
+    return Look(seen_by(laser_of(scanner, ranges), scanner.sigma), at, ranges)
+
+
+def _sees(case: Case, at: RigidTransform) -> bool:
+    """Tell whether anything of what the map shows is seen from a place in the building."""
+    exact = replace(case.scanner, sigma=0.0)
+    standing, shown = (scan(segments, at, exact) for segments in (case.scene, case.shown))
+    met = (shown.hits >= 0) & (standing.hits >= 0)
+    return bool((np.abs(standing.true_ranges[met] - shown.true_ranges[met]) < TOUCHING).any())
 
 
 def laser_of(scanner: Scanner, ranges: np.ndarray) -> LaserScan:

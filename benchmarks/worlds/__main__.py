@@ -1,7 +1,7 @@
 """Scans of drawn worlds: ``python -m benchmarks.worlds``; as a table beside the others ``python -m benchmarks worlds``.
 
 Every case is drawn by world, condition and number, so that the answers depend neither on what else is drawn nor on the
-number of processes.
+number of processes, nor on whether Ray starts them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from simulation import CONDITIONS, FAMILIES
 
+from ..engines import add_engine, engine_of
 from ..table import machine
 from .cases import HALVES
 from .outcomes import read, write
@@ -25,7 +26,7 @@ def main() -> None:
     parser.add_argument("--conditions", default=",".join(CONDITIONS), help="with commas; by default all")
     parser.add_argument("--quick", type=float, default=1.0, metavar="N", help="draw about one in N of everything")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="number of the first case of each kind")
-    parser.add_argument("--processes", type=int, default=None, metavar="N", help="by default one a core")
+    add_engine(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="write each answer as a line of JSON")
     parser.add_argument("--read", type=Path, metavar="FILE", help="print the tables of such a file, draw nothing")
     parser.add_argument("--pictures", action="store_true", help="draw each world with one scan as a picture, no more")
@@ -39,7 +40,7 @@ def main() -> None:
         draw_worlds(choice.worlds)
         return
     print(f"{machine()}; processor time of one thread each")
-    outcomes = list(read(args.read)) if args.read else run(choice, args.processes)
+    outcomes = list(read(args.read)) if args.read else run(choice, engine_of(args))
     if args.out:
         write(args.out, outcomes)
     report(outcomes)

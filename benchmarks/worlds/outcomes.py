@@ -13,7 +13,7 @@ import numpy as np
 import orjson
 
 from association import AssociationResult, Status, associate
-from registration import RigidTransform, wrap_angle
+from registration import RigidTransform, Segments, wrap_angle
 from simulation import Case, Scanner, scan, wall_of_segment
 
 from ..outcomes import offset
@@ -179,19 +179,23 @@ def _diagnostics(result: AssociationResult) -> dict[str, Any]:
 
 
 def share_read(case: Case, pose: RigidTransform) -> float:
-    """Return the share of a scan's beams that read what the map shows from a pose.
+    """Return the share of a scan's beams that read what the map shows from a pose."""
+    return share_that_reads(case.map, case.scanner, case.ranges, pose)
+
+
+def share_that_reads(shown: Segments, scanner: Scanner, ranges: np.ndarray, pose: RigidTransform) -> float:
+    """Return the share of the beams that read what is shown from a pose, which is in the frame of that.
 
     A beam may read what its neighbours should: at an edge half a beam decides. One without return reads right where
     the map shows nothing within reach. Beams of which nothing is known do not count.
     """
-    scanner = case.scanner
     slack = SIGMAS * scanner.sigma + TOLERANCE
-    shown = scan(case.map, pose, replace(scanner, sigma=0.0)).true_ranges
-    first, last = (shown[-1:], shown[:1]) if _full_turn(scanner) else (shown[:1], shown[-1:])
-    around = np.stack([shown, np.concatenate([first, shown[:-1]]), np.concatenate([shown[1:], last])])
-    known = ~np.isnan(case.ranges)
-    nothing = (case.ranges > scanner.range_max - slack) & (around.max(axis=0) > scanner.range_max - slack)
-    measured = np.where(np.isfinite(case.ranges), case.ranges, -np.inf)
+    expected = scan(shown, pose, replace(scanner, sigma=0.0)).true_ranges
+    first, last = (expected[-1:], expected[:1]) if _full_turn(scanner) else (expected[:1], expected[-1:])
+    around = np.stack([expected, np.concatenate([first, expected[:-1]]), np.concatenate([expected[1:], last])])
+    known = ~np.isnan(ranges)
+    nothing = (ranges > scanner.range_max - slack) & (around.max(axis=0) > scanner.range_max - slack)
+    measured = np.where(np.isfinite(ranges), ranges, -np.inf)
     close = (np.abs(around - measured) <= slack).any(axis=0)
     return float((nothing | close)[known].mean()) if known.any() else 0.0
 

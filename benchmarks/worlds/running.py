@@ -1,15 +1,14 @@
-"""Many questions on all cores: drawn, searched and recorded in processes, in an order that does not depend on them."""
+"""Many questions on an engine: drawn, searched and recorded, in an order that does not depend on who did it."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
+from fleet import Engine, Lost, Processes
 from simulation import CONDITIONS, FAMILIES
 
 from .cases import FORMS, in_map, questions
@@ -57,45 +56,47 @@ class Choice:
         return found
 
 
-def run(choice: Choice, processes: int | None = None) -> list[WorldOutcome]:
+def run(choice: Choice, engine: Engine | None = None) -> list[WorldOutcome]:
     """Search all that was chosen, both forms of each scan; tell on standard error how far it is.
 
     Parameters
     ----------
     choice : Choice
-    processes : int, optional
-        As many as there are cores by default. The answers do not depend on it.
+    engine : Engine, optional
+        By default as many processes as there are cores. The answers do not depend on it.
+
+    Raises
+    ------
+    RuntimeError
+        When a chunk ended every worker that had it.
     """
-    chunks, found = choice.chunks, []
+    chunks, found = choice.chunks, {}
     began = told = time.monotonic()
-    for done, outcomes in enumerate(_results(chunks, processes or os.cpu_count() or 1), start=1):
-        found += outcomes
+    for chunk, outcomes in (engine or Processes(os.cpu_count() or 1)).run(outcomes_of, chunks):
+        if isinstance(outcomes, Lost):
+            raise RuntimeError(f"lost: {chunk}")
+        found[chunk] = outcomes
         now = time.monotonic()
-        if now - told > REPORT_EVERY or done == len(chunks):
+        if now - told > REPORT_EVERY or len(found) == len(chunks):
             told = now
-            left = (now - began) / done * (len(chunks) - done)
-            print(f"worlds: {done} of {len(chunks)} chunks, {len(found)} answers, {left:.0f} s left", file=sys.stderr)
-    return found
-
-
-def _results(chunks: Sequence[Chunk], processes: int) -> Iterator[list[WorldOutcome]]:
-    """Yield the outcomes of each chunk, in their order."""
-    if processes == 1:
-        _warm_up()
-        yield from map(outcomes_of, chunks)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, initializer=_warm_up) as pool:
-        yield from pool.map(outcomes_of, chunks)
+            left = (now - began) / len(found) * (len(chunks) - len(found))
+            print(f"worlds: {len(found)} of {len(chunks)} chunks, {left:.0f} s left", file=sys.stderr)
+    return [outcome for chunk in chunks for outcome in found[chunk]]
 
 
 def outcomes_of(chunk: Chunk) -> list[WorldOutcome]:
     """Search the scans of one chunk, each in every form."""
+    _warm_up()
+    return _searched(chunk)
+
+
+def _searched(chunk: Chunk) -> list[WorldOutcome]:
     drawn = questions([chunk.world], [chunk.condition], chunk.numbers)
     return [answer(question, form) for question in drawn for form in FORMS]
 
 
+@cache
 def _warm_up() -> None:
-    """Compile what is compiled, so that no answer's time holds it."""
-    outcomes_of(Chunk("offices", "window", range(1)))
-    outcomes_of(Chunk("offices", "clutter_33", range(1)))
+    """Compile what is compiled, so that no answer's time holds it; once in a process."""
+    _searched(Chunk("offices", "window", range(1)))
+    _searched(Chunk("offices", "clutter_33", range(1)))

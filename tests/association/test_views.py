@@ -13,7 +13,8 @@ from association.alignment import aligned
 from association.explain import explain
 from association.layout import SIGHTING, WALL
 from association.scan import Views, scaled
-from association.tuning import ROUGH_SHARE, SPRING
+from association.tuning import LEAST_IN_STEP, ROUGH_SHARE, SPRING
+from association.verdict import judge
 from association.view_settling import SeenOnWalls
 from association.views import corrected
 from registration import RigidTransform
@@ -246,3 +247,35 @@ def test_beams_count_where_every_view_has_them() -> None:
     with_beams = View(scan_of(ends, viewpoint=(0.0, 0.0), beams=beams_of(INDEX, INSIDE)))
     assert assemble([with_beams, replace(with_beams, pose=pose(0.1))]).beams is not None
     assert assemble([with_beams, View(scan_of(ends))]).beams is None
+
+
+def test_a_drive_whose_last_view_does_not_fit_is_not_gone_by() -> None:
+    """Its other views may fix where these were; the frame of the scan hangs on them by odometry alone."""
+    places = [pose(), pose(-0.4, 0.2, 0.1), pose(-0.8, 0.1, 0.2), pose(-0.5, -0.4, 0.3)]
+
+    def look(at: RigidTransform, turned: float) -> Scan:
+        beams, ends = beams_of(INDEX, INSIDE.compose(at)), seen(ROOM, INSIDE.compose(at), noise=0.005, seed=5)[0]
+        turn = pose(theta=turned)
+        ends = turn.apply(ends.reshape(-1, 2, 2)).reshape(-1, 4)
+        return scan_of(ends, viewpoint=(0.0, 0.0), beams=replace(beams, angles=beams.angles + turned))
+
+    def drive(turned: float) -> Scan:
+        step = np.diag([0.02**2, 0.02**2, 0.005**2])
+        views = [View(look(at, turned if k == 0 else 0.0), at, step if k else None) for k, at in enumerate(places)]
+        return assemble(views)
+
+    def shown(turned: float) -> float:
+        answer = explain(context_of(INDEX, drive(turned))).answer
+        assert answer is not None
+        return answer.beams.in_step
+
+    assert shown(0.0) == pytest.approx(1.0, abs=0.05)
+    assert shown(0.12) < LEAST_IN_STEP
+    context = context_of(INDEX, drive(0.0))
+    explained = explain(context)
+    assert judge(context, explained).usable
+    answer = explained.answer
+    assert answer is not None
+    slipped = replace(explained, answer=replace(answer, beams=replace(answer.beams, in_step=LEAST_IN_STEP - 0.01)))
+    verdict = judge(context, slipped)
+    assert (verdict.status, [one.code for one in verdict.reasons][:1]) == (Status.AMBIGUOUS, ["unexplained"])

@@ -17,6 +17,7 @@ from benchmarks.worlds.outcomes import WorldOutcome, answer, read, share_read, w
 from benchmarks.worlds.pictures import draw_worlds
 from benchmarks.worlds.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
 from benchmarks.worlds.tables import could_be_told, held, quantile_bins, worst_gap
+from fleet import Processes
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES, draw_case
 
@@ -119,7 +120,7 @@ def test_what_is_drawn_is_as_much_as_was_promised() -> None:
 
 
 def test_the_same_chunk_gives_the_same_answers_in_any_number_of_processes(tmp_path) -> None:
-    alone, together = run(FEW, processes=1), run(FEW, processes=2)
+    alone, together = run(FEW, Processes(1)), run(FEW, Processes(2))
     assert timeless(alone) == timeless(together)
     assert [(o.world, o.condition, o.form) for o in alone] == [
         (w, c, f) for c in FEW.conditions for w in FEW.worlds for f in FORMS
