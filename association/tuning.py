@@ -205,8 +205,8 @@ FEW_BEAMS = 60  # tables; for a first look: neighbouring beams say the same
 MOST_BEAMS = 180  # tables
 BEAM_FINALISTS = 32  # tables
 # When the deadline has passed so many candidates are looked at, and of them so many finalists. Measured.
-LATE_CANDIDATES = 32
-LATE_FINALISTS = 4
+LATE_CANDIDATES = 16
+LATE_FINALISTS = 2
 BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
 BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
