@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .features import Features
 
 FILE = "models.json"
+LEAST, MOST = "least", "most"  # kinds of pairs
 
 Floats = NDArray[np.float64]
 
@@ -38,40 +39,80 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
+class Pair:
+    """What two features add together: the one counts as far as the other lets it.
+
+    Attributes
+    ----------
+    kind : str
+        `LEAST`: both have to speak for the answer. `MOST`: one of them is enough.
+    first, second : str
+        Names, of `Features`.
+    nats : float
+        What it adds where both speak for the answer.
+    from_to : ((float, float), (float, float))
+        For each the value that does not speak for the answer at all and the one that does in full. In between it is
+        linear.
+    """
+
+    kind: str
+    first: str
+    second: str
+    nats: float
+    from_to: tuple[tuple[float, float], tuple[float, float]]
+
+    def __call__(self, features: Features) -> float:
+        """Return what the features of an answer add, nats."""
+        one, other = (
+            min(1.0, max(0.0, (getattr(features, name) - start) / (end - start)))
+            for name, (start, end) in zip((self.first, self.second), self.from_to, strict=True)
+        )
+        return self.nats * float(min(one, other) if self.kind == LEAST else max(one, other))
+
+
+@dataclass(frozen=True, slots=True)
 class Model:
-    """A generalised additive model: the logarithm of the odds is a sum of curves, one for each feature.
+    """An additive model: the logarithm of the odds is a sum of curves, one for each feature, and of some pairs of them.
 
     Attributes
     ----------
     curves : mapping
         By the name of the feature, of `Features`.
+    pairs : tuple of Pair
     """
 
     curves: Mapping[str, Curve]
+    pairs: tuple[Pair, ...] = ()
 
     def logit(self, features: Features) -> float:
         """Return the logarithm of the odds."""
-        return sum(curve(getattr(features, name)) for name, curve in self.curves.items())
-
-    def part(self, features: Features, names: Sequence[str]) -> float:
-        """Return what some features add to it; those that do not count add nothing."""
-        return sum(self.curves[name](getattr(features, name)) for name in names if name in self.curves)
+        by_curves = sum(curve(getattr(features, name)) for name, curve in self.curves.items())
+        return by_curves + sum(pair(features) for pair in self.pairs)
 
 
 def as_model(document: Mapping[str, Sequence[float]]) -> Model:
-    """Read a model: for each feature its slope, then the value and the change of slope of each bend in turn."""
-    curves = {}
-    for name, (slope, *rest) in document.items():
-        curves[name] = Curve(slope, tuple(zip(rest[::2], rest[1::2], strict=True)))
-    return Model(curves)
+    """Read a model.
+
+    For each feature its slope, then the value and the change of slope of each bend in turn. For a pair, whose key is
+    its kind and the names of both, what it adds, then for each where it begins to count and where it does in full.
+    """
+    curves, pairs = {}, []
+    for key, (first, *rest) in document.items():
+        if " " in key:
+            kind, one, other = key.split(" ")
+            start, end, begin, finish = rest
+            pairs.append(Pair(kind, one, other, first, ((start, end), (begin, finish))))
+        else:
+            curves[key] = Curve(first, tuple(zip(rest[::2], rest[1::2], strict=True)))
+    return Model(curves, tuple(pairs))
 
 
 def as_document(model: Model) -> dict[str, list[float]]:
     """Do the opposite of `as_model`."""
-    return {
-        name: [float(f"{value:.4g}") for value in (curve.slope, *(v for bend in curve.bends for v in bend))]
-        for name, curve in model.curves.items()
-    }
+    numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
+    for pair in model.pairs:
+        numbers[f"{pair.kind} {pair.first} {pair.second}"] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
+    return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 
 
 def _read() -> tuple[dict[str, Model], dict[str, str], Features]:

@@ -84,7 +84,7 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
     if standing.status is Status.DEGENERATE:
         codes.append("free_direction")
     elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
-        codes += ["too_little"] if standing.thin else []
+        codes += ["too_little", "one_wall_decides"] if standing.thin else []
         codes += ["unexplained"] if standing.out_of_step else []
         codes += ["twin"] if standing.twin else []
         codes += [code for code in _weighed(features, cautious) if code not in codes]
@@ -93,11 +93,22 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
 
 def _weighed(features: Features, cautious: Model) -> list[str]:
     """Order the reasons by what their features take from the logarithm of the odds; at least the first of them."""
-    lacking = {
-        code: cautious.part(USUAL, names) - cautious.part(features, names) for code, names in FEATURES_OF.items()
-    }
+    lacking = {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
     if features.lead > NO_TWIN:
         # Many places explain a little of the scan, and none explains it about as well.
         lacking["too_little"] += max(0.0, lacking.pop("twin"))
     ordered = sorted(lacking, key=lambda code: -lacking[code])
     return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]
+
+
+def _taken(features: Features, cautious: Model, names: tuple[str, ...]) -> float:
+    """Return what some features take from the logarithm of the odds, nats.
+
+    That is the mean of what it loses when these become, of a usual right answer, what they are here, and of what it
+    gains when they become here what they usually are: what pairs of features add is shared between both by that.
+    """
+    here = {name: getattr(features, name) for name in names}
+    usual = {name: getattr(USUAL, name) for name in names}
+    loses = cautious.logit(USUAL) - cautious.logit(USUAL._replace(**here))
+    gains = cautious.logit(features._replace(**usual)) - cautious.logit(features)
+    return 0.5 * (loses + gains)

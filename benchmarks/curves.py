@@ -1,5 +1,8 @@
 """The curves of a verdict's model: fitted by likelihood, each rising or falling throughout where its feature speaks so.
 
+Beside them stand pairs of features of which the one counts as far as the other does too, or where the other does not;
+these never go the wrong way either.
+
 More of what speaks for an answer must not make the verdict less sure of it. Free curves do so where few examples hold
 them, and what they win on the buildings that they were fitted on they lose on others.
 
@@ -10,15 +13,16 @@ elsewhere. All that these would teach is to mistrust a scan that fits without fa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
-from association.models import Curve, Model
+from association.models import Curve, Model, Pair
 
 from .examples import DRAWN, DRAWN_STRANGERS, Example
 
+IN_FULL = (0.05, 0.95)  # quantiles of a feature between which it counts in a pair
 RIDGE = 3.0  # on slopes of standardised features, in units of one answer; cross-validated
 LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
@@ -50,6 +54,8 @@ class Task:
         The features of the new one.
     bends : tuple of float
         Quantiles of each at which its curve may bend.
+    pairs : tuple of (str, str, str)
+        The kind and both names, each behind the sign by which it speaks for an answer: ("least", "+share", "-null").
     """
 
     name: str
@@ -57,6 +63,7 @@ class Task:
     current: Model
     names: tuple[str, ...]
     bends: tuple[float, ...]
+    pairs: tuple[tuple[str, str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +134,10 @@ def fit(examples: Sequence[Example], task: Task, temperature: float) -> Fitted:
         bounds += [(-np.inf if name not in FOR else 0.0, np.inf if name not in AGAINST else 0.0)] * (
             len(bends[name]) + 1
         )
+    pairs = [_pair(examples, kind, one, other) for kind, one, other in task.pairs]
+    for pair in pairs:
+        columns.append(np.array([[pair(e.features)] for e in examples]))
+        bounds.append((0.0, np.inf))
     raw = np.hstack(columns)
     middle, scale = raw.mean(axis=0), raw.std(axis=0)
     middle[0], scale[0] = 0.0, 1.0
@@ -152,4 +163,15 @@ def fit(examples: Sequence[Example], task: Task, temperature: float) -> Fitted:
         changes = np.diff(slopes).tolist()
         curves[name] = Curve(float(slopes[0]), tuple(zip(places, changes, strict=True)))
         at += len(slopes)
-    return Fitted(Model(curves), temperature)
+    fitted = (replace(pair, nats=float(nats)) for pair, nats in zip(pairs, w[at:], strict=True))
+    return Fitted(Model(curves, tuple(fitted)), temperature)
+
+
+def _pair(examples: Sequence[Example], kind: str, *signed: str) -> Pair:
+    """Return a pair that adds up to one nat."""
+    from_to = []
+    for name in signed:
+        low, high = np.quantile([getattr(e.features, name[1:]) for e in examples], IN_FULL).tolist()
+        from_to.append((low, high) if name[0] == "+" else (high, low))
+    one, other = signed
+    return Pair(kind, one[1:], other[1:], 1.0, (from_to[0], from_to[1]))

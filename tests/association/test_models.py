@@ -12,9 +12,14 @@ from hypothesis import strategies as st
 
 import association
 from association.features import Features
-from association.models import FILE, FITTED_ON, MODELS, USUAL, Curve, Model, as_document, as_model
+from association.models import FILE, FITTED_ON, LEAST, MODELS, MOST, USUAL, Curve, Model, Pair, as_document, as_model
 
 from .reference import verdict as twin
+
+
+def names_of(model: Model) -> set[str]:
+    return set(model.curves) | {name for pair in model.pairs for name in (pair.first, pair.second)}
+
 
 COUNTED = Features(*(0.1 * k + 0.5 for k in range(len(Features._fields))))
 NAMES = {"probability", "cautious", "probability_with_beams", "cautious_with_beams"}
@@ -32,17 +37,45 @@ def test_a_curve_is_a_line_that_bends(value: float, expected: float) -> None:
 def test_the_odds_are_those_of_the_curves_together() -> None:
     model = Model({"constant": Curve(-1.0), "share": Curve(3.0, ((0.6, -1.0),))})
     assert model.logit(COUNTED) == pytest.approx(-0.5 + 3.0 * 0.8 - 0.2)
-    assert model.part(COUNTED, ["share", "lead"]) == pytest.approx(3.0 * 0.8 - 0.2)
-    assert model.part(COUNTED, []) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "share", "lead", "expected"),
+    [
+        (LEAST, 0.9, 0.0, 2.0),  # both speak for it in full
+        (LEAST, 0.6, 0.0, 1.0),
+        (LEAST, 0.6, 3.0, 0.5),
+        (LEAST, 0.9, 9.0, 0.0),
+        (MOST, 0.6, 9.0, 1.0),
+        (MOST, 0.1, 0.0, 2.0),
+        (MOST, 0.1, 9.0, 0.0),
+    ],
+)
+def test_of_a_pair_both_have_to_speak_or_one_is_enough(kind: str, share: float, lead: float, expected: float) -> None:
+    """The share from 0.4 to 0.8, the lead from 4 down to 0."""
+    pair = Pair(kind, "share", "lead", 2.0, ((0.4, 0.8), (4.0, 0.0)))
+    features = USUAL._replace(share=share, lead=lead)
+    assert pair(features) == pytest.approx(expected)
+    model = Model({"constant": Curve(1.0)}, (pair,))
+    assert model.logit(features) == pytest.approx(1.0 + expected)
 
 
 NUMBERS = st.floats(-9.999, 9.999).map(lambda x: float(f"{x:.4g}"))
 CURVES = st.tuples(NUMBERS, st.lists(st.tuples(NUMBERS, NUMBERS), max_size=3)).map(lambda c: [c[0], *sum(c[1], ())])
 
 
-@given(st.dictionaries(st.sampled_from(Features._fields), CURVES))
+NAMED = st.sampled_from(Features._fields)
+KEYS = st.tuples(st.sampled_from((LEAST, MOST)), NAMED, NAMED).map(" ".join)
+RANGES = st.tuples(NUMBERS, st.sampled_from((-1.0, 0.5, 3.0))).map(lambda r: [r[0], float(f"{r[0] + r[1]:.4g}")])
+PAIRS = st.tuples(NUMBERS, RANGES, RANGES).map(lambda p: [p[0], *p[1], *p[2]])
+
+
+@given(st.dictionaries(NAMED, CURVES), st.dictionaries(KEYS, PAIRS, max_size=4))
 @settings(deadline=None)
-def test_models_come_back_from_the_file_as_they_were_written(document: dict[str, list[float]]) -> None:
+def test_models_come_back_from_the_file_as_they_were_written(
+    curves: dict[str, list[float]], pairs: dict[str, list[float]]
+) -> None:
+    document = curves | pairs
     model = as_model(document)
     assert as_document(model) == document
     assert model.logit(COUNTED) == pytest.approx(twin.logit(document, COUNTED._asdict()))
@@ -58,7 +91,9 @@ def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
     document = json.loads((Path(association.__file__).parent / FILE).read_text())
     assert set(MODELS) == set(document["models"]) == set(FITTED_ON) == NAMES
     curves = document["models"][name]
-    assert set(curves) <= set(Features._fields)
+    assert {name for key in curves for name in key.removeprefix(LEAST).removeprefix(MOST).split()} <= set(
+        Features._fields
+    )
     expected = twin.logit(curves, COUNTED._asdict())
     assert MODELS[name].logit(COUNTED) == pytest.approx(expected)
     assert all(math.isfinite(number) for curve in curves.values() for number in curve)
@@ -68,10 +103,10 @@ def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
 def test_beams_speak_only_where_there_are_beams() -> None:
     """A scan without has 0 for both of their shares, which is not what it read."""
     for name in ("probability", "cautious"):
-        assert not {"read", "passed"} & set(MODELS[name].curves)
+        assert not {"read", "passed", "root_farther", "root_nearer"} & names_of(MODELS[name])
 
 
 def test_the_mirrored_scan_counts_only_where_other_buildings_are_reckoned_with() -> None:
     """The probability does not have it: it is searched only for what would be usable."""
     for name in ("probability", "probability_with_beams"):
-        assert not any(feature.startswith("null") for feature in MODELS[name].curves)
+        assert not any(feature.startswith("null") for feature in names_of(MODELS[name]))

@@ -99,8 +99,9 @@ def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:
     everything = codes_of(
         complete=False, contradicted=True, strange=True, thin=True, taken={"twin": 3.0, "too_little": 4.0}
     )
-    assert everything == ["prior_contradicted", "search_incomplete", "elsewhere", "too_little", "twin"]
-    assert codes_of(thin=True, taken={"unexplained": 3.0}) == ["too_little", "unexplained"]
+    thin = ["too_little", "one_wall_decides"]
+    assert everything == ["prior_contradicted", "search_incomplete", "elsewhere", *thin, "twin"]
+    assert codes_of(thin=True, taken={"unexplained": 3.0}) == [*thin, "unexplained"]
     assert codes_of(strange=True, taken={"elsewhere": 9.0}) == ["elsewhere"]
     assert codes_of(twin=True, taken={"unexplained": 3.0}) == ["twin", "unexplained"], "whatever the models make of it"
 

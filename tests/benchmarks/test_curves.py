@@ -71,6 +71,26 @@ def test_a_curve_follows_odds_that_bend() -> None:
     assert above == pytest.approx(8.0, rel=0.1)
 
 
+def test_a_pair_is_found_where_both_features_have_to_speak() -> None:
+    rng = np.random.default_rng(7)
+    share, deviation = rng.uniform(0.0, 1.0, 6000), rng.uniform(0.0, 0.2, 6000)
+    logit = -2.0 + 5.0 * np.minimum(share, 1.0 - deviation / 0.2)
+    scans = answers(share, deviation, rng.uniform(size=6000) < 1.0 / (1.0 + np.exp(-logit)))
+    both = ("least", "+share", "-deviation"), ("most", "+share", "-deviation")
+    least, most = fit(scans, replace(task(()), pairs=both), 1.0).model.pairs
+    assert (least.kind, least.first, least.second) == ("least", "share", "deviation")
+    assert least.nats > 3.0 > 10.0 * most.nats >= 0.0
+    assert least.from_to[0] == pytest.approx((0.05, 0.95), abs=0.02)
+    assert least.from_to[1] == pytest.approx((0.19, 0.01), abs=0.01)
+
+
+def test_a_pair_never_takes_from_what_speaks_for_an_answer() -> None:
+    share, other = np.tile([0.0, 1.0], 500), np.repeat([0.0, 0.2], 500)
+    scans = answers(share, other, (share < 0.5) | (other > 0.1))
+    (pair,) = fit(scans, replace(task(()), pairs=(("least", "+share", "-deviation"),)), 1.0).model.pairs
+    assert pair.nats == pytest.approx(0.0, abs=1e-9)
+
+
 def test_pieces_between_bends_add_up_to_the_value() -> None:
     values = np.array([-1.0, 0.3, 0.7, 2.0])
     found = pieces(values, (0.0, 0.5, 1.0))
@@ -96,6 +116,10 @@ def test_the_models_in_use_never_go_the_wrong_way(name: str) -> None:
         if feature in (*FOR, *AGAINST):
             sign = 1.0 if feature in FOR else -1.0
             assert min(sign * s for s in slopes(curve)) > -1e-3 * max(1.0, *map(abs, slopes(curve))), feature
+    for pair in MODELS[name].pairs:
+        assert pair.nats >= 0.0
+        for feature, (start, end) in zip((pair.first, pair.second), pair.from_to, strict=True):
+            assert (end > start) == (feature in FOR) or feature in EITHER
 
 
 def test_log_loss_counts_strangers_by_their_weight() -> None:

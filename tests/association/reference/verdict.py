@@ -17,7 +17,7 @@ from association.ranking import Ranked
 from registration.observability import MAX_DEVIATION
 
 Numbers = dict[str, float]
-Document = Mapping[str, list[float]]  # for each feature its slope, then value and change of slope of each bend
+Document = Mapping[str, list[float]]  # for each feature its slope, then value and change of slope of each bend; pairs
 
 
 def worth(one: Ranked) -> float:
@@ -98,9 +98,18 @@ def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null:
 
 
 def logit(model: Document, numbers: Numbers) -> float:
-    """Add up the curves: a line from 0 to the value, steeper or less steep beyond each bend."""
+    """Add up the curves: a line from 0 to the value, steeper or less steep beyond each bend. Then the pairs."""
     total = 0.0
     for name, (slope, *bends) in model.items():
+        if " " in name:
+            kind, *both = name.split()
+            ends = [bends[:2], bends[2:]]
+            shares = [
+                float(np.interp(numbers[one], sorted(end), (0.0, 1.0) if end[0] < end[1] else (1.0, 0.0)))
+                for one, end in zip(both, ends, strict=True)
+            ]
+            total += slope * {"least": min, "most": max}[kind](shares)
+            continue
         total += slope * numbers[name]
         for start, more in zip(bends[::2], bends[1::2], strict=True):
             total += more * max(0.0, numbers[name] - start)
