@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 
 from registration import RigidTransform
@@ -32,7 +33,6 @@ from .tuning import (
     USABLE_PROBABILITY,
 )
 
-NULL_FEATURES = ("null", "null_gap", "null_better")
 ROUNDING = 1e-9  # of a chance
 
 
@@ -170,18 +170,16 @@ def _logistic(logit: float) -> float:
 def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float) -> float:
     """Return what share of the answer's score the mirrored scan may reach, and the cautious chance is `bar` at least.
 
-    Of some shares, one after the other from `NULL_SHARE` on; wherever the map is not symmetric about the place.
+    Of `NULL_SHARES`, or 0; wherever the map is not symmetric about the place. The more it reaches the less the chance.
     """
     if best.score <= 0.0:
         return 0.0
-    others = cautious.logit(features) - cautious.part(features, NULL_FEATURES)
-    allowed = 0.0
-    for share in NULL_SHARES:
-        with_it = with_null(features, best, Null(share * best.score, 0.0))
-        if _logistic(others + cautious.part(with_it, NULL_FEATURES)) < bar + ROUNDING:
-            break
-        allowed = share
-    return allowed
+
+    def matters(share: float) -> bool:
+        return _logistic(cautious.logit(with_null(features, best, Null(share * best.score, 0.0)))) < bar + ROUNDING
+
+    few = bisect_left(NULL_SHARES, True, key=matters)
+    return NULL_SHARES[few - 1] if few else 0.0
 
 
 def _out_of_step(answer: Answer) -> bool:
