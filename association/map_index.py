@@ -149,7 +149,7 @@ class MapIndex:
     def tables(self) -> MapTables:
         """What the kernels of the search are handed."""
         sweep = Sweep(self.runs.rows, self.runs.bin_starts, self.sectors)
-        return MapTables(Place(self.walls.rows, self.grid), sweep, self.raster)
+        return MapTables(Place(self.walls.rows, self.walls.bin_starts, self.grid), sweep, self.raster)
 
     @property
     def nbytes(self) -> int:

@@ -17,7 +17,7 @@ from .kernels.symmetry import mirrored_share
 from .ranking import Ranked, rank_candidates
 from .scan import mirrored
 from .scan_lines import ScanLines
-from .tuning import NULL_CONFIDENCE, NULL_ENOUGH, NULL_KEPT, NULL_SHARE
+from .tuning import BEAMS_READ, NULL_CONFIDENCE, NULL_CONFIDENCE_NEAR, NULL_ENOUGH, NULL_KEPT, NULL_MARGIN, NULL_SHARE
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,20 +37,34 @@ class Null:
     symmetry: float
 
 
-def null_of(context: SearchContext, best: Ranked) -> Null:
-    """Search the mirrored scan for something that is nearly as good as the answer."""
+def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
+    """Search the mirrored scan for something that is nearly as good as the answer.
+
+    Where it comes to less than `share` of the answer's score it may be told to be none, which takes less of a search.
+    """
     scan = mirrored(context.scan)
     # The index is the one that the options want already.
     lines = ScanLines.of(scan, context.index.sigma, context.options)
-    options = replace(context.options, confidence=min(context.options.confidence, NULL_CONFIDENCE), exhaustive=False)
-    other = replace(context, scan=scan, lines=lines, prior=None, options=options)
-    known = max(0.0, best.by_segments)
+    other = replace(context, scan=scan, lines=lines, prior=None)
+    known, wanted = max(0.0, best.by_segments), share * best.score
     # Beams may add to any pose, so that without them nothing is enough.
-    effort = Effort(NULL_KEPT, NULL_SHARE, NULL_SHARE, known, math.inf if context.with_beams else NULL_ENOUGH * known)
-    ranked = rank_candidates(other, find_candidates(other, effort))
+    enough = math.inf if context.with_beams else NULL_ENOUGH * known
+    by_segments = NULL_MARGIN * (wanted - BEAMS_READ if context.with_beams else wanted)
+    if by_segments > NULL_SHARE * known > 0.0:
+        least = by_segments / known
+        near = _searched(other, Effort(NULL_KEPT, least, least, known, enough), NULL_CONFIDENCE_NEAR)
+        if not near or near[0].score < wanted:
+            return Null(0.0, 0.0)
+    ranked = _searched(other, Effort(NULL_KEPT, NULL_SHARE, NULL_SHARE, known, enough), NULL_CONFIDENCE)
     if not ranked:
         return Null(0.0, 0.0)
     return Null(ranked[0].score, _symmetry(context, best, ranked[0]))
+
+
+def _searched(context: SearchContext, effort: Effort, confidence: float) -> list[Ranked]:
+    options = replace(context.options, confidence=min(context.options.confidence, confidence), exhaustive=False)
+    context = replace(context, options=options)
+    return rank_candidates(context, find_candidates(context, effort))
 
 
 def _symmetry(context: SearchContext, best: Ranked, null: Ranked) -> float:

@@ -29,6 +29,8 @@ from .tuning import (
     DISTINCT_DISTANCE,
     FEW_BEAMS,
     INSIDE,
+    LATE_CANDIDATES,
+    LATE_FINALISTS,
     LEAST_DISTINCT,
     MOST_BEAMS,
     RANKED_AT_ONCE,
@@ -128,6 +130,11 @@ class _Scored:
     estimates: Records
     merits: Records
     matches: Records
+
+    def best(self, values: Floats, most: int) -> _Scored:
+        """Return those with the greatest of some values (k,), in their order."""
+        places = np.sort(np.argsort(-values, kind="stable")[:most])
+        return _Scored(self.estimates[places], self.merits[places], self.matches[places])
 
 
 def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Ranked]:
@@ -231,11 +238,15 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
 
 def _weigh_beams(context: SearchContext, scored: _Scored) -> _Scored:
     """Add what the raw beams say to the scores, and move the best poses to where the beams fit."""
+    finalists = BEAM_FINALISTS
+    if context.deadline.passed:
+        finalists = LATE_FINALISTS
+        scored = scored.best(scored.merits["score"] + _prior_values(context, scored.estimates), LATE_CANDIDATES)
     by_few = scored.merits["score"] + _nats(beam_evidence_at(context, scored.estimates, FEW_BEAMS, 0))
-    best = np.argsort(-by_few, kind="stable")[:BEAM_FINALISTS]
+    best = np.argsort(-by_few, kind="stable")[:finalists]
     if context.window is not None:
         # What lies within the window is looked at, however good the poses outside are.
-        within = np.argsort(-(by_few + _prior_values(context, scored.estimates)), kind="stable")[:BEAM_FINALISTS]
+        within = np.argsort(-(by_few + _prior_values(context, scored.estimates)), kind="stable")[:finalists]
         best = np.concatenate([within, best[~np.isin(best, within)]])
     poses = scored.estimates[best]
     evidence = beam_evidence_at(context, poses, MOST_BEAMS, len(poses))

@@ -102,7 +102,7 @@ def mirrored(scan: Scan) -> Scan:
     """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left."""
     seen, at, views = scan.measured, scan.viewpoint, scan.views
     ends = seen.segments.endpoints.reshape(-1, 2, 2)[:, ::-1] * MIRROR
-    measured = replace(seen, segments=Segments.from_array(ends.reshape(-1, 4)), centroids=seen.centroids * MIRROR)
+    measured = replace(seen, segments=Segments.derived(ends.reshape(-1, 4)), centroids=seen.centroids * MIRROR)
     beams = None if scan.beams is None else scan.beams.mirrored()
     return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored())
 
@@ -114,7 +114,7 @@ def turned_round(scan: Scan) -> Scan:
     round: neither beams nor lines of sight count.
     """
     ends = scan.measured.segments.endpoints[:, [2, 3, 0, 1]]
-    measured = replace(scan.measured, segments=Segments.from_array(ends))
+    measured = replace(scan.measured, segments=Segments.derived(ends))
     return Scan(measured, None, None, scan.views and scan.views.blind())
 
 

@@ -60,9 +60,18 @@ class Raster(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The walls, and where they are: what lies at a point, and what a ray meets."""
+    """The walls, and where they are: what lies at a point, and what a ray meets.
+
+    Attributes
+    ----------
+    walls : (m,) of `WALL`, by direction bin
+    bin_starts : (bins + 1,) where each bin begins
+    grid : Grid
+        Walls within `REACH` of each cell, in ascending order.
+    """
 
     walls: Records
+    bin_starts: Integers
     grid: Grid
 
 
@@ -244,6 +253,7 @@ class Workspace(NamedTuple):
     ----------
     matches : (n,) of `MATCH`
     spreads : (n,) angle gates in sectors
+    possible : (n,) what each scan line can add at a pose, nats, -1 where it can lie on no wall
     held : (n,) which wall of each scan line is in the sums, or -1
     shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
@@ -251,6 +261,7 @@ class Workspace(NamedTuple):
 
     matches: Records
     spreads: Floats
+    possible: Floats
     held: Integers
     shares: Records
     scratch: Records
@@ -259,4 +270,5 @@ class Workspace(NamedTuple):
     def of(cls, count: int, walls: int) -> Workspace:
         """Return one for a scan of `count` lines and a map of that many walls."""
         held = np.full(count, -1, np.int64)
-        return cls(np.zeros(count, MATCH), np.zeros(count), held, np.zeros(walls, WALL_SHARE), np.zeros(1, SCRATCH))
+        spreads, possible, shares = np.zeros(count), np.zeros(count), np.zeros(walls, WALL_SHARE)
+        return cls(np.zeros(count, MATCH), spreads, possible, held, shares, np.zeros(1, SCRATCH))

@@ -192,14 +192,21 @@ FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of s
 SHORTEST_SHOWN = 0.2  # m, tables; less of a wall tells nothing of its symmetry
 NULL_KEPT = 24  # poses, tables
 NULL_SHARE = 0.7  # of the answer's score, tables; a null below it says no more
+# Shares at which it is looked up whether a null matters, the last being `MOST_NULL`.
+NULL_SHARES = (0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2)
+NULL_MARGIN = 0.9  # of the score in question, measured; a pose that scores less while it is searched for is not kept
 NULL_ENOUGH = 1.1  # likewise; a null above it
 NULL_CONFIDENCE = 0.99  # tables; it is one feature among others
+NULL_CONFIDENCE_NEAR = 0.999  # tables; where only what matters is looked for, which fewer bases show
 
 # --- Beams ------------------------------------------------------------------------------------------------------------
 
 FEW_BEAMS = 60  # tables; for a first look: neighbouring beams say the same
 MOST_BEAMS = 180  # tables
 BEAM_FINALISTS = 32  # tables
+# When the deadline has passed so many candidates are looked at, and of them so many finalists. Measured.
+LATE_CANDIDATES = 16
+LATE_FINALISTS = 2
 BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
 BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together

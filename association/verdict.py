@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 
 from registration import RigidTransform
@@ -13,7 +14,7 @@ from .families import is_degenerate, is_thin, place_on_family
 from .features import Features, features_of, twin_share, with_null
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
-from .null import null_of
+from .null import Null, null_of
 from .ranking import Ranked
 from .reasons import Standing, reasons_of
 from .result import Reason, Status
@@ -23,12 +24,16 @@ from .tuning import (
     ELSEWHERE_PROBABILITY,
     FAR_FROM_PRIOR,
     LEAST_IN_STEP,
+    MOST_NULL,
     NO_MATCH_PROBABILITY,
+    NULL_SHARES,
     USABLE_CAUTIOUS,
     USABLE_CAUTIOUS_DRIVE,
     USABLE_CAUTIOUS_WITH_BEAMS,
     USABLE_PROBABILITY,
 )
+
+ROUNDING = 1e-9  # of a chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +81,8 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     best = answer.best
     better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
-    chances = _Chances.of(context, answer, rivals, capped=better_elsewhere)
+    certain = complete and not contradicted and context.window is None and not _out_of_step(answer)
+    chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
     status = _status(answer, chances, _bar(context), capped=better_elsewhere)
     pose = place_on_family(context, answer) if status is Status.DEGENERATE else answer.registered.pose
     if context.window is not None and pose is not None and not context.window.contains(pose):
@@ -119,7 +125,7 @@ class _Chances:
     share : float
         Of the answer among the explanations that are about as good; it is in `right` and `careful`.
     features : Features
-        What these come from, with the null where it was needed.
+        What these come from; with the null where it was needed and might matter.
     cautious : Model
         By which the careful one does.
     """
@@ -132,7 +138,10 @@ class _Chances:
     cautious: Model
 
     @classmethod
-    def of(cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool) -> _Chances:
+    def of(
+        cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool, certain: bool
+    ) -> _Chances:
+        """Work them out; `certain`: whether the answer is usable if they suffice."""
         form = "_with_beams" if context.with_beams else ""
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
         features, share = features_of(context, answer, rivals), twin_share(answer.best, rivals)
@@ -144,14 +153,33 @@ class _Chances:
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
-            # Only what would be usable has to stand up to the mirrored scan, which costs another search.
-            features = with_null(features, answer.best, null_of(context, answer.best))
-            careful = cautious.logit(features)
+            # Only what would be usable has to stand up to the mirrored scan, which costs another search. Where it is
+            # usable nothing else is told of the null; where it is not, the reasons go by what it comes to.
+            certain = certain and _logistic(right) * share >= USABLE_PROBABILITY
+            allowed = _allowed_null(cautious, features, answer.best, _bar(context) / share) if certain else 0.0
+            if allowed < MOST_NULL:
+                features = with_null(features, answer.best, null_of(context, answer.best, allowed))
+                careful = cautious.logit(features)
         return cls(_logistic(right) * share, _logistic(careful) * share, explained, share, features, cautious)
 
 
 def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
+
+
+def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float) -> float:
+    """Return what share of the answer's score the mirrored scan may reach, and the cautious chance is `bar` at least.
+
+    Of `NULL_SHARES`, or 0; wherever the map is not symmetric about the place. The more it reaches the less the chance.
+    """
+    if best.score <= 0.0:
+        return 0.0
+
+    def matters(share: float) -> bool:
+        return _logistic(cautious.logit(with_null(features, best, Null(share * best.score, 0.0)))) < bar + ROUNDING
+
+    few = bisect_left(NULL_SHARES, True, key=matters)
+    return NULL_SHARES[few - 1] if few else 0.0
 
 
 def _out_of_step(answer: Answer) -> bool:

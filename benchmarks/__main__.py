@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 
 from . import vectorization
+from .adversarial import adversarial
 from .analysis import analysis
 from .batch import batch
 from .bridge import bridge
@@ -80,6 +81,10 @@ def _mistakes(quick: int) -> list[Row]:
     return rows
 
 
+def _adversarial(quick: int) -> list[Row]:
+    return adversarial(max(1, 5 // quick))
+
+
 def _parts(quick: int) -> list[Row]:
     parts(quick)
     return []
@@ -105,6 +110,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "vectorization": _vectorization,
     "ranges": _ranges,
     "analyze": _analyze,
+    "adversarial": _adversarial,
     "parts": _parts,
     "mistakes": _mistakes,
     "peers": _peers,

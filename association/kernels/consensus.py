@@ -12,8 +12,8 @@ from registration.kernels import invert3, joint_add, joint_cost, joint_informati
 from registration.layout import Record, Records
 
 from ..tables import Place, Workspace
-from ..tuning import MAX_STEP, MAX_TURN, SPRING
-from .matching import match_scan, wrap
+from ..tuning import MAX_STEP, MAX_TURN, ROUNDS, SPRING
+from .matching import allow_all, match_scan, wrap
 
 
 @kernel
@@ -262,13 +262,14 @@ def value_pairs(
 
 @kernel
 def refine(
-    scan: Records, estimate: Record, place: Place, terms: Record, matches: Records, work: Workspace, rounds: int
+    scan: Records, estimate: Record, place: Place, terms: Record, matches: Records, work: Workspace, floor: float
 ) -> float:
     """Grow and shrink the consensus set at a pose, solving anew each time; pose and covariance move in place.
 
-    Pairs that come or go change the sums of `work` in constant time. Returns the score in nats, of which ``value`` of
-    `work` holds the parts; the consensus set stays in `matches`. A direction that no pair fixes is held where it is,
-    and shows in the covariance.
+    `matches` come as those of `estimate`, by `match_scan`. Pairs that come or go change the sums of `work` in constant
+    time. Returns the score in nats, of which ``value`` of `work` holds the parts; the consensus set stays in `matches`.
+    Where the gains in the end do not come to `floor` it returns 0, and the rest is left undone. A direction that no
+    pair fixes is held where it is, and shows in the covariance.
     """
     walls = place.walls
     gates = terms.gates
@@ -277,23 +278,28 @@ def refine(
     sums = scratch.sums
     information = scratch.information
     value = scratch.value
+    possible = work.possible
+    allow_all(scan, possible)
     start_over(work)
     value.gain = 0.0
     value.cost = 0.0
     value.freedom = 0.0
-    for _ in range(rounds):
-        match_scan(scan, estimate, place, gates, 0.0, matches)
-        if not take_up(scan, matches, walls, wall_variance, work):
-            break
+    changed = take_up(scan, matches, walls, wall_variance, work)
+    rounds = 0
+    while changed:
         if sums.count == 0.0:
             return 0.0  # of pairs that came and went the sums keep rounding, which fixes nothing
-        if not solve(sums, estimate, information, value):
+        moved = solve(sums, estimate, information, value)
+        rounds += 1
+        last = rounds == ROUNDS or not moved
+        if match_scan(scan, estimate, place, gates, possible, floor if last else 0.0, matches) < 0.0:
+            return 0.0
+        changed = take_up(scan, matches, walls, wall_variance, work)
+        if last:
             break
-    match_scan(scan, estimate, place, gates, 0.0, matches)
-    changed = take_up(scan, matches, walls, wall_variance, work)
     value.gain = value_pairs(scan, estimate, walls, wall_variance, matches, work)
     changed = take_up(scan, matches, walls, wall_variance, work) or changed
-    if sums.count == 0.0 or value.gain <= 0.0:
+    if sums.count == 0.0 or value.gain <= 0.0 or value.gain < floor:
         return 0.0
     if changed or value.cost == math.inf:
         solve(sums, estimate, information, value)

@@ -6,9 +6,12 @@ from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
 from ..tables import Place, Raster
-from ..tuning import BRIDGING, SECTORS
+from ..tuning import BRIDGING, DIRECTION_BINS, SECTORS
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)
+BINS_PER_RADIAN = DIRECTION_BINS / (2.0 * math.pi)
+SUM_SLACK = 1e-9  # nats, rounding
+GATE_MARGIN = 1.01  # over an angle's gate, which `match_scan` tests by a cosine to the second order
 
 
 @inlined
@@ -19,17 +22,19 @@ def wrap(angle: float) -> float:
 
 @kernel
 def match_scan(
-    scan: Records, estimate: Record, place: Place, gates: Record, threshold: float, matches: Records
+    scan: Records, estimate: Record, place: Place, gates: Record, possible: Floats, threshold: float, matches: Records
 ) -> float:
     """Find for every scan segment the wall that it lies on best, the most telling segments first.
 
     Gated by the innovation: ``offset^2`` against ``sigma^2 + g' C g`` with the pose's covariance C. Best is least in
-    offset over gate plus what the overlap lacks. Writes wall or -1, offset, sine and overlap to `matches` and returns
-    the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach.
+    offset over gate plus what the overlap lacks. `possible` (n,) is what each segment can add at most, nats, as of
+    `may_score` or `allow_all`; those below 0 lie on no wall. Writes wall or -1, offset, sine and overlap to `matches`
+    and returns the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach.
 
     One loop without calls: handing arrays on costs more than the work, Numba counts references to each.
     """
     walls = place.walls
+    bin_starts = place.bin_starts
     starts = place.grid.starts
     items = place.grid.items
     shape = place.grid.shape[0]
@@ -37,38 +42,63 @@ def match_scan(
     s = math.sin(estimate.theta)
     per_cell = 1.0 / shape.cell
     total = 0.0
+    left = SUM_SLACK
     for i in range(len(scan)):
+        left += max(0.0, possible[i])
+    for i in range(len(scan)):
+        matches[i].wall = -1
+        matches[i].overlap = 0.0
+        if possible[i] < 0.0:
+            continue
+        left -= possible[i]
         gx = c * scan[i].x - s * scan[i].y
         gy = s * scan[i].x + c * scan[i].y
         dx = c * scan[i].dx - s * scan[i].dy
         dy = s * scan[i].dx + c * scan[i].dy
-        # g = (n, n . J R m) with the normal n across the segment.
-        lever = dx * gx + dy * gy
-        var = (
-            dy * dy * estimate.xx
-            - 2.0 * dx * dy * estimate.xy
-            + dx * dx * estimate.yy
-            + 2.0 * lever * (dx * estimate.yt - dy * estimate.xt)
-            + lever * lever * estimate.tt
-        )
-        deviation = math.sqrt(scan[i].offset_variance + max(var, 0.0))
-        offset_gate = min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
-        deviation = math.sqrt(scan[i].angle_variance + estimate.tt)
-        angle_gate = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
-        cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
+        length = scan[i].length
+        half = 0.5 * length
         x = gx + estimate.x
         y = gy + estimate.y
         fx = (x - shape.x0) * per_cell
         fy = (y - shape.y0) * per_cell
-        length = scan[i].length
-        half = 0.5 * length
         best_cost = 1e300
-        matches[i].wall = -1
-        matches[i].overlap = 0.0
+        begin = 0
+        end = 0
         if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
             here = int(fy) * shape.columns + int(fx)
-            for k in range(starts[here], starts[here + 1]):
+            begin = starts[here]
+            end = starts[here + 1]
+        if begin < end:
+            # g = (n, n . J R m) with the normal n across the segment.
+            lever = dx * gx + dy * gy
+            var = (
+                dy * dy * estimate.xx
+                - 2.0 * dx * dy * estimate.xy
+                + dx * dx * estimate.yy
+                + 2.0 * lever * (dx * estimate.yt - dy * estimate.xt)
+                + lever * lever * estimate.tt
+            )
+            deviation = math.sqrt(scan[i].offset_variance + max(var, 0.0))
+            offset_gate = min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
+            deviation = math.sqrt(scan[i].angle_variance + estimate.tt)
+            angle_gate = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
+            cos_gate = 1.0 - 0.5 * angle_gate * angle_gate
+            # Walls are numbered by direction: those that may be near it are some in a row, from `first` on.
+            turned = (estimate.theta + scan[i].angle + math.pi) * BINS_PER_RADIAN
+            spread = GATE_MARGIN * angle_gate * BINS_PER_RADIAN
+            lowest = math.floor(turned - spread) % DIRECTION_BINS
+            highest = math.floor(turned + spread) % DIRECTION_BINS
+            first = bin_starts[lowest]
+            span = bin_starts[highest + 1] - first
+            if highest < lowest:
+                span += len(walls)
+            for k in range(begin, end):
                 w = items[k]
+                place_in_row = w - first
+                if place_in_row < 0:
+                    place_in_row += len(walls)
+                if place_in_row >= span:
+                    continue
                 wx = walls[w].dx
                 wy = walls[w].dy
                 offset = wx * y - wy * x - walls[w].offset
@@ -109,26 +139,35 @@ def match_scan(
                     matches[i].sine = dx * wy - dy * wx
                     matches[i].overlap = overlap
         total += scan[i].gain * matches[i].overlap
-        if total + scan[i].later_gain < threshold:
+        if total + left < threshold:
             return -1.0
-    return total
+    return -1.0 if total < threshold else total
+
+
+@inlined
+def allow_all(scan: Records, possible: Floats) -> None:
+    """Write that every scan segment may lie on a wall."""
+    for i in range(len(scan)):
+        possible[i] = scan[i].gain
 
 
 @kernel
 def angle_spreads(scan: Records, theta_var: float, gates: Record, spreads: Floats) -> None:
     """Write the angle gate of every scan segment at a pose with that variance, in sectors.
 
-    A hundredth wider than `match_scan` has it, which tests a cosine to the second order.
+    A little wider than `match_scan` has it: see `GATE_MARGIN`.
     """
     for i in range(len(scan)):
         deviation = math.sqrt(scan[i].angle_variance + theta_var)
-        gate = 1.01 * min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
+        gate = GATE_MARGIN * min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
         spreads[i] = gate * PER_RADIAN
 
 
 @kernel
-def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, threshold: float) -> bool:
+def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, threshold: float, possible: Floats) -> bool:
     """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
+
+    Writes to `possible` (n,) what each segment can add, nats, -1 where it can lie on no wall.
 
     Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or
     is between two; and a tenth of the price of `match_scan`. `spreads` as of `angle_spreads`.
@@ -145,6 +184,7 @@ def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, thre
     s *= per_cell
     total = 0.0
     for i in range(len(scan)):
+        possible[i] = -1.0
         fx = c * scan[i].x - s * scan[i].y + left
         fy = s * scan[i].x + c * scan[i].y + bottom
         if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
@@ -154,6 +194,7 @@ def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, thre
                 for raw in range(math.floor(middle - spreads[i]), math.floor(middle + spreads[i]) + 1):
                     if (here >> (raw & (SECTORS - 1))) & 1:
                         total += scan[i].gain
+                        possible[i] = scan[i].gain
                         break
         if total + scan[i].later_gain < threshold:
             return False

@@ -13,7 +13,6 @@ from ..tuning import (
     BASE_SLACK,
     BASE_SLACK_SHARE,
     MIN_CROSSING,
-    ROUNDS,
     SECTOR_BITS,
     SECTORS,
     TESTS_ANCHOR,
@@ -26,7 +25,7 @@ from ..tuning import (
 )
 from .best_poses import floor_of, offer, prior_value
 from .consensus import refine, turning
-from .matching import PER_RADIAN, angle_spreads, match_scan, may_score, wrap
+from .matching import PER_RADIAN, allow_all, angle_spreads, match_scan, may_score, wrap
 
 
 @inlined
@@ -112,12 +111,17 @@ def try_pose(
         ):
             return TESTS_REJECTED
     floor = floor_of(rules, progress, bonus) + progress.least_freedom
-    if gates.least_overlap >= WHOLE_OVERLAP and not may_score(scan, pose, work.spreads, raster, floor):
+    possible = work.possible
+    if gates.least_overlap < WHOLE_OVERLAP:
+        allow_all(scan, possible)
+    elif not may_score(scan, pose, work.spreads, raster, floor, possible):
         return TESTS_REJECTED
-    if match_scan(scan, pose, place, gates, floor, work.matches) < 0.0:
+    if match_scan(scan, pose, place, gates, possible, floor, work.matches) < 0.0:
         return TESTS_HYPOTHESIS
     progress.verified += 1
-    score = refine(scan, pose, place, terms, work.matches, work, ROUNDS)
+    # No prior makes up for what the set lacks.
+    least = floor_of(rules, progress, 0.0) + progress.least_freedom
+    score = refine(scan, pose, place, terms, work.matches, work, least)
     offer(found, progress, rules, prior, pose, score)
     return TESTS_REFINED
 

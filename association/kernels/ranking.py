@@ -10,9 +10,9 @@ from registration.layout import SYMMETRIC3, Floats, Records
 
 from ..layout import BLOCKER, Integers
 from ..tables import Blockers, Place, Question, Sights, Workspace
-from ..tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
+from ..tuning import FAR_BEHIND, START_ANGLE_VARIANCE, START_VARIANCE
 from .consensus import one_step_cost, refine
-from .matching import wrap
+from .matching import allow_all, match_scan, wrap
 from .sight import count_blockers, sight_penalty
 
 
@@ -40,6 +40,7 @@ def rank(
     length = 0.0
     for i in range(len(scan)):
         length += scan[i].length
+    allow_all(scan, work.possible)
     for k in range(len(estimates)):
         one = estimates[k]
         merit = merits[k]
@@ -49,7 +50,8 @@ def rank(
         one.yy = START_VARIANCE
         one.yt = 0.0
         one.tt = START_ANGLE_VARIANCE
-        merit.score = refine(scan, one, place, terms, matches[k], work, ROUNDS)
+        match_scan(scan, one, place, terms.gates, work.possible, 0.0, matches[k])
+        merit.score = refine(scan, one, place, terms, matches[k], work, 0.0)
         merit.cost = work.scratch[0].value.cost if merit.score > 0.0 else 0.0
         merit.one_step_cost = one_step_cost(sums, one) if merit.score > 0.0 else 0.0
         det = sums.xx * sums.yy - sums.xy * sums.xy

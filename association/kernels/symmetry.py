@@ -18,7 +18,7 @@ from ..tuning import (
     RAYS,
     SHORTEST_SHOWN,
 )
-from .matching import match_scan
+from .matching import allow_all, match_scan
 from .sight import first_hit
 
 
@@ -102,4 +102,6 @@ def mirrored_share(
         total += lines[k].gain
     if total == 0.0:
         return 0.0
-    return match_scan(lines, null[0], place, gates[0], -1.0, matches) / total
+    possible = np.empty(len(lines))
+    allow_all(lines, possible)
+    return match_scan(lines, null[0], place, gates[0], possible, 0.0, matches) / total

@@ -16,6 +16,7 @@ from .errors import IndexNotReadyError
 if TYPE_CHECKING:  # the store comes without what computes
     from association import Deadline, MapIndex
 
+ALONE = 2  # times the cache; the largest map takes that where its directions mean nothing
 LOOK_SECONDS = 0.05  # after which who waits for another's index looks whether its own client is still there
 
 
@@ -98,11 +99,15 @@ class IndexCache:
         return made
 
     def _keep(self, key: Hashable, made: CachedMap) -> None:
-        if made.bytes > self._max_bytes:
+        """Keep a map; one that is larger than the cache, by up to as much again, alone and until the next comes.
+
+        It takes as much whenever it is built: to do so for each request would need no less memory.
+        """
+        if made.bytes > ALONE * self._max_bytes:
             return
+        self._drop_until(self._max_bytes - made.bytes)
         self._ready[key] = made
         self.bytes += made.bytes
-        self._drop_until(self._max_bytes)
 
     def _drop_until(self, most: int) -> None:
         while self._ready and self.bytes > most:

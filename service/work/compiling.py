@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 from filelock import FileLock
 
 from registration import compiling
+
+BESIDE = "from service.work.warmup import warm_up_measuring; warm_up_measuring()"
 
 PACKAGES = ("registration", "vectorization", "association")
 
@@ -17,12 +23,17 @@ def is_compiled() -> bool:
 def compile_kernels() -> None:
     """Compile everything, or wait for another process that does.
 
-    The compiler keeps 330 MB, so whoever is to go on afterwards loads what another process has compiled.
+    The compiler keeps 330 MB, so whoever is to go on afterwards loads what another process has compiled. What registers
+    and vectorizes is compiled by a process beside this one, where there is another core: the compiler takes one.
     """
     place = compiling.cache_directory("association").parent
     place.mkdir(parents=True, exist_ok=True)
     with FileLock(place / "linefix.lock"):
-        if not is_compiled():
-            from .warmup import warm_up
+        if is_compiled():
+            return
+        from .warmup import warm_up, warm_up_searching
 
-            warm_up()
+        if (os.cpu_count() or 1) > 1:
+            with subprocess.Popen([sys.executable, "-c", BESIDE]):
+                warm_up_searching()
+        warm_up()

@@ -17,7 +17,7 @@ from association import (
     associate,
 )
 from association.checking import check_map, try_sample
-from registration import MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
+from registration import Beams, MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
 
 # A room with a niche, seen from inside: free space on the left of every wall.
@@ -46,29 +46,49 @@ SYMMETRIC_ROOM = np.array(
 )
 
 
+TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+
+
 def warm_up() -> None:
     """Register, vectorize, associate, check and analyze a map once in each way that has kernels of its own."""
+    warm_up_measuring()
+    warm_up_searching()
     room = Segments.from_array(ROOM)
-    measured = MeasuredSegments.from_segments(room)
+    index = MapIndex.build(room, 0.0)
+    check_map(index)
+    one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
+    for scan in (_with_beams(), one_wall):
+        try_sample(index, scan, Deadline(), oriented=True)
+    robot = Robot(beams=360)
+    analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
+    for number in range(len(analysis.standing.poses)):
+        analysis.look(number)
+
+
+def warm_up_measuring() -> None:
+    """Register and vectorize once in each way that has kernels of its own."""
+    room = Segments.from_array(ROOM)
     pairs = np.repeat(np.arange(len(room))[:, None], 2, axis=1)
     for options in (
         RegistrationOptions(),
         RegistrationOptions(estimator="one_step", rotation="mitsuta", oriented=False),
         RegistrationOptions(estimator="one_step", evaluate_at=RigidTransform(0.0, 0.0, 0.0)),
     ):
-        register(room, measured, pairs, 0.0, options)
-    turn = np.linspace(-np.pi, np.pi, 360, endpoint=False)
-    ranges = room_ranges(turn)
-    seen = vectorize(LaserScan(-np.pi, turn[1] - turn[0], ranges, 0.1, 30.0))
-    points = np.stack([ranges * np.cos(turn), ranges * np.sin(turn)], axis=1)
+        register(room, MeasuredSegments.from_segments(room), pairs, 0.0, options)
+    ranges = room_ranges(TURN)
+    vectorize(LaserScan(-np.pi, TURN[1] - TURN[0], ranges, 0.1, 30.0))
+    points = np.stack([ranges * np.cos(TURN), ranges * np.sin(TURN)], axis=1)
     vectorize(points)
     vectorize(points, viewpoint=None)
-    index = MapIndex.build(room, 0.0)
-    pose = RigidTransform(0.0, 0.0, 0.0)
-    beams = Scan(seen.measured, (0.0, 0.0), seen.beams)
+
+
+def warm_up_searching() -> None:
+    """Associate once in each way that has kernels of its own."""
+    room = Segments.from_array(ROOM)
+    measured, index, pose = MeasuredSegments.from_segments(room), MapIndex.build(room, 0.0), RigidTransform(0, 0, 0)
     for scan, prior, how in (
         (Scan(measured), None, AssociationOptions()),
-        (beams, SoftPrior(pose, np.eye(3)), AssociationOptions()),
+        (_with_beams(), SoftPrior(pose, np.eye(3)), AssociationOptions()),
         (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
         (assemble([View(Scan(measured)), View(Scan(measured), pose, 1e-4 * np.eye(3))]), None, AssociationOptions()),
     ):
@@ -76,14 +96,12 @@ def warm_up() -> None:
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
-    check_map(index)
-    one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
-    for scan in (beams, one_wall):
-        try_sample(index, scan, Deadline(), oriented=True)
-    robot = Robot(beams=360)
-    analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
-    for number in range(len(analysis.standing.poses)):
-        analysis.look(number)
+
+
+def _with_beams() -> Scan:
+    """Return the room as a laser in its middle sees it."""
+    beams = Beams(TURN, room_ranges(TURN), 30.0)
+    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
 
 
 def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -124,6 +124,16 @@ def test_what_comes_nowhere_near_the_answer_is_not_looked_for(walls: Floats) -> 
     assert null_of(context, answer.best) == Null(0.0, 0.0)
 
 
+def test_a_null_that_comes_to_less_than_is_asked_about_is_none() -> None:
+    """One that comes to as much is told as it is."""
+    context, answer = best_of(LOBBY, CORNER)
+    null = null_of(context, answer.best)
+    share = null.score / answer.best.score
+    assert share > tuning.NULL_SHARE
+    assert null_of(context, answer.best, share - 1e-6) == null
+    assert null_of(context, answer.best, share + 0.4) == Null(0.0, 0.0)
+
+
 @pytest.mark.parametrize("with_beams", [False, True])
 @pytest.mark.parametrize("sampling", ["ordered", "random"])
 def test_the_null_is_the_same_each_time_and_leaves_the_search_as_it_was(sampling: str, with_beams: bool) -> None:

@@ -16,7 +16,7 @@ from association.context import SearchContext
 from association.explain import explain
 from association.layout import FOUND
 from association.ranking import Ranked, rank_candidates
-from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LEAST_DISTINCT, MOST_BEAMS
+from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LATE_FINALISTS, LEAST_DISTINCT, MOST_BEAMS
 from registration import RigidTransform
 from registration.layout import Floats
 
@@ -194,12 +194,12 @@ def test_what_beams_speak_against_altogether_is_none() -> None:
     assert ranked_at(context, INSIDE) == []
 
 
-def crowded(prior: Prior | None) -> list[Ranked]:
+def crowded(prior: Prior | None, at: float | None = None) -> list[Ranked]:
     """Rank 40 equal rooms and one that lacks walls, all of them candidates."""
     poor = ROOM[3:] + np.tile([0.0, 50.0], 2)
     index = index_of(np.vstack([equal_rooms(40), poor]))
     scan = scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE))
-    context = context_of(index, scan, prior, max_alternatives=50)
+    context = replace(context_of(index, scan, prior, max_alternatives=50), deadline=Deadline(at))
     return ranked_at(context, *map(room, range(40)), pose(INSIDE.x, INSIDE.y + 50.0, INSIDE.theta))
 
 
@@ -207,8 +207,13 @@ def test_single_beams_are_looked_at_for_the_best_alone() -> None:
     assert len(crowded(None)) == BEAM_FINALISTS
 
 
-def test_what_lies_in_a_window_is_looked_at_however_good_the_others_are() -> None:
-    found = crowded(HardPrior(pose(INSIDE.x, INSIDE.y + 50.0, INSIDE.theta), 0.5, 0.3))
+def test_they_are_looked_at_for_few_when_the_deadline_has_passed() -> None:
+    assert len(crowded(None, at=0.0)) == LATE_FINALISTS
+
+
+@pytest.mark.parametrize("at", [None, 0.0])
+def test_what_lies_in_a_window_is_looked_at_however_good_the_others_are(at: float | None) -> None:
+    found = crowded(HardPrior(pose(INSIDE.x, INSIDE.y + 50.0, INSIDE.theta), 0.5, 0.3), at)
     assert [one.inside for one in found] == [True] + [False] * (len(found) - 1)
     assert found[0].score < found[1].score
 

@@ -138,9 +138,9 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> int:
     """Return how often the mirrored scan was searched while an answer was judged."""
     asked = []
 
-    def null_of(context: SearchContext, best: Ranked) -> null.Null:
-        asked.append(best)
-        return null.null_of(context, best)
+    def null_of(context: SearchContext, best: Ranked, share: float) -> null.Null:
+        asked.append(share)
+        return null.null_of(context, best, share)
 
     with monkeypatch.context() as patch:
         patch.setattr(verdict, "null_of", null_of)
@@ -151,8 +151,10 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> int:
 def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     """It costs a search: not where a twin, a free direction, the prior or either probability forbids it already."""
     sure = leading(40.0)
-    assert asked_of(sure, monkeypatch) == 1
-    assert asked_of(replace(sure, complete=False), monkeypatch) == 1, "the status is told all the same"
+    assert asked_of(sure, monkeypatch) == 0, "no null takes anything from it"
+    assert asked_of(replace(sure, complete=False), monkeypatch) == 1, "the reasons are told by it"
+    with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, 1.1, -100.0]}}):
+        assert asked_of(sure, monkeypatch) == 1
     better = Drawn(room(prior=AROUND), LIKELY, beyond=((LIKELY.score - LIKELY.rival + 10.0, False),))
     loose = replace(sure, numbers=LIKELY._replace(deviation=0.51))
     for one in (leading(0.0), replace(sure, degenerate=True), replace(sure, thin=True), loose, better):

@@ -11,9 +11,9 @@ from hypothesis import example, given, settings
 from numpy.typing import ArrayLike
 
 from association import Scan
-from association.kernels import consensus
+from association.kernels import consensus, matching
 from association.layout import MATCH, Integers, record
-from association.tables import Workspace
+from association.tables import Place, Workspace
 from association.tuning import MAX_STEP, MAX_TURN, ROUNDS, SPRING
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.kernels import joint_cost, joint_information
@@ -219,6 +219,14 @@ def test_hold_and_clear() -> None:
     assert not sums.view(float).any()
 
 
+def refine(
+    rows: Records, estimate: Records, place: Place, matches: Records, work: Workspace, floor: float = 0.0
+) -> float:
+    """Match at a pose and refine it, (1,) of `ESTIMATE`; return the score."""
+    matching.match_scan(rows, estimate[0], place, GATES[0], rows["gain"].copy(), 0.0, matches)
+    return consensus.refine(rows, estimate[0], place, TERMS[0], matches, work, floor)
+
+
 @given(SEEDS)
 @example(15105341)  # where a consensus set loses all its pairs
 @settings(max_examples=20, deadline=None)
@@ -230,10 +238,10 @@ def test_refine(seed: int) -> None:
     work.scratch["value"] = 1.0, 2.0, 3.0  # what another pose left behind
     for start in (d.near(), d.near(0.05, 0.2, 0.2), d.near(0.02, 4.0, 4.0)):
         spread = covariance(d.rng)
-        for rounds in (1, ROUNDS):
+        expected = twin.refine(d.scan, start, spread, PLACE, GATES, MODEL, ROUNDS)
+        for floor in (0.0, max(0.0, expected.score - 1e-2)):
             estimate, matches = estimate_of(start, spread), np.zeros(len(d.scan), MATCH)
-            got = consensus.refine(d.scan, estimate[0], PLACE, TERMS[0], matches, work, rounds)
-            expected = twin.refine(d.scan, start, spread, PLACE, GATES, MODEL, rounds)
+            got = refine(d.scan, estimate, PLACE, matches, work, floor)
             rounding = 100.0 if expected.free else 1.0
             assert got == pytest.approx(expected.score, abs=1e-4 * rounding)
             assert same_pose(pose_of(estimate[0]), expected.pose, 1e-5 * rounding, 1e-6 * rounding)
@@ -242,6 +250,7 @@ def test_refine(seed: int) -> None:
             np.testing.assert_allclose(matches["worth"], expected.matches["worth"], atol=1e-4 * rounding)
             gain, cost, freedom = work.scratch["value"][0].item()
             assert got == pytest.approx(max(0.0, gain - 0.5 * cost - freedom)) or not (matches["wall"] >= 0).any()
+        assert refine(d.scan, estimate_of(start, spread), PLACE, matches, work, gain + 1e-6) == 0.0
 
 
 def test_refine_finds_the_pose_again() -> None:
@@ -249,7 +258,7 @@ def test_refine_finds_the_pose_again() -> None:
     d = drawn(7, radius=12.0)
     estimate = estimate_of(moved(d.at, [0.017, 0.07, -0.07]), np.diag([0.01, 0.01, 4e-4]))
     matches = np.zeros(len(d.scan), MATCH)
-    consensus.refine(d.scan, estimate[0], PLACE, TERMS[0], matches, workspace_of(d.scan), 4)
+    refine(d.scan, estimate, PLACE, matches, workspace_of(d.scan))
     assert same_pose(pose_of(estimate[0]), d.at, 0.03, 0.005)
     expected = np.full(len(d.scan), -1)
     expected[d.row_of[d.truth >= 0]] = INDEX.wall_of_piece[d.truth[d.truth >= 0]]
@@ -265,7 +274,7 @@ def refined(walls: ArrayLike, scan: Scan, start: RigidTransform) -> tuple[float,
         np.zeros(len(rows), MATCH),
         workspace_of(rows, index),
     )
-    score = consensus.refine(rows, estimate[0], index.tables.place, TERMS[0], matches, work, ROUNDS)
+    score = refine(rows, estimate, index.tables.place, matches, work)
     x, y = index.origin
     return score, moved(pose_of(estimate[0]), [0.0, x, y])
 

@@ -38,7 +38,8 @@ def test_match_scan(seed: int, gates: Records) -> None:
     matches = np.zeros(len(d.scan), MATCH)
 
     def got(threshold: float) -> float:
-        return matching.match_scan(d.scan, estimate_of(at, spread)[0], PLACE, gates[0], threshold, matches)
+        possible = d.scan["gain"].copy()
+        return matching.match_scan(d.scan, estimate_of(at, spread)[0], PLACE, gates[0], possible, threshold, matches)
 
     assert got(0.0) == pytest.approx(total)
     found = expected["wall"] >= 0
@@ -56,7 +57,8 @@ def test_a_long_segment_bridges_a_doorway(gap: float, overlap: float) -> None:
     index = index_of([[0.0, 0.0, 3.0, 0.0], [3.0 + gap, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
     scan = context_of(index, scan_of([[0.0, 0.0, 6.0, 0.0]])).lines.rows
     matches = np.zeros(1, MATCH)
-    matching.match_scan(scan, estimate_of(local(index, pose()))[0], index.tables.place, GATES[0], 0.0, matches)
+    at, place = estimate_of(local(index, pose()))[0], index.tables.place
+    matching.match_scan(scan, at, place, GATES[0], scan["gain"].copy(), 0.0, matches)
     assert matches["overlap"][0] == pytest.approx(overlap)
 
 
@@ -72,7 +74,7 @@ def test_long_segments_on_walls_with_doorways(seed: int) -> None:
     scan = context_of(index, scan_of([[begin, 0.05, begin + length, 0.05]])).lines.rows
     loose, at = gates(AssociationOptions(min_overlap=0.0)), local(index, pose())
     matches = np.zeros(1, MATCH)
-    matching.match_scan(scan, estimate_of(at)[0], index.tables.place, loose[0], 0.0, matches)
+    matching.match_scan(scan, estimate_of(at)[0], index.tables.place, loose[0], scan["gain"].copy(), 0.0, matches)
     expected, _ = twin.match_scan(scan, at, NOTHING_KNOWN, index.tables.place, loose)
     assert_records(matches, expected, atol=1e-9)
 
@@ -89,17 +91,25 @@ def test_angle_spreads(seed: int, theta_var: float, gates: Records) -> None:
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
 def test_may_score(seed: int) -> None:
-    """The bound is what the twin adds up, and no matching exceeds it."""
+    """The bound is what the twin adds up, no matching exceeds it, and what can lie nowhere needs no matching."""
     d = drawn(seed)
     spread = covariance(d.rng)
     spreads = twin.angle_spreads(d.scan, spread[2, 2], GATES)
+    possible, matches, others = np.zeros(len(d.scan)), np.zeros(len(d.scan), MATCH), np.zeros(len(d.scan), MATCH)
     for at in (d.at, d.near(0.3, 3.0, 3.0), d.near(2.0, 9.0, 9.0)):
         bound = twin.reachable(d.scan, at, spreads, TABLES.raster)
-        assert matching.may_score(d.scan, estimate_of(at)[0], spreads, TABLES.raster, bound - 1e-6)
-        assert not matching.may_score(d.scan, estimate_of(at)[0], spreads, TABLES.raster, bound + 1e-6)
-        assert twin.match_scan(d.scan, at, spread, PLACE, GATES)[1] <= bound + 1e-9
+        one = estimate_of(at, spread)[0]
+        assert not matching.may_score(d.scan, one, spreads, TABLES.raster, bound + 1e-6, possible)
+        assert matching.may_score(d.scan, one, spreads, TABLES.raster, bound - 1e-6, possible)
+        assert possible[possible > 0.0].sum() == pytest.approx(bound)
+        np.testing.assert_array_equal(possible[possible > 0.0], d.scan["gain"][possible > 0.0])
+        total = matching.match_scan(d.scan, one, PLACE, GATES[0], d.scan["gain"].copy(), 0.0, others)
+        assert total <= bound + 1e-9
+        assert matching.match_scan(d.scan, one, PLACE, GATES[0], possible, total - 1e-9, matches) == total
+        np.testing.assert_array_equal(matches["wall"], others["wall"])
     far = moved(d.at, [0.0, 1e3, 0.0])
-    assert not matching.may_score(d.scan, estimate_of(far)[0], spreads, TABLES.raster, 1e-9)
+    assert not matching.may_score(d.scan, estimate_of(far)[0], spreads, TABLES.raster, 1e-9, possible)
+    assert (possible[0] < 0.0).all()
 
 
 def test_a_pose_over_a_doorway_may_score() -> None:
@@ -110,5 +120,6 @@ def test_a_pose_over_a_doorway_may_score() -> None:
         index = index_of([[0.0, 0.0, jamb, 0.0], [jamb + 1.45, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
         for slide in np.linspace(-3.0, 6.0, 46):
             at = estimate_of(local(index, pose(float(slide))))[0]
-            total = matching.match_scan(segments, at, index.tables.place, GATES[0], 0.0, matches)
-            assert matching.may_score(segments, at, spreads, index.raster, total - 1e-9), (jamb, slide)
+            gains = segments["gain"].copy()
+            total = matching.match_scan(segments, at, index.tables.place, GATES[0], gains, 0.0, matches)
+            assert matching.may_score(segments, at, spreads, index.raster, total - 1e-9, gains), (jamb, slide)

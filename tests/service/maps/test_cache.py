@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 
 from association import Deadline, MapIndex
 from registration import Segments
 from service.maps import CachedMap, IndexCache
 from service.maps.errors import IndexNotReadyError
+from service.settings import Settings
 from service.telemetry.metrics import Metrics
 
 NO_END = Deadline()
@@ -102,8 +105,35 @@ def test_what_fits_exactly_is_kept() -> None:
     assert len(cache) == 2
     cache.get("c", lambda: a_map(60), NO_END)
     assert (len(cache), cache.bytes) == (1, 60)
-    cache.get("d", lambda: a_map(61), NO_END)
+    cache.get("d", lambda: a_map(121), NO_END)
     cache.get("c", lambda: pytest.fail("is there"), NO_END)
+
+
+def test_what_is_larger_than_the_cache_is_kept_alone_until_the_next_comes() -> None:
+    cache = IndexCache(60, Metrics())
+    cache.get("a", lambda: a_map(30), NO_END)
+    cache.get("b", lambda: a_map(61), NO_END)
+    assert (len(cache), cache.bytes) == (1, 61)
+    cache.get("b", lambda: pytest.fail("is there"), NO_END)
+    cache.make_room(0)
+    assert len(cache) == 0
+    cache.get("b", lambda: a_map(120), NO_END)
+    cache.get("a", lambda: a_map(30), NO_END)
+    assert (len(cache), cache.bytes) == (1, 30)
+
+
+@pytest.mark.parametrize("oriented", [True, False])
+def test_the_default_cache_keeps_the_largest_map(oriented: bool) -> None:
+    """Of walls of 5 m in all directions, which are on many lists."""
+    rng = np.random.default_rng(1)
+    count = Settings().max_map_segments
+    middles, angles = rng.uniform(0.0, 1e3, (count, 2)), rng.uniform(-math.pi, math.pi, count)
+    half = 2.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    index = MapIndex.build(Segments.from_array(np.hstack([middles - half, middles + half])), oriented=oriented)
+    cache = IndexCache(Settings().cache_bytes, Metrics())
+    for _ in range(2):
+        cache.get("a", lambda: CachedMap(index, "map", index.nbytes), NO_END)
+    assert cache.has("a")
 
 
 def test_hits_and_misses_are_counted() -> None:
