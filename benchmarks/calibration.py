@@ -56,8 +56,8 @@ CAREFUL_WITH_BEAMS = (
     "read", "solitude", "lead", "root_unmatched", "agreement", "misfit_of_many", "hinge_deviation", "hinge_moves",
     "root_farther", "root_nearer",
 )  # fmt: skip
-# Chosen likewise, each of the 45 pairs that promised most tried in both kinds, until none takes off 0.0003 more; without
-# deviations and hinges, for whether the scan is of this map is asked whatever direction is free.
+# Chosen likewise, each of the 45 pairs that promised most tried in both kinds, until none takes off 0.0003 more.
+# Without deviations and hinges: whether the scan is of this map is asked whatever direction is free.
 PAIRS = (
     ("least", "+misfit", "+root_count"), ("most", "-longest_unmatched", "+misfit_of_many"),
     ("least", "-blocked", "-misfit_of_many"), ("most", "-null", "-root_length"), ("most", "+lead", "+root_length"),
