@@ -87,7 +87,7 @@ siege: $(VENV)/.ready  ## print what each of many attacks takes from an honest c
 	$(BIN)/python -m benchmarks.siege
 
 fuzz: $(VENV)/.ready  ## send 100,000 strange requests
-	FUZZ_CASES=100000 $(BIN)/python -m pytest -s tests/service/test_fuzz.py
+	FUZZ_CASES=100000 $(BIN)/python -m pytest -s tests/service/http/test_fuzz.py
 
 experiments: $(VENV)/.ready  ## the paper's tables and figures, into out/experiments
 	$(BIN)/python -m experiments

@@ -44,3 +44,10 @@ def missing(document: Path) -> Iterator[str]:
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_what_a_document_points_at_is_there(document: Path) -> None:
     assert sorted(missing(document)) == []
+
+
+def test_what_the_makefile_names_is_there() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    named = re.findall(r"(?<![\w/$(.)-])(?:tests|requirements|web|\.ci|docs)/[\w./-]*\w", makefile)
+    assert "tests/faults" in named
+    assert [name for name in named if not (ROOT / name).exists()] == []
