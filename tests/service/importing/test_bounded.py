@@ -90,5 +90,5 @@ def test_it_is_told_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setenv(name, "sesame")
     with pytest.raises(FormatsMissingError):
         read({"a.csv": SQUARE})
-    assert "PYTHONPATH" in (tmp_path / "seen").read_text()
+    assert "'PATH'" in (tmp_path / "seen").read_text()
     assert "sesame" not in (tmp_path / "seen").read_text()
