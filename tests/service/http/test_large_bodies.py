@@ -58,7 +58,8 @@ def test_a_service_with_large_bodies_keeps_nothing_of_them_and_takes_its_parser_
     before = resident()
     for _ in range(2):
         running.client.put("/v1/maps/m", content=body).raise_for_status()
-    assert resident() - before < 0.75 * len(body) / 1e6
+    # On a busy machine the thread that stored the last one may still hold it when the answer has come.
+    until(lambda: resident() - before < 0.75 * len(body) / 1e6)
 
     (first,) = children_of(pid)
     os.kill(first, signal.SIGKILL)
