@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from registration.layout import Records
 
 from .context import SearchContext
-from .kernels.planning import BUDGET, EXHAUSTED, PROVEN, advance, plan_bases
+from .kernels.planning import BUDGET, EXHAUSTED, PROVEN, advance, missed_share, plan_bases
 from .kernels.proposing import search_slides
-from .layout import FOUND, PROGRESS, RULES, record
+from .layout import FOUND, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
 from .result import SearchReport
-from .tables import Plan
+from .tables import Plan, Samples
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,
@@ -32,7 +31,7 @@ from .tuning import (
     REUSE,
     RIVAL_SHARE,
     SAMPLE_SEED,
-    SAMPLE_WORDS,
+    SAMPLES,
     SLIDE_DISTINCT_SHARE,
     SLIDE_SEGMENTS,
     SLIDE_SPACING,
@@ -165,6 +164,8 @@ def _go_through_bases(context: SearchContext, rules: Records, found: Records, pr
     stopped = EXHAUSTED if len(plan.bases) == 0 else BUDGET
     while stopped == BUDGET and not context.deadline.passed:
         stopped = advance(question, tables, plan, found, progress, context.workspace, allowed, chunk)
+    if stopped == BUDGET and not plan.random:
+        progress["missed"] = missed_share(question, plan, progress)
     return stopped
 
 
@@ -177,8 +178,7 @@ def _plan(context: SearchContext) -> Plan:
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
         freest=np.argsort(-scan["freedom"], kind="stable"),
-        inliers=_sampled_inliers(n),
-        missing=np.full((n, SAMPLE_WORDS), ~np.uint64(0)),
+        samples=_samples(n),
         fade=0.0 if context.options.sampling == "random" else math.log(REUSE),
         random=context.options.sampling == "random",
     )
@@ -195,16 +195,18 @@ def _drawn(bases: Records, options: AssociationOptions) -> Records:
     return bases
 
 
-@lru_cache(maxsize=BASE_SEGMENTS + 1)
-def _sampled_inliers(n: int) -> NDArray[np.uint64]:
-    """Sample consensus sets among n segments: ``[m, i]`` says for 64 samples a word whether i is in a set of m + 1.
+def _samples(n: int) -> Samples:
+    """Sample consensus sets among n segments, without any base so far."""
+    orders, ranks = _orders(n)
+    found, sizes, gains = np.full(SAMPLES, n, np.uint8), np.zeros(SAMPLES, np.uint8), np.zeros(SAMPLES)
+    return Samples(orders, ranks, found, sizes, gains, np.arange(SAMPLES + 1, dtype=np.int32))
 
-    All sets of a size are as likely. A better consensus set has so many segments at least, whichever they are.
-    """
-    draws = np.random.default_rng(SAMPLE_SEED).random((SAMPLE_WORDS * 64, n))
-    ranks = np.argsort(np.argsort(draws, axis=1), axis=1).T
-    bits = np.packbits(ranks[None] <= np.arange(n)[:, None, None], axis=-1)
-    return np.ascontiguousarray(bits).view(np.uint64)
+
+@lru_cache(maxsize=BASE_SEGMENTS + 1)
+def _orders(n: int) -> tuple[Integers, Integers]:
+    """Draw orders of n segments (samples, n), all as likely; return the places of each segment, too, (n, samples)."""
+    orders = np.random.default_rng(SAMPLE_SEED).random((SAMPLES, n)).argsort(axis=1)
+    return orders.astype(np.uint8), np.ascontiguousarray(orders.argsort(axis=1).T, dtype=np.uint8)
 
 
 def _slide(context: SearchContext, effort: Effort, found: Records, progress: Records, chunk: int) -> bool:

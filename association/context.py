@@ -17,6 +17,7 @@ from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
 from .scan_lines import ScanLines, gates
 from .tables import Question, Sights, Workspace
+from .tuning import LATE_CROWD
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 ANY = record(RULES)  # for kernels that keep no poses
@@ -87,9 +88,17 @@ class SearchContext:
     @cached_property
     def lines_of_sight(self) -> Sights:
         """The same where it scores poses: segments have no lines of sight where single beams tell more."""
-        if not self.with_beams:
-            return self.sights
+        return self.nothing_seen if self.with_beams else self.sights
+
+    @cached_property
+    def nothing_seen(self) -> Sights:
+        """The same, without lines of sight."""
         return Sights(self.sights.places, np.zeros(len(self.sights.starts), np.int64), np.zeros(0, SIGHTING))
+
+    @property
+    def too_late_to_look(self) -> bool:
+        """Whether the deadline has passed where so many walls lie in one place that to follow rays takes long."""
+        return self.index.crowd > LATE_CROWD and self.deadline.passed
 
     @cached_property
     def workspace(self) -> Workspace:

@@ -15,7 +15,6 @@ from registration.layout import JOINT_SUMS, POSE, SEEN, SYMMETRIC3, Floats, Reco
 
 Integers: TypeAlias = NDArray[np.integer[Any]]
 Indices: TypeAlias = NDArray[np.intp]
-Words: TypeAlias = NDArray[np.uint64]
 Flags: TypeAlias = NDArray[np.bool_]
 
 _F, _I = np.float64, np.int64

@@ -211,8 +211,8 @@ def _distinct(scored: _Scored, values: Floats, most: int) -> list[int]:
 def _score(context: SearchContext, poses: Records) -> _Scored:
     """Refine the poses on their consensus sets and score those, with lines of sight unless there are beams.
 
-    The first are scored also when the deadline has passed, so that there is an answer; what it leaves unscored is worth
-    nothing.
+    The first are scored also when the deadline has passed, so that there is an answer, without lines of sight where
+    those take long; what it leaves unscored is worth nothing.
 
     Raises
     ------
@@ -230,7 +230,8 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
             break
         some = slice(begin, begin + step)
         parts = scored.estimates[some], scored.merits[some], scored.matches[some]
-        rank(context.question(ANY), place, context.lines_of_sight, *parts, context.workspace)
+        sights = context.nothing_seen if context.too_late_to_look else context.lines_of_sight
+        rank(context.question(ANY), place, sights, *parts, context.workspace)
     if context.deadline.cancelled:
         raise CancelledError
     return scored

@@ -41,8 +41,11 @@ class BeamShares:
 
 
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
-    """List the map segments of walls that rays to the consensus set pass through; none without a viewpoint."""
-    if context.scan.viewpoint is None:
+    """List the map segments of walls that rays to the consensus set pass through.
+
+    None without a viewpoint, or where the deadline has passed and that would take long.
+    """
+    if context.scan.viewpoint is None or context.too_late_to_look:
         return ()
     index = context.index
     pieces = missing_pieces(

@@ -12,7 +12,7 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import MATCH, SCRATCH, WALL_SHARE, Indices, Integers, Words
+from .layout import MATCH, SCRATCH, WALL_SHARE, Indices, Integers
 
 
 class Walls(NamedTuple):
@@ -217,6 +217,27 @@ class Blockers(NamedTuple):
     touched: Integers
 
 
+class Samples(NamedTuple):
+    """Sampled consensus sets: orders of the n segments that bases are made of, the first of each being the set.
+
+    Attributes
+    ----------
+    orders : (s, n) the segments of each
+    ranks : (n, s) the places of each segment in them
+    found : (s,) up to which place each has a base that was gone through, n where it has none
+    sizes : (s,) how many are in each set
+    gains : (s,) what they come to, nats
+    undecided : (s + 1,) those of which none is known to hold a base; at last, how many these are
+    """
+
+    orders: Integers
+    ranks: Integers
+    found: Integers
+    sizes: Integers
+    gains: Floats
+    undecided: Integers
+
+
 class Plan(NamedTuple):
     """The bases of a scan, and what tells when enough of them have been gone through.
 
@@ -227,8 +248,8 @@ class Plan(NamedTuple):
     residual : (all scan segments,) what is left of each gain in the bound, nats
     best_gains : (n,) the gains of the first n, the largest first, nats
     freest : (all scan lines,) those that take most freedom by themselves first
-    inliers : (n, n, words) ``[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1
-    missing : (n, words) which of these samples have missed all bases so far
+    samples : Samples
+        Consensus sets that may have missed all bases so far.
     fade : float
         What the logarithm of a base's merit loses for each earlier use of one of its segments.
     random : bool
@@ -240,8 +261,7 @@ class Plan(NamedTuple):
     residual: Floats
     best_gains: Floats
     freest: Integers
-    inliers: Words
-    missing: Words
+    samples: Samples
     fade: float
     random: bool
 

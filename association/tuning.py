@@ -125,7 +125,7 @@ SHORT_POWER = -0.7  # of the length of the shorter segment, metres
 SHORT_LENGTH = 0.1  # m
 SINE_POWER = 0.3
 GAIN_POWER = 3.0  # of the lesser gain, tables: long segments are clutter less often
-SAMPLE_WORDS = 160  # of 64 samples, a resolution of 1e-4
+SAMPLES = 10_240  # consensus sets, a resolution of 1e-4
 SAMPLE_SEED = 20190901
 # Work between two looks at the clock, in tests of a wall: a few milliseconds. Measured.
 CHUNK = 300_000
@@ -207,6 +207,7 @@ BEAM_FINALISTS = 32  # tables
 # When the deadline has passed so many candidates are looked at, and of them so many finalists. Measured.
 LATE_CANDIDATES = 16
 LATE_FINALISTS = 2
+LATE_CROWD = 500.0  # measured; walls on the list that a place on a wall has, from which rays are left out then
 BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
 BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
 NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together

@@ -7,8 +7,8 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
-from ..layout import BASE, Integers, Words
-from ..tables import MapTables, Plan, Question, Walls, Workspace
+from ..layout import BASE, Integers
+from ..tables import MapTables, Plan, Question, Samples, Walls, Workspace
 from ..tuning import (
     COST_ANCHOR,
     COST_BASE,
@@ -162,24 +162,49 @@ def cover(residual: Floats, a: int, b: int) -> float:
 
 
 @kernel
-def strike(missing: Words, inliers: Words, a: int, b: int, fewest: int) -> float:
-    """Take a base off the sampled consensus sets that have missed all bases so far.
+def strike(samples: Samples, a: int, b: int) -> None:
+    """Note in the sampled consensus sets that a base was gone through."""
+    found = samples.found
+    first = samples.ranks[a]
+    second = samples.ranks[b]
+    for s in range(len(found)):
+        later = first[s] if first[s] > second[s] else second[s]
+        found[s] = later if later < found[s] else found[s]
 
-    ``inliers[m, i]`` says for 64 samples a word whether segment i is in a set of m + 1 segments, ``missing[m]`` which
-    samples are left; sets of less than `fewest` segments are left alone. Returns the share left of those of `fewest`.
+
+@kernel
+def missed_sets(scan: Records, samples: Samples, fewest: int, needed: float, most: int) -> int:
+    """Count the sampled consensus sets that hold none of the bases so far, up to one more than `most`.
+
+    Each is an order of the segments of bases, and has as many of the first as come to gains of `needed`, `fewest` at
+    least, which may be more than before, never less. An order whose gains do not come to it has no set. Where a set
+    was found to hold a base it is not looked at any more.
     """
-    ones = 0
-    for m in range(fewest - 1, len(missing)):
-        for k in range(missing.shape[1]):
-            missing[m, k] = missing[m, k] & ~(inliers[m, a, k] & inliers[m, b, k])
-    for k in range(missing.shape[1]):
-        # Population count of 64 bits.
-        word = missing[fewest - 1, k]
-        word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
-        word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
-        word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-        ones += int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
-    return ones / (64.0 * missing.shape[1])
+    orders = samples.orders
+    found = samples.found
+    sizes = samples.sizes
+    gains = samples.gains
+    undecided = samples.undecided
+    n = orders.shape[1]
+    left = 0
+    at = 0
+    end = undecided[len(found)]
+    while at < end and left <= most:
+        s = undecided[at]
+        held = found[s] < fewest
+        if not held:
+            while (gains[s] < needed or sizes[s] < fewest) and sizes[s] < n:
+                gains[s] += scan[orders[s, sizes[s]]].gain
+                sizes[s] += 1
+            held = found[s] < sizes[s] or gains[s] < needed
+        if held:
+            end -= 1
+            undecided[at] = undecided[end]
+        else:
+            left += 1
+            at += 1
+    undecided[len(found)] = end
+    return left
 
 
 @kernel
@@ -219,6 +244,33 @@ def least_freedom(scan: Records, freest: Integers, needed: float) -> float:
     return 0.0
 
 
+@kernel
+def needed_of(question: Question, plan: Plan, best_value: float) -> float:
+    """Return what the gains of a set come to at least that scores as high as a rival of the best."""
+    needed = question.terms[0].rules.rival_share * best_value
+    return needed + least_freedom(question.scan, plan.freest, needed)
+
+
+@kernel
+def gain_beyond(scan: Records, plan: Plan) -> float:
+    """Return what the segments of a scan could add of which no bases are made, nats."""
+    beyond = 0.0
+    for i in range(len(plan.best_gains), len(scan)):
+        beyond += scan[i].gain
+    return beyond
+
+
+@kernel
+def missed_share(question: Question, plan: Plan, progress: Records) -> float:
+    """Return the share of the sampled consensus sets that hold none of the bases so far."""
+    scan = question.scan
+    needed = needed_of(question, plan, progress[0].best_value)
+    beyond = gain_beyond(scan, plan)
+    count = len(plan.samples.found)
+    fewest = fewest_segments(plan.best_gains, beyond, needed)
+    return missed_sets(scan, plan.samples, fewest, needed - beyond, count) / count
+
+
 # Why `advance` came back.
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
 
@@ -237,15 +289,15 @@ def advance(
     """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
 
     `allowed` is the greatest chance of having missed a better consensus set, -1 to go through all bases; `progress`
-    (1,) keeps that chance up to date. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+    (1,) keeps that chance up to date, or says that it is greater than that: see `missed_share`. Returns one of
+    `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
     """
     scan = question.scan
     rules = question.terms[0].rules
     state = progress[0]
     bases = plan.bases
-    beyond = 0.0
-    for i in range(len(plan.best_gains), len(scan)):
-        beyond += scan[i].gain
+    count = len(plan.samples.found)
+    beyond = gain_beyond(scan, plan)
     spent = 0
     while True:
         if state.base < 0:
@@ -258,8 +310,7 @@ def advance(
             return BUDGET
         state.base = -1
         state.least_freedom = least_freedom(scan, plan.freest, rules.kept_share * state.best_value)
-        needed = rules.rival_share * state.best_value
-        needed += least_freedom(scan, plan.freest, needed)
+        needed = needed_of(question, plan, state.best_value)
         a = base.sliding
         b = base.crossing
         if is_telling(scan, a, b):
@@ -268,7 +319,10 @@ def advance(
             if plan.random:
                 state.missed *= 1.0 - drawn_chance(fewest, len(plan.best_gains))
             else:
-                state.missed = strike(plan.missing, plan.inliers, a, b, fewest)
+                strike(plan.samples, a, b)
+                # It need not be known by how much too many are left.
+                most = math.floor(allowed * count) if allowed >= 0.0 else -1
+                state.missed = missed_sets(scan, plan.samples, fewest, needed - beyond, most) / count
         if state.best_value >= rules.enough:
             return CONFIDENT
         if allowed >= 0.0:

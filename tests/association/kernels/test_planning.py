@@ -12,8 +12,8 @@ from hypothesis import given, settings
 
 from association.kernels import planning
 from association.kernels.proposing import search_base
-from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, Words, record
-from association.tables import Plan, Question
+from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, record
+from association.tables import Plan, Question, Samples
 from association.tuning import REUSE
 from registration.layout import Records
 
@@ -95,28 +95,30 @@ def test_bound_is_never_below_what_can_have_been_missed() -> None:
     assert bound < 0.7 * gains.sum()
 
 
-def sampled(n: int, words: int, rng: np.random.Generator) -> Words:
-    """Sample sets among n segments: bit k of ``[m, i]`` says whether segment i is among the first m + 1 of draw k."""
-    ranks = rng.permuted(np.tile(np.arange(n), (64 * words, 1)), axis=1).T
-    bits = np.packbits(ranks[None] <= np.arange(n)[:, None, None], axis=-1)
-    return np.ascontiguousarray(bits).view(np.uint64)
+def sampled(n: int, count: int, rng: np.random.Generator) -> Samples:
+    orders = rng.permuted(np.tile(np.arange(n, dtype=np.uint8), (count, 1)), axis=1)
+    ranks = np.ascontiguousarray(orders.argsort(axis=1).T, dtype=np.uint8)
+    found, sizes, gains = np.full(count, n, np.uint8), np.zeros(count, np.uint8), np.zeros(count)
+    return Samples(orders, ranks, found, sizes, gains, np.arange(count + 1, dtype=np.int32))
 
 
 @given(SEEDS)
 @settings(max_examples=40, deadline=None)
 def test_strike(seed: int) -> None:
-    """It counts the samples that are left, and leaves sets that are too small alone."""
+    """The sets that are left are counted, as they grow; what all segments together do not come to has none."""
     rng = np.random.default_rng(seed)
-    inliers = sampled(7, 3, rng)
-    missing, fewest, tried = np.full((7, 3), ~np.uint64(0)), int(rng.integers(2, 6)), []
-    for _ in range(5):
+    samples, scan = sampled(7, 200, rng), drawn(seed).scan[:7]
+    most = int(rng.integers(0, 200))
+    gains = scan["gain"]
+    tried, total = [], float(scan["gain"].sum())
+    for needed in np.sort(rng.uniform(-5.0, 1.1 * total, 5)):
         a, b = rng.choice(7, 2, replace=False).tolist()
         tried.append({"sliding": a, "crossing": b})
-        left = planning.strike(missing, inliers, a, b, fewest)
-        assert left == twin.missed_share(inliers, tried, fewest)
-    for m in range(7):
-        kept = np.unpackbits(missing[m].view(np.uint8)).mean()
-        assert kept == (twin.missed_share(inliers, tried, m + 1) if m + 1 >= fewest else 1.0)
+        planning.strike(samples, a, b)
+        fewest = twin.fewest_segments((-np.sort(-gains)).tolist(), 0.0, needed)
+        expected = round(200 * twin.missed_share(samples.orders, gains, tried, needed))
+        assert planning.missed_sets(scan, samples, fewest, needed, most) == min(expected, most + 1)
+        assert planning.missed_sets(scan, samples, fewest, needed, 200) == expected
 
 
 @given(SEEDS)
@@ -184,8 +186,7 @@ def plan_of(scan: Records, rng: np.random.Generator, *, drawn_by_chance: bool) -
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
         freest=np.argsort(-scan["freedom"], kind="stable"),
-        inliers=sampled(n, 8, rng),
-        missing=np.full((n, 8), ~np.uint64(0)),
+        samples=sampled(n, 512, rng),
         fade=0.0 if drawn_by_chance else math.log(REUSE),
         random=drawn_by_chance,
     )
@@ -244,7 +245,11 @@ def expected_end(d: Drawn, effort: Effort) -> End:
             bound -= less
             fewest = twin.fewest_segments(gains, beyond, needed)
             by_chance = missed * (1.0 - twin.drawn_chance(fewest, len(gains)))
-            missed = by_chance if effort.by_chance else twin.missed_share(plan.inliers, tried, fewest)
+            missed = (
+                by_chance
+                if effort.by_chance
+                else twin.missed_share(plan.samples.orders, d.scan["gain"], tried, needed - beyond)
+            )
         proven = effort.allowed >= 0.0 and bound < needed
         if best >= effort.enough or (missed <= effort.allowed and not proven):
             return End(planning.CONFIDENT, count, bound, missed)
@@ -265,7 +270,8 @@ def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
         why = planning.advance(question, TABLES, plan, found, progress, work, effort.allowed, budget)
         calls += 1
     state = progress[0]
-    end = End(why, int(state["bases"]), float(state["bound"]), float(state["missed"]))
+    missed = float(state["missed"]) if effort.by_chance else planning.missed_share(question, plan, progress)
+    end = End(why, int(state["bases"]), float(state["bound"]), missed)
     return end, found[: int(state["count"])], calls
 
 

@@ -114,8 +114,16 @@ def least_freedom_sorted(scan: Records, needed: float) -> float:
     return 0.0 if needed <= 0.0 else float(min(enough, default=scan["freedom"].max(initial=0.0)))
 
 
-def missed_share(inliers: np.ndarray, bases: list[Record], fewest: int) -> float:
-    """Return of the sampled sets of `fewest` segments the share that holds none of the bases."""
-    bits = np.unpackbits(inliers[fewest - 1].view(np.uint8), axis=-1).astype(bool)
-    held = [bits[base["sliding"]] & bits[base["crossing"]] for base in bases]
-    return float((~np.any(held, axis=0)).mean()) if held else 1.0
+def missed_share(orders: np.ndarray, gains: np.ndarray, bases: list[Record], needed: float) -> float:
+    """Return of the sampled sets the share that holds none of the bases.
+
+    They are the first two and more of each order that come to what is needed, where all of it does.
+    """
+    missed = 0
+    for order in orders.tolist():
+        sums = np.cumsum(gains[order])
+        if sums[-1] < needed:
+            continue
+        some = set(order[: max(2, int(np.argmax(sums >= needed)) + 1)])
+        missed += not any({base["sliding"], base["crossing"]} <= some for base in bases)
+    return missed / len(orders)
