@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -151,9 +152,13 @@ class Deadline:
     ----------
     at : float or None
         `time.monotonic()` seconds.
+    rest : callable or None
+        Called in the search's own thread whenever that looks whether it has to end, every few milliseconds; it may
+        wait, so that a processor can be lent to somebody else.
     """
 
     at: float | None = None
+    rest: Callable[[], None] | None = field(default=None, init=False)
     _cancelled: bool = field(default=False, init=False)
     _outer: Deadline | None = field(default=None, init=False)
 
@@ -175,4 +180,11 @@ class Deadline:
     @property
     def passed(self) -> bool:
         """Whether the search has to end."""
+        self._may_rest()
         return self.cancelled or (self.at is not None and time.monotonic() >= self.at)
+
+    def _may_rest(self) -> None:
+        if self._outer is not None:
+            self._outer._may_rest()
+        if self.rest is not None:
+            self.rest()

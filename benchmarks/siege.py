@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import gzip
+import itertools
 import os
 import socket
 import threading
@@ -92,6 +93,21 @@ def one_cell() -> bytes:
     return encoded({"map": {"segments": ends}, "scan": {"segments": rng.uniform(-2.0, 2.0, (200, 4))}})
 
 
+def maps_anew() -> Script:
+    """Send along a map of 20,000 segments, another each time."""
+    rng, numbers = np.random.default_rng(0), itertools.count(1)
+    begins = rng.uniform(0.0, 300.0, (20_000, 2))
+    rows = encoded(np.hstack([begins, begins + rng.uniform(-1.0, 1.0, begins.shape)]).round(3))
+    scan = encoded(examples.ASSOCIATE["scan"])
+
+    def script(connection: socket.socket) -> None:
+        body = b'{"map": {"sigma": %.6f, "segments": %b}, "scan": %b}' % (1e-6 * next(numbers), rows, scan)
+        connection.sendall(request(body))
+        connection.recv(65_536)
+
+    return script
+
+
 def large_map() -> bytes:
     """Return a map of some 8 MB; it is stored as ``siege`` before each attack."""
     return encoded({"segments": np.random.default_rng(0).uniform(0.0, 1e3, (110_000, 4))})
@@ -121,6 +137,7 @@ def attacks() -> dict[str, tuple[int, Script]]:
         "unknown fields": (4, sent(request(unknown))),
         "parallel walls": (8, sent(request(parallel_walls()))),
         "one cell": (8, sent(request(one_cell()))),
+        "maps anew": (4, maps_anew()),
         "gzip": (12, sent(request(packed, b"Content-Encoding: gzip\r\n"))),
         "bodies withheld": (20, sent(half, 10.0)),
         "a large map stored": (2, sent(put)),

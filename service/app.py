@@ -16,7 +16,7 @@ from starlette.middleware.cors import CORSMiddleware
 from .admission.budget import ByteBudget
 from .admission.connections import ConnectionLimit, most_connections
 from .admission.entrance import Entrance
-from .admission.gate import SearchGate
+from .admission.gate import Gate
 from .admission.key_file import KeyFile
 from .admission.keys import Keyring
 from .admission.origins import Origins
@@ -46,6 +46,7 @@ from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
+INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
 def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
@@ -100,7 +101,8 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
 def _services(settings: Settings, part: Part) -> Services:
     """Put the parts together; of several processes each has its share."""
     metrics = Metrics()
-    gate = SearchGate(part.share(settings.searches), part.share(settings.queue))
+    gate = Gate(part.share(settings.searches), part.share(settings.queue))
+    indexing = Gate(part.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE)
     budget = _budget(settings, part, settings.max_bodies_bytes)
     store = MapStore(settings.url, may_make=not part.replaces, most_bytes=settings.max_stored_bytes)
     cache = IndexCache(part.share(settings.cache_bytes), metrics)
@@ -113,6 +115,7 @@ def _services(settings: Settings, part: Part) -> Services:
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
     metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)
+    metrics.watch("linefix_indexing_running", "Large maps that are indexed", lambda: indexing.running)
     metrics.watch("linefix_connections", "Connections open", lambda: len(connections))
     metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: budget.held)
     metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes)
@@ -124,6 +127,10 @@ def _services(settings: Settings, part: Part) -> Services:
         readiness=readiness,
         entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
         gate=gate,
+        # How many wait there is bounded by their bytes.
+        parsing=Gate(1, settings.max_connections, "parsing"),
+        parsing_apart=Gate(1, settings.max_connections, "parsing-apart"),
+        indexing=indexing,
         keyring=keyring,
         connections=connections,
         answers=_budget(settings, part, settings.max_answers_bytes),

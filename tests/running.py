@@ -63,9 +63,9 @@ class RunningService:
         yield lambda: sum(_status(pid, "VmHWM") for pid in pids)
 
     @contextmanager
-    def connection(self, timeout: float = 20.0) -> Iterator[socket.socket]:
+    def connection(self, timeout: float = 20.0, source: str = "127.0.0.1") -> Iterator[socket.socket]:
         """Talk to the service below HTTP."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=timeout) as connection:
+        with socket.create_connection(("127.0.0.1", self.port), timeout, (source, 0)) as connection:
             yield connection
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..schemas.errors import BodyTooLargeError
 from .errors import ForeignMapError, MissingRoleError
-from .gate import SearchGate
+from .gate import Gate
 from .grants import GUARDED, Asked, Grant, asked_of
 from .keys import Keyring
 from .origins import Origins
@@ -29,13 +29,13 @@ class Entrance:
 
     Parameters
     ----------
-    gate : SearchGate
+    gate : Gate
     keyring : Keyring
     origins : Origins
     max_body_bytes : int
     """
 
-    def __init__(self, gate: SearchGate, keyring: Keyring, origins: Origins, max_body_bytes: int) -> None:
+    def __init__(self, gate: Gate, keyring: Keyring, origins: Origins, max_body_bytes: int) -> None:
         self._gate = gate
         self._keyring = keyring
         self._origins = origins

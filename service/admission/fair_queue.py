@@ -31,6 +31,14 @@ class FairQueue:
         """How many are active."""
         return len(self._used)
 
+    def used_by(self, holder: Holder) -> float:
+        """Return how many seconds an active holder has used; safe from any thread."""
+        return self._used.get(holder, 0.0)
+
+    def standing(self) -> tuple[tuple[Holder, float], ...]:
+        """Return who waits, and how many seconds each has used."""
+        return tuple((holder, self._used[holder]) for holder in self._lines)
+
     def places_of(self, holder: Holder) -> int:
         """Return how many turns of a holder wait, run, or are on their way."""
         return len(self._lines.get(holder, ())) + self._running[holder] + self._coming[holder]
@@ -47,12 +55,17 @@ class FairQueue:
 
     def join(self, holder: Holder, *, fixed: bool) -> Turn:
         """Return a turn at the end of the holder's line; a fixed one is never taken away again."""
-        self._activate(holder)
-        turn: Turn = asyncio.get_running_loop().create_future()
-        self._lines.setdefault(holder, deque()).append(turn)
+        turn = self._line_of(holder)
+        self._lines[holder].append(turn)
         if fixed:
             self._fixed.add(turn)
-        self.waiting += 1
+        return turn
+
+    def join_again(self, holder: Holder) -> Turn:
+        """Return a turn for what runs and is to go on before the holder starts anything else; it is fixed."""
+        turn = self._line_of(holder)
+        self._lines[holder].appendleft(turn)
+        self._fixed.add(turn)
         return turn
 
     def leave(self, holder: Holder, turn: Turn) -> None:
@@ -92,6 +105,13 @@ class FairQueue:
         self._running[holder] -= 1
         self._used[holder] += seconds
         self._forget_idle(holder)
+
+    def _line_of(self, holder: Holder) -> Turn:
+        """Return a turn that is to be put into the holder's line, which there is."""
+        self._activate(holder)
+        self._lines.setdefault(holder, deque())
+        self.waiting += 1
+        return asyncio.get_running_loop().create_future()
 
     def _left(self, holder: Holder, turn: Turn) -> None:
         self._fixed.discard(turn)

@@ -1,11 +1,20 @@
-"""Who may search now: at most one search per core, a short queue shared fairly, and no for the rest."""
+"""Who may search now: at most one search per core, a short queue shared fairly, and no for the rest.
+
+A turn that has gone on for long rests while somebody waits who has used less: otherwise who asks for what takes seconds
+would have the processor for as long each time, and who asks for milliseconds would get one answer for each of those.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import os
+import sys
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
@@ -16,10 +25,36 @@ from .ticket import Ticket
 
 T = TypeVar("T")
 HEARING_SECONDS = 0.5  # s that a search has to notice that it shall end
+LONG_SECONDS = 0.02  # s after which a turn may have to rest: shorter ones are waited for
+LEAD_SECONDS = 0.002  # s by which it has used more than somebody who waits; every look would be too often
+RESTING = 4  # turns that may rest, for each slot: each keeps a thread, and the memory of its search
 
 
-class SearchGate:
+@dataclass(eq=False, slots=True)
+class _Run:
+    """A function that runs, or rests.
+
+    Attributes
+    ----------
+    holder : Holder
+    begun : float
+        `time.monotonic()` seconds; since when it runs, or goes on after a rest.
+    before : float
+        Seconds that it ran before that.
+    awake : Event
+        Clear while it rests.
+    """
+
+    holder: Holder
+    begun: float
+    before: float = 0.0
+    awake: threading.Event = field(default_factory=threading.Event)
+
+
+class Gate:
     """Runs functions in threads of its own, a bounded number at a time and a bounded number waiting.
+
+    What looks at its deadline may have to rest there, for others to have their turns.
 
     Belongs to one event loop.
 
@@ -29,6 +64,10 @@ class SearchGate:
         Searches that run at once.
     queue : int
         Searches that may wait.
+    name : str
+        Of the threads.
+    nice : int
+        By how much they go behind other threads.
 
     Attributes
     ----------
@@ -36,11 +75,17 @@ class SearchGate:
         Slots that are taken.
     """
 
-    def __init__(self, slots: int, queue: int) -> None:
+    def __init__(self, slots: int, queue: int, name: str = "search", nice: int = 0) -> None:
         self.slots = slots
         self._places = slots + queue
-        self._executor = ThreadPoolExecutor(slots, thread_name_prefix="search")
+        self._most_resting = RESTING * slots
+        threads = slots + self._most_resting
+        self._executor = ThreadPoolExecutor(threads, name, initializer=_go_behind, initargs=(nice,))
         self._queue = FairQueue()
+        self._waiting: tuple[tuple[Holder, float], ...] = ()
+        self._resting: set[_Run] = set()
+        self._local = threading.local()
+        self._closed = False
         self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
         self.running = 0
         self._expected = 0
@@ -105,15 +150,16 @@ class SearchGate:
         ticket.arrive()
         await self._enter(deadline, ticket)
         ticket.admitted = True
-        begun = time.monotonic()
+        run = _Run(ticket.holder, time.monotonic())
         loop = asyncio.get_running_loop()
+        deadline.rest = partial(self._may_rest, loop)
         try:
-            work = loop.run_in_executor(self._executor, function)
+            work = loop.run_in_executor(self._executor, partial(self._working, run, function))
         except BaseException:
             self._leave(ticket.holder, 0.0)
             raise
         self._deadlines[work] = deadline
-        work.add_done_callback(lambda done: self._finish(done, ticket.holder, begun))
+        work.add_done_callback(lambda done: self._finish(done, run))
         return await self._outcome(work, deadline, heeds)
 
     async def _outcome(self, work: asyncio.Future[T], deadline: Deadline, heeds: Callable[[], bool]) -> T:
@@ -139,7 +185,53 @@ class SearchGate:
 
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
+        self._closed = True
+        for run in self._resting:
+            run.awake.set()
         self._executor.shutdown(wait=False)
+
+    def _working(self, run: _Run, function: Callable[[], T]) -> T:
+        """Run a function in a thread, which is known by its turn meanwhile."""
+        self._local.run = run
+        try:
+            return function()
+        finally:
+            self._local.run = None
+
+    def _may_rest(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Wait, in the thread of a turn that has run for long, while somebody waits who has used less."""
+        run: _Run | None = getattr(self._local, "run", None)
+        if run is None or self._closed:
+            return
+        spent = time.monotonic() - run.begun
+        if run.before + spent < LONG_SECONDS:
+            return
+        mine = self._queue.used_by(run.holder) + spent - LEAD_SECONDS
+        if all(used >= mine or holder == run.holder for holder, used in self._waiting):
+            return
+        run.awake.clear()
+        try:
+            loop.call_soon_threadsafe(self._rest, run)
+        except RuntimeError:  # the loop has ended
+            return
+        while not run.awake.wait(HEARING_SECONDS) and not self._closed:
+            pass  # the loop may have ended without having put it to rest: then nobody wakes it
+
+    def _rest(self, run: _Run) -> None:
+        """Put a turn that runs back into the queue, where nothing takes its place away, and hand on its slot."""
+        if self._closed or len(self._resting) >= self._most_resting:
+            run.awake.set()
+            return
+        spent = time.monotonic() - run.begun
+        run.before += spent
+        self._resting.add(run)
+        self._queue.join_again(run.holder).add_done_callback(lambda _: self._go_on(run))
+        self._leave(run.holder, spent)
+
+    def _go_on(self, run: _Run) -> None:
+        self._resting.discard(run)
+        run.begun = time.monotonic()
+        run.awake.set()
 
     def _require_share(self, holder: Holder) -> None:
         """Raise unless a holder has less than its share of a full queue."""
@@ -166,6 +258,7 @@ class SearchGate:
         if not ticket.admitted:
             self._make_room(holder)
         turn = self._queue.join(holder, fixed=ticket.admitted)
+        self._note_waiting()
         try:
             await asyncio.wait({turn}, timeout=_left(deadline))
         except asyncio.CancelledError:
@@ -173,6 +266,7 @@ class SearchGate:
             raise
         if not turn.done():
             self._queue.leave(holder, turn)
+            self._note_waiting()
             raise DeadlinePassedError
         turn.result()
 
@@ -190,23 +284,35 @@ class SearchGate:
         """Leave the queue, or hand on the turn that has just come."""
         if not turn.done():
             self._queue.leave(holder, turn)
+            self._note_waiting()
         elif turn.exception() is None:
             self._leave(holder, 0.0)
 
-    def _finish(self, done: asyncio.Future[Any], holder: Holder, begun: float) -> None:
+    def _finish(self, done: asyncio.Future[Any], run: _Run) -> None:
         del self._deadlines[done]
         if not done.cancelled():
             done.exception()  # looked at, also where the caller has gone
-        self._leave(holder, time.monotonic() - begun)
+        self._leave(run.holder, time.monotonic() - run.begun)
 
     def _leave(self, holder: Holder, seconds: float) -> None:
         """Hand the slot to the next in the queue, or give it back."""
         self._queue.finished(holder, seconds)
         following = self._queue.next()
+        self._note_waiting()
         if following is None:
             self.running -= 1
         else:
             following.set_result(None)
+
+    def _note_waiting(self) -> None:
+        """Write down who waits, for threads to look at."""
+        self._waiting = self._queue.standing()
+
+
+def _go_behind(nice: int) -> None:
+    """Have this thread go behind others where threads have priorities of their own."""
+    if nice and sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), nice)
 
 
 def _left(deadline: Deadline) -> float | None:

@@ -18,7 +18,7 @@ class Expecting(Protocol):
 
 
 class Ticket:
-    """One request's admission; made by `Entrance.admit`, taken by `SearchGate.run`.
+    """One request's admission; made by `Entrance.admit`, taken by `Gate.run`.
 
     From the end of its body until it reaches the gate, a request that is to search counts as taking a place. Without
     that, requests that arrive together would all see the same free place.

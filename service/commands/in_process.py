@@ -159,9 +159,8 @@ class InProcess:
             return
         self._has_compiled = True
         print("linefix: compiling, which takes a minute; what comes of it is kept for the next time", file=sys.stderr)
-        with suppress(
-            ParserEndedError, OSError
-        ):  # if it ends early or can keep nothing this one compiles what it needs
+        # If it ends early or can keep nothing this one compiles what it needs.
+        with suppress(ParserEndedError, OSError):
             self._parser.call(compile_kernels)
         self._parser.close()
 

@@ -16,6 +16,9 @@ from association import Deadline
 
 from ..admission.budget import ByteAccount
 from ..admission.errors import DeadlinePassedError, ForeignMapError
+from ..admission.gate import Gate
+from ..admission.ticket import Ticket
+from ..maps.cache import CachedMap
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap
 from ..parsing.parser_process import LARGE
@@ -75,19 +78,29 @@ class Exchange:
     async def read(self, reader: Reader[T]) -> T:
         """Receive the body and check it, off the event loop where that takes long.
 
-        A large one is parsed in a turn at the gate, like a search: it takes a core for a while, too. The deadline
-        counts from the moment when the body is there.
+        The deadline counts from the moment when the body is there.
         """
-        services = self.services
-        limits = services.settings.limits()
         async with self.received() as data:
             with stage("parse"):
                 if len(data) <= SMALL:
-                    return reader(data, limits)
-                if len(data) <= LARGE:
-                    return await services.parse_threads.run(partial(reader, data, limits))
-                call = partial(services.parser.call, reader, data, limits)
-                return await self.search(call, self.job().deadline)
+                    return reader(data, self.services.settings.limits())
+                return await self.unless_hung_up(self.parse(reader, data, deadline := self.job().deadline), deadline)
+
+    async def parse(self, reader: Reader[T], data: bytes | bytearray, deadline: Deadline) -> T:
+        """Check a body when its turn comes.
+
+        Turns are shared between callers, as those at the gate are, and are others than these: no search waits for
+        somebody's large body. Nor do bodies for larger ones, which another process parses.
+        """
+        services = self.services
+        if len(data) <= LARGE:
+            return await self._parsing(services.parsing, partial(reader, data, services.settings.limits()), deadline)
+        call = partial(services.parser.call, reader, data, services.settings.limits())
+        return await self._parsing(services.parsing_apart, call, deadline)
+
+    async def _parsing(self, gate: Gate, call: Callable[[], T], deadline: Deadline) -> T:
+        # By a ticket of its own: the request is still on its way to its search.
+        return await gate.run(call, deadline, Ticket(self._ticket.holder), lambda: True)
 
     @asynccontextmanager
     async def received(self, *, form: bool = False) -> AsyncIterator[bytearray]:
@@ -99,7 +112,8 @@ class Exchange:
             data = body.data
             if body.gzipped:
                 packed, max_bytes = len(data), services.settings.max_body_bytes
-                data = await services.parse_threads.run(partial(unpack, data, max_bytes, body.account.take))
+                call = partial(unpack, data, max_bytes, body.account.take)
+                data = await self._parsing(services.parsing_apart, call, self.job().deadline)
                 body.data.clear()
                 body.account.give_back(packed)
             yield data
@@ -144,6 +158,17 @@ class Exchange:
             account.take(len(found.document or b""))
             yield found
 
+    async def index(self, on: InlineMap | FoundMap, deadline: Deadline, *, oriented: bool | None) -> CachedMap | None:
+        """Index a map for which that takes long, in a turn of another kind: a search can rest, this cannot.
+
+        None where it is left to the search's own turn.
+        """
+        lookup = self.services.lookup
+        if not lookup.takes_long(on):
+            return None
+        call = partial(lookup.indexed, on, oriented=oriented, deadline=deadline)
+        return await self.services.indexing.run(call, deadline, Ticket(self._ticket.holder), lambda: False)
+
     async def search(self, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True) -> T:
         """Run a search when its turn comes; give up when the client does."""
         return await self.unless_hung_up(self.take_turn(call, deadline, heeds), deadline)
@@ -151,7 +176,7 @@ class Exchange:
     async def take_turn(self, call: Callable[[], T], deadline: Deadline, heeds: Callable[[], bool] = lambda: True) -> T:
         """Run a part of this request when its turn comes; what was let in once is not sent away later.
 
-        What does not heed the deadline is waited for until then and no longer: see `SearchGate.run`.
+        What does not heed the deadline is waited for until then and no longer: see `Gate.run`.
         """
         return await self.services.gate.run(queued(call), deadline, self._ticket, heeds)
 

@@ -10,7 +10,7 @@ from starlette.types import Scope
 from ..admission.budget import ByteBudget
 from ..admission.connections import ConnectionLimit
 from ..admission.entrance import Entrance
-from ..admission.gate import SearchGate
+from ..admission.gate import Gate
 from ..admission.keys import Keyring
 from ..admission.readiness import Readiness
 from ..maps import MapStore
@@ -40,7 +40,9 @@ class Services:
     refusals : RefusalTally
     readiness : Readiness
     entrance : Entrance
-    gate : SearchGate
+    gate : Gate
+    parsing, parsing_apart, indexing : Gate
+        Where bodies have their turns to be parsed, by a thread and by another process, and large maps to be indexed.
     keyring : Keyring
     connections : ConnectionLimit
     bodies : BodyReceiver
@@ -66,7 +68,10 @@ class Services:
     refusals: RefusalTally
     readiness: Readiness
     entrance: Entrance
-    gate: SearchGate
+    gate: Gate
+    parsing: Gate
+    parsing_apart: Gate
+    indexing: Gate
     keyring: Keyring
     connections: ConnectionLimit
     bodies: BodyReceiver
@@ -83,11 +88,26 @@ class Services:
     key_threads: Threads
     traces: Traces | None = None
 
+    @property
+    def working(self) -> bool:
+        """Whether anything runs at the gates."""
+        return any(gate.running for gate in self._gates)
+
+    @property
+    def _gates(self) -> tuple[Gate, ...]:
+        return self.gate, self.parsing, self.parsing_apart, self.indexing
+
+    def give_up(self) -> None:
+        """Tell everything that runs to end, and wait no longer for what does not hear."""
+        for gate in self._gates:
+            gate.cancel_all()
+
     def close(self) -> None:
         """Give up what still runs and give everything back."""
         self.refusals.report()
-        self.gate.cancel_all()
-        self.gate.close()
+        self.give_up()
+        for gate in self._gates:
+            gate.close()
         self.parser.close()
         for threads in (self.parse_threads, self.store_threads, self.key_threads, self.probe):
             threads.close()

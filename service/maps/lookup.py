@@ -21,6 +21,8 @@ from .store import MapStore
 
 MAX_EXTENT = 1e5  # m
 OVERHEAD = 24_000  # bytes that an index takes beside its arrays, however small these are
+LONG_SEGMENTS = 2_000  # of a map that takes some milliseconds to be indexed, and
+LONG_BYTES = 100_000  # of the document of one
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 
 
@@ -72,6 +74,12 @@ class MapLookup:
             return FoundMap(record, None)
         stored = self._store.load(map_id)
         return FoundMap(stored.record, stored.document)
+
+    def takes_long(self, asked: InlineMap | FoundMap) -> bool:
+        """Tell whether it may take long until a map is ready to be searched."""
+        if isinstance(asked, InlineMap):
+            return len(asked.segments) > LONG_SEGMENTS
+        return asked.document is not None and len(asked.document) > LONG_BYTES
 
     def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
         """Return a map ready to be searched.

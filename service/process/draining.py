@@ -47,7 +47,7 @@ def drain_on_signals(services: Services, loop: asyncio.AbstractEventLoop) -> Non
     def drain(number: int) -> None:
         seconds = services.settings.drain_seconds
         loop.call_later(seconds, close, number)
-        loop.call_later(seconds + GRACE, services.gate.cancel_all)
+        loop.call_later(seconds + GRACE, services.give_up)
 
     for number in HANDLED_SIGNALS:
         signal.signal(number, handle)

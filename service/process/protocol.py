@@ -14,7 +14,7 @@ from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import RequestResponseCycle
 
 from ..admission.entrance import search_of
-from ..admission.errors import AdmissionError, MissingKeyError, UnknownKeyError
+from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
 from ..http.problems import RAISED
 from ..http.reception import taken_or_made
 from ..http.state import state_of
@@ -22,6 +22,7 @@ from ..schemas.errors import RequestError
 from .receipt import Exit, ReceiptProtocol
 
 UNREAD = 65_536  # bytes; what is left of a refused body up to here is read and dropped, beyond it the connection ends
+LATER = 0.05  # s after which who keeps others waiting is told to wait: told at once it would ask again at once
 OTHER = "unmatched"
 STRANGERS = (MissingKeyError, UnknownKeyError)
 """What ends the connection: nobody is served on it who has shown no key."""
@@ -38,6 +39,9 @@ class AdmittingProtocol(ReceiptProtocol):
         assert state is not None
         try:
             state.ticket = self._services.entrance.admit(scope)
+        except ShareUsedError as error:
+            self.loop.call_later(LATER, self._refuse, cycle, error)
+            return
         except (AdmissionError, RequestError) as error:
             self._refuse(cycle, error)
             return
@@ -55,7 +59,9 @@ class AdmittingProtocol(ReceiptProtocol):
         super().on_message_complete()
 
     def _refuse(self, cycle: RequestResponseCycle, error: AdmissionError | RequestError) -> None:
-        """Answer in place of the application."""
+        """Answer in place of the application, unless there is nobody, or nothing, left to answer."""
+        if self._lost or cycle.response_complete:
+            return
         scope = cast("Scope", cycle.scope)
         close = isinstance(error, STRANGERS) or _is_unread(cycle, scope) or not cycle.keep_alive
         cycle.response_started = cycle.response_complete = True

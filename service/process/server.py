@@ -46,7 +46,7 @@ def serve_alone(settings: Settings, listener: socket.socket) -> int:
         # When it has ended well uvicorn raises the signal again, for handlers that were there before.
         signal.signal(number, lambda *_: None)
     uvicorn.Server(config).run([listener])
-    if config.loaded_app.state.services.gate.running:
+    if config.loaded_app.state.services.working:
         logging.shutdown()
         os._exit(0)
     return 0

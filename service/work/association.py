@@ -69,9 +69,11 @@ class Associator:
     lookup: MapLookup
     metrics: Metrics
 
-    def answer(self, asked: AssociateRequest, on: InlineMap | FoundMap, job: Job) -> Done:
-        """Find one scan in one map; raises what `target` and `find` raise."""
-        target = self.target(on, asked.options, job.deadline)
+    def answer(
+        self, asked: AssociateRequest, on: InlineMap | FoundMap, job: Job, ready: CachedMap | None = None
+    ) -> Done:
+        """Find one scan in one map, which may be ready already; raises what `target` and `find` raise."""
+        target = self.target(on, asked.options, job.deadline, ready)
         job.watch.lap("decode")
         job.searching.set()
         found = self.find(target, asked, asked.options, job.deadline)
@@ -79,8 +81,10 @@ class Associator:
         answer = {**found, "map": target.reference, "client_ref": asked.client_ref}
         return job.done(answer, map=target.reference, verdict=found["status"], usable=found["usable"])
 
-    def target(self, on: InlineMap | FoundMap, options: SearchOptions, deadline: Deadline) -> Target:
-        """Return a map, indexed; one that is begun is finished, whenever the deadline passes.
+    def target(
+        self, on: InlineMap | FoundMap, options: SearchOptions, deadline: Deadline, ready: CachedMap | None = None
+    ) -> Target:
+        """Return a map, indexed unless it is ready; one that is begun is finished, whenever the deadline passes.
 
         Raises
         ------
@@ -92,7 +96,7 @@ class Associator:
             When it cannot be searched.
         """
         with stage("index"):
-            cached = self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
+            cached = ready or self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
         if isinstance(on, FoundMap):
             return Target(cached, {"map_id": on.record.map_id, "revision": on.record.revision})
         return Target(cached, None)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 
 from filelock import FileLock
 
 from registration import compiling
 
-BESIDE = "from service.work.warmup import warm_up_measuring; warm_up_measuring()"
+from ..parsing.own_modules import command_of
 
+BESIDE = "service.work.warmup"  # as a program it compiles what registers and vectorizes
 PACKAGES = ("registration", "vectorization", "association")
 
 
@@ -34,6 +34,6 @@ def compile_kernels() -> None:
         from .warmup import warm_up, warm_up_searching
 
         if (os.cpu_count() or 1) > 1:
-            with subprocess.Popen([sys.executable, "-c", BESIDE]):
+            with subprocess.Popen(command_of(BESIDE)):
                 warm_up_searching()
         warm_up()

@@ -116,3 +116,7 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
         hit = (np.abs(cross) > 1e-12) & (along > 0.0) & (share >= 0.0) & (share <= 1.0)
         nearest = np.where(hit, np.minimum(nearest, along), nearest)
     return nearest
+
+
+if __name__ == "__main__":
+    warm_up_measuring()

@@ -43,6 +43,14 @@ def searched_for(seconds: float = 4.0) -> bytes:
     return orjson.dumps(body, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
+def slow_to_index(walls: int) -> bytes:
+    """Return a map that takes seconds to be indexed where directions mean nothing."""
+    rng = np.random.default_rng(3)
+    begins, angles = rng.uniform(0.0, 500.0, (walls, 2)), rng.uniform(0.0, np.pi, walls)
+    segments = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+    return orjson.dumps({"segments": segments.round(4)}, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
 @contextmanager
 def searching(running: RunningService) -> Iterator[None]:
     """Have the hard map searched for as long as the block takes; then whoever asked for that hangs up."""

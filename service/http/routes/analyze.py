@@ -62,6 +62,7 @@ async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: Analyze
     """Index the map in one turn at the gate, and try its places in as many short ones as it takes."""
     lookup = exchange.services.lookup
     async with exchange.looking_up(named, job.deadline, oriented=None) as on:
+        await exchange.index(on, job.deadline, oriented=None)
         work = partial(begin_analysis, lookup, on, asked, job)
         tally = await exchange.take_turn(work, job.deadline, job.searching.is_set)
     await _take_looks(exchange, tally, job)

@@ -10,7 +10,8 @@ from ...parsing.reading import read_model
 from ...schemas import examples
 from ...schemas.replies import AssociateAnswer
 from ...schemas.requests import AssociateRequest
-from ..exchange import searching
+from ...work.job import Done, Job
+from ..exchange import Exchange, searching
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
 router = APIRouter(tags=["associate"])
@@ -29,6 +30,13 @@ async def post_associate(request: Request) -> Response:
     exchange = searching(request)
     asked = await exchange.read(partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
-    async with exchange.looking_up(asked.map, job.deadline, oriented=asked.options.oriented) as on:
-        work = partial(exchange.services.associator.answer, asked, on, job)
-        return exchange.answer(await exchange.search(work, job.deadline, job.searching.is_set))
+    return exchange.answer(await exchange.unless_hung_up(_work(exchange, asked, job), job.deadline))
+
+
+async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
+    """Search in one turn at the gate, in which the map is indexed, too, where that takes no time to speak of."""
+    oriented = asked.options.oriented
+    async with exchange.looking_up(asked.map, job.deadline, oriented=oriented) as on:
+        ready = await exchange.index(on, job.deadline, oriented=oriented)
+        work = partial(exchange.services.associator.answer, asked, on, job, ready)
+        return await exchange.take_turn(work, job.deadline, job.searching.is_set)

@@ -44,10 +44,11 @@ async def post_batch(request: Request) -> Response:
 
 
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
-    """Index the map in one turn at the gate, and search for each scan in another."""
-    associator = exchange.services.associator
-    async with exchange.looking_up(asked.map, job.deadline, oriented=asked.options.oriented) as on:
-        index = partial(associator.target, on, asked.options, job.deadline)
+    """Index the map in one turn, and search for each scan in another."""
+    associator, oriented = exchange.services.associator, asked.options.oriented
+    async with exchange.looking_up(asked.map, job.deadline, oriented=oriented) as on:
+        ready = await exchange.index(on, job.deadline, oriented=oriented)
+        index = partial(associator.target, on, asked.options, job.deadline, ready)
         target = await exchange.take_turn(index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
     calls = [

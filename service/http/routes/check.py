@@ -69,6 +69,7 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
     lookup = exchange.services.lookup
     async with exchange.looking_up(StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
+        await exchange.index(on, job.deadline, oriented=True)
         work = partial(check, lookup, on, asked, job)
         checked = await exchange.take_turn(work, job.deadline, job.searching.is_set)
     judged = None

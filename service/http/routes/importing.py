@@ -14,7 +14,6 @@ from association import Deadline
 from ...admission.errors import DeadlinePassedError
 from ...importing.bounded import ReadMap, read_apart
 from ...importing.bounds import Bounds
-from ...parsing.parser_process import LARGE
 from ...parsing.reading import read_model
 from ...schemas.imports import FORM as SCHEMA
 from ...schemas.imports import ImportAnswer
@@ -59,10 +58,7 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     bounds = Bounds(settings.max_import_bytes, settings.max_body_bytes, settings.max_map_segments)
     read = await _alone(exchange, partial(read_apart, content, content_type, bounds, job.deadline), job.deadline)
     job.watch.lap("read")
-    parse = partial(read_model, InlineMap, read.map, settings.limits())
-    if len(read.map) > LARGE:
-        parse = partial(services.parser.call, read_model, InlineMap, read.map, settings.limits())
-    line_map = await exchange.take_turn(parse, job.deadline)
+    line_map = await exchange.parse(partial(read_model, InlineMap), read.map, job.deadline)
     check = partial(answer_import, services.lookup, line_map, read, job)
     return await exchange.take_turn(check, job.deadline, job.searching.is_set)
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from association import Deadline
 from service.admission.fair_queue import Holder
-from service.admission.gate import SearchGate
+from service.admission.gate import Gate
 from service.admission.ticket import Ticket
 
 T = TypeVar("T")
@@ -29,7 +29,7 @@ async def until(condition: Callable[[], bool]) -> None:
         await asyncio.sleep(0.001)
 
 
-class BlockedGate(SearchGate):
+class BlockedGate(Gate):
     """A gate, and a search that runs until it is released."""
 
     def __init__(self, slots: int, queue: int) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import os
+import sys
 import threading
 import time
 
@@ -11,7 +13,7 @@ import pytest
 
 from association import CancelledError, Deadline
 from service.admission.errors import DeadlinePassedError, QueueFullError
-from service.admission.gate import HEARING_SECONDS, SearchGate
+from service.admission.gate import HEARING_SECONDS, Gate
 from service.admission.ticket import Ticket
 
 from .gates import PATIENCE, gate_of, in_loop, soon, until
@@ -209,7 +211,7 @@ def test_what_fails_after_its_caller_has_left_is_not_reported_as_a_defect() -> N
 
 def test_what_cannot_be_started_gives_the_slot_back() -> None:
     async def scenario() -> None:
-        gate = SearchGate(1, 0)
+        gate = Gate(1, 0)
         gate.close()
         for _ in range(2):
             with pytest.raises(RuntimeError, match="shutdown"):
@@ -290,5 +292,24 @@ def test_told_to_give_up_twice_it_ends_once() -> None:
             await asyncio.wait({deaf})
             await asyncio.sleep(0.05)
         assert failures == []
+
+    in_loop(scenario)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have no priority of their own elsewhere")
+def test_threads_may_go_behind_others() -> None:
+    def nice() -> int:
+        return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+    async def scenario() -> None:
+        behind, usual = Gate(1, 1, nice=3), Gate(1, 1)
+        before = nice()
+        assert [await gate.run(nice, soon(), Ticket(), lambda: True) for gate in (behind, usual)] == [
+            before + 3,
+            before,
+        ]
+        assert nice() == before
+        for gate in (behind, usual):
+            gate.close()
 
     in_loop(scenario)

@@ -6,22 +6,13 @@ from collections.abc import Callable
 from itertools import count
 from typing import Any
 
-import numpy as np
-import orjson
 import pytest
 
 from tests.running import RunningService, until
+from tests.service.searches import slow_to_index
 
-RUNNING, BEGUN = "linefix_searches_running", "linefix_map_cache_misses_total"
+RUNNING, BEGUN = "linefix_indexing_running", "linefix_map_cache_misses_total"
 SEEN = {"segments": [[0.0, 1.0, 2.0, 1.0]]}
-
-
-def slow_to_index(walls: int) -> bytes:
-    """Return a map that takes seconds to be indexed where directions mean nothing."""
-    rng = np.random.default_rng(3)
-    begins, angles = rng.uniform(0.0, 500.0, (walls, 2)), rng.uniform(0.0, np.pi, walls)
-    segments = np.hstack([begins, begins + 3.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
-    return orjson.dumps({"segments": segments.round(4)}, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 @pytest.mark.parametrize("path", ["/v1/associate", "/v1/associate:batch"])

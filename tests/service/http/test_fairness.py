@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 
-from tests.running import RunningService, client_of
-from tests.service.searches import searched_a_while, searched_briefly
+from service.process.protocol import LATER
+from tests.running import RunningService, client_of, until
+from tests.service.searches import POST, searched_a_while, searched_briefly, searched_for, searching, store_hard_map
 
 
 def test_a_flood_leaves_the_others_their_share(start_service: Callable[..., RunningService]) -> None:
@@ -62,3 +64,41 @@ def test_a_key_alone_has_all_of_the_service(start_service: Callable[..., Running
     for thread in threads:
         thread.join()
     assert answers == [200] * 10
+
+
+def test_who_keeps_others_waiting_is_told_so_a_little_later(start_service: Callable[..., RunningService]) -> None:
+    """Told at once it would ask at once; one that does not wait for it is no defect."""
+    running = start_service(searches=1, queue=1)
+    store_hard_map(running)
+    long, asked = post(searched_for(30.0)), post(searched_briefly())
+    with searching(running), running.connection(source="127.0.0.2") as another:
+        another.sendall(long)
+        until(lambda: running.count("linefix_searches_waiting") == 1.0)
+        begun = time.monotonic()
+        assert running.client.post("/v1/associate", content=searched_briefly()).status_code == 429
+        assert time.monotonic() - begun >= LATER
+        probed = time.monotonic()
+        assert running.client.get("/livez").status_code == 200
+        assert time.monotonic() - probed < LATER, "on the same connection"
+        for _ in range(10):
+            with running.connection() as connection:
+                connection.sendall(asked)
+        with running.connection() as connection:
+            connection.sendall(asked * 3)
+            heard = b""
+            while heard.count(b"HTTP/1.1 429 ") < 3:
+                heard += connection.recv(65_536)
+        with running.connection() as connection:
+            connection.sendall(POST + b"Transfer-Encoding: chunked\r\n\r\nno number\r\n")
+            heard = b""
+            while data := connection.recv(65_536):
+                heard += data
+            assert heard.count(b"\r\n\r\n") == 1
+        time.sleep(2 * LATER)
+    log = running.log()
+    assert "a defect" not in log
+    assert "Exception" not in log
+
+
+def post(body: bytes) -> bytes:
+    return POST + b"Content-Length: %d\r\n\r\n" % len(body) + body

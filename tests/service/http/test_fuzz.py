@@ -19,6 +19,7 @@ from schemathesis import GenerationMode, checks
 
 from service.schemas import examples
 from tests.running import RunningService, running
+from tests.service.importing.forms import SQUARE, TYPE, form, room_grid
 
 CASES = int(os.environ.get("FUZZ_CASES", "2000"))
 PATHS = ["/v1/register", "/v1/associate", "/v1/associate:batch", "/v1/vectorize"]
@@ -73,6 +74,8 @@ OPERATIONS = [
     ("GET", "/v1/maps"),
     ("GET", "/v1/maps/{map_id}:check"),
     ("POST", "/v1/maps/{map_id}:check"),
+    ("POST", "/v1/analyze"),
+    ("POST", "/v1/maps/{map_id}:analyze"),
     ("GET", "/v1/limits"),
     ("GET", "/version"),
     ("GET", "/livez"),
@@ -264,6 +267,35 @@ def test_extreme_scans(
     assert_sane(client.post("/v1/associate", json=body))
     points = [[r or 0.0, float(i)] for i, r in enumerate(ranges)]
     assert_sane(client.post("/v1/vectorize", json={"points": points, "options": {"sigma": sigma}}))
+
+
+SVG = b'<svg xmlns="http://www.w3.org/2000/svg" width="9"><path d="M0 0h8v5h-8z"/><rect width="2" height="1"/></svg>'
+GEOJSON = b'{"type": "LineString", "coordinates": [[0.0, 0.0], [8.0, 0.0], [8.0, 5.0], [0.0, 5.0]]}'
+DXF = b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\nWALL\n10\n0.0\n20\n0.0\n11\n8.0\n21\n0.0\n0\nENDSEC\n0\nEOF\n"
+FILES = [{"plan.svg": SVG}, {"plan.geojson": GEOJSON}, {"plan.dxf": DXF}, {"plan.csv": SQUARE}, room_grid()]
+TOKENS = st.sampled_from([b"", b"0", b"-", b"1e999", b"nan", b"9" * 30, b"\n", b"\xff", b"<", b"[", b'"', b"\x00" * 9])
+
+
+@st.composite
+def mutated_files(draw: st.DrawFn) -> dict[str, bytes]:
+    """Files of a map that are right but for up to three places in one of them, and perhaps in another's name."""
+    files = dict(draw(st.sampled_from(FILES)))
+    name = draw(st.sampled_from(sorted(files)))
+    for _ in range(draw(st.integers(0, 3))):
+        content = files[name]
+        begin = draw(st.integers(0, len(content)))
+        end = draw(st.sampled_from([begin, begin + 1, begin + 4, len(content)]))
+        files[name] = content[:begin] + draw(TOKENS | st.binary(max_size=8)) + content[end:]
+    if draw(st.integers(0, 5)) == 0:
+        files[draw(st.sampled_from(["map.png", "map.yaml", "map.zip", "map", "a.db3", "../map.svg"]))] = files.pop(name)
+    return files
+
+
+@fuzz(0.003)
+@given(files=mutated_files(), options=st.none() | st.binary(max_size=30) | ANYTHING.map(encoded))
+def test_mutated_files_of_other_tools(client: httpx.Client, files: dict[str, bytes], options: bytes | None) -> None:
+    fields = [] if options is None else [("options", options.decode("latin-1"))]
+    assert_sane(client.post("/v1/maps:import", content=bytes(form(files, *fields)), headers={"content-type": TYPE}))
 
 
 def test_memory_stays_flat(fuzzed: RunningService, client: httpx.Client) -> None:

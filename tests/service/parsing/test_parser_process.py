@@ -17,7 +17,7 @@ import pytest
 import registration
 from service.parsing.channel import receive, send
 from service.parsing.errors import NotJsonError, ParserEndedError
-from service.parsing.parser_process import ParserProcess
+from service.parsing.parser_process import NICE, ParserProcess
 from service.parsing.reading import read_map, read_model
 from service.schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
 from service.schemas.parts import MapDocument
@@ -31,6 +31,10 @@ def parser() -> Iterator[ParserProcess]:
     yield made
     made.close()
     assert made.pid is None
+
+
+def test_searches_go_before_it(parser: ParserProcess) -> None:
+    assert parser.call(os.nice, 0) == os.nice(0) + NICE
 
 
 def test_what_stands_in_the_working_folder_is_not_taken_for_the_service(

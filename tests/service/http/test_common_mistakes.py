@@ -1,0 +1,110 @@
+"""Mistakes that callers make are named, with what to send instead; and what only looks like one is taken."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import pytest
+
+from .test_refusals import ROOM, associate_body, refused
+
+
+def test_angles_in_degrees_are_not_taken(client: httpx.Client) -> None:
+    prior = {"x": 0.0, "y": 0.0, "theta": 80.0}
+    laser = {"angle_min": -180.0, "angle_increment": 0.01, "ranges": [1.0] * 10}
+    for body, pointer in (
+        (associate_body(prior={**prior, "radius": 1.0, "angle": 1.0}), "/prior/theta"),
+        (associate_body(prior={**prior, "covariance": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}), "/prior/theta"),
+        (associate_body(scan={"laser": laser}), "/scan/laser/angle_min"),
+    ):
+        problem = refused(client.post("/v1/associate", json=body), 422, "invalid_request")
+        assert [error["pointer"] for error in problem["errors"]] == [pointer]
+        (error,) = problem["errors"]
+        assert "radians" in error["message"]
+        assert "degrees" in error["message"]
+        assert "12.566" not in error["message"]
+
+
+@pytest.mark.parametrize(
+    ("matrix", "named"),
+    [
+        ([0.1] * 36, "yaw"),
+        ([[0.1] * 6] * 6, "yaw"),
+        ([0.1] * 9, "3 rows"),
+        ([[0.1] * 3] * 2, "3 rows"),
+        ([], "3 rows"),
+    ],
+)
+def test_a_covariance_of_another_shape_is_one_fault(client: httpx.Client, matrix: object, named: str) -> None:
+    """ROS gives 36 numbers in a row, of which (x, y, yaw) are those of rows and columns 0, 1 and 5."""
+    prior = {"x": 0.0, "y": 0.0, "theta": 0.0, "covariance": matrix}
+    problem = refused(client.post("/v1/associate", json=associate_body(prior=prior)), 422, "invalid_request")
+    (error,) = problem["errors"]
+    assert error["pointer"] == "/prior/covariance"
+    assert named in error["message"]
+
+
+def test_a_misspelt_field_is_named(client: httpx.Client) -> None:
+    for body, wanted in (
+        (associate_body(scan={"segement": ROOM}), {"/scan/segments": "missing", "/scan/segement": "unknown field"}),
+        (associate_body(map={"id": "hq"}), {"/map/segments": "missing", "/map/id": "unknown field"}),
+        (associate_body(scan={"ranges": [1.0]}), {"/scan/laser": "missing", "/scan/ranges": "unknown field"}),
+    ):
+        problem = refused(client.post("/v1/associate", json=body), 422, "invalid_request")
+        assert {error["pointer"]: error["message"] for error in problem["errors"]} == wanted
+
+
+def test_numbers_next_to_nothing_are_no_defect(client: httpx.Client) -> None:
+    laser = {"angle_min": -3.0, "angle_increment": 0.1, "ranges": [2.0] * 50}
+    for changed, status in (
+        ({"angle_increment": 1e-200}, 422),
+        ({"ranges": [5e-324] * 50}, 200),
+        ({"ranges": [2.0, 5e-324] * 25, "range_min": 0.0}, 200),
+        ({"angle_increment": 1e-320, "ranges": [10.0] * 50}, 422),
+    ):
+        for path, body in (
+            ("/v1/vectorize", {"laser": laser | changed}),
+            ("/v1/associate", associate_body(scan={"laser": laser | changed})),
+        ):
+            assert client.post(path, json=body).status_code == status, (path, changed)
+
+
+def test_nan_is_told_what_to_send_instead(client: httpx.Client) -> None:
+    for number in ("NaN", "Infinity", "-Infinity"):
+        answer = client.post("/v1/vectorize", content=f'{{"laser": {{"ranges": [1.0, {number}]}}}}'.encode())
+        detail = refused(answer, 400, "invalid_json")["detail"]
+        assert "an unknown range is null" in detail
+        assert "above range_max" in detail
+
+
+def test_a_laser_scan_message_is_taken_with_all_its_fields(client: httpx.Client) -> None:
+    laser = {"angle_min": -0.4, "angle_increment": 0.1, "ranges": [2.0] * 9, "range_max": 30.0}
+    more = {"angle_max": 0.4, "time_increment": 0.0, "scan_time": 0.1, "intensities": [1.0] * 9}
+    header = {"seq": 7, "stamp": {"sec": 12, "nanosec": 5}, "frame_id": "base_laser"}
+    plain, full = (
+        client.post("/v1/vectorize", json={"laser": one}).json() for one in (laser, laser | more | {"header": header})
+    )
+    assert plain["segments"] == full["segments"]
+
+
+def test_a_laser_scan_s_header_fills_stamp_and_frame(client: httpx.Client) -> None:
+    laser = {"angle_min": -0.4, "angle_increment": 0.1, "ranges": [2.0] * 9, "range_max": 30.0}
+    stamp = {"sec": 12, "nanosec": 5}
+    headed = laser | {"header": {"stamp": stamp, "frame_id": "base_laser"}}
+
+    def told(**scan: Any) -> tuple[object, object]:
+        answer = client.post("/v1/associate", json=associate_body(scan=scan)).json()
+        return answer["stamp"], answer["child_frame_id"]
+
+    assert told(laser=laser) == (None, "laser")
+    assert told(laser=headed) == (stamp, "base_laser")
+    assert told(laser=headed, stamp=3, frame_id="mine") == (3, "mine")
+    assert told(laser=laser | {"header": {}}) == (None, "laser")
+    assert told(laser=laser | {"header": {"frame_id": ""}}) == (None, "laser")
+    batch = client.post("/v1/associate:batch", json={"map": {"segments": ROOM}, "scans": [{"laser": headed}]}).json()
+    assert batch["results"][0]["result"]["child_frame_id"] == "base_laser"
+    for header, pointer in (({"stmp": 1}, "/scan/laser/header/stmp"), (3, "/scan/laser/header")):
+        body = associate_body(scan={"laser": laser | {"header": header}})
+        problem = refused(client.post("/v1/associate", json=body), 422, "invalid_request")
+        assert problem["errors"][0]["pointer"] == pointer
