@@ -104,7 +104,7 @@ def _services(settings: Settings, part: Part) -> Services:
     gate = Gate(part.share(settings.searches), part.share(settings.queue))
     indexing = Gate(part.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE)
     budget = _budget(settings, part, settings.max_bodies_bytes)
-    store = MapStore(settings.url, may_make=not part.replaces, most_bytes=settings.max_stored_bytes)
+    store = MapStore(settings.url, may_make=part.is_first, most_bytes=settings.max_stored_bytes)
     cache = IndexCache(part.share(settings.cache_bytes), metrics)
     parser = ParserProcess()
     lookup = MapLookup(cache, store, parser)

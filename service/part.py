@@ -21,12 +21,17 @@ class Part:
     replaces: bool = False
 
     @property
+    def is_first(self) -> bool:
+        """Whether it may make what has to be there once; the others come to what is there."""
+        return self.index == 0 and not self.replaces
+
+    @property
     def opens_late(self) -> bool:
         """Whether it takes connections only when it is ready: others take them meanwhile, or the first says why not.
 
         A service is ready as soon as one of its processes is. No other may take a request that it has to refuse.
         """
-        return self.replaces or self.index > 0
+        return not self.is_first
 
     def share(self, whole: int) -> int:
         """Return this part's share of something; all shares add up to the whole."""

@@ -17,6 +17,7 @@ import socket
 import tempfile
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -25,6 +26,9 @@ from typing import TYPE_CHECKING
 from filelock import FileLock, Timeout
 from uvicorn.supervisors import Multiprocess
 
+from ..database_file import file_of
+from ..maps.database import DatabaseFile
+from ..maps.errors import StoreError
 from ..part import Part
 from ..settings import Settings
 from ..telemetry.metrics import forget_worker, share_counts
@@ -71,7 +75,15 @@ class Supervisor(Multiprocess):
 
 
 def supervise(settings: Settings, listener: socket.socket) -> int:
-    """Run workers until a signal comes; return the status to exit with."""
+    """Run workers until a signal comes; return the status to exit with.
+
+    The file of the maps is made before any of them runs: one that still starts when it is moved away must not make it
+    anew.
+    """
+    path = file_of(settings.url)
+    if path is not None:
+        with suppress(StoreError):  # the first worker tries again, and says what is wrong
+            DatabaseFile(path, may_make=True).require()
     # Counts live in memory where there is a file system for that; nothing else need be writable.
     shared = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
     with tempfile.TemporaryDirectory(prefix="linefix-workers-", dir=shared) as directory:

@@ -9,10 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from service.app import create_app
 from service.database_url import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import StoreAwayError
+from service.part import Part
 from service.schemas import examples
+from service.settings import Settings
 from tests.running import RunningService, children_of, until
 
 
@@ -76,6 +79,16 @@ def test_who_stands_in_for_another_makes_none(tmp_path: Path) -> None:
     assert not path.exists()
     open_store(path).close()
     open_store(path, may_make=False).close()
+
+
+@pytest.mark.parametrize("part", [Part(1, 2), Part(0, 2, replaces=True)], ids=["second", "replaces"])
+def test_of_several_processes_only_the_first_makes_it(tmp_path: Path, part: Part) -> None:
+    """One that still started when the file was moved away made it anew."""
+    services = create_app(Settings(data_dir=tmp_path), part).state.services
+    with pytest.raises(StoreAwayError):
+        services.store.open()
+    assert list(tmp_path.iterdir()) == []
+    services.close()
 
 
 @pytest.mark.parametrize("workers", [1, 2])

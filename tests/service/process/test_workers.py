@@ -52,6 +52,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
         until(lambda: ready(service) == 2)
         yield service
         assert "a defect" not in service.log()
+        assert "does not open" not in service.log()
 
 
 def test_shares_add_up() -> None:
