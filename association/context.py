@@ -11,7 +11,7 @@ from registration import RigidTransform
 from registration.layout import Records
 
 from .alignment import aligned
-from .layout import HARD_PRIOR, NO_PRIOR, POINT, PRIOR, RULES, SIGHTING, SOFT_PRIOR, TERMS, as_records, record
+from .layout import HARD_PRIOR, NO_PRIOR, POINT, PRIOR, SIGHTING, SOFT_PRIOR, TERMS, as_records, record
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
@@ -20,7 +20,6 @@ from .tables import Question, Sights, Workspace
 from .tuning import LATE_CROWD
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
-ANY = record(RULES)  # for kernels that keep no poses
 
 
 @lru_cache
@@ -107,9 +106,15 @@ class SearchContext:
 
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""
+        terms = self.question_of_a_pose.terms.copy()
+        terms["rules"] = rules
+        return Question(self.lines.rows, terms)
+
+    @cached_property
+    def question_of_a_pose(self) -> Question:
+        """The same for kernels that keep no poses."""
         terms = np.zeros(1, TERMS)
-        terms["gates"], terms["rules"], terms["prior"] = self.gates, rules, self.prior_record
-        terms["model"] = self.lines.model
+        terms["gates"], terms["prior"], terms["model"] = self.gates, self.prior_record, self.lines.model
         return Question(self.lines.rows, terms)
 
     def anywhere(self) -> SearchContext:

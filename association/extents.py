@@ -9,6 +9,13 @@ from registration import Segments
 from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 
 
+def diagonal(segments: Segments) -> float:
+    """Return the diagonal of the box around segments, metres; 0 without any."""
+    if not len(segments):
+        return 0.0
+    return float(np.hypot(*np.ptp(segments.endpoints.reshape(-1, 2), axis=0)))
+
+
 def inner_extent(segments: Segments) -> float:
     """Return how wide segments lie apart in the direction in which that is most, metres.
 

@@ -19,6 +19,7 @@ from .tuning import (
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
+    NARROW_REACH,
     RASTER_CELL,
     REACH,
     SECTORS,
@@ -44,10 +45,13 @@ def swept_runs(runs: Walls) -> Grid:
 def directions_near(walls: Walls, runs: Walls) -> Raster:
     """Set in each cell the sectors of the walls and runs near it: runs also have directions over their doorways."""
     # The line of a run may pass its walls by as much as they were merged with.
-    both, reach = np.vstack([ends_of(walls), ends_of(runs)]), REACH + MERGE_LATERAL
-    shape = _shape(both, RASTER_CELL, reach, MAX_CELLS)
-    sectors = np.concatenate([_sectors(walls), _sectors(runs)])
-    return Raster(shape, direction_raster(as_records(ENDS, both), reach, shape, sectors))
+    both = np.vstack([ends_of(walls), ends_of(runs)])
+    shape = _shape(both, RASTER_CELL, REACH + MERGE_LATERAL, MAX_CELLS)
+    sectors, ends = np.concatenate([_sectors(walls), _sectors(runs)]), as_records(ENDS, both)
+    bits = np.zeros(int(shape["columns"][0] * shape["rows"][0]), dtype=np.uint32)
+    direction_raster(ends, REACH + MERGE_LATERAL, shape, sectors, bits)
+    direction_raster(ends, NARROW_REACH + MERGE_LATERAL, shape, sectors + SECTORS, bits)
+    return Raster(shape, bits)
 
 
 def _sectors(walls: Walls) -> NDArray[np.int32]:

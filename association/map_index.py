@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from registration import Segments
 
 from .errors import InvalidMapError
+from .extents import diagonal
 from .grids import directions_near, near_walls, swept_runs
 from .layout import ENDS, Integers, as_records
 from .tables import Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
@@ -143,7 +144,7 @@ class MapIndex:
     @cached_property
     def diagonal(self) -> float:
         """Of the box around the map, metres."""
-        return float(np.hypot(*np.ptp(self.segments.endpoints.reshape(-1, 2), axis=0)))
+        return diagonal(self.segments)
 
     @cached_property
     def tables(self) -> MapTables:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.resources import files
 
 import numpy as np
@@ -35,7 +36,11 @@ class Curve:
 
     def __call__(self, value: float) -> float:
         """Return what a value adds, nats."""
-        return self.slope * value + sum(more * (value - start) for start, more in self.bends if value > start)
+        bent = 0.0
+        for start, more in self.bends:
+            if value > start:
+                bent += more * (value - start)
+        return self.slope * value + bent
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +68,13 @@ class Pair:
 
     def __call__(self, features: Features) -> float:
         """Return what the features of an answer add, nats."""
-        one, other = (
-            min(1.0, max(0.0, (getattr(features, name) - start) / (end - start)))
-            for name, (start, end) in zip((self.first, self.second), self.from_to, strict=True)
-        )
+        (start, end), (begin, finish) = self.from_to
+        one = min(1.0, max(0.0, (getattr(features, self.first) - start) / (end - start)))
+        other = min(1.0, max(0.0, (getattr(features, self.second) - begin) / (finish - begin)))
         return self.nats * float(min(one, other) if self.kind == LEAST else max(one, other))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Model:
     """An additive model: the logarithm of the odds is a sum of curves, one for each feature, and of some pairs of them.
 
@@ -86,8 +90,16 @@ class Model:
 
     def logit(self, features: Features) -> float:
         """Return the logarithm of the odds."""
-        by_curves = sum(curve(getattr(features, name)) for name, curve in self.curves.items())
-        return by_curves + sum(pair(features) for pair in self.pairs)
+        by_curves = by_pairs = 0.0
+        for place, curve in self._curves:
+            by_curves += curve(features[place])
+        for pair in self.pairs:
+            by_pairs += pair(features)
+        return by_curves + by_pairs
+
+    @cached_property
+    def _curves(self) -> tuple[tuple[int, Curve], ...]:
+        return tuple((Features._fields.index(name), curve) for name, curve in self.curves.items())
 
 
 def as_model(document: Mapping[str, Sequence[float]]) -> Model:

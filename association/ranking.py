@@ -13,7 +13,7 @@ from registration import RigidTransform
 from registration.layout import Records
 
 from .candidates import Candidates
-from .context import ANY, SearchContext
+from .context import SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
@@ -161,7 +161,10 @@ def score_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[
     CancelledError
         When the deadline was cancelled.
     """
-    scored = _score(context, np.concatenate([one.estimate for one in explanations]))
+    poses = np.zeros(len(explanations), ESTIMATE)
+    for place, one in enumerate(explanations):
+        poses[place] = one.estimate[0]
+    scored = _score(context, poses)
     again = []
     for place, one in enumerate(explanations):
         merit = scored.merits[place]
@@ -231,7 +234,7 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
         some = slice(begin, begin + step)
         parts = scored.estimates[some], scored.merits[some], scored.matches[some]
         sights = context.nothing_seen if context.too_late_to_look else context.lines_of_sight
-        rank(context.question(ANY), place, sights, *parts, context.workspace)
+        rank(context.question_of_a_pose, place, sights, *parts, context.workspace)
     if context.deadline.cancelled:
         raise CancelledError
     return scored

@@ -12,7 +12,7 @@ from registration.chi_square import chi_square_quantile
 from registration.layout import Floats, Records
 from registration.observability import THREE_SIGMA_TAIL
 
-from .context import ANY, SearchContext
+from .context import SearchContext
 from .kernels.settling import settle as settle_matches
 from .layout import HINGE, SETTLED
 from .ranking import Ranked
@@ -64,7 +64,7 @@ def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Sett
     without = np.zeros(len(best.matches) if hinges else 0, HINGE)
     known = context.index.sigma
     count = settle_matches(
-        context.question(ANY), context.index.walls.rows, best.matches, best.estimate,
+        context.question_of_a_pose, context.index.walls.rows, best.matches, best.estimate,
         -1.0 if known is None else known**2, settled, without, context.workspace,
     )  # fmt: skip
     theta, x, y, xx, xy, xt, yy, yt, tt = settled["pose"][0].item()

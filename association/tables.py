@@ -52,7 +52,8 @@ class Raster(NamedTuple):
     Attributes
     ----------
     shape : (1,) of `GRID_SHAPE`
-    bits : (columns * rows,) bit s of a cell is set where a wall or a run of direction sector s is near
+    bits : (columns * rows,) bit s of a cell is set where a wall or a run of direction sector s is within `REACH`, bit
+        ``SECTORS + s`` where it is within `NARROW_REACH`
     """
 
     shape: Records
@@ -273,6 +274,7 @@ class Workspace(NamedTuple):
     ----------
     matches : (n,) of `MATCH`
     spreads : (n,) angle gates in sectors
+    shifts : (n,) where in the raster's cells the bits for the offset gate begin
     possible : (n,) what each scan line can add at a pose, nats, -1 where it can lie on no wall
     held : (n,) which wall of each scan line is in the sums, or -1
     shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
@@ -281,6 +283,7 @@ class Workspace(NamedTuple):
 
     matches: Records
     spreads: Floats
+    shifts: Integers
     possible: Floats
     held: Integers
     shares: Records
@@ -291,4 +294,5 @@ class Workspace(NamedTuple):
         """Return one for a scan of `count` lines and a map of that many walls."""
         held = np.full(count, -1, np.int64)
         spreads, possible, shares = np.zeros(count), np.zeros(count), np.zeros(walls, WALL_SHARE)
-        return cls(np.zeros(count, MATCH), spreads, possible, held, shares, np.zeros(1, SCRATCH))
+        shifts = np.zeros(count, np.int64)
+        return cls(np.zeros(count, MATCH), spreads, shifts, possible, held, shares, np.zeros(1, SCRATCH))

@@ -26,6 +26,7 @@ CELL = 1.0  # m, tables
 SWEEP_CELL = 2.0  # m, tables
 SWEEP_REACH = 0.02  # m, rounding
 RASTER_CELL = 0.5  # m, tables
+NARROW_REACH = 0.15  # m, tables; a wall is in the raster of narrow gates where it is this near
 MAX_CELLS = 4_000_000  # memory: some 50 MB
 MAX_SWEEP_CELLS = 1_000_000  # memory
 MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about

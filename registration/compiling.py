@@ -31,7 +31,8 @@ from typing import Any, TypeVar, cast
 import llvmlite
 import numba
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic, overload
 
 from .interpreting import interpreted
 
@@ -54,6 +55,7 @@ except (ImportError, AttributeError) as error:
     raise ImportError(UNKNOWN_NUMBA) from error
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Value = TypeVar("Value")
 
 logger = logging.getLogger("linefix")
 
@@ -94,6 +96,42 @@ def inlined(function: Function) -> Function:
     """Compile a small function into each kernel that calls it."""
     compiled = njit(inline="always")(function)
     return cast(Function, compiled) if isinstance(compiled, Dispatcher) else interpreted(function)
+
+
+def borrowed(value: Value) -> Value:
+    """Return arrays, or tuples of them, as they are, for a kernel that counts no references to them.
+
+    Numba counts references to each array that is taken from a tuple or handed on, atomically, which for threads that
+    search one map comes to waiting for one another. Whoever called the kernel holds what it is handed until it returns:
+    nothing that it borrowed, nor any part of it, may it return or write to where it is kept.
+    """
+    return value
+
+
+def _uncounted(context: Any, builder: Any, kind: types.Type, value: Any) -> Any:
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        array.meminfo = array.meminfo.type(None)
+        return array._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        members: Any = kind
+        for place, member in enumerate(members):
+            part = _uncounted(context, builder, member, builder.extract_value(value, place))
+            value = builder.insert_value(value, part, place)
+    return value
+
+
+@intrinsic
+def _borrow(_: Any, value: types.Type) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _uncounted(context, builder, signature.args[0], arguments[0])
+
+    return value(value), codegen
+
+
+@overload(borrowed)
+def _borrowed(value):  # type: ignore[no-untyped-def]  # Numba compares its parameters with those of what it returns
+    return lambda value: _borrow(value)  # type: ignore[call-arg]  # an intrinsic's first parameter is not passed
 
 
 def cache_directory(package: str) -> Path:

@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import inlined, kernel
+from registration.compiling import borrowed, inlined, kernel
 from registration.kernels import joint_add, joint_solve
 from registration.layout import Record, Records
 
@@ -178,6 +178,9 @@ def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Wo
 
     The first `refined` poses are moved to where the beams fit best, if they fit better there.
     """
+    rays = borrowed(rays)
+    place = borrowed(place)
+    work = borrowed(work)
     moved = work.scratch[0].estimate
     evidence = work.scratch[0].evidence
     for k in range(len(poses)):

@@ -5,13 +5,14 @@ import math
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
+from ..layout import Integers
 from ..tables import Place, Raster
-from ..tuning import BRIDGING, DIRECTION_BINS, SECTORS
+from ..tuning import BRIDGING, DIRECTION_BINS, NARROW_REACH, SECTORS
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)
 BINS_PER_RADIAN = DIRECTION_BINS / (2.0 * math.pi)
 SUM_SLACK = 1e-9  # nats, rounding
-GATE_MARGIN = 1.01  # over an angle's gate, which `match_scan` tests by a cosine to the second order
+GATE_MARGIN = 1.01  # over a gate: angles are tested by a cosine to the second order
 
 
 @inlined
@@ -152,25 +153,42 @@ def allow_all(scan: Records, possible: Floats) -> None:
 
 
 @kernel
-def angle_spreads(scan: Records, theta_var: float, gates: Record, spreads: Floats) -> None:
-    """Write the angle gate of every scan segment at a pose with that variance, in sectors.
+def gates_about(
+    scan: Records, theta_var: float, x: float, y: float, slip: float, gates: Record, spreads: Floats, shifts: Integers
+) -> None:
+    """Write what gates scan segments have at a pose that turns about ``(x, y)``, of the scan frame, with that variance.
 
-    A little wider than `match_scan` has it: see `GATE_MARGIN`.
+    For the angle in sectors, a little wider than `match_scan` has it: see `GATE_MARGIN`; for the offset which bits of
+    the raster are to be looked at, those of what is near where the gate is narrow. The covariance of the pose may be
+    that of one that is turned by up to `slip` radians.
     """
+    away = GATE_MARGIN * slip * math.hypot(x, y)
     for i in range(len(scan)):
         deviation = math.sqrt(scan[i].angle_variance + theta_var)
         gate = GATE_MARGIN * min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
         spreads[i] = gate * PER_RADIAN
+        lever = abs(scan[i].dx * (scan[i].x - x) + scan[i].dy * (scan[i].y - y)) + away
+        deviation = math.sqrt(scan[i].offset_variance + theta_var * lever * lever)
+        gate = GATE_MARGIN * min(gates.greatest_offset, max(gates.least_offset, gates.sigmas * deviation))
+        shifts[i] = SECTORS if gate <= NARROW_REACH else 0
 
 
 @kernel
-def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, threshold: float, possible: Floats) -> bool:
+def may_score(
+    scan: Records,
+    pose: Record,
+    spreads: Floats,
+    shifts: Integers,
+    raster: Raster,
+    threshold: float,
+    possible: Floats,
+) -> bool:
     """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
 
     Writes to `possible` (n,) what each segment can add, nats, -1 where it can lie on no wall.
 
     Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or
-    is between two; and a tenth of the price of `match_scan`. `spreads` as of `angle_spreads`.
+    is between two; and a tenth of the price of `match_scan`. `spreads` and `shifts` as of `gates_about`.
     """
     shape = raster.shape[0]
     bits = raster.bits
@@ -188,7 +206,7 @@ def may_score(scan: Records, pose: Record, spreads: Floats, raster: Raster, thre
         fx = c * scan[i].x - s * scan[i].y + left
         fy = s * scan[i].x + c * scan[i].y + bottom
         if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
-            here = bits[int(fy) * shape.columns + int(fx)]
+            here = bits[int(fy) * shape.columns + int(fx)] >> shifts[i]
             if here != 0:
                 middle = turned + scan[i].angle * PER_RADIAN
                 for raw in range(math.floor(middle - spreads[i]), math.floor(middle + spreads[i]) + 1):

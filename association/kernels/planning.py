@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import borrowed, inlined, kernel
 from registration.layout import Floats, Records
 
 from ..layout import BASE, Integers
@@ -292,6 +292,12 @@ def advance(
     (1,) keeps that chance up to date, or says that it is greater than that: see `missed_share`. Returns one of
     `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
     """
+    question = borrowed(question)
+    tables = borrowed(tables)
+    plan = borrowed(plan)
+    found = borrowed(found)
+    progress = borrowed(progress)
+    work = borrowed(work)
     scan = question.scan
     rules = question.terms[0].rules
     state = progress[0]

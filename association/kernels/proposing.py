@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import borrowed, inlined, kernel
 from registration.layout import Record, Records
 
 from ..layout import HARD_PRIOR, Integers
@@ -25,7 +25,7 @@ from ..tuning import (
 )
 from .best_poses import floor_of, offer, prior_value
 from .consensus import refine, turning
-from .matching import PER_RADIAN, allow_all, angle_spreads, match_scan, may_score, wrap
+from .matching import PER_RADIAN, allow_all, gates_about, match_scan, may_score, wrap
 
 
 @inlined
@@ -114,7 +114,7 @@ def try_pose(
     possible = work.possible
     if gates.least_overlap < WHOLE_OVERLAP:
         allow_all(scan, possible)
-    elif not may_score(scan, pose, work.spreads, raster, floor, possible):
+    elif not may_score(scan, pose, work.spreads, work.shifts, raster, floor, possible):
         return TESTS_REJECTED
     if match_scan(scan, pose, place, gates, possible, floor, work.matches) < 0.0:
         return TESTS_HYPOTHESIS
@@ -157,13 +157,13 @@ def search_base(
     va = a.angle_variance
     vb = b.angle_variance
     theta_var = va * vb / (va + vb)
-    angle_spreads(question.scan, theta_var, gates, work.spreads)
     tolerance = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(va + vb)))
     cos_tolerance = 1.0 - 0.5 * tolerance * tolerance
     turn = b.angle - a.angle
     mx = b.x - a.x
     my = b.y - a.y
-    swing = tolerance * va / (va + vb) * math.hypot(mx, my) / abs(math.sin(turn))
+    slip = tolerance * va / (va + vb)
+    swing = slip * math.hypot(mx, my) / abs(math.sin(turn))
     half_a = 0.5 * a.length - end_slack(a.length) - swing
     half_b = 0.5 * b.length - end_slack(b.length) - swing
     adx = a.dx
@@ -172,6 +172,7 @@ def search_base(
     bdy = b.dy
     pin_x = 0.5 * (a.x + b.x)
     pin_y = 0.5 * (a.y + b.y)
+    gates_about(question.scan, theta_var, pin_x, pin_y, slip, gates, work.spreads, work.shifts)
     x0 = shape.x0
     y0 = shape.y0
     cell = shape.cell
@@ -296,6 +297,10 @@ def search_slides(
     For scans without a base: what is found is a family of poses, fixed across the walls and free along them. Goes on
     from the anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
     """
+    question = borrowed(question)
+    tables = borrowed(tables)
+    found = borrowed(found)
+    work = borrowed(work)
     state = progress[0]
     place = tables.place
     raster = tables.raster
@@ -304,7 +309,7 @@ def search_slides(
     pose = work.scratch[0].estimate
     a = question.scan[sliding]
     spent = 0
-    angle_spreads(question.scan, a.angle_variance, question.terms[0].gates, work.spreads)
+    gates_about(question.scan, a.angle_variance, a.x, a.y, 0.0, question.terms[0].gates, work.spreads, work.shifts)
     anchor_list = np.empty(len(runs), dtype=np.int32)
     n_anchors = anchors(a.length, runs, tables.sweep.bin_starts, anchor_list)
     while state.anchor < n_anchors:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import kernel
+from registration.compiling import borrowed, kernel
 from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Floats, Records
 
@@ -31,6 +31,11 @@ def rank(
     The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). Where there are no sights
     there are no lines of sight.
     """
+    question = borrowed(question)
+    place = borrowed(place)
+    sights = borrowed(sights)
+    matches = borrowed(matches)
+    work = borrowed(work)
     scan = question.scan
     terms = question.terms[0]
     sums = work.scratch[0].sums

@@ -159,17 +159,16 @@ def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, 
 
 
 @kernel
-def direction_raster(ends: Records, radius: float, shape: Records, sectors: Integers) -> Integers:
-    """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of. Returns (rows * columns,) of bits."""
+def direction_raster(ends: Records, radius: float, shape: Records, sectors: Integers, bits: Integers) -> None:
+    """Set bit ``sectors[i]`` of every cell that wall i comes within `radius` of, in `bits` (rows * columns,)."""
     x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
     columns, rows = shape[0].columns, shape[0].rows
-    bits = np.zeros(columns * rows, dtype=np.uint16)
     for i in range(len(ends)):
         x1 = ends[i].x1
         y1 = ends[i].y1
         x2 = ends[i].x2
         y2 = ends[i].y2
-        bit = np.uint16(1 << sectors[i])
+        bit = np.uint32(1 << sectors[i])
         first = max(0, int((min(x1, x2) - radius - x0) / cell))
         last = min(columns - 1, int((max(x1, x2) + radius - x0) / cell))
         for column in range(first, last + 1):
@@ -179,4 +178,3 @@ def direction_raster(ends: Records, radius: float, shape: Records, sectors: Inte
             top = min(rows - 1, int((yb - y0) / cell))
             for row in range(bottom, top + 1):
                 bits[row * columns + column] |= bit
-    return bits

@@ -9,7 +9,6 @@ import numpy as np
 from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
-from association.context import ANY
 from association.layout import Indices
 from association.scan_lines import gates
 from association.tables import Workspace
@@ -25,7 +24,7 @@ INDEX = index_of(MAZE)
 TABLES = INDEX.tables
 PLACE = TABLES.place
 GATES = gates(AssociationOptions())
-TERMS = context_of(INDEX, scan_of([[0.0, 0.0, 1.0, 0.0]])).question(ANY).terms  # under the usual options
+TERMS = context_of(INDEX, scan_of([[0.0, 0.0, 1.0, 0.0]])).question_of_a_pose.terms  # under the usual options
 MODEL = TERMS["model"]
 SMALL = np.diag([1e-4, 1e-4, 1e-6])  # a pose's covariance
 

@@ -13,6 +13,7 @@ from association import AssociationOptions
 from association.kernels import matching
 from association.layout import MATCH
 from association.scan_lines import gates
+from registration import RigidTransform
 from registration.layout import Records
 
 from ..records import NOTHING_KNOWN, assert_records, estimate_of
@@ -81,11 +82,14 @@ def test_long_segments_on_walls_with_doorways(seed: int) -> None:
 
 @given(SEEDS, st.floats(0.0, 1e-2), st.sampled_from([GATES, WIDE]))
 @settings(max_examples=20, deadline=None)
-def test_angle_spreads(seed: int, theta_var: float, gates: Records) -> None:
-    scan = drawn(seed).scan
-    spreads = np.zeros(len(scan))
-    matching.angle_spreads(scan, theta_var, gates[0], spreads)
-    np.testing.assert_allclose(spreads, twin.angle_spreads(scan, theta_var, gates), rtol=1e-12)
+def test_gates_about(seed: int, theta_var: float, gates: Records) -> None:
+    d = drawn(seed)
+    spreads, shifts = np.zeros(len(d.scan)), np.zeros(len(d.scan), np.int64)
+    pin, slip = d.rng.uniform(-5.0, 5.0, 2), float(d.rng.uniform(0.0, 0.3))
+    matching.gates_about(d.scan, theta_var, pin[0], pin[1], slip, gates[0], spreads, shifts)
+    expected, begins = twin.gates_about(d.scan, theta_var, pin, slip, gates)
+    np.testing.assert_allclose(spreads, expected, rtol=1e-12)
+    assert shifts.tolist() == begins.tolist()
 
 
 @given(SEEDS)
@@ -93,14 +97,16 @@ def test_angle_spreads(seed: int, theta_var: float, gates: Records) -> None:
 def test_may_score(seed: int) -> None:
     """The bound is what the twin adds up, no matching exceeds it, and what can lie nowhere needs no matching."""
     d = drawn(seed)
-    spread = covariance(d.rng)
-    spreads = twin.angle_spreads(d.scan, spread[2, 2], GATES)
+    theta_var, pin, slip = 10.0 ** d.rng.uniform(-6.0, -3.0), d.rng.uniform(-5.0, 5.0, 2), d.rng.uniform(0.0, 0.2)
+    spreads, shifts = twin.gates_about(d.scan, theta_var, pin, slip, GATES)
     possible, matches, others = np.zeros(len(d.scan)), np.zeros(len(d.scan), MATCH), np.zeros(len(d.scan), MATCH)
     for at in (d.at, d.near(0.3, 3.0, 3.0), d.near(2.0, 9.0, 9.0)):
-        bound = twin.reachable(d.scan, at, spreads, TABLES.raster)
-        one = estimate_of(at, spread)[0]
-        assert not matching.may_score(d.scan, one, spreads, TABLES.raster, bound + 1e-6, possible)
-        assert matching.may_score(d.scan, one, spreads, TABLES.raster, bound - 1e-6, possible)
+        bound = twin.reachable(d.scan, at, spreads, shifts, TABLES.raster)
+        x, y = RigidTransform(0.0, 0.0, at.theta + d.rng.choice([-slip, 0.0, slip])).apply(pin)
+        turning = np.array([y, -x, 1.0])
+        one = estimate_of(at, theta_var * np.outer(turning, turning))[0]
+        assert not matching.may_score(d.scan, one, spreads, shifts, TABLES.raster, bound + 1e-6, possible)
+        assert matching.may_score(d.scan, one, spreads, shifts, TABLES.raster, bound - 1e-6, possible)
         assert possible[possible > 0.0].sum() == pytest.approx(bound)
         np.testing.assert_array_equal(possible[possible > 0.0], d.scan["gain"][possible > 0.0])
         total = matching.match_scan(d.scan, one, PLACE, GATES[0], d.scan["gain"].copy(), 0.0, others)
@@ -108,18 +114,18 @@ def test_may_score(seed: int) -> None:
         assert matching.match_scan(d.scan, one, PLACE, GATES[0], possible, total - 1e-9, matches) == total
         np.testing.assert_array_equal(matches["wall"], others["wall"])
     far = moved(d.at, [0.0, 1e3, 0.0])
-    assert not matching.may_score(d.scan, estimate_of(far)[0], spreads, TABLES.raster, 1e-9, possible)
+    assert not matching.may_score(d.scan, estimate_of(far)[0], spreads, shifts, TABLES.raster, 1e-9, possible)
     assert (possible[0] < 0.0).all()
 
 
 def test_a_pose_over_a_doorway_may_score() -> None:
     """The raster has the direction of a run also where its walls are farther away than they are listed."""
     segments = context_of(INDEX, scan_of([[0.0, 0.0, 6.0, 0.0]])).lines.rows
-    spreads, matches = twin.angle_spreads(segments, 0.0, GATES), np.zeros(1, MATCH)
+    (spreads, shifts), matches = twin.gates_about(segments, 0.0, np.zeros(2), 0.0, GATES), np.zeros(1, MATCH)
     for jamb in np.linspace(3.0, 3.5, 11):
         index = index_of([[0.0, 0.0, jamb, 0.0], [jamb + 1.45, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
         for slide in np.linspace(-3.0, 6.0, 46):
             at = estimate_of(local(index, pose(float(slide))))[0]
             gains = segments["gain"].copy()
             total = matching.match_scan(segments, at, index.tables.place, GATES[0], gains, 0.0, matches)
-            assert matching.may_score(segments, at, spreads, index.raster, total - 1e-9, gains), (jamb, slide)
+            assert matching.may_score(segments, at, spreads, shifts, index.raster, total - 1e-9, gains), (jamb, slide)

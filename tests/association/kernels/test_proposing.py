@@ -21,7 +21,7 @@ from ..records import estimate_of, pose_of
 from ..reference import proposing as twin
 from ..reference.consensus import refine
 from ..reference.geometry import moved
-from ..reference.matching import angle_spreads, match_scan, reachable
+from ..reference.matching import gates_about, match_scan, reachable
 from ..scenes import context_of, index_of, same_pose, scan_of
 from .drawn import GATES, INDEX, MODEL, PLACE, SEEDS, SMALL, TABLES, Drawn, drawn, oblique, workspace_of
 
@@ -222,7 +222,7 @@ def test_try_pose(seed: int) -> None:
     question, work = asked(d, window), workspace_of(d.scan)
     question.terms["rules"]["kept_share"] = 0.65
     if whole := d.rng.random() < 0.7:
-        work.spreads[:] = angle_spreads(d.scan, covariance[2, 2], GATES)
+        work.spreads[:], _ = gates_about(d.scan, covariance[2, 2], np.zeros(2), 0.0, GATES)
     else:
         question.terms["gates"]["least_overlap"] = 0.4  # a midpoint may then be off the map: the raster knows nothing
     gates = question.terms["gates"]
@@ -238,7 +238,7 @@ def test_try_pose(seed: int) -> None:
         work.scratch["estimate"] = estimate_of(at, covariance)
         spent = proposing.try_pose(question, PLACE, TABLES.raster, found, progress[0], work)
         outside = window is not None and not twin.may_be_refined_into(window, at)
-        if outside or (whole and reachable(d.scan, at, work.spreads, TABLES.raster) < floor):
+        if outside or (whole and reachable(d.scan, at, work.spreads, work.shifts, TABLES.raster) < floor):
             steps = (0, 0, TESTS_REJECTED)
         elif match_scan(d.scan, at, covariance, PLACE, gates)[1] < floor:
             steps = (0, 0, TESTS_HYPOTHESIS)

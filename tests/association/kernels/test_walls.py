@@ -143,6 +143,7 @@ def test_every_wall_is_listed_where_it_is_near() -> None:
 @settings(max_examples=30, deadline=None)
 def test_direction_raster(seed: int) -> None:
     ends = turned_maze(seed)
-    sectors = np.random.default_rng(seed).integers(0, 16, len(ends)).astype(np.int32)
-    bits = walls.direction_raster(as_records(ENDS, ends), 0.43, SHAPE, sectors)
+    sectors = np.random.default_rng(seed).integers(0, 32, len(ends)).astype(np.int32)
+    bits = np.zeros(int(SHAPE["columns"][0] * SHAPE["rows"][0]), np.uint32)
+    walls.direction_raster(as_records(ENDS, ends), 0.43, SHAPE, sectors, bits)
     assert bits.tolist() == twin.direction_raster(ends, 0.43, SHAPE, sectors)

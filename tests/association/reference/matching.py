@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from association.layout import MATCH
+from association.layout import MATCH, Integers
 from association.tables import Place, Raster
-from association.tuning import BRIDGING, SECTORS
+from association.tuning import BRIDGING, NARROW_REACH, SECTORS
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 
@@ -76,19 +76,24 @@ def covered(walls: Records, wall: Record, middle: Floats, length: float) -> floa
     return float(total)
 
 
-def angle_spreads(scan: Records, theta_var: float, gates: Records) -> Floats:
-    """Return the angle gates in sectors, a hundredth wider."""
-    variances = (float(variance) + theta_var for variance in scan["angle_variance"])
-    return np.array([1.01 * _gate(gates[0], "angle", variance) * SECTORS / math.tau for variance in variances])
+def gates_about(scan: Records, theta_var: float, pin: Floats, slip: float, gates: Records) -> tuple[Floats, Integers]:
+    """Return the angle gates in sectors, a hundredth wider, and which bits of the raster the offset gates may go by."""
+    spreads, shifts = [], []
+    for segment in scan:
+        spreads.append(_gate(gates[0], "angle", float(segment["angle_variance"]) + theta_var) * SECTORS / math.tau)
+        lever = abs(float(direction(segment) @ (point(segment) - pin))) + 1.01 * slip * float(np.hypot(*pin))
+        gate = _gate(gates[0], "offset", float(segment["offset_variance"]) + theta_var * lever**2)
+        shifts.append(SECTORS if 1.01 * gate <= NARROW_REACH else 0)
+    return 1.01 * np.array(spreads), np.array(shifts, np.int64)
 
 
-def reachable(scan: Records, pose: RigidTransform, spreads: Floats, raster: Raster) -> float:
+def reachable(scan: Records, pose: RigidTransform, spreads: Floats, shifts: Integers, raster: Raster) -> float:
     """Sum the gains of the segments near whose midpoint a wall has their direction, up to their spread."""
     total = 0.0
     width = math.tau / SECTORS
-    for segment, spread in zip(scan, spreads, strict=True):
+    for segment, spread, shift in zip(scan, spreads, shifts.tolist(), strict=True):
         cell = cell_of(raster.shape, pose.apply(point(segment)))
-        bits = 0 if cell is None else int(raster.bits[cell])
+        bits = 0 if cell is None else int(raster.bits[cell]) >> shift
         centres = [width * s - math.pi for s in range(SECTORS) if bits >> s & 1]
         angle = float(segment["angle"]) + pose.theta
         if any(abs(wrap(angle - centre)) <= (spread + 0.5) * width for centre in centres):
