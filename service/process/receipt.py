@@ -71,8 +71,8 @@ class ReceiptProtocol(FramingProtocol):
 
     @property
     def use(self) -> Use:
-        """What the connection is good for at the moment."""
-        if self._ending or not (self._in_message or self.is_busy()):
+        """What the connection is good for at the moment; a head that does not end is good for nothing."""
+        if self._ending or not (self.is_busy() or (self._in_message and not self._in_head)):
             return Use.IDLE
         running = self._running
         if running is None or running.response_complete or (running.more_body and not running.response_started):

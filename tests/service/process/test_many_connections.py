@@ -6,7 +6,8 @@ import resource
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
+from http.client import HTTPConnection
 
 import httpx
 import orjson
@@ -79,6 +80,19 @@ def test_an_address_keeps_its_connections_beside_another_s_flood(start_service: 
         mine.sendall(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
         told = b"".join(iter(lambda: mine.recv(65536), b""))
         assert float(told.split(b"\nlinefix_connections ")[1].split()[0]) <= 10 + 1
+
+
+def test_heads_that_do_not_end_take_no_connection_that_is_used(start_service: Callable[..., RunningService]) -> None:
+    """Between two requests it was given up before them."""
+    running = start_service(max_connections=20)
+    with ExitStack() as stack:
+        mine = stack.enter_context(closing(HTTPConnection("127.0.0.1", running.port, timeout=10)))
+        mine.connect()
+        mine.auto_open = False
+        for _ in range(60):
+            stack.enter_context(connect(running)).sendall(HELD["in their heads"])
+            mine.request("GET", "/livez")
+            assert mine.getresponse().read() == b'{"status":"ok"}'
 
 
 def test_where_all_are_at_work_a_new_one_is_told_so(start_service: Callable[..., RunningService]) -> None:
