@@ -29,6 +29,7 @@ HELD = [
     checks.response_schema_conformance,
     checks.response_headers_conformance,
 ]
+LONGEST = 60.0  # s; an analysis may take half a minute, its deadline by default
 GROWTH = 32e6  # bytes that requests may leave behind
 
 
@@ -100,7 +101,7 @@ def test_the_schema_holds(schema: Any, operation: tuple[str, str], mode: Generat
     @fuzz(0.01 if path in PATHS else 0.002 if not path.startswith("/v1/maps") else 0.02)
     @given(case=schema[path][method].as_strategy(generation_mode=mode))
     def one(case: schemathesis.Case) -> None:
-        response = case.call()
+        response = case.call(timeout=LONGEST)
         # A deadline may be asked for that is over at once.
         assert response.status_code < 500 or response.status_code == 504, response.text
         assert response.status_code < 400 or len(response.content) <= 8192
