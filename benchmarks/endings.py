@@ -24,6 +24,7 @@ from examples.running import running_service
 from service.schemas import examples
 
 from .open_loop import request_of
+from .siege import parallel_walls
 from .table import Row, at_most, machine, print_rows
 
 HANG_UP_MS, SLOW_S, REPLACED_S, DRAINED_S = 250.0, 10.0, 3.0, 10.0
@@ -39,6 +40,11 @@ def heavy(count: int = 199_000, seed: int = 0) -> bytes:
         "scan": {"segments": examples.SEEN},
     }
     return orjson.dumps(body, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def long_search() -> bytes:
+    """Return a request whose search takes all of its deadline, a second."""
+    return orjson.dumps({**orjson.loads(parallel_walls()), "options": {"deadline_ms": 1000}})
 
 
 def ask(port: int, body: bytes) -> int:
@@ -74,16 +80,16 @@ def hang_ups() -> list[Row]:
     """Hang up while waiting in the queue, and count until the place is free."""
     with running_service(searches=1, queue=1) as (url, _):
         port = int(url.rsplit(":", 1)[1])
-        seconds = [_hang_up(port, seed) for seed in range(TRIES)]
+        seconds = [_hang_up(port) for _ in range(TRIES)]
     found = [one for one in seconds if one is not None]
     return [
         at_most(f"a hang-up frees the place, longest of {len(found)}, ms", 1e3 * max(found), HANG_UP_MS, form=".0f")
     ]
 
 
-def _hang_up(port: int, seed: int) -> float | None:
+def _hang_up(port: int) -> float | None:
     """Return how long it took, seconds; None when the turn came before."""
-    busy = threading.Thread(target=ask, args=(port, heavy(seed=seed)))
+    busy = threading.Thread(target=ask, args=(port, long_search()))
     busy.start()
     until(lambda: count(port, "linefix_searches_running") == 1)
     with socket.create_connection(("127.0.0.1", port)) as waiting:
