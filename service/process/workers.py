@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("linefix")
 ALL_ENDED = 9.8  # s after the signal whoever is left is killed
 LOOK_SECONDS = 1.0  # between looks whether the event loop turns
+ENDED_AS_TOLD = (-signal.SIGTERM, -signal.SIGINT, -signal.SIGHUP)  # a worker that was still starting
 
 
 class Supervisor(Multiprocess):
@@ -71,7 +72,7 @@ class Supervisor(Multiprocess):
     @property
     def status(self) -> int:
         """The status to exit with: 0 when all ended as they were told."""
-        return int(any(process.exitcode not in (0, -signal.SIGTERM, -signal.SIGINT) for process in self.processes))
+        return int(any(process.exitcode not in (0, *ENDED_AS_TOLD) for process in self.processes))
 
 
 def supervise(settings: Settings, listener: socket.socket) -> int:
