@@ -45,8 +45,7 @@ chooser.addEventListener("change", () => {
   if (chooser.value) void choose(chooser.value);
 });
 virtual.addEventListener("change", () => {
-  state.virtual = virtual.checked && state.map !== null;
-  virtual.checked = state.virtual;
+  state.virtual = virtual.checked; // it may be waiting for a map that is being read
   askSoon();
 });
 

@@ -62,9 +62,7 @@ function row(id: string, segments: number): HTMLLIElement {
 }
 
 async function use(id: string): Promise<void> {
-  const { scan, virtual } = state;
   setMap(await getMap(id), id);
-  Object.assign(state, { scan, virtual });
   showAll(`The stored map ${id}.`);
   askSoon();
 }

@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from service.schemas import examples
 from tests.running import RunningService
@@ -227,6 +227,27 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     verdict(page, "usable")
     assert client.get("/v1/maps/page-rectangle").json()["segments"] == rectangle["segments"]
     client.delete("/v1/maps/page-rectangle")
+
+
+def test_a_virtual_robot_waits_for_its_map(page: Page, client: httpx.Client) -> None:
+    """Whoever is quicker than the map is read, or starts with the robot, has not to tick twice."""
+    walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
+    client.put("/v1/maps/page-late", json=walls).raise_for_status()
+    page.goto("/")
+    robot = page.get_by_label("a virtual robot")
+    robot.check()
+    robot.uncheck()
+    on_the_way: list[Route] = []
+    page.route("**/v1/maps/page-late", lambda route: on_the_way.append(route))
+    page.locator("#stored summary").click()
+    with page.expect_request("**/v1/maps/page-late"):
+        page.get_by_role("button", name="Open page-late").click()
+    robot.check()
+    on_the_way[0].continue_()
+    verdict(page, "usable")
+    expect(robot).to_be_checked()
+    page.unroute("**/v1/maps/page-late")
+    client.delete("/v1/maps/page-late")
 
 
 def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
