@@ -40,7 +40,7 @@ FITTED = np.dtype(
     [
         ("nx", "f8"), ("ny", "f8"),  # unit normal, away from the sensor
         ("p", "f8"),  # m, distance from the sensor
-        ("mean", "f8"),  # m, weighted mean of the points' abscissae
+        ("middle", "f8"),  # m, weighted mean of the points' abscissae
         ("spread", "f8"),  # m^2, their weighted second moment about it
         ("weight", "f8"),  # 1/m^2, of all points
         ("count", "f8"),  # of points

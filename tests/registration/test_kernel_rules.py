@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -176,3 +178,15 @@ def test_the_rule_finds_what_is_freed_too_early() -> None:
     assert [function.name for function in functions(BAD) if not freed_too_early(function)] == []
     assert len(list(functions(GOOD))) == 4
     assert len(list(functions(BAD))) == 5
+
+
+LAYOUTS = sorted(path.parts[len(ROOT.parts)] for path in ROOT.glob("*/layout.py"))
+
+
+@pytest.mark.parametrize("package", LAYOUTS)
+def test_no_field_hides_behind_an_attribute_of_records(package: str) -> None:
+    """As plain Python a kernel would read a method of numpy there, such as ``mean``."""
+    layout = import_module(f"{package}.layout")
+    records = [value for value in vars(layout).values() if isinstance(value, np.dtype) and value.names]
+    assert records
+    assert [name for one in records for name in one.names or () if hasattr(np.record, name)] == []

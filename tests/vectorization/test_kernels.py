@@ -162,7 +162,7 @@ def test_the_fitted_line_is_the_most_likely_one_and_carries_its_information(seed
     assert math.atan2(line["ny"], line["nx"]) == pytest.approx(angle, abs=1e-5)
     assert line["p"] == pytest.approx(distance, abs=1e-5)
     # The information of (angle, distance): weight, weight times mean, and weight times the second moment about 0.
-    w, m = line["weight"], line["mean"]
+    w, m = line["weight"], line["middle"]
     expected = [[w * (line["spread"] + m * m), -w * m], [-w * m, w]]
     np.testing.assert_allclose(np.abs(information), np.abs(expected), rtol=1e-3, atol=1e-3 * w)
     residuals = ranges - line["p"] / (rays @ [line["nx"], line["ny"]])
@@ -267,7 +267,7 @@ GOOD = {
 )  # fmt: skip
 def test_a_line_is_accepted_for_its_points_length_angle_fit_and_side(field: str, value: Any, accepted: bool) -> None:
     line = line_with(**{**GOOD, field: value})
-    assert (tracing.large_enough(line, 10, 1.0) and tracing.acceptable(line, True)) is accepted
+    assert bool(tracing.large_enough(line, 10, 1.0) and tracing.acceptable(line, True)) is accepted
 
 
 def test_points_without_rays_may_lie_on_a_line_through_their_middle() -> None:

@@ -92,7 +92,7 @@ def fit_line(points: Records, a: int, b: int, scanner: Record, line: Record, own
         of = weigh(points, a, b, scanner, line, own, POINT_GATE * POINT_GATE * scale)
         if of.number < 2 or not of.abscissa2 > 0.0:
             return False
-        line.mean += of.abscissa
+        line.middle += of.abscissa
         line.spread = of.abscissa2 / of.weight
         line.weight = of.weight
         line.count = of.number
@@ -106,8 +106,8 @@ def fit_line(points: Records, a: int, b: int, scanner: Record, line: Record, own
         s = slope * c
         nx = c * line.nx + s * line.ny
         ny = c * line.ny - s * line.nx
-        p = c * offset - s * line.mean
-        line.mean = c * line.mean + s * offset
+        p = c * offset - s * line.middle
+        line.middle = c * line.middle + s * offset
         line.nx = nx
         line.ny = ny
         line.p = p
@@ -145,7 +145,7 @@ def weigh(
             line.begin = min(line.begin, t)
             line.end = max(line.end, t)
             w = 1.0 / v
-            t -= line.mean
+            t -= line.middle
             w_sum += w
             t_sum += w * t
             e_sum += w * e

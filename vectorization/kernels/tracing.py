@@ -100,7 +100,7 @@ def fit_all(points: Records, bounds: Records, totals: Records, min_points: int, 
             continue
         line = lines[count]
         line_of(totals[k], line)
-        line.mean = abscissa_on(line, totals[k].x, totals[k].y) / totals[k].count
+        line.middle = abscissa_on(line, totals[k].x, totals[k].y) / totals[k].count
         line.first = bounds[k].first
         line.last = bounds[k].end - 1
         if fit_and_extend(points, taken, line, scanner, own):
@@ -158,7 +158,7 @@ def extend(points: Records, start: int, direction: int, taken: Flags, line: Reco
                 break
         if math.hypot(point.x - before.x, point.y - before.y) > scanner.longest:
             break
-        lever = abscissa_on(line, point.x, point.y) - line.mean
+        lever = abscissa_on(line, point.x, point.y) - line.middle
         known = (1.0 + lever * lever / line.spread) / line.weight
         v = scanner.variance * cosine * cosine + scanner.floor + known
         certain = known < WORST_KNOWN * (scanner.variance + scanner.floor)
@@ -190,8 +190,8 @@ def describe(lines: Records, x: float, y: float) -> tuple[Floats, Floats, Floats
         segments[k].begin_y = foot_y + line.begin * line.nx
         segments[k].end_x = foot_x - line.end * line.ny
         segments[k].end_y = foot_y + line.end * line.nx
-        centroids[k, X] = foot_x - line.mean * line.ny
-        centroids[k, Y] = foot_y + line.mean * line.nx
+        centroids[k, X] = foot_x - line.middle * line.ny
+        centroids[k, Y] = foot_y + line.middle * line.nx
         dof = max(1.0, line.count - 2.0)
         sigmas[k] = math.sqrt(line.count / line.weight)
         if line.chi2 > dof + WIDENING * math.sqrt(2.0 * dof):
