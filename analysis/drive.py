@@ -13,7 +13,6 @@ from registration import RigidTransform, Segments, wrap_angle
 from simulation import Scanner, scan
 
 STEP = 1.0  # m from view to view
-MOST = 30.0  # m
 # Standard deviations of odometry on a step: m, m, rad. As of wheels that are not looked after.
 ODOMETRY = (0.02, 0.02, 0.02)
 CLEARANCE = 0.3  # m; what it keeps from everything ahead

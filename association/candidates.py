@@ -11,12 +11,15 @@ import numpy as np
 from registration.layout import Records
 
 from .context import SearchContext
-from .kernels.planning import BUDGET, EXHAUSTED, PROVEN, advance, missed_share, plan_bases
-from .kernels.proposing import search_slides
+from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance
+from .kernels.planning import begin
+from .kernels.sliding import search_slides, sliding_segments
+from .kernels.stopping import missed_share
 from .layout import FOUND, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
 from .result import SearchReport
-from .tables import Plan, Samples
+from .sharing import Sharing
+from .tables import Plan, Question
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,
@@ -27,7 +30,6 @@ from .tuning import (
     KEPT_SHARE,
     KEPT_SHARE_FOR_BEAMS,
     KEPT_SLIDES,
-    PARALLEL_SINE,
     REUSE,
     RIVAL_SHARE,
     SAMPLE_SEED,
@@ -117,12 +119,12 @@ def find_candidates(context: SearchContext, effort: Effort | None = None) -> Can
 def _search(context: SearchContext, effort: Effort) -> Candidates:
     """Search the map, or the window of a hard prior."""
     scan, index, kept = context.lines.rows, context.index, effort.kept
-    found = np.zeros(kept + KEPT_SLIDES, FOUND)
-    progress = record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0, best_value=effort.known)
-    rules = _rules(effort, DISTINCT_DISTANCE)
+    found, progress = np.zeros(kept + KEPT_SLIDES, FOUND), np.zeros(1, PROGRESS)
+    progress["best_value"] = effort.known
     # A test of a pose takes longer the more walls lie where it is.
     chunk = int(CHUNK / max(1.0, index.crowd / USUAL_CROWD))
-    stopped = _go_through_bases(context, rules, found[:kept], progress, chunk)
+    question = context.question(_rules(effort, DISTINCT_DISTANCE))
+    stopped = _go_through_bases(context, question, found[:kept], progress, chunk)
     places = list(range(int(progress["count"][0])))
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slid = _slide(context, effort, found[kept:], progress, chunk)
@@ -156,50 +158,35 @@ def _rules(effort: Effort, distinct_distance: float) -> Records:
     )
 
 
-def _go_through_bases(context: SearchContext, rules: Records, found: Records, progress: Records, chunk: int) -> int:
+def _go_through_bases(context: SearchContext, question: Question, found: Records, progress: Records, chunk: int) -> int:
     """Fill `found` and `progress`; return why it ended, `BUDGET` where the deadline did."""
-    question, tables = context.question(rules), context.index.tables
-    plan = _plan(context)
+    tables, plan = context.index.tables, _plan(context, question, progress)
     allowed = -1.0 if context.options.exhaustive else 1.0 - context.options.confidence
     stopped = EXHAUSTED if len(plan.bases) == 0 else BUDGET
     while stopped == BUDGET and not context.deadline.passed:
         stopped = advance(question, tables, plan, found, progress, context.workspace, allowed, chunk)
+        if stopped == BUDGET and context.deadline.helped:
+            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(allowed)
     if stopped == BUDGET and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
     return stopped
 
 
-def _plan(context: SearchContext) -> Plan:
-    scan, index = context.lines.rows, context.index
-    n = min(len(scan), BASE_SEGMENTS)
-    return Plan(
-        bases=_drawn(plan_bases(scan, n, index.runs, index.area), context.options),
-        uses=np.zeros(n),
-        residual=scan["gain"].copy(),
-        best_gains=-np.sort(-scan["gain"][:n]),
-        freest=np.argsort(-scan["freedom"], kind="stable"),
-        samples=_samples(n),
-        fade=0.0 if context.options.sampling == "random" else math.log(REUSE),
-        random=context.options.sampling == "random",
-    )
+def _plan(context: SearchContext, question: Question, progress: Records) -> Plan:
+    index, options = context.index, context.options
+    orders, random = _orders(min(len(question.scan), BASE_SEGMENTS)), options.sampling == "random"
+    plan = begin(question, index.runs, index.area, *orders, progress, 0.0 if random else math.log(REUSE), random)
+    return plan._replace(bases=_drawn(plan.bases, options)) if random else plan
 
 
 def _drawn(bases: Records, options: AssociationOptions) -> Records:
-    """Put bases in a random order where the options want it.
+    """Put bases in a random order.
 
     Those with the greatest sums of the logarithm of their merit and a Gumbel variate are draws without replacement with
     a probability by merit.
     """
-    if options.sampling == "random":
-        bases["merit"] += np.random.default_rng(options.seed).gumbel(size=len(bases))
+    bases["merit"] += np.random.default_rng(options.seed).gumbel(size=len(bases))
     return bases
-
-
-def _samples(n: int) -> Samples:
-    """Sample consensus sets among n segments, without any base so far."""
-    orders, ranks = _orders(n)
-    found, sizes, gains = np.full(SAMPLES, n, np.uint8), np.zeros(SAMPLES, np.uint8), np.zeros(SAMPLES)
-    return Samples(orders, ranks, found, sizes, gains, np.arange(SAMPLES + 1, dtype=np.int32))
 
 
 @lru_cache(maxsize=BASE_SEGMENTS + 1)
@@ -217,8 +204,8 @@ def _slide(context: SearchContext, effort: Effort, found: Records, progress: Rec
     question = context.question(_rules(effort, SLIDE_DISTINCT_SHARE * spacing))
     tables, share = context.index.tables, effort.kept_share if context.with_beams else effort.rival_share
     progress["count"] = 0
-    slid = True
-    for sliding in _sliding_segments(context.lines.rows, share * float(progress["best_value"][0])):
+    slid, scan, floor = True, context.lines.rows, share * float(progress["best_value"][0])
+    for sliding in sliding_segments(scan, min(len(scan), BASE_SEGMENTS), floor, SLIDE_SEGMENTS).tolist():
         progress["anchor"] = progress["step"] = 0
         slid = False
         while not slid and not context.deadline.passed:
@@ -226,15 +213,3 @@ def _slide(context: SearchContext, effort: Effort, found: Records, progress: Rec
         if not slid:
             break
     return slid
-
-
-def _sliding_segments(scan: Records, floor: float) -> list[int]:
-    """Pick the two longest segments of each class of parallel ones that may explain more than `floor` nats."""
-    few = scan[:BASE_SEGMENTS]
-    parallel = np.abs(np.outer(few["dx"], scan["dy"]) - np.outer(few["dy"], scan["dx"])) < PARALLEL_SINE
-    promising = parallel @ scan["gain"] > floor
-    chosen: list[int] = []
-    for i in np.nonzero(promising)[0]:
-        if len(chosen) < SLIDE_SEGMENTS and parallel[i, chosen].sum() < 2:
-            chosen.append(int(i))
-    return chosen

@@ -11,7 +11,7 @@ from registration import RigidTransform
 from registration.layout import Records
 
 from .alignment import aligned
-from .layout import HARD_PRIOR, NO_PRIOR, POINT, PRIOR, SIGHTING, SOFT_PRIOR, TERMS, as_records, record
+from .layout import HARD_PRIOR, NO_PRIOR, POINT, PRIOR, RULES, SIGHTING, SOFT_PRIOR, TERMS, as_records, record
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
@@ -20,6 +20,7 @@ from .tables import Question, Sights, Workspace
 from .tuning import LATE_CROWD
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
+NOTHING_KEPT = record(RULES)
 
 
 @lru_cache
@@ -102,20 +103,22 @@ class SearchContext:
     @cached_property
     def workspace(self) -> Workspace:
         """What the kernels write to while they look at poses."""
+        return self.another_workspace()
+
+    def another_workspace(self) -> Workspace:
+        """Return one for another thread."""
         return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
 
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""
-        terms = self.question_of_a_pose.terms.copy()
-        terms["rules"] = rules
-        return Question(self.lines.rows, terms)
+        return self.question_of_a_pose._replace(rules=rules)
 
     @cached_property
     def question_of_a_pose(self) -> Question:
         """The same for kernels that keep no poses."""
         terms = np.zeros(1, TERMS)
         terms["gates"], terms["prior"], terms["model"] = self.gates, self.prior_record, self.lines.model
-        return Question(self.lines.rows, terms)
+        return Question(self.lines.rows, terms, NOTHING_KEPT)
 
     def anywhere(self) -> SearchContext:
         """Return the same search without its prior."""

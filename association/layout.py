@@ -47,10 +47,10 @@ SCAN_LINE = _fields(
 
 # What segments of a scan show together that continue or repeat one another: unit direction; midpoint; length from end
 # to end, and of what they cover; mean of the points and their second moment along the line (m^2); how many
-# they are; variance of its offset (m^2); what is not known of where they were seen from, as variances of the offset
-# (m^2) and the angle (rad^2).
+# they are, and the standard deviation of one of them (m); variance of its offset (m^2); what is not known of where they
+# were seen from, as variances of the offset (m^2) and the angle (rad^2).
 LINE_PARTS = _fields(
-    (_F, "dx dy x y length covered centroid_x centroid_y spread points variance common_offset common_angle")
+    (_F, "dx dy x y length covered centroid_x centroid_y spread points sigma variance common_offset common_angle")
 )
 
 # What one view shows of a line of the scan: which view's sensor that is; the row of that line; unit direction;
@@ -81,6 +81,10 @@ WALL_SHARE = _fields((_F, "c s x y one weight count"))
 # A pose among the best: score and prior together; the score alone.
 FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
 
+# A pose that was tried ahead of its turn: what the prior says of it; what the scan lines come to at most before it is
+# refined; the score; the refined pose.
+TRIED = np.dtype([*_fields((_F, "bonus possible score")).descr, *POSE.descr])
+
 # Geometry of a grid: its corner; the size of a cell; how many there are.
 GRID_SHAPE = _fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 
@@ -100,20 +104,21 @@ RULES = _fields((_F, "kept_share distinct_distance distinct_angle rival_share en
 PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYMMETRIC3.descr])
 NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 
-# All of these together.
-TERMS = np.dtype([("gates", GATES), ("rules", RULES), ("prior", PRIOR), ("model", MODEL)])
+# What a pose is judged by.
+TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
 # Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs.
 BASE = _fields((_I, "sliding crossing"), (_F, "merit"))
 
 # How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
-# through, poses proposed, poses scored to the end; where to go on: the base or -1, the anchor, the step along it or the
-# item of a cell, and the slide or -inf; bound on the gain of a pose that contains no base so far; chance of having
-# missed a better consensus set; the freedom that any set takes at least whose score would be kept.
+# through, poses proposed, poses scored to the end; where to go on: at which base or -1, the anchor, the step along it
+# or the item of a cell, and the slide or -inf, with the cell of it and the slides at which the next column and row of
+# cells begin; how many poses were tried ahead of their turn; bound on the gain of a pose that contains no base so far;
+# chance of having missed a better consensus set; the freedom that any set takes at least whose score would be kept.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
-    (_I, "count bases hypotheses verified base anchor step"),
-    (_F, "slide bound missed least_freedom"),
+    (_I, "count bases hypotheses verified current anchor step column row tried"),
+    (_F, "slide next_x next_y bound missed least_freedom"),
 )
 
 # A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
@@ -138,6 +143,15 @@ BLOCKER = _fields((_I, "to_matched to_clutter"))
 # What single beams say of a pose: the shares that read the wall they should, and that passed through one.
 BEAM_EVIDENCE = _fields((_F, "read passed"))
 
+
+# What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
+# it below the first of them. From `start` on the slope is more by `more`.
+CURVE = _fields((_I, "feature begin end"), (_F, "slope"))
+BEND = _fields((_F, "start more"))
+
+# What it adds for two features together: which; 1 where the lesser share counts, 0 for the greater; nats; for each the
+# value from which it speaks for the answer, and that at which it does in full.
+TWO_FEATURES = _fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
 # What kernels write to while they look at one pose: the pose; the information of its consensus set, its sums, and what
 # it is worth; the end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would

@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .features import Features
+from .kernels.odds import log_odds
+from .layout import BEND, CURVE, TWO_FEATURES
+from .tables import Odds
 
 FILE = "models.json"
 LEAST, MOST = "least", "most"  # kinds of pairs
@@ -33,14 +36,6 @@ class Curve:
 
     slope: float
     bends: tuple[tuple[float, float], ...] = ()
-
-    def __call__(self, value: float) -> float:
-        """Return what a value adds, nats."""
-        bent = 0.0
-        for start, more in self.bends:
-            if value > start:
-                bent += more * (value - start)
-        return self.slope * value + bent
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +61,6 @@ class Pair:
     nats: float
     from_to: tuple[tuple[float, float], tuple[float, float]]
 
-    def __call__(self, features: Features) -> float:
-        """Return what the features of an answer add, nats."""
-        (start, end), (begin, finish) = self.from_to
-        one = min(1.0, max(0.0, (getattr(features, self.first) - start) / (end - start)))
-        other = min(1.0, max(0.0, (getattr(features, self.second) - begin) / (finish - begin)))
-        return self.nats * float(min(one, other) if self.kind == LEAST else max(one, other))
-
 
 @dataclass(frozen=True)
 class Model:
@@ -90,16 +78,27 @@ class Model:
 
     def logit(self, features: Features) -> float:
         """Return the logarithm of the odds."""
-        by_curves = by_pairs = 0.0
-        for place, curve in self._curves:
-            by_curves += curve(features[place])
-        for pair in self.pairs:
-            by_pairs += pair(features)
-        return by_curves + by_pairs
+        return float(log_odds(self._odds, np.array(features)))
 
     @cached_property
-    def _curves(self) -> tuple[tuple[int, Curve], ...]:
-        return tuple((Features._fields.index(name), curve) for name, curve in self.curves.items())
+    def _odds(self) -> Odds:
+        """The same for the kernel."""
+        place = Features._fields.index
+        curves, bends = np.zeros(len(self.curves), CURVE), [bend for c in self.curves.values() for bend in c.bends]
+        end = 0
+        for row, (name, curve) in zip(curves, self.curves.items(), strict=True):
+            end += len(curve.bends)
+            row["feature"], row["begin"], row["end"], row["slope"] = (
+                place(name),
+                end - len(curve.bends),
+                end,
+                curve.slope,
+            )
+        pairs = [
+            (place(pair.first), place(pair.second), pair.kind == LEAST, pair.nats, *pair.from_to[0], *pair.from_to[1])
+            for pair in self.pairs
+        ]
+        return Odds(np.array(curves, CURVE), np.array(bends, BEND), np.array(pairs, TWO_FEATURES))
 
 
 def as_model(document: Mapping[str, Sequence[float]]) -> Model:

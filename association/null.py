@@ -44,7 +44,8 @@ def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
     """
     scan = mirrored(context.scan)
     # The index is the one that the options want already.
-    lines = ScanLines.of(scan, context.index.sigma, context.options)
+    one_view = scan.views is None
+    lines = context.lines.mirrored() if one_view else ScanLines.of(scan, context.index.sigma, context.options)
     other = replace(context, scan=scan, lines=lines, prior=None)
     known, wanted = max(0.0, best.by_segments), share * best.score
     # Beams may add to any pose, so that without them nothing is enough.

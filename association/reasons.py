@@ -34,8 +34,8 @@ class Standing:
     complete: bool
     contradicted: bool
     elsewhere: bool
-    thin: bool
-    twin: bool
+    thin: bool = False
+    twin: bool = False
     out_of_step: bool = False
 
 

@@ -10,17 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments
-from registration.layout import Floats, Records
+from registration.layout import Records
 
-from .kernels.scans import collinear_segments, describe_lines, join_segments
+from .kernels.scans import (
+    describe_labelled,
+    describe_view,
+    join_lines,
+    lines_of_a_view,
+    mirror_lines,
+    seen_at_once,
+)
 from .layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, as_records, record
 from .options import AssociationOptions
 from .scan import Scan, Views
 from .tables import Measured
 from .tuning import (
     COMMON_ERROR,
-    CUT_COSINE,
-    CUT_LATERAL,
     FREE_ANGLE,
     FREE_DISTANCE,
     GATE_SIGMAS,
@@ -29,7 +34,6 @@ from .tuning import (
     LEAST_OFFSET_GATE,
     LEAST_OVERLAP,
     LINE_ANGLE,
-    LINE_COSINE,
     LINE_LATERAL,
     MODEL_OFFSET,
     MOST_LATERAL,
@@ -73,13 +77,16 @@ class ScanLines:
         measured = scan.measured
         variances, model = _variances(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
-            labels, lines = _joined_lines(_given(measured), counted=measured.counted)
-            row_of, rows = _described(labels, lines, variances, model)
-            return cls(row_of, rows, model, _seen_at_once(rows))
+            row_of, rows, seen = describe_view(_given(measured), measured.counted, variances, model)
+            return cls(row_of, rows, model, seen)
         part_of, parts, views = parts_of(measured, scan.views)
-        labels, lines = _joined_views(parts, scan.views)
-        line_row, rows = _described(labels, lines, variances, model)
+        line_row, rows = describe_labelled(*_joined_views(parts, scan.views), variances, model)
         return cls(line_row[part_of], rows, model, _sightings(parts, views, line_row))
+
+    def mirrored(self) -> ScanLines:
+        """Return those of the scan with left and right exchanged, which has to be of one view."""
+        rows = mirror_lines(self.rows)
+        return replace(self, rows=rows, sightings=seen_at_once(rows))
 
 
 def _given(measured: MeasuredSegments) -> Measured:
@@ -89,33 +96,6 @@ def _given(measured: MeasuredSegments) -> Measured:
         as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
         as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.points,
     )  # fmt: skip
-
-
-def _joined_lines(given: Measured, *, counted: bool) -> tuple[Integers, Records]:
-    """Join what one view shows of a line: first what was cut, then what lies about on it."""
-    cut, lines = _joined(given, CUT_LATERAL, CUT_COSINE, counted=True)
-    whole = given if len(lines) == len(given.lengths) else _measured(lines)
-    apart, lines = _joined(whole, LINE_LATERAL, LINE_COSINE, counted=counted)
-    return apart if whole is given else apart[cut], lines
-
-
-def _described(
-    labels: Integers, lines: Records, variances: Records, model: Records
-) -> tuple[NDArray[np.intp], Records]:
-    """Order lines by what they tell; return the row of each that is labelled, and the rows."""
-    order = np.argsort(-lines["length"], kind="stable")
-    place = np.empty(len(order), dtype=np.intp)
-    place[order] = np.arange(len(order))
-    return place[labels], describe_lines(lines, order, variances, model)
-
-
-def _seen_at_once(rows: Records) -> Records:
-    """Return what one view shows: all rows, in their order."""
-    seen = np.zeros(len(rows), SIGHTING)
-    seen["row"] = np.arange(len(rows))
-    for name in ("dx", "dy", "x", "y", "length"):
-        seen[name] = rows[name]
-    return seen
 
 
 def parts_of(measured: MeasuredSegments, views: Views) -> tuple[NDArray[np.intp], Records, NDArray[np.intp]]:
@@ -132,7 +112,7 @@ def parts_of(measured: MeasuredSegments, views: Views) -> tuple[NDArray[np.intp]
     covariance, before = views.covariance, 0
     for v, pose in enumerate(views.poses):
         own = np.flatnonzero(views.of_segment == v)
-        labels, lines = _joined_lines(_given(_taken(measured, own)), counted=measured.counted)
+        labels, lines = lines_of_a_view(_given(_taken(measured, own)), measured.counted)
         part_of[own] = labels + before
         block = covariance[3 * v : 3 * v + 3, 3 * v : 3 * v + 3]
         levers = lines["dx"] * (lines["centroid_x"] - pose.x) + lines["dy"] * (lines["centroid_y"] - pose.y)
@@ -166,7 +146,7 @@ def _joined_views(parts: Records, views: Views) -> tuple[Integers, Records]:
     if views.uncertain and len(parts):
         lateral = min(MOST_LATERAL, lateral + VIEW_SIGMAS * float(np.sqrt(parts["common_offset"].mean())))
         turn = min(MOST_TURN, turn + VIEW_SIGMAS * float(np.sqrt(parts["common_angle"].mean())))
-    labels, lines = _joined(_measured(parts), lateral, math.cos(turn), counted=True)
+    labels, lines = join_lines(parts, lateral, math.cos(turn), True)
     weights = np.bincount(labels, parts["length"], len(lines))
     for name in ("common_offset", "common_angle"):
         lines[name] = np.bincount(labels, parts["length"] * parts[name], len(lines)) / weights
@@ -180,33 +160,6 @@ def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) 
     for name in ("dx", "dy", "x", "y", "length", "centroid_x", "centroid_y", "spread", "variance"):
         seen[name] = parts[name]
     return seen[np.lexsort((rows, views))]
-
-
-def _joined(given: Measured, lateral: float, cosine: float, *, counted: bool) -> tuple[Integers, Records]:
-    """Join what continues or repeats one another; return (n,) the line of each segment, and the lines."""
-    longest = np.argsort(-given.lengths, kind="stable")
-    labels = collinear_segments(given, longest, lateral, cosine)
-    lines = np.zeros(int(labels.max(initial=-1)) + 1, LINE_PARTS)
-    join_segments(given, longest, labels, counted, lines)
-    return labels, lines
-
-
-def _measured(lines: Records) -> Measured:
-    """Return lines as segments to be joined further."""
-
-    def fixed(array: Floats) -> Floats:
-        # As what was sent is: for a kernel an array that may be written to is another type.
-        array.setflags(write=False)
-        return array
-
-    def points(x: str, y: str) -> Records:
-        return as_records(POINT, fixed(np.stack([lines[x], lines[y]], axis=1)))
-
-    lengths, spreads, counts = (fixed(lines[name].copy()) for name in ("length", "spread", "points"))
-    sigma = fixed(np.sqrt(lines["variance"] * counts))
-    return Measured(
-        points("dx", "dy"), points("x", "y"), lengths, points("centroid_x", "centroid_y"), spreads, sigma, counts
-    )
 
 
 @lru_cache

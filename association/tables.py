@@ -199,10 +199,27 @@ class Question(NamedTuple):
     ----------
     scan : (n,) of `SCAN_LINE`
     terms : (1,) of `TERMS`
+    rules : (1,) of `RULES`
     """
 
     scan: Records
     terms: Records
+    rules: Records
+
+
+class Odds(NamedTuple):
+    """A model of the verdict.
+
+    Attributes
+    ----------
+    curves : (n,) of `CURVE`
+    bends : (k,) of `BEND`
+    pairs : (m,) of `TWO_FEATURES`
+    """
+
+    curves: Records
+    bends: Records
+    pairs: Records
 
 
 class Blockers(NamedTuple):

@@ -73,7 +73,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     answer, rivals, complete = explanations.answer, explanations.rivals, explanations.search.complete
     if answer is None:
         why = reasons_of(
-            Standing(Status.NO_MATCH, complete, bool(explanations.ranked), elsewhere=True, thin=False, twin=False),
+            Standing(Status.NO_MATCH, complete, bool(explanations.ranked), elsewhere=True),
             None,
             None,
         )
@@ -84,7 +84,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     certain = complete and not contradicted and context.window is None and not _out_of_step(answer)
     chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
     status = _status(answer, chances, _bar(context), capped=better_elsewhere)
-    pose = place_on_family(context, answer) if status is Status.DEGENERATE else answer.registered.pose
+    pose = place_on_family(context, answer)
     if context.window is not None and pose is not None and not context.window.contains(pose):
         # It was inside before it was registered: the window is narrower than what the scan says.
         contradicted = contradicted or status is not Status.NO_MATCH
@@ -172,8 +172,6 @@ def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float)
 
     Of `NULL_SHARES`, or 0; wherever the map is not symmetric about the place. The more it reaches the less the chance.
     """
-    if best.score <= 0.0:
-        return 0.0
 
     def matters(share: float) -> bool:
         return _logistic(cautious.logit(with_null(features, best, Null(share * best.score, 0.0)))) < bar + ROUNDING

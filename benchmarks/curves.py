@@ -136,7 +136,8 @@ def fit(examples: Sequence[Example], task: Task, temperature: float) -> Fitted:
         )
     pairs = [_pair(examples, kind, one, other) for kind, one, other in task.pairs]
     for pair in pairs:
-        columns.append(np.array([[pair(e.features)] for e in examples]))
+        alone = Model({}, (pair,))
+        columns.append(np.array([[alone.logit(e.features)] for e in examples]))
         bounds.append((0.0, np.inf))
     raw = np.hstack(columns)
     middle, scale = raw.mean(axis=0), raw.std(axis=0)

@@ -14,8 +14,7 @@ from unittest.mock import patch
 import numpy as np
 
 from association import scan_lines
-from association.kernels.scans import join_segments
-from association.layout import LINE_PARTS, Integers
+from association.kernels.scans import as_lines, describe_labelled, join_labelled, longest_first, seen_at_once
 from association.tables import Measured
 from registration.layout import Records
 
@@ -63,14 +62,12 @@ def without_wall_error(terms: Terms) -> None:
     terms[1]["wall_variance"] = TINY**2
 
 
-def each_by_itself(given: Measured, lateral: float, cosine: float, *, counted: bool) -> tuple[Integers, Records]:
+def each_by_itself(measured: Measured, counted: bool, variances: Records, model: Records) -> tuple[Any, Records, Any]:
     """Describe the segments as lines without joining any."""
-    apart = np.zeros(len(given.lengths), dtype=np.intp)
-    apart[:] = np.arange(len(apart))
-    longest = np.argsort(-given.lengths, kind="stable")
-    lines = np.zeros(len(apart), LINE_PARTS)
-    join_segments(given, longest, apart, counted, lines)
-    return apart, lines
+    apart, given = np.arange(len(measured.lengths)), as_lines(measured)
+    lines = join_labelled(given, longest_first(given), apart, counted)
+    row_of, rows = describe_labelled(apart, lines, variances, model)
+    return row_of, rows, seen_at_once(rows)
 
 
 VARIANTS: dict[str, Callable[[], AbstractContextManager[Any]]] = {
@@ -78,7 +75,7 @@ VARIANTS: dict[str, Callable[[], AbstractContextManager[Any]]] = {
     "without the freedom taken": partial(changed, without_freedom),
     "each match with an error of its own": partial(changed, without_common_error),
     "walls without an error": partial(changed, without_wall_error),
-    "no segments joined": partial(patch.object, scan_lines, "_joined", each_by_itself),
+    "no segments joined": partial(patch.object, scan_lines, "describe_view", each_by_itself),
 }
 
 

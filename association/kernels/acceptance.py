@@ -10,6 +10,7 @@ from registration.layout import Floats, Records
 from ..layout import BLOCKER, Indices
 from ..tables import Blockers, Lines, Pieces, Place, Sights, Workspace
 from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT
+from .ordering import ascending
 from .sight import count_blockers
 
 
@@ -20,7 +21,7 @@ def union_length(lows: Floats, highs: Floats, count: int) -> float:
         return highs[0] - lows[0]
     total = 0.0
     reach = -math.inf
-    for k in np.argsort(lows[:count]):
+    for k in ascending(lows[:count]):
         start = max(lows[k], reach)
         if highs[k] > start:
             total += highs[k] - start

@@ -1,14 +1,14 @@
-"""Compiled choice of bases: the cheap and telling ones first, and when enough have been gone through."""
+"""Compiled choice of bases: the cheap and telling ones first."""
 
 import math
 
 import numpy as np
 
-from registration.compiling import borrowed, inlined, kernel
-from registration.layout import Floats, Records
+from registration.compiling import inlined, kernel
+from registration.layout import Floats, Record, Records
 
 from ..layout import BASE, Integers
-from ..tables import MapTables, Plan, Question, Samples, Walls, Workspace
+from ..tables import Plan, Question, Samples, Walls
 from ..tuning import (
     COST_ANCHOR,
     COST_BASE,
@@ -23,7 +23,8 @@ from ..tuning import (
     TELLING,
     UNTELLING,
 )
-from .proposing import least_length, search_base
+from .ordering import ascending
+from .proposing import least_length
 
 
 @kernel
@@ -56,22 +57,36 @@ def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats
 
 
 @kernel
-def is_telling(scan: Records, a: int, b: int) -> bool:
+def middle_of(scan: Records) -> tuple[float, float, float]:
+    """Return the mean of the midpoints by their gains, x and y, and the mean square of how far they lie from it."""
+    gain = 0.0
+    x = 0.0
+    y = 0.0
+    for i in range(len(scan)):
+        gain += scan[i].gain
+        x += scan[i].gain * scan[i].x
+        y += scan[i].gain * scan[i].y
+    if gain <= 0.0:
+        return 0.0, 0.0, 0.0
+    x /= gain
+    y /= gain
+    square = 0.0
+    for i in range(len(scan)):
+        square += scan[i].gain * ((scan[i].x - x) ** 2 + (scan[i].y - y) ** 2)
+    return x, y, square / gain
+
+
+@inlined
+def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool:
     """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
 
     Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
+    `middle` is that of the scan.
     """
-    va = scan[a].angle_variance
-    vb = scan[b].angle_variance
-    variance = va * vb / (va + vb)
-    x = 0.5 * (scan[a].x + scan[b].x)
-    y = 0.5 * (scan[a].y + scan[b].y)
-    total = 0.0
-    gain = 0.0
-    for i in range(len(scan)):
-        total += scan[i].gain * ((scan[i].x - x) ** 2 + (scan[i].y - y) ** 2)
-        gain += scan[i].gain
-    return variance * total <= TELLING**2 * gain
+    variance = a.angle_variance * b.angle_variance / (a.angle_variance + b.angle_variance)
+    x, y, square = middle
+    square += (0.5 * (a.x + b.x) - x) ** 2 + (0.5 * (a.y + b.y) - y) ** 2
+    return variance * square <= TELLING**2
 
 
 @kernel
@@ -81,6 +96,7 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
     The merit is what the base can tell (the lesser gain) over what it will cost. `area` is that of the map, m^2.
     """
     slides, fitting = slack_tables(scan, count, runs)
+    middle = middle_of(scan)
     bin_starts = runs.bin_starts
     bins = len(bin_starts) - 1
     total = np.zeros(count)
@@ -92,7 +108,9 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
             taken[n_taken] = b
             n_taken += 1
     short = np.empty(count)
+    tells = np.empty(count)
     for i in range(count):
+        tells[i] = math.log(scan[i].gain)
         short[i] = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
         for b in range(bins):
             total[i] += slides[i, b]
@@ -116,8 +134,8 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
             cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
             bases[k].sliding = i if sweep_i <= sweep_j else j
             bases[k].crossing = j if sweep_i <= sweep_j else i
-            merit = GAIN_POWER * math.log(min(scan[i].gain, scan[j].gain)) - math.log(cost)
-            if not is_telling(scan, i, j):
+            merit = GAIN_POWER * min(tells[i], tells[j]) - math.log(cost)
+            if not is_telling(scan[i], scan[j], middle):
                 merit += math.log(UNTELLING)
             bases[k].merit = merit
             k += 1
@@ -149,192 +167,52 @@ def next_base(bases: Records, uses: Floats, fade: float) -> int:
 
 
 @kernel
-def cover(residual: Floats, a: int, b: int) -> float:
-    """Return by how much a base lowers the bound on what a pose can score that contains none of the bases so far.
-
-    Such a pose lacks one segment of each base. The greedy packing of the gains over the bases is a feasible solution of
-    the dual of that covering problem, so the bound holds. `residual` (n,) is what is left of each gain.
-    """
-    less = min(residual[a], residual[b])
-    residual[a] -= less
-    residual[b] -= less
-    return less
-
-
-@kernel
-def strike(samples: Samples, a: int, b: int) -> None:
-    """Note in the sampled consensus sets that a base was gone through."""
-    found = samples.found
-    first = samples.ranks[a]
-    second = samples.ranks[b]
-    for s in range(len(found)):
-        later = first[s] if first[s] > second[s] else second[s]
-        found[s] = later if later < found[s] else found[s]
-
-
-@kernel
-def missed_sets(scan: Records, samples: Samples, fewest: int, needed: float, most: int) -> int:
-    """Count the sampled consensus sets that hold none of the bases so far, up to one more than `most`.
-
-    Each is an order of the segments of bases, and has as many of the first as come to gains of `needed`, `fewest` at
-    least, which may be more than before, never less. An order whose gains do not come to it has no set. Where a set
-    was found to hold a base it is not looked at any more.
-    """
-    orders = samples.orders
-    found = samples.found
-    sizes = samples.sizes
-    gains = samples.gains
-    undecided = samples.undecided
-    n = orders.shape[1]
-    left = 0
-    at = 0
-    end = undecided[len(found)]
-    while at < end and left <= most:
-        s = undecided[at]
-        held = found[s] < fewest
-        if not held:
-            while (gains[s] < needed or sizes[s] < fewest) and sizes[s] < n:
-                gains[s] += scan[orders[s, sizes[s]]].gain
-                sizes[s] += 1
-            held = found[s] < sizes[s] or gains[s] < needed
-        if held:
-            end -= 1
-            undecided[at] = undecided[end]
-        else:
-            left += 1
-            at += 1
-    undecided[len(found)] = end
-    return left
-
-
-@kernel
-def fewest_segments(best_gains: Floats, beyond: float, needed: float) -> int:
-    """Return how many of the first segments a consensus set has at least that scores `needed`.
-
-    `best_gains` (n,): their gains, the largest first; `beyond`: what all other segments of the scan could add.
-    """
-    total = beyond
-    for m in range(len(best_gains)):
-        if total >= needed:
-            return max(m, 2)
-        total += best_gains[m]
-    return max(len(best_gains), 2)
-
-
-@inlined
-def drawn_chance(fewest: int, count: int) -> float:
-    """Return the chance that both segments of a base drawn among `count` are among `fewest` inliers."""
-    return min(1.0, fewest * (fewest - 1) / max(1, count * (count - 1)))
-
-
-@kernel
-def least_freedom(scan: Records, freest: Integers, needed: float) -> float:
-    """Return what freedom a consensus set takes at least whose gains come to `needed`, nats.
-
-    It has one of the lines at least without which the others do not come to that; `freest` (n,) are the lines, those
-    that take most by themselves first.
-    """
-    rest = 0.0
-    for i in range(len(scan)):
-        rest += scan[i].gain
-    for i in freest:
-        rest -= scan[i].gain
-        if rest < needed:
-            return scan[i].freedom
-    return 0.0
-
-
-@kernel
-def needed_of(question: Question, plan: Plan, best_value: float) -> float:
-    """Return what the gains of a set come to at least that scores as high as a rival of the best."""
-    needed = question.terms[0].rules.rival_share * best_value
-    return needed + least_freedom(question.scan, plan.freest, needed)
-
-
-@kernel
-def gain_beyond(scan: Records, plan: Plan) -> float:
-    """Return what the segments of a scan could add of which no bases are made, nats."""
-    beyond = 0.0
-    for i in range(len(plan.best_gains), len(scan)):
-        beyond += scan[i].gain
-    return beyond
-
-
-@kernel
-def missed_share(question: Question, plan: Plan, progress: Records) -> float:
-    """Return the share of the sampled consensus sets that hold none of the bases so far."""
-    scan = question.scan
-    needed = needed_of(question, plan, progress[0].best_value)
-    beyond = gain_beyond(scan, plan)
-    count = len(plan.samples.found)
-    fewest = fewest_segments(plan.best_gains, beyond, needed)
-    return missed_sets(scan, plan.samples, fewest, needed - beyond, count) / count
-
-
-# Why `advance` came back.
-BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
-
-
-@kernel
-def advance(
+def begin(
     question: Question,
-    tables: MapTables,
-    plan: Plan,
-    found: Records,
+    runs: Walls,
+    area: float,
+    orders: Integers,
+    ranks: Integers,
     progress: Records,
-    work: Workspace,
-    allowed: float,
-    budget: int,
-) -> int:
-    """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
+    fade: float,
+    random: bool,
+) -> Plan:
+    """Plan a search, and put `progress` (1,) at its beginning, at the best value that is known.
 
-    `allowed` is the greatest chance of having missed a better consensus set, -1 to go through all bases; `progress`
-    (1,) keeps that chance up to date, or says that it is greater than that: see `missed_share`. Returns one of
-    `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+    `orders` (samples, n) and `ranks` (n, samples) are those of `Samples`, n being how many segments bases are made of;
+    `area` is that of the map, m^2; `fade` and `random` as in `Plan`.
     """
-    question = borrowed(question)
-    tables = borrowed(tables)
-    plan = borrowed(plan)
-    found = borrowed(found)
-    progress = borrowed(progress)
-    work = borrowed(work)
     scan = question.scan
-    rules = question.terms[0].rules
+    count, n = orders.shape
     state = progress[0]
-    bases = plan.bases
-    count = len(plan.samples.found)
-    beyond = gain_beyond(scan, plan)
-    spent = 0
-    while True:
-        if state.base < 0:
-            state.base = next_base(bases, plan.uses, plan.fade)
-            if state.base < 0:
-                return EXHAUSTED
-        base = bases[state.base]
-        spent += search_base(question, tables, base, found, state, work, budget - spent)
-        if state.anchor > 0 or state.slide > -math.inf:
-            return BUDGET
-        state.base = -1
-        state.least_freedom = least_freedom(scan, plan.freest, rules.kept_share * state.best_value)
-        needed = needed_of(question, plan, state.best_value)
-        a = base.sliding
-        b = base.crossing
-        if is_telling(scan, a, b):
-            state.bound -= cover(plan.residual, a, b)
-            fewest = fewest_segments(plan.best_gains, beyond, needed)
-            if plan.random:
-                state.missed *= 1.0 - drawn_chance(fewest, len(plan.best_gains))
-            else:
-                strike(plan.samples, a, b)
-                # It need not be known by how much too many are left.
-                most = math.floor(allowed * count) if allowed >= 0.0 else -1
-                state.missed = missed_sets(scan, plan.samples, fewest, needed - beyond, most) / count
-        if state.best_value >= rules.enough:
-            return CONFIDENT
-        if allowed >= 0.0:
-            if state.bound < needed:
-                return PROVEN
-            if state.missed <= allowed:
-                return CONFIDENT
-        if spent > budget:
-            return BUDGET
+    state.current = -1
+    state.slide = -math.inf
+    state.bound = 0.0
+    state.missed = 1.0
+    residual = np.empty(len(scan))
+    freedoms = np.empty(len(scan))
+    losses = np.empty(n)
+    for i in range(n):
+        losses[i] = -scan[i].gain
+    for i in range(len(scan)):
+        residual[i] = scan[i].gain
+        freedoms[i] = -scan[i].freedom
+        state.bound += scan[i].gain
+    # All of these have sets that may have missed all bases.
+    found = np.empty(count, dtype=np.uint8)
+    undecided = np.empty(count + 1, dtype=np.int32)
+    for s in range(count):
+        found[s] = n
+        undecided[s] = s
+    undecided[count] = count
+    samples = Samples(orders, ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided)
+    return Plan(
+        plan_bases(scan, n, runs, area),
+        np.zeros(n),
+        residual,
+        residual[ascending(losses)],
+        ascending(freedoms),
+        samples,
+        fade,
+        random,
+    )

@@ -1,14 +1,14 @@
-"""Compiled proposals: from bases of two scan segments, and from one that slides, to scored poses."""
+"""Compiled proposals: from bases of two scan segments to poses."""
 
 import math
 
 import numpy as np
 
-from registration.compiling import borrowed, inlined, kernel
+from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
 from ..layout import HARD_PRIOR, Integers
-from ..tables import MapTables, Place, Question, Raster, Workspace
+from ..tables import MapTables, Question, Workspace
 from ..tuning import (
     BASE_SLACK,
     BASE_SLACK_SHARE,
@@ -16,16 +16,12 @@ from ..tuning import (
     SECTOR_BITS,
     SECTORS,
     TESTS_ANCHOR,
-    TESTS_HYPOTHESIS,
-    TESTS_REFINED,
-    TESTS_REJECTED,
-    WHOLE_OVERLAP,
     WINDOW_MARGIN,
     WINDOW_TURN,
 )
-from .best_poses import floor_of, offer, prior_value
-from .consensus import refine, turning
-from .matching import PER_RADIAN, allow_all, gates_about, match_scan, may_score, wrap
+from .consensus import turning
+from .matching import PER_RADIAN, gates_about, wrap
+from .trying import try_pose
 
 
 @inlined
@@ -88,55 +84,23 @@ def base_pose(a: Record, b: Record, wa: Record, wb: Record, pose: Record) -> boo
 
 
 @kernel
-def try_pose(
-    question: Question, place: Place, raster: Raster, found: Records, progress: Record, work: Workspace
-) -> int:
-    """Score the pose of the workspace, given with its covariance; keep it if it is among the best.
-
-    Returns what it cost, in tests of a wall.
-    """
-    scan = question.scan
-    terms = question.terms[0]
-    gates = terms.gates
-    rules = terms.rules
-    prior = terms.prior
-    pose = work.scratch[0].estimate
-    progress.hypotheses += 1
-    bonus = prior_value(prior, pose)
-    if prior.kind == HARD_PRIOR:
-        bonus = 0.0
-        if (
-            math.hypot(pose.x - prior.x, pose.y - prior.y) > prior.radius + WINDOW_MARGIN
-            or abs(wrap(pose.theta - prior.theta)) > prior.angle + WINDOW_TURN
-        ):
-            return TESTS_REJECTED
-    floor = floor_of(rules, progress, bonus) + progress.least_freedom
-    possible = work.possible
-    if gates.least_overlap < WHOLE_OVERLAP:
-        allow_all(scan, possible)
-    elif not may_score(scan, pose, work.spreads, work.shifts, raster, floor, possible):
-        return TESTS_REJECTED
-    if match_scan(scan, pose, place, gates, possible, floor, work.matches) < 0.0:
-        return TESTS_HYPOTHESIS
-    progress.verified += 1
-    # No prior makes up for what the set lacks.
-    least = floor_of(rules, progress, 0.0) + progress.least_freedom
-    score = refine(scan, pose, place, terms, work.matches, work, least)
-    offer(found, progress, rules, prior, pose, score)
-    return TESTS_REFINED
-
-
-@kernel
 def search_base(
-    question: Question, tables: MapTables, base: Record, found: Records, progress: Record, work: Workspace, budget: int
+    question: Question,
+    tables: MapTables,
+    base: Record,
+    found: Records,
+    tried: Records,
+    progress: Record,
+    work: Workspace,
+    budget: int,
 ) -> int:
     """Go through all pairs of runs that fit a base of two scan segments a, which slides, and b.
 
     A run under a fixes the rotation and leaves one slide; the grid is walked along what the midpoint of b then sweeps.
     The final angle splits the misfit of both, so that b turns about a by up to `swing` metres: the ends are tested
     loosely until then. Goes on from the anchor where `progress` stands, at its slide unless that is -inf and there at
-    the item of its step, and stops when `budget` tests are used up, within a cell, too. Returns the tests that it took;
-    the anchor is back at 0, and the slide at -inf, when the base is done.
+    the item of its step, and stops when `budget` tests are used up, within a cell, too, or the room in `tried`. Returns
+    the tests that it took; the anchor is back at 0, and the slide at -inf, when the base is done.
 
     The walk stands here whole, and reads arrays only by element: see `match_scan`.
     """
@@ -195,6 +159,7 @@ def search_base(
         spent += TESTS_ANCHOR
         dx = wa.dx
         dy = wa.dy
+        resumed = progress.slide > -math.inf
         at = max(wa.begin + half_a, progress.slide)
         high = wa.end - half_a
         first = progress.step
@@ -226,6 +191,11 @@ def search_base(
         pace_y = cell / max(abs(dy), 1e-12)
         next_x = at + ((column + 1 - fx) if dx > 0.0 else (fx - column)) * pace_x
         next_y = at + ((row + 1 - fy) if dy > 0.0 else (fy - row)) * pace_y
+        if resumed:  # as it was left, to the bit: a crossing may lie where cells meet
+            column = progress.column
+            row = progress.row
+            next_x = progress.next_x
+            next_y = progress.next_y
         # The sectors that the direction of b may lie in, one or two.
         turned = (wa.angle + turn + math.pi) * PER_RADIAN + 0.5
         first_sector = math.floor(turned - spread)
@@ -256,11 +226,15 @@ def search_base(
                         continue
                     if base_pose(a, b, wa, runs[wb], pose):
                         turning(theta_var, c * pin_x - s * pin_y, s * pin_x + c * pin_y, pose)
-                        spent += try_pose(question, place, raster, found, progress, work)
-                        if spent > budget:
+                        spent += try_pose(question, place, raster, found, tried, progress, work)
+                        if spent > budget or (progress.tried == len(tried) and progress.tried > 0):
                             progress.anchor -= 1
                             progress.slide = at
                             progress.step = k + 1
+                            progress.column = column
+                            progress.row = row
+                            progress.next_x = next_x
+                            progress.next_y = next_y
                             return spent
             at = until
             if next_x < next_y:
@@ -273,75 +247,13 @@ def search_base(
             if spent > budget and entered < at <= high:
                 progress.anchor -= 1
                 progress.slide = at
+                progress.column = column
+                progress.row = row
+                progress.next_x = next_x
+                progress.next_y = next_y
                 return spent
         if spent > budget and progress.anchor < n_anchors:
             return spent
     progress.anchor = 0
     progress.bases += 1
     return spent
-
-
-@kernel
-def search_slides(
-    question: Question,
-    tables: MapTables,
-    sliding: int,
-    found: Records,
-    progress: Records,
-    work: Workspace,
-    spacing: float,
-    budget: int,
-) -> bool:
-    """Lay scan segment `sliding` on every run that is long enough, at slides `spacing` metres apart; keep the best.
-
-    For scans without a base: what is found is a family of poses, fixed across the walls and free along them. Goes on
-    from the anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
-    """
-    question = borrowed(question)
-    tables = borrowed(tables)
-    found = borrowed(found)
-    work = borrowed(work)
-    state = progress[0]
-    place = tables.place
-    raster = tables.raster
-    runs = tables.sweep.runs
-    prior = question.terms[0].prior
-    pose = work.scratch[0].estimate
-    a = question.scan[sliding]
-    spent = 0
-    gates_about(question.scan, a.angle_variance, a.x, a.y, 0.0, question.terms[0].gates, work.spreads, work.shifts)
-    anchor_list = np.empty(len(runs), dtype=np.int32)
-    n_anchors = anchors(a.length, runs, tables.sweep.bin_starts, anchor_list)
-    while state.anchor < n_anchors:
-        w = anchor_list[state.anchor]
-        wall = runs[w]
-        state.anchor += 1
-        first = state.step
-        state.step = 0
-        half = 0.5 * a.length - end_slack(a.length)
-        low = wall.begin + half
-        high = wall.end - half
-        theta = wall.angle - a.angle
-        c = math.cos(theta)
-        s = math.sin(theta)
-        gx = c * a.x - s * a.y
-        gy = s * a.x + c * a.y
-        if prior.kind == HARD_PRIOR:
-            middle = wall.dx * (prior.x + gx) + wall.dy * (prior.y + gy)
-            low = max(low, middle - prior.radius)
-            high = min(high, middle + prior.radius)
-            if low > high or abs(wrap(theta - prior.theta)) > prior.angle + WINDOW_TURN:
-                continue
-        steps = max(1, math.ceil((high - low) / spacing))
-        for j in range(first, steps):
-            if spent > budget:
-                state.anchor -= 1
-                state.step = j
-                return False
-            slide = low + (j + 0.5) / steps * (high - low)
-            pose.theta = theta
-            pose.x = wall.dx * slide - wall.dy * wall.offset - gx
-            pose.y = wall.dy * slide + wall.dx * wall.offset - gy
-            turning(a.angle_variance, gx, gy, pose)
-            spent += try_pose(question, place, raster, found, state, work)
-    return True

@@ -8,34 +8,73 @@ from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, LEAST_POINTS, Floats, Record, Records
 
-from ..layout import SCAN_LINE, Integers
+from ..layout import LINE_PARTS, SCAN_LINE, SIGHTING, Indices, Integers
 from ..tables import Measured
 from ..tuning import (
+    CUT_COSINE,
+    CUT_LATERAL,
     GAIN,
     GAIN_LENGTH,
     GAIN_PER_METRE,
     LEAST_SPREAD,
     LEAST_VARIANCE,
+    LINE_COSINE,
     LINE_GAP,
+    LINE_LATERAL,
     MODEL_ANGLE,
     MODEL_OFFSET,
     ROUGHNESS,
 )
 from .acceptance import union_length
 from .consensus import freedom_taken
+from .ordering import ascending
 
 
 @kernel
-def collinear_segments(measured: Measured, order: Integers, lateral: float, least_cosine: float) -> Integers:
-    """Label segments of a scan that continue or repeat one another, (n,): the number of the line each is part of.
+def as_lines(measured: Measured) -> Records:
+    """Return each segment as a line by itself, (n,) of `LINE_PARTS`."""
+    directions = measured.directions
+    midpoints = measured.midpoints
+    lengths = measured.lengths
+    centroids = measured.centroids
+    spreads = measured.spreads
+    sigma = measured.sigma
+    points = measured.points
+    lines = np.zeros(len(lengths), dtype=LINE_PARTS)
+    for i in range(len(lengths)):
+        line = lines[i]
+        line.dx = directions[i].x
+        line.dy = directions[i].y
+        line.x = midpoints[i].x
+        line.y = midpoints[i].y
+        line.length = lengths[i]
+        line.covered = lengths[i]
+        line.centroid_x = centroids[i].x
+        line.centroid_y = centroids[i].y
+        line.spread = spreads[i]
+        line.points = points[i]
+        line.sigma = sigma[i]
+        line.variance = sigma[i] ** 2 / points[i]
+    return lines
+
+
+@kernel
+def longest_first(lines: Records) -> Integers:
+    """Order lines by length, ties by index, (n,)."""
+    lengths = np.empty(len(lines))
+    for i in range(len(lines)):
+        lengths[i] = -lines[i].length
+    return ascending(lengths)
+
+
+@kernel
+def collinear_lines(given: Records, order: Integers, lateral: float, least_cosine: float) -> Indices:
+    """Label parts of lines that continue or repeat one another, (n,): the number of the line each is part of.
 
     In `order`, the longest first: each that is on no line yet begins one, and takes on those whose middle is within
     `lateral` metres of it and that are turned by no more than `least_cosine` says, as far as they follow without a gap
     of more than `LINE_GAP`. The lines are numbered in the order of those that begin them.
     """
-    directions = measured.directions
-    midpoints = measured.midpoints
-    lengths = measured.lengths
     n = len(order)
     labels = np.full(n, -1)
     near = np.empty(n, dtype=np.int64)
@@ -47,24 +86,25 @@ def collinear_segments(measured: Measured, order: Integers, lateral: float, leas
         if labels[i] >= 0:
             continue
         labels[i] = lines
-        dx = directions[i].x
-        dy = directions[i].y
+        first = given[i]
+        dx = first.dx
+        dy = first.dy
         count = 0
         for later in range(k + 1, n):
             j = order[later]
-            cosine = directions[j].x * dx + directions[j].y * dy
+            cosine = given[j].dx * dx + given[j].dy * dy
             if labels[j] >= 0 or cosine < least_cosine:
                 continue
-            x = midpoints[j].x - midpoints[i].x
-            y = midpoints[j].y - midpoints[i].y
+            x = given[j].x - first.x
+            y = given[j].y - first.y
             if abs(dx * y - dy * x) > lateral:
                 continue
             near[count] = j
-            lows[count] = dx * x + dy * y - 0.5 * lengths[j] * cosine
-            highs[count] = dx * x + dy * y + 0.5 * lengths[j] * cosine
+            lows[count] = dx * x + dy * y - 0.5 * given[j].length * cosine
+            highs[count] = dx * x + dy * y + 0.5 * given[j].length * cosine
             count += 1
-        low = -0.5 * lengths[i]
-        high = 0.5 * lengths[i]
+        low = -0.5 * first.length
+        high = 0.5 * first.length
         grown = count > 0
         while grown:
             grown = False
@@ -80,109 +120,95 @@ def collinear_segments(measured: Measured, order: Integers, lateral: float, leas
 
 
 @kernel
-def join_segments(measured: Measured, order: Integers, labels: Integers, counted: bool, lines: Records) -> None:
-    """Write what the segments of each label show together to `lines` (k,) of `LINE_PARTS`.
+def join_labelled(given: Records, order: Integers, labels: Integers, counted: bool) -> Records:
+    """Return what the parts of each label show together, (k,) of `LINE_PARTS`.
 
     What overlaps counts its points once. Where they were not `counted`, a line has `LEAST_POINTS` at least.
     """
-    directions = measured.directions
-    midpoints = measured.midpoints
-    lengths = measured.lengths
-    centroids = measured.centroids
     n = len(order)
+    count = 0
+    for i in range(n):
+        count = max(count, labels[i] + 1)
+    lines = np.empty(count, dtype=LINE_PARTS)
     members = np.empty(n, dtype=np.int64)
-    starts = np.zeros(len(lines) + 1, dtype=np.int64)
+    starts = np.zeros(count + 1, dtype=np.int64)
     for k in range(n):
         starts[labels[order[k]] + 1] += 1
-    for k in range(len(lines)):
+    for k in range(count):
         starts[k + 1] += starts[k]
     filled = np.copy(starts)
     for k in range(n):
         i = order[k]
         members[filled[labels[i]]] = i
         filled[labels[i]] += 1
-    for k in range(len(lines)):
+    for k in range(count):
+        lines[k] = given[members[starts[k]]]
         line = lines[k]
-        first = members[starts[k]]
-        line.dx = directions[first].x
-        line.dy = directions[first].y
-        line.x = midpoints[first].x
-        line.y = midpoints[first].y
-        line.length = lengths[first]
-        line.covered = lengths[first]
-        line.centroid_x = centroids[first].x
-        line.centroid_y = centroids[first].y
-        line.spread = measured.spreads[first]
-        line.points = measured.points[first]
-        line.variance = measured.sigma[first] ** 2 / line.points
+        line.covered = line.length
         line.common_offset = 0.0
         line.common_angle = 0.0
         if starts[k + 1] - starts[k] > 1:
-            join(measured, members[starts[k] : starts[k + 1]], line)
+            join(given, members[starts[k] : starts[k + 1]], line)
         if not counted and line.points < LEAST_POINTS:
             line.variance *= line.points / LEAST_POINTS
+        line.sigma = math.sqrt(line.variance * line.points)
+    return lines
 
 
 @kernel
-def shares_of(measured: Measured, members: Integers, line: Record) -> Floats:
-    """Return (m,) the share of each segment along a line that those before it do not cover; write `covered`."""
-    midpoints = measured.midpoints
-    lengths = measured.lengths
+def shares_of(given: Records, members: Integers, line: Record) -> Floats:
+    """Return (m,) the share of each part along a line that those before it do not cover; write `covered`."""
     lows = np.empty(len(members))
     highs = np.empty(len(members))
     shares = np.empty(len(members))
     line.covered = 0.0
     for k in range(len(members)):
         i = members[k]
-        along = line.dx * (midpoints[i].x - line.x) + line.dy * (midpoints[i].y - line.y)
-        lows[k] = along - 0.5 * lengths[i]
-        highs[k] = along + 0.5 * lengths[i]
+        along = line.dx * (given[i].x - line.x) + line.dy * (given[i].y - line.y)
+        lows[k] = along - 0.5 * given[i].length
+        highs[k] = along + 0.5 * given[i].length
         before = line.covered
         line.covered = union_length(lows, highs, k + 1)
-        shares[k] = min(1.0, max(0.0, (line.covered - before) / lengths[i]))
+        shares[k] = min(1.0, max(0.0, (line.covered - before) / given[i].length))
     return shares
 
 
 @kernel
-def join(measured: Measured, members: Integers, line: Record) -> None:
-    """Put one line through the points behind several segments, the longest first; `line` comes as the first of them.
+def join(given: Records, members: Integers, line: Record) -> None:
+    """Put one line through the points behind several parts, the longest first; `line` comes as the first of them.
 
     Its direction is the greatest one of the points' second moment.
     """
-    directions = measured.directions
-    midpoints = measured.midpoints
-    lengths = measured.lengths
-    centroids = measured.centroids
-    shares = shares_of(measured, members, line)
+    shares = shares_of(given, members, line)
     points = 0.0
     information = 0.0
     exact = False
     for k in range(len(members)):
         i = members[k]
-        shares[k] *= measured.points[i]
+        shares[k] *= given[i].points
         points += shares[k]
-        if measured.sigma[i] > 0.0:
-            information += shares[k] / measured.sigma[i] ** 2
+        if given[i].sigma > 0.0:
+            information += shares[k] / given[i].sigma ** 2
         else:
             exact = exact or shares[k] > 0.0
     x = 0.0
     y = 0.0
     for k in range(len(members)):
-        x += shares[k] / points * centroids[members[k]].x
-        y += shares[k] / points * centroids[members[k]].y
+        x += shares[k] / points * given[members[k]].centroid_x
+        y += shares[k] / points * given[members[k]].centroid_y
     xx = 0.0
     xy = 0.0
     yy = 0.0
     for k in range(len(members)):
         i = members[k]
         share = shares[k] / points
-        dx = directions[i].x
-        dy = directions[i].y
-        gx = centroids[i].x - x
-        gy = centroids[i].y - y
-        xx += share * (gx * gx + measured.spreads[i] * dx * dx)
-        xy += share * (gx * gy + measured.spreads[i] * dx * dy)
-        yy += share * (gy * gy + measured.spreads[i] * dy * dy)
+        dx = given[i].dx
+        dy = given[i].dy
+        gx = given[i].centroid_x - x
+        gy = given[i].centroid_y - y
+        xx += share * (gx * gx + given[i].spread * dx * dx)
+        xy += share * (gx * gy + given[i].spread * dx * dy)
+        yy += share * (gy * gy + given[i].spread * dy * dy)
     angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
     dx = math.cos(angle)
     dy = math.sin(angle)
@@ -192,9 +218,9 @@ def join(measured: Measured, members: Integers, line: Record) -> None:
     low = math.inf
     high = -math.inf
     for i in members:
-        along = dx * (midpoints[i].x - x) + dy * (midpoints[i].y - y)
-        low = min(low, along - 0.5 * lengths[i])
-        high = max(high, along + 0.5 * lengths[i])
+        along = dx * (given[i].x - x) + dy * (given[i].y - y)
+        low = min(low, along - 0.5 * given[i].length)
+        high = max(high, along + 0.5 * given[i].length)
     line.dx = dx
     line.dy = dy
     line.x = x + 0.5 * (low + high) * dx
@@ -258,4 +284,77 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
         one.freedom = freedom_alone(one, model[0], alone[0])
         later += one.gain
     keep_alive(alone)
+    return out
+
+
+@kernel
+def join_lines(given: Records, lateral: float, least_cosine: float, counted: bool) -> tuple[Indices, Records]:
+    """Join what continues or repeats one another; return (n,) the line of each part, and the lines."""
+    order = longest_first(given)
+    labels = collinear_lines(given, order, lateral, least_cosine)
+    return labels, join_labelled(given, order, labels, counted)
+
+
+@kernel
+def lines_of_a_view(measured: Measured, counted: bool) -> tuple[Indices, Records]:
+    """Join what one view shows of a line: first what was cut, then what lies about on it.
+
+    Returns (n,) the line of each segment, and the lines, (k,) of `LINE_PARTS`.
+    """
+    given = as_lines(measured)
+    cut, lines = join_lines(given, CUT_LATERAL, CUT_COSINE, True)
+    if len(lines) == len(given):
+        return join_lines(given, LINE_LATERAL, LINE_COSINE, counted)
+    apart, lines = join_lines(lines, LINE_LATERAL, LINE_COSINE, counted)
+    for i in range(len(cut)):
+        cut[i] = apart[cut[i]]
+    return cut, lines
+
+
+@kernel
+def describe_labelled(labels: Integers, lines: Records, variances: Records, model: Records) -> tuple[Indices, Records]:
+    """Order lines by what they tell; return the row of each part that is labelled, and the rows."""
+    order = longest_first(lines)
+    place = np.empty(len(order), dtype=np.int64)
+    for k in range(len(order)):
+        place[order[k]] = k
+    row_of = np.empty(len(labels), dtype=np.int64)
+    for i in range(len(labels)):
+        row_of[i] = place[labels[i]]
+    return row_of, describe_lines(lines, order, variances, model)
+
+
+@kernel
+def seen_at_once(rows: Records) -> Records:
+    """Return what one view shows of the rows: each of them, in their order, (n,) of `SIGHTING`."""
+    seen = np.zeros(len(rows), dtype=SIGHTING)
+    for i in range(len(rows)):
+        seen[i].row = i
+        seen[i].dx = rows[i].dx
+        seen[i].dy = rows[i].dy
+        seen[i].x = rows[i].x
+        seen[i].y = rows[i].y
+        seen[i].length = rows[i].length
+    return seen
+
+
+@kernel
+def describe_view(
+    measured: Measured, counted: bool, variances: Records, model: Records
+) -> tuple[Indices, Records, Records]:
+    """Return the row of each segment of a scan of one view, the rows, and what is seen of them."""
+    labels, lines = lines_of_a_view(measured, counted)
+    row_of, rows = describe_labelled(labels, lines, variances, model)
+    return row_of, rows, seen_at_once(rows)
+
+
+@kernel
+def mirror_lines(rows: Records) -> Records:
+    """Return the rows of the scan with left and right exchanged: y becomes -y, and free space stays on the left."""
+    out = np.copy(rows)
+    for i in range(len(rows)):
+        out[i].dx = -rows[i].dx
+        out[i].y = -rows[i].y
+        out[i].centroid_y = -rows[i].centroid_y
+        out[i].angle = math.atan2(out[i].dy, out[i].dx)
     return out

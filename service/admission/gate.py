@@ -21,6 +21,7 @@ from association import CancelledError, Deadline
 
 from .errors import DeadlinePassedError, QueueFullError, ShareUsedError
 from .fair_queue import FairQueue, Holder, Turn
+from .helpers import HelperThreads
 from .ticket import Ticket
 
 T = TypeVar("T")
@@ -54,7 +55,8 @@ class _Run:
 class Gate:
     """Runs functions in threads of its own, a bounded number at a time and a bounded number waiting.
 
-    What looks at its deadline may have to rest there, for others to have their turns.
+    What looks at its deadline may have to rest there, for others to have their turns. While slots are free
+    their threads may take part in what runs: the deadline has them as its helpers.
 
     Belongs to one event loop.
 
@@ -82,6 +84,7 @@ class Gate:
         threads = slots + self._most_resting
         self._executor = ThreadPoolExecutor(threads, name, initializer=_go_behind, initargs=(nice,))
         self._queue = FairQueue()
+        self._helpers = HelperThreads(slots - 1, self._spare) if slots > 1 else None
         self._waiting: tuple[tuple[Holder, float], ...] = ()
         self._resting: set[_Run] = set()
         self._local = threading.local()
@@ -152,7 +155,7 @@ class Gate:
         ticket.admitted = True
         run = _Run(ticket.holder, time.monotonic())
         loop = asyncio.get_running_loop()
-        deadline.rest = partial(self._may_rest, loop)
+        deadline.rest, deadline.helpers = partial(self._may_rest, loop), self._helpers
         try:
             work = loop.run_in_executor(self._executor, partial(self._working, run, function))
         except BaseException:
@@ -186,9 +189,12 @@ class Gate:
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
         self._closed = True
-        for run in self._resting:
-            run.awake.set()
         self._executor.shutdown(wait=False)
+        if self._helpers is not None:
+            self._helpers.close()
+
+    def _spare(self) -> int:
+        return 0 if self._closed else self.slots - self.running
 
     def _working(self, run: _Run, function: Callable[[], T]) -> T:
         """Run a function in a thread, which is known by its turn meanwhile."""

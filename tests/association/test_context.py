@@ -53,7 +53,7 @@ def test_what_the_kernels_are_asked() -> None:
     context = context_of(ROOM_INDEX, SCAN, HARD, min_overlap=0.3)
     question = context.question(rules)
     assert question.scan is context.lines.rows
-    assert question.terms["rules"] == rules
+    assert question.rules is rules
     assert question.terms["gates"] == context.gates
     assert question.terms["gates"]["least_overlap"] == 0.3
     assert question.terms["prior"] == context.prior_record

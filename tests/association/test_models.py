@@ -30,8 +30,9 @@ NAMES = {"probability", "cautious", "probability_with_beams", "cautious_with_bea
 )
 def test_a_curve_is_a_line_that_bends(value: float, expected: float) -> None:
     """Up by 2, from 1 on down by 1, from 3 on up by 3."""
-    assert Curve(2.0, ((1.0, -3.0), (3.0, 4.0)))(value) == pytest.approx(expected)
-    assert Curve(2.0)(value) == pytest.approx(2.0 * value)
+    features = COUNTED._replace(lead=value)
+    assert Model({"lead": Curve(2.0, ((1.0, -3.0), (3.0, 4.0)))}).logit(features) == pytest.approx(expected)
+    assert Model({"lead": Curve(2.0)}).logit(features) == pytest.approx(2.0 * value)
 
 
 def test_the_odds_are_those_of_the_curves_together() -> None:
@@ -55,7 +56,7 @@ def test_of_a_pair_both_have_to_speak_or_one_is_enough(kind: str, share: float, 
     """The share from 0.4 to 0.8, the lead from 4 down to 0."""
     pair = Pair(kind, "share", "lead", 2.0, ((0.4, 0.8), (4.0, 0.0)))
     features = USUAL._replace(share=share, lead=lead)
-    assert pair(features) == pytest.approx(expected)
+    assert Model({}, (pair,)).logit(features) == pytest.approx(expected)
     model = Model({"constant": Curve(1.0)}, (pair,))
     assert model.logit(features) == pytest.approx(1.0 + expected)
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import MapIndex
+from association import MapIndex, Scan, View, assemble
+from association.scan_lines import parts_of
 from association.tuning import (
     COMMON_ERROR,
     FREE_ANGLE,
@@ -21,9 +22,10 @@ from association.tuning import (
     MODEL_OFFSET,
     ROUGHNESS,
 )
+from registration.layout import Floats, Records
 
 from .answers import ROOM_INDEX, SCAN
-from .scenes import INSIDE, beams_of, context_of, scan_of
+from .scenes import INSIDE, beams_of, context_of, pose, scan_of
 
 
 def test_the_longest_come_first_and_equal_ones_as_they_were_sent() -> None:
@@ -77,6 +79,34 @@ def test_with_raw_ranges_neighbouring_points_have_an_error_in_common() -> None:
     more = with_ranges["angle_variance"] - without["angle_variance"]
     np.testing.assert_allclose(more, COMMON_ERROR**2 / without["spread"])
     np.testing.assert_allclose(with_ranges["offset_variance"], without["offset_variance"])
+
+
+def test_what_is_not_known_of_a_views_place_moves_its_lines_together() -> None:
+    """How much the offset of a line at its middle changes with place and heading of its view is found by moving it."""
+    ends = [[1.0, 1.0, 4.0, 1.2], [5.0, 0.0, 5.0, 3.7], [-2.0, -1.0, -2.0, 1.2], [0.0, 4.0, 1.5, 4.4]]
+    seen, at = scan_of(ends).measured, pose(2.0, -1.0, 0.4)
+    root = np.array([[0.05, 0.0, 0.0], [0.02, 0.08, 0.0], [-0.01, 0.015, 0.02]])
+
+    def parts(moved: Floats) -> tuple[Records, Records]:
+        x, y, theta = moved.tolist()
+        there = pose(at.x + x, at.y + y, at.theta + theta)
+        scan = assemble([View(Scan(seen)), View(Scan(seen), there, root @ root.T)])
+        assert scan.views is not None
+        _, lines, of_view = parts_of(scan.measured, scan.views)
+        return lines[of_view == 1], lines[of_view == 0]
+
+    lines, exact = parts(np.zeros(3))
+    assert len(lines) == len(exact) > 3
+    assert not exact["common_offset"].any()
+    assert not exact["common_angle"].any()
+    np.testing.assert_allclose(lines["common_angle"], (root @ root.T)[2, 2])
+    changes = []
+    for step in 1e-6 * np.eye(3):
+        there, _ = parts(step)
+        away = np.stack([there[name] - lines[name] for name in ("centroid_x", "centroid_y")], 1)
+        changes.append((lines["dx"] * away[:, 1] - lines["dy"] * away[:, 0]) / 1e-6)
+    by_root = np.stack(changes, 1) @ root
+    np.testing.assert_allclose(lines["common_offset"], (by_root**2).sum(axis=1), rtol=1e-4)
 
 
 @pytest.mark.parametrize(

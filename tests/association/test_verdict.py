@@ -134,9 +134,9 @@ def test_at_every_limit_itself_an_answer_is_usable() -> None:
         assert judge(room(), alone).status is Status.NO_MATCH
 
 
-def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> int:
-    """Return how often the mirrored scan was searched while an answer was judged."""
-    asked = []
+def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Return up to which shares of the score the mirrored scan was searched while an answer was judged."""
+    asked: list[float] = []
 
     def null_of(context: SearchContext, best: Ranked, share: float) -> null.Null:
         asked.append(share)
@@ -145,23 +145,29 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> int:
     with monkeypatch.context() as patch:
         patch.setattr(verdict, "null_of", null_of)
         judge(one.context, one.explanations)
-    return len(asked)
+    return asked
 
 
 def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     """It costs a search: not where a twin, a free direction, the prior or either probability forbids it already."""
     sure = leading(40.0)
-    assert asked_of(sure, monkeypatch) == 0, "no null takes anything from it"
-    assert asked_of(replace(sure, complete=False), monkeypatch) == 1, "the reasons are told by it"
-    with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, 1.1, -100.0]}}):
-        assert asked_of(sure, monkeypatch) == 1
+    assert asked_of(sure, monkeypatch) == [], "no null takes anything from it"
+    assert asked_of(replace(sure, complete=False), monkeypatch) == [0.0], "the reasons are told by it"
+    for matters, share in ((1.11, 1.1), (0.96, 0.95), (0.71, 0.0)):
+        with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, matters, -100.0]}}):
+            assert asked_of(sure, monkeypatch) == [share]
+    monkeypatch.setattr(verdict, "loose_twin_share", lambda *_: 0.92)
+    for probable, asked in ((0.93, [0.0]), (0.91, [])):
+        with judged_by(SURE, USABLE_PROBABILITY=probable):
+            assert asked_of(sure, monkeypatch) == asked, "it is not usable all the same, and the reasons are told by it"
+    monkeypatch.undo()
     better = Drawn(room(prior=AROUND), LIKELY, beyond=((LIKELY.score - LIKELY.rival + 10.0, False),))
     loose = replace(sure, numbers=LIKELY._replace(deviation=0.51))
     for one in (leading(0.0), replace(sure, degenerate=True), replace(sure, thin=True), loose, better):
-        assert asked_of(one, monkeypatch) == 0
+        assert asked_of(one, monkeypatch) == []
     for model in ("probability", "cautious"):
         with judged_by({**SURE, model: {"constant": [0.0]}}):
-            assert asked_of(sure, monkeypatch) == 0
+            assert asked_of(sure, monkeypatch) == []
 
 
 def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> None:
@@ -275,6 +281,8 @@ def test_margin_and_runner_up() -> None:
     spoken_against = judge(room(), explanations_of(answer_with(ranked(5.0, -5.5)), ranked(2.0, -4.0)))
     assert spoken_against.margin == pytest.approx(1.5)
     assert spoken_against.runner_up is None
+    worth_nothing = judge(room(), explanations_of(answer_with(ranked(5.0, -5.0)), ranked(2.0, -4.0)))
+    assert worth_nothing.runner_up is None
 
 
 def test_of_a_pose_that_is_fixed_the_registered_one_is_answered() -> None:

@@ -25,7 +25,7 @@ from ..reference import proposing
 from ..reference.geometry import moved
 from ..reference.matching import match_scan
 from ..scenes import context_of, index_of, local, pose, same_pose, scan_of
-from .drawn import GATES, INDEX, MODEL, PLACE, SEEDS, SMALL, TERMS, covariance, drawn, workspace_of
+from .drawn import ASKED, GATES, INDEX, MODEL, PLACE, SEEDS, SMALL, covariance, drawn, workspace_of
 
 
 def test_turning() -> None:
@@ -224,7 +224,7 @@ def refine(
 ) -> float:
     """Match at a pose and refine it, (1,) of `ESTIMATE`; return the score."""
     matching.match_scan(rows, estimate[0], place, GATES[0], rows["gain"].copy(), 0.0, matches)
-    return consensus.refine(rows, estimate[0], place, TERMS[0], matches, work, floor)
+    return consensus.refine(rows, estimate[0], place, ASKED.terms[0], matches, work, floor)
 
 
 @given(SEEDS)

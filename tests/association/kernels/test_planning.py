@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association.kernels import planning
+from association.kernels import advancing, planning, sliding, stopping
 from association.kernels.proposing import search_base
 from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, record
 from association.tables import Plan, Question, Samples
-from association.tuning import REUSE
+from association.tuning import PARALLEL_SINE, REUSE
 from registration.layout import Records
 
 from ..reference import planning as twin
 from ..reference.consensus import Pairs, freedom_taken
 from ..reference.scans import freedom_alone
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, MODEL, SEEDS, TABLES, Drawn, drawn, oblique, workspace_of
+from .drawn import INDEX, MODEL, NOTHING, SEEDS, TABLES, Drawn, drawn, oblique, workspace_of
 
 RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95, enough=np.inf)
 BASES = 8  # segments that bases are made of
@@ -50,7 +50,7 @@ def test_is_telling(seed: int) -> None:
     d = drawn(seed)
     scan = uncertain(d)
     for a, b in itertools.combinations(range(len(scan)), 2):
-        assert planning.is_telling(scan, a, b) is twin.is_telling(scan, a, b)
+        assert bool(planning.is_telling(scan[a], scan[b], planning.middle_of(scan))) is twin.is_telling(scan, a, b)
 
 
 def test_a_base_tells_as_long_as_it_lays_the_others_off_by_a_quarter_of_a_metre() -> None:
@@ -59,7 +59,7 @@ def test_a_base_tells_as_long_as_it_lays_the_others_off_by_a_quarter_of_a_metre(
     scan["x"], scan["y"], scan["gain"], scan["angle_variance"] = 0.0, 0.0, [0.0, 0.0, 1.0, 1.0], 2.0 * 0.02**2
     for distance, telling in ((12.4, True), (12.6, False)):
         scan["x"][2:], scan["y"][2:] = [distance, 0.0], [0.0, distance]
-        assert planning.is_telling(scan, 0, 1) is telling
+        assert bool(planning.is_telling(scan[0], scan[1], planning.middle_of(scan))) is telling
 
 
 @given(SEEDS)
@@ -86,7 +86,7 @@ def test_bound_is_never_below_what_can_have_been_missed() -> None:
     tried = []
     for _ in range(12):
         a, b = rng.choice(9, 2, replace=False).tolist()
-        bound -= planning.cover(residual, a, b)
+        bound -= stopping.cover(residual, a, b)
         tried.append((1 << a) | (1 << b))
         free = [s for s in range(512) if not any(s & t == t for t in tried)]
         missed = max(sum(gains[i] for i in range(9) if s >> i & 1) for s in free)
@@ -114,11 +114,11 @@ def test_strike(seed: int) -> None:
     for needed in np.sort(rng.uniform(-5.0, 1.1 * total, 5)):
         a, b = rng.choice(7, 2, replace=False).tolist()
         tried.append({"sliding": a, "crossing": b})
-        planning.strike(samples, a, b)
+        stopping.strike(samples, a, b)
         fewest = twin.fewest_segments((-np.sort(-gains)).tolist(), 0.0, needed)
         expected = round(200 * twin.missed_share(samples.orders, gains, tried, needed))
-        assert planning.missed_sets(scan, samples, fewest, needed, most) == min(expected, most + 1)
-        assert planning.missed_sets(scan, samples, fewest, needed, 200) == expected
+        assert stopping.missed_sets(scan, samples, fewest, needed, most) == min(expected, most + 1)
+        assert stopping.missed_sets(scan, samples, fewest, needed, 200) == expected
 
 
 @given(SEEDS)
@@ -127,13 +127,13 @@ def test_fewest_segments(seed: int) -> None:
     rng = np.random.default_rng(seed)
     gains = -np.sort(-rng.integers(1, 9, 6).astype(float))
     beyond, needed = float(rng.choice([0.0, 3.0])), float(rng.integers(-1, 50))
-    assert planning.fewest_segments(gains, beyond, needed) == twin.fewest_segments(gains.tolist(), beyond, needed)
+    assert stopping.fewest_segments(gains, beyond, needed) == twin.fewest_segments(gains.tolist(), beyond, needed)
 
 
 def test_drawn_chance() -> None:
     for count in range(8):
         for fewest in range(2, max(3, count + 1)):
-            assert planning.drawn_chance(fewest, count) == pytest.approx(twin.drawn_chance(fewest, count))
+            assert stopping.drawn_chance(fewest, count) == pytest.approx(twin.drawn_chance(fewest, count))
 
 
 @given(SEEDS)
@@ -145,10 +145,10 @@ def test_least_freedom(seed: int) -> None:
     scan["gain"], scan["freedom"] = rng.integers(1, 9, len(scan)), rng.integers(1, 6, len(scan))
     freest = np.argsort(-scan["freedom"], kind="stable")
     for needed in (*rng.integers(1, int(scan["gain"].sum()) + 1, 5), scan["gain"].sum()):
-        got = planning.least_freedom(scan, freest, float(needed))
+        got = stopping.least_freedom(scan, freest, float(needed))
         assert got == twin.least_freedom(scan, needed) == twin.least_freedom_sorted(scan, needed)
-    assert planning.least_freedom(scan, freest, 0.0) == 0.0
-    assert planning.least_freedom(scan, freest, scan["gain"].sum() + 1.0) == scan["freedom"].max()
+    assert stopping.least_freedom(scan, freest, 0.0) == 0.0
+    assert stopping.least_freedom(scan, freest, scan["gain"].sum() + 1.0) == scan["freedom"].max()
 
 
 @given(SEEDS)
@@ -175,7 +175,7 @@ def test_no_set_takes_less_freedom(seed: int) -> None:
             taken[some] = freedom_taken(pairs.information(0.0), model), scan["gain"][list(some)].sum()
     for needed in d.rng.uniform(1.0, scan["gain"].sum(), 8):
         least = min(freedom for freedom, gain in taken.values() if gain >= needed)
-        assert planning.least_freedom(scan, freest, needed) <= least + 1e-9
+        assert stopping.least_freedom(scan, freest, needed) <= least + 1e-9
 
 
 def plan_of(scan: Records, rng: np.random.Generator, *, drawn_by_chance: bool) -> Plan:
@@ -192,8 +192,48 @@ def plan_of(scan: Records, rng: np.random.Generator, *, drawn_by_chance: bool) -
     )
 
 
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_begin(seed: int) -> None:
+    """A scan of more segments than bases are made of, and of fewer; the best value that is known stays."""
+    d = drawn(seed)
+    question, n = context_of(INDEX, scan_of(d.endpoints)).question(RULE), int(d.rng.integers(1, len(d.scan) + 1))
+    samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0, slide=2.0)
+    plan = planning.begin(
+        question, INDEX.runs, INDEX.area, samples.orders, samples.ranks, progress, math.log(REUSE), seed % 2 == 0
+    )
+    assert progress[0]["current"] == -1
+    assert progress[0]["slide"] == -math.inf
+    assert progress[0]["bound"] == pytest.approx(d.scan["gain"].sum())
+    assert progress[0]["missed"] == 1.0
+    assert progress[0]["best_value"] == 3.0
+    np.testing.assert_array_equal(plan.bases, planning.plan_bases(question.scan, n, INDEX.runs, INDEX.area))
+    np.testing.assert_array_equal(plan.uses, np.zeros(n))
+    np.testing.assert_array_equal(plan.residual, d.scan["gain"])
+    np.testing.assert_array_equal(plan.best_gains, sorted(d.scan["gain"][:n], reverse=True))
+    np.testing.assert_array_equal(plan.freest, sorted(range(len(d.scan)), key=lambda i: -d.scan["freedom"][i]))
+    assert (plan.fade, plan.random) == (math.log(REUSE), seed % 2 == 0)
+    for got, expected in zip(plan.samples, samples, strict=True):
+        np.testing.assert_array_equal(got, expected)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_sliding_segments(seed: int) -> None:
+    """Of each class of parallel ones two at most, if together they come to more than the floor."""
+    d = drawn(seed)
+    few, most, floor = int(d.rng.integers(0, len(d.scan) + 1)), int(d.rng.integers(1, 5)), d.rng.uniform(0.0, 30.0)
+    directions = np.stack([d.scan["dx"], d.scan["dy"]], 1)
+    chosen: list[int] = []
+    for i, direction in enumerate(directions[:few]):
+        alike = np.abs(directions @ [direction[1], -direction[0]]) < PARALLEL_SINE
+        if d.scan["gain"][alike].sum() > floor and alike[chosen].sum() < 2:
+            chosen.append(i)
+    assert sliding.sliding_segments(d.scan, few, floor, most).tolist() == chosen[:most]
+
+
 def start_of(scan: Records) -> Records:
-    return record(PROGRESS, base=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
+    return record(PROGRESS, current=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
 
 
 @dataclass(frozen=True)
@@ -233,7 +273,7 @@ def expected_end(d: Drawn, effort: Effort) -> End:
     order = twin.order_of([base.item() for base in plan.bases], plan.fade)
     for count, k in enumerate(order, 1):
         base = plan.bases[k]
-        search_base(question, TABLES, base, found, state[0], work, 10**9)
+        search_base(question, TABLES, base, found, NOTHING, state[0], work, 10**9)
         best = float(state["best_value"][0])
         state["least_freedom"] = twin.least_freedom_sorted(d.scan, 0.65 * best)
         needed = 0.95 * best + twin.least_freedom_sorted(d.scan, 0.95 * best)
@@ -252,10 +292,10 @@ def expected_end(d: Drawn, effort: Effort) -> End:
             )
         proven = effort.allowed >= 0.0 and bound < needed
         if best >= effort.enough or (missed <= effort.allowed and not proven):
-            return End(planning.CONFIDENT, count, bound, missed)
+            return End(advancing.CONFIDENT, count, bound, missed)
         if proven:
-            return End(planning.PROVEN, count, bound, missed)
-    return End(planning.EXHAUSTED, len(order), bound, missed)
+            return End(advancing.PROVEN, count, bound, missed)
+    return End(advancing.EXHAUSTED, len(order), bound, missed)
 
 
 def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
@@ -265,12 +305,12 @@ def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
         plan_of(question.scan, np.random.default_rng(0), drawn_by_chance=effort.by_chance),
         workspace_of(d.scan),
     )
-    why, calls = planning.BUDGET, 0
-    while why == planning.BUDGET:
-        why = planning.advance(question, TABLES, plan, found, progress, work, effort.allowed, budget)
+    why, calls = advancing.BUDGET, 0
+    while why == advancing.BUDGET:
+        why = advancing.advance(question, TABLES, plan, found, progress, work, effort.allowed, budget)
         calls += 1
     state = progress[0]
-    missed = float(state["missed"]) if effort.by_chance else planning.missed_share(question, plan, progress)
+    missed = float(state["missed"]) if effort.by_chance else stopping.missed_share(question, plan, progress)
     end = End(why, int(state["bases"]), float(state["bound"]), missed)
     return end, found[: int(state["count"])], calls
 
@@ -315,7 +355,7 @@ def test_a_value_that_is_enough_ends_it(seed: int) -> None:
     assert assert_ends_alike(d, Effort(-1.0, enough=best + 1e-6)) == end
     if best > 0.0:
         early = assert_ends_alike(d, Effort(-1.0, enough=best - 1e-6))
-        assert early.why == planning.CONFIDENT
+        assert early.why == advancing.CONFIDENT
         assert early.bases <= end.bases
 
 
@@ -325,4 +365,4 @@ def test_all_three_ends_are_met() -> None:
         for seed in range(8)
         for allowed in (-1.0, 0.0, 0.3)
     }
-    assert ends == {planning.EXHAUSTED, planning.PROVEN, planning.CONFIDENT}
+    assert ends == {advancing.EXHAUSTED, advancing.PROVEN, advancing.CONFIDENT}

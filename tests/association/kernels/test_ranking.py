@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 from association.kernels import ranking
 from association.layout import MATCH, MERIT
-from association.tables import Place, Question, Sights, Workspace
+from association.tables import Place, Sights, Workspace
 from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_FAMILY
 from registration import RigidTransform
 from registration.layout import Records
@@ -17,7 +17,7 @@ from ..records import assert_records, covariance_of, estimate_of, pose_of, sight
 from ..reference import ranking as twin
 from ..reference.geometry import moved
 from ..scenes import INSIDE, ROOM, context_of, index_of, local, pose, same_pose, scan_of, seen
-from .drawn import GATES, MODEL, PLACE, SEEDS, TERMS, drawn
+from .drawn import ASKED, GATES, MODEL, PLACE, SEEDS, drawn
 
 
 def ranked(
@@ -27,7 +27,7 @@ def ranked(
     estimates = np.concatenate([estimate_of(at, np.full((3, 3), 9.0)) for at in poses])
     merits, matches = np.zeros(len(poses), MERIT), np.zeros((len(poses), len(scan)), MATCH)
     work = Workspace.of(len(scan), len(place.walls))
-    ranking.rank(Question(scan, TERMS), place, sights, estimates, merits, matches, work)
+    ranking.rank(ASKED._replace(scan=scan), place, sights, estimates, merits, matches, work)
     return estimates, merits, matches
 
 

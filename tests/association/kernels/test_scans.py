@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from numpy.typing import ArrayLike
 
+from association import Scan, mirrored
 from association.kernels import scans
-from association.layout import LINE_PARTS, POINT, VARIANCES, Integers, as_records, record
+from association.layout import POINT, VARIANCES, Integers, as_records, record
 from association.tables import Measured
 from association.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
 from registration import MeasuredSegments, Segments
@@ -47,7 +48,7 @@ def measured_of(rng: np.random.Generator, ends: ArrayLike) -> MeasuredSegments:
     return MeasuredSegments.from_segments(segments, rng.uniform(0.005, 0.1, n), points, moments)
 
 
-def given_of(measured: MeasuredSegments) -> Measured:
+def given_to(measured: MeasuredSegments) -> Measured:
     segments = measured.segments
     return Measured(
         as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
@@ -55,18 +56,29 @@ def given_of(measured: MeasuredSegments) -> Measured:
     )  # fmt: skip
 
 
+def given_of(measured: MeasuredSegments) -> Records:
+    return scans.as_lines(given_to(measured))
+
+
+def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
+    """Return lines as segments that were measured so."""
+    middles, half = np.stack([lines["x"], lines["y"]], 1), 0.5 * lines["length"][:, None]
+    along = half * np.stack([lines["dx"], lines["dy"]], 1)
+    segments = Segments.derived(np.hstack([middles - along, middles + along]))
+    centroids = np.stack([lines["centroid_x"], lines["centroid_y"]], 1)
+    return MeasuredSegments(segments, lines["sigma"], lines["points"], centroids, lines["spread"], counted)
+
+
 def labelled(measured: MeasuredSegments, lateral: float = LINE_LATERAL, cosine: float = LINE_COSINE) -> list[int]:
     order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
-    return [int(label) for label in scans.collinear_segments(given_of(measured), order, lateral, cosine)]
+    return [int(label) for label in scans.collinear_lines(given_of(measured), order, lateral, cosine)]
 
 
 def joined(measured: MeasuredSegments, labels: list[int] | None = None) -> Records:
     """Join the segments of each label; by default those that continue one another."""
     order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
     of_line: Integers = np.array(labelled(measured) if labels is None else labels, np.intp)
-    lines = np.zeros(int(of_line.max(initial=-1)) + 1, LINE_PARTS)
-    scans.join_segments(given_of(measured), order, of_line, measured.counted, lines)
-    return lines
+    return scans.join_labelled(given_of(measured), order, of_line, measured.counted)
 
 
 @given(SEEDS)
@@ -176,6 +188,52 @@ def test_describe_lines(seed: int) -> None:
     order, expected = twin.describe_lines(lines, variances[0], model[0])
     got = scans.describe_lines(lines, np.array(order), variances, model)
     assert_records(got, expected, rtol=1e-8, atol=1e-12)
+
+
+def view_of(seed: int) -> tuple[MeasuredSegments, Records, Records]:
+    """Return segments, and what goes into the variances of lines and of walls."""
+    rng = np.random.default_rng(seed)
+    return measured_of(rng, in_pieces(rng)), record(VARIANCES, map=1e-4), model_of(1e-3, 0.3, 0.1)
+
+
+def assert_rows(got: Records, expected: Records, rtol: float) -> None:
+    """Compare rows; half a turn to the left is one to the right."""
+    np.testing.assert_allclose(np.exp(1j * got["angle"]), np.exp(1j * expected["angle"]), atol=rtol)
+    got, expected = got.copy(), expected.copy()
+    got["angle"] = expected["angle"] = 0.0
+    assert_records(got, expected, rtol=rtol, atol=1e-9)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_describe_view(seed: int) -> None:
+    """First what was cut is joined, then what lies about on a line; the longest comes first, and is seen as it is."""
+    measured, variances, model = view_of(seed)
+    cut = twin.collinear_segments(measured, CUT_LATERAL, CUT_COSINE)
+    once = as_measured(twin.join_segments(replace(measured, counted=True), cut), counted=measured.counted)
+    if len(once) == len(measured):
+        once, cut = measured, list(range(len(measured)))
+    apart = twin.collinear_segments(once, LINE_LATERAL, LINE_COSINE)
+    order, expected = twin.describe_lines(twin.join_segments(once, apart), variances[0], model[0])
+    row_of, rows, seen = scans.describe_view(given_to(measured), measured.counted, variances, model)
+    assert row_of.tolist() == [order.index(apart[line]) for line in cut]
+    assert_rows(rows, expected, 1e-7)
+    assert seen["row"].tolist() == list(range(len(rows)))
+    assert (seen["sensor"] == 0).all()
+    for name in ("dx", "dy", "x", "y", "length"):
+        np.testing.assert_array_equal(seen[name], rows[name])
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_mirror_lines(seed: int) -> None:
+    """Those of the mirrored scan, to rounding: its segments lie in the same order, and go together in the same way."""
+    measured, variances, model = view_of(seed)
+    row_of, rows, _ = scans.describe_view(given_to(measured), measured.counted, variances, model)
+    other = mirrored(Scan(measured)).measured
+    expected_row_of, expected, _ = scans.describe_view(given_to(other), other.counted, variances, model)
+    assert row_of.tolist() == expected_row_of.tolist()
+    assert_rows(scans.mirror_lines(rows), expected, 1e-9)
 
 
 def test_a_scan_of_nothing_has_no_lines() -> None:

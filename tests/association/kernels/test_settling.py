@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from association.kernels.settling import settle, weakest
 from association.layout import HINGE, SETTLED, WALL, Integers
-from association.tables import Question, Workspace
+from association.tables import Workspace
 from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, UNSEEN_ERROR
 from registration import RigidTransform
 from registration.layout import Record, Records
@@ -21,7 +21,7 @@ from ..reference import settling as twin
 from ..reference.consensus import matches_on
 from ..reference.geometry import direction, normal
 from ..scenes import pose, same_pose
-from .drawn import PLACE, SEEDS, TERMS, Drawn, drawn
+from .drawn import ASKED, PLACE, SEEDS, Drawn, drawn
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Set:
     def settled(self, map_variance: float = -1.0) -> tuple[Record, Records]:
         """Return `SETTLED` and the hinges."""
         out, hinges = np.zeros(1, SETTLED), np.zeros(len(self.scan), HINGE)
-        question, work = Question(self.scan, TERMS), Workspace.of(len(self.scan), len(self.walls))
+        question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
         start, matches = estimate_of(self.start), matches_on(self.held)
         count = settle(question, self.walls, matches, start, map_variance, out, hinges, work)
         assert start == estimate_of(self.start)

@@ -107,6 +107,7 @@ def _join(measured: MeasuredSegments, line: Record) -> None:
         on = new > 0.0
         of_one = points.sum() / (points[on] / measured.sigma[on] ** 2).sum()  # variance of one of the points
         line["variance"] = of_one / (points.sum() if measured.counted else max(LEAST_POINTS, points.sum()))
+        line["sigma"] = math.sqrt(line["variance"] * line["points"])  # so that the points do not tell more than that
 
 
 def _spans(segments: Segments, d: Floats, middle: Floats) -> Floats:

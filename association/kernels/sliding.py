@@ -1,0 +1,108 @@
+"""Compiled proposals of scans without a base: parallel segments laid on every run; what is found is free along them."""
+
+import math
+
+import numpy as np
+
+from registration.compiling import borrowed, kernel
+from registration.layout import Records
+
+from ..layout import HARD_PRIOR, TRIED, Integers
+from ..tables import MapTables, Question, Workspace
+from ..tuning import PARALLEL_SINE, WINDOW_TURN
+from .consensus import turning
+from .matching import gates_about, wrap
+from .proposing import anchors, end_slack
+from .trying import try_pose
+
+
+@kernel
+def sliding_segments(scan: Records, count: int, floor: float, most: int) -> Integers:
+    """Pick from the first `count` the two longest segments of each class of parallel ones that may explain more.
+
+    More than `floor` nats, with all that are parallel to them; at most `most`.
+    """
+    chosen = np.empty(most, dtype=np.int64)
+    n = 0
+    for i in range(count):
+        if n == most:
+            break
+        gain = 0.0
+        for j in range(len(scan)):
+            if abs(scan[i].dx * scan[j].dy - scan[i].dy * scan[j].dx) < PARALLEL_SINE:
+                gain += scan[j].gain
+        before = 0
+        for k in range(n):
+            j = chosen[k]
+            before += abs(scan[i].dx * scan[j].dy - scan[i].dy * scan[j].dx) < PARALLEL_SINE
+        if gain > floor and before < 2:
+            chosen[n] = i
+            n += 1
+    return chosen[:n]
+
+
+@kernel
+def search_slides(
+    question: Question,
+    tables: MapTables,
+    sliding: int,
+    found: Records,
+    progress: Records,
+    work: Workspace,
+    spacing: float,
+    budget: int,
+) -> bool:
+    """Lay scan segment `sliding` on every run that is long enough, at slides `spacing` metres apart; keep the best.
+
+    For scans without a base: what is found is a family of poses, fixed across the walls and free along them. Goes on
+    from the anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
+    """
+    question = borrowed(question)
+    tables = borrowed(tables)
+    found = borrowed(found)
+    work = borrowed(work)
+    state = progress[0]
+    place = tables.place
+    raster = tables.raster
+    runs = tables.sweep.runs
+    prior = question.terms[0].prior
+    pose = work.scratch[0].estimate
+    a = question.scan[sliding]
+    spent = 0
+    nothing = np.empty(0, dtype=TRIED)
+    gates_about(question.scan, a.angle_variance, a.x, a.y, 0.0, question.terms[0].gates, work.spreads, work.shifts)
+    anchor_list = np.empty(len(runs), dtype=np.int32)
+    n_anchors = anchors(a.length, runs, tables.sweep.bin_starts, anchor_list)
+    while state.anchor < n_anchors:
+        w = anchor_list[state.anchor]
+        wall = runs[w]
+        state.anchor += 1
+        first = state.step
+        state.step = 0
+        half = 0.5 * a.length - end_slack(a.length)
+        low = wall.begin + half
+        high = wall.end - half
+        theta = wall.angle - a.angle
+        c = math.cos(theta)
+        s = math.sin(theta)
+        gx = c * a.x - s * a.y
+        gy = s * a.x + c * a.y
+        if prior.kind == HARD_PRIOR:
+            middle = wall.dx * (prior.x + gx) + wall.dy * (prior.y + gy)
+            low = max(low, middle - prior.radius)
+            high = min(high, middle + prior.radius)
+            if low > high or abs(wrap(theta - prior.theta)) > prior.angle + WINDOW_TURN:
+                continue
+        steps = max(1, math.ceil((high - low) / spacing))
+        for j in range(first, steps):
+            if spent > budget:
+                state.anchor -= 1
+                state.step = j
+                return False
+            slide = low + (j + 0.5) / steps * (high - low)
+            pose.theta = theta
+            pose.x = wall.dx * slide - wall.dy * wall.offset - gx
+            pose.y = wall.dy * slide + wall.dx * wall.offset - gy
+            turning(a.angle_variance, gx, gy, pose)
+            spent += try_pose(question, place, raster, found, nothing, state, work)
+    return True
