@@ -14,7 +14,7 @@ from pathlib import Path
 from . import drawing
 from .drawing import Mutant, draw, modules_of
 from .rules import key_of, known_equivalents, suite_of
-from .running import Outcome, Runner
+from .running import RESULTS, Outcome, Runner
 
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "out" / "mutants"
@@ -49,7 +49,7 @@ class Results:
         """Keep what became of it."""
         self._known[self._key(mutant)] = outcome
         with self._path.open("a") as file:
-            file.write(json.dumps({"key": self._key(mutant), "outcome": asdict(outcome), **asdict(mutant)}) + "\n")
+            file.write(json.dumps({"key": self._key(mutant), "outcome": asdict(outcome)}) + "\n")
 
     def _key(self, mutant: Mutant) -> str:
         text = (self._root / mutant.path).read_bytes()
@@ -114,7 +114,7 @@ def main() -> None:
     asked = parser.parse_args()
     PLACE.mkdir(parents=True, exist_ok=True)
     drawn = {place: drawn_from(ROOT, place, asked.count, asked.seed) for place in asked.places}
-    results = Results(PLACE / "results.jsonl", ROOT)
+    results = Results(ROOT / RESULTS, ROOT)
     runner = None if asked.table else Runner(ROOT, PLACE)
     for mutant in (mutant for mutants in drawn.values() for mutant in mutants if runner is not None):
         known = results.of(mutant)

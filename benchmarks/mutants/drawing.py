@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import random
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from operator import itemgetter
 from pathlib import Path
 
 from cosmic_ray.ast import ast_nodes, get_ast
@@ -60,6 +61,8 @@ def modules_of(root: Path, package: str) -> list[str]:
 def draw(root: Path, package: str, count: int, seed: int) -> list[Mutant]:
     """Return mutants of a package: places are drawn first, then one mistake for each.
 
+    Each place draws a number of its own, so that a change of the code elsewhere leaves the others drawn as they were.
+
     Parameters
     ----------
     root : Path
@@ -70,15 +73,17 @@ def draw(root: Path, package: str, count: int, seed: int) -> list[Mutant]:
         How many; 0 for one at every place.
     seed : int
     """
-    rng = random.Random(seed)
-    places = [
-        (path, position, choices)
-        for path in modules_of(root, package)
-        for position, choices in sorted(_places(root / path).items())
-    ]
-    rng.shuffle(places)
+    places = []
+    for path in modules_of(root, package):
+        lines = (root / path).read_text().splitlines()
+        seen: Counter[str] = Counter()
+        for (line, column), choices in sorted(_places(root / path).items()):
+            name = f"{path} {column} {lines[line - 1].strip()}"
+            rng = random.Random(f"{seed} {name} {seen[name]}")
+            places.append((rng.random(), rng, path, choices))
+            seen[name] += 1
     drawn: list[Mutant] = []
-    for path, _, choices in places:
+    for _, rng, path, choices in sorted(places, key=itemgetter(0)):
         if count and len(drawn) == count:
             break
         found = _one_of(root, path, rng.sample(choices, len(choices)))

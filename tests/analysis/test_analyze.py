@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from analysis import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
+from analysis.robot import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
 from analysis.standing import is_free
 from association import CancelledError, Deadline, MapIndex, Status
 from registration import Segments
@@ -170,8 +171,30 @@ def test_a_robot_that_cannot_be(robot: dict[str, float], argument: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("argument", "least", "greatest"),
+    [("beams", 8, MOST_BEAMS), ("range_max", 0.5, 1000.0), ("sigma", LEAST_SIGMA, MOST_SIGMA)],
+)
+def test_a_robot_may_be_at_the_limits(argument: str, least: float, greatest: float) -> None:
+    for limit, beyond in ((least, 0.99 * least), (greatest, 1.01 * greatest)):
+        assert getattr(Robot(**{argument: limit}), argument) == limit  # type: ignore[arg-type]
+        with pytest.raises(AnalysisError):
+            Robot(**{argument: beyond})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("side", "spacing"), [(15.0, 0.8), (14.9, 0.7), (16.2, 0.8), (4.0, 0.3), (3000.0, 100.0), (1999.0, 100.0)]
+)
+def test_where_nothing_else_is_asked_for_there_are_some_400_places(side: float, spacing: float) -> None:
+    """To a tenth of a metre, within the limits."""
+    room = Segments.from_array(outline([(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)]))
+    places = standing_places(room, Robot(), None)
+    assert places.spacing == pytest.approx(spacing)
+    assert len(places.poses) == math.floor(side / spacing) ** 2
+
+
+@pytest.mark.parametrize(
     ("spacing", "point", "argument"),
-    [(0.1, None, "spacing"), (200.0, None, "spacing"), (1.0, (50.0, 0.0), "point"), (1.0, (0.0, 3.0), "point")],
+    [(0.29, None, "spacing"), (100.1, None, "spacing"), (1.0, (50.0, 0.0), "point"), (1.0, (0.0, 3.0), "point")],
 )
 def test_places_that_cannot_be(spacing: float, point: tuple[float, float] | None, argument: str) -> None:
     with pytest.raises(AnalysisError) as caught:

@@ -72,6 +72,18 @@ def test_a_seed_draws_the_same_mutants_and_another_others() -> None:
     assert len({(mutant.path, mutant.operator, mutant.occurrence) for mutant in once}) == 8
 
 
+def test_a_change_elsewhere_leaves_what_is_drawn_in_its_order(project: Path) -> None:
+    def drawn() -> list[tuple[str, str]]:
+        return [(mutant.before, mutant.after) for mutant in draw(project, "package", 0, 1)]
+
+    before = drawn()
+    module = project / "package" / "module.py"
+    module.write_text("def new(x):\n    return x * 7 + 3\n\n\n" + module.read_text())
+    after = drawn()
+    assert len(after) > len(before)
+    assert [each for each in after if "* 7 + 3" not in each[0]] == before
+
+
 def test_every_module_has_tests_that_are_there() -> None:
     for package in PACKAGES:
         for path in modules_of(ROOT, package):

@@ -27,11 +27,14 @@ def given_up(lines: list[Line]) -> list[int]:
 
 
 def test_there_is_room_for_all_up_to_the_limit() -> None:
-    limit = ConnectionLimit(6)
-    lines = [Line() for _ in range(6)]
-    for number, line in enumerate(lines):
-        assert limit.add(line, bytes([number // 2]))
-    assert (len(limit), given_up(lines)) == (6, [])
+    for most in (6, 600):
+        limit = ConnectionLimit(most)
+        lines = [Line() for _ in range(most)]
+        for number, line in enumerate(lines):
+            assert limit.add(line, b"%d" % (number // 2))
+        assert (len(limit), given_up(lines)) == (most, [])
+        assert limit.add(Line(), b"new")
+        assert (len(limit), given_up(lines)) == (most, [0])
 
 
 def test_who_has_the_most_gives_up_what_was_not_used_for_longest() -> None:

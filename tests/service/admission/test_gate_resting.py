@@ -6,9 +6,9 @@ import asyncio
 import threading
 import time
 
-from service.admission.gate import LONG_SECONDS, RESTING
+from service.admission.gate import HEARING_SECONDS, LONG_SECONDS, RESTING
 
-from .gates import BlockedGate, gate_of, in_loop, soon, until
+from .gates import PATIENCE, BlockedGate, gate_of, in_loop, soon, until
 
 
 class Long:
@@ -172,6 +172,55 @@ def test_no_more_rest_than_may() -> None:
             assert await short == "short"
 
     in_loop(scenario)
+
+
+def test_a_turn_rests_as_long_as_it_takes() -> None:
+    """Longer than it takes to notice that the gate has closed."""
+
+    async def scenario() -> None:
+        async with gate_of(1, 8) as gate:
+            long = Long()
+            first = long.asked_of(gate, b"long")
+            await until(lambda: long.looks > 0)
+            other = gate.ask(gate.release.wait, b"other")
+            await until(lambda: gate.waiting == 1 and gate.running == 1)
+            await asyncio.sleep(1.5 * HEARING_SECONDS)
+            assert await is_held_up(long)
+            gate.release.set()
+            assert await other
+            long.ended.set()
+            assert await first == "long"
+
+    in_loop(scenario)
+
+
+def test_nobody_rests_when_the_loop_has_ended() -> None:
+    """A search that goes on beyond it, while others wait, is not ended by that."""
+    gate, deadline, ended, looked = BlockedGate(1, 8), soon(), threading.Event(), threading.Event()
+    found: list[bool] = []
+
+    def late() -> None:
+        ended.wait()
+        time.sleep(1.5 * LONG_SECONDS)
+        try:
+            found.append(deadline.passed)
+        finally:
+            looked.set()
+
+    async def scenario() -> None:
+        gate.ask(late, b"long", deadline)
+        await until(lambda: gate.running == 1)
+        gate.ask(gate.release.wait, b"other")
+        await until(lambda: gate.waiting == 1)
+
+    loop = asyncio.new_event_loop()
+    loop.set_exception_handler(lambda *_: None)  # tasks that it leaves behind are meant to be
+    loop.run_until_complete(scenario())
+    loop.close()  # as it is, with what runs and what waits
+    ended.set()
+    assert looked.wait(PATIENCE)
+    assert found == [False]
+    gate.close()
 
 
 def test_what_rests_goes_on_when_the_gate_closes() -> None:

@@ -120,7 +120,8 @@ def test_the_page_of_a_named_origin_may_ask() -> None:
 def test_what_a_browser_asks_first_for_a_named_origin_needs_no_key() -> None:
     asks = sent(origin="https://page.example", access_control_request_method="POST")
     assert NAMED.is_preflight("options".upper(), asks)
-    assert not NAMED.is_preflight("GET", asks)
+    for method in ("GET", "POST", "PUT"):
+        assert not NAMED.is_preflight(method, asks)
     assert not OPEN.is_preflight("OPTIONS", asks)
     assert not NAMED.is_preflight("OPTIONS", asks[:1])
     assert not NAMED.is_preflight("OPTIONS", asks[1:])

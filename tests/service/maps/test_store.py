@@ -126,6 +126,15 @@ def test_a_listing_is_in_the_order_of_bytes(store: MapStore) -> None:
     assert (seen, sizes) == (sorted(names), [3, 3, 3])
 
 
+def test_a_listing_of_what_begins_so(store: MapStore) -> None:
+    for name in ("b", "hq", "hq-", "hq-1", "hq-2", "hq-~", "hq.1", "hr", "HQ-1"):
+        store.put(name.replace("~", "zz"), b"x", BOX, ANY)
+    assert [item.map_id for item in store.list(9, "", "hq-").maps] == ["hq-", "hq-1", "hq-2", "hq-zz"]
+    assert [item.map_id for item in store.list(2, "hq-", "hq-").maps] == ["hq-1", "hq-2"]
+    assert [item.map_id for item in store.list(9, "hr", "hq-").maps] == []
+    assert len(store.list(9, "").maps) == 9
+
+
 def test_of_many_first_writers_none_is_lost(database: str) -> None:
     with opened(database) as one, opened(database) as other, ThreadPoolExecutor(12) as threads:
         asked = [threads.submit((one, other)[i % 2].put, "m", b"%d" % i, BOX, ANY) for i in range(24)]
