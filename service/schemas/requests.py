@@ -18,7 +18,9 @@ from .parts import (
     MeasuredFields,
     RaySigma,
     SearchOptions,
+    Twist,
     require_at_the_sensor,
+    require_times,
 )
 from .strict import FreeJson, Point, Pose, Sigma, Strict
 from .views import AnyScan
@@ -131,6 +133,9 @@ class VectorizeRequest(Strict):
 
     laser: Laser | None = None
     points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
+    twist: Twist | None = Field(
+        None, description="how the sensor moved meanwhile, in its own frame; segments are in that of the first beam"
+    )
     viewpoint: Point | None = Field(
         default_factory=lambda: [0.0, 0.0],
         description="where the sensor stood, metres: on the left of every segment; null: not from one place, as a "
@@ -142,6 +147,10 @@ class VectorizeRequest(Strict):
     def _exactly_one(self) -> VectorizeRequest:
         if (self.laser is None) == (self.points is None):
             raise PydanticCustomError("one_of", "expected either laser or points")
+        if self.laser is not None:
+            require_times(self.laser, self.twist)
+        elif self.twist is not None:
+            raise PydanticCustomError("twist", "a twist needs a laser: of points nobody knows when they were measured")
         return self
 
     @field_validator("viewpoint")

@@ -24,7 +24,7 @@ def answer_vectorization(asked: VectorizeRequest, job: Job) -> Done:
     options = VectorizationOptions(how.sigma, how.min_points, how.min_length, how.max_gap)
     job.watch.lap("decode")
     if asked.laser is not None:
-        found = vectorize_laser(asked.laser, options, _PLACES)
+        found = vectorize_laser(asked.laser, options, _PLACES, asked.twist)
     else:
         assert asked.points is not None  # the model takes exactly one of the two
         found = vectorize_points(asked.points, options, viewpoint_of(asked.viewpoint), _PLACES)

@@ -550,6 +550,7 @@ class VectorizeRequest(TypedDict):
 
     laser: NotRequired[Laser | None]
     points: NotRequired[list[list[float]] | None]
+    twist: NotRequired[Twist | None]
     viewpoint: NotRequired[list[float] | None]
     options: NotRequired[VectorizeOptions]
 

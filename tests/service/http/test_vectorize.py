@@ -101,3 +101,29 @@ def test_null_has_one_meaning_in_all_that_is_said_of_it(client: httpx.Client) ->
     field = client.get("/openapi.json").json()["components"]["schemas"]["Laser"]["properties"]["ranges"]
     assert "null or below range_min: nothing is known" in field["description"]
     assert "above range_max: nothing came back" in field["description"]
+
+
+TWIST = {"vx": 0.5, "vy": -0.2, "omega": 1.5}
+
+
+def test_a_scan_taken_while_moving_is_cut_alike_by_both_routes(client: httpx.Client) -> None:
+    moving = {"laser": laser(1) | {"time_increment": 0.1 / len(TURN)}, "twist": TWIST}
+    cut = client.post("/v1/vectorize", json=moving).json()["segments"]
+    asked = {"map": {"segments": ROOM.tolist()}, "scan": moving, "options": {"include": ["segments"]}}
+    assert client.post("/v1/associate", json=asked).json()["segments"] == cut
+    assert cut != client.post("/v1/vectorize", json={"laser": moving["laser"]}).json()["segments"]
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"laser": laser(1), "twist": TWIST}, ""),
+        ({"points": contour(), "twist": TWIST}, ""),
+        ({"laser": laser(1) | {"time_increment": 0.1}, "twist": TWIST}, "/twist"),
+    ],
+    ids=["no times", "points", "turns too fast"],
+)
+def test_a_twist_that_cannot_be_used_is_refused(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:
+    reply = client.post("/v1/vectorize", json=body)
+    assert reply.status_code == 422
+    assert [error["pointer"] for error in reply.json()["errors"]] == [pointer]
