@@ -38,6 +38,7 @@ from .tuning import (
     SLIDE_SEGMENTS,
     SLIDE_SPACING,
     SLIDE_SPACING_FOR_BEAMS,
+    TELLING_SEGMENTS,
     USUAL_CROWD,
 )
 
@@ -132,10 +133,11 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
     if context.deadline.cancelled:
         raise CancelledError
     order = np.argsort(-found["value"][places], kind="stable")
+    exhaustive = stopped == EXHAUSTED and len(scan) <= BASE_SEGMENTS
     report = SearchReport(
         complete=stopped != BUDGET and slid,
-        exhaustive=stopped == EXHAUSTED and len(scan) <= BASE_SEGMENTS,
-        confidence=1.0 if stopped in (EXHAUSTED, PROVEN) else 1.0 - float(progress["missed"][0]),
+        exhaustive=exhaustive,
+        confidence=1.0 if exhaustive or stopped == PROVEN else 1.0 - float(progress["missed"][0]),
         bases=int(progress["bases"][0]),
         hypotheses=int(progress["hypotheses"][0]),
         verified=int(progress["verified"][0]),
@@ -167,14 +169,14 @@ def _go_through_bases(context: SearchContext, question: Question, found: Records
         stopped = advance(question, tables, plan, found, progress, context.workspace, allowed, chunk)
         if stopped == BUDGET and context.deadline.helped:
             stopped = Sharing(context, question, plan, found, progress, chunk).go_on(allowed)
-    if stopped == BUDGET and not plan.random:
+    if stopped in (BUDGET, EXHAUSTED) and len(plan.bases) and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
     return stopped
 
 
 def _plan(context: SearchContext, question: Question, progress: Records) -> Plan:
     index, options = context.index, context.options
-    orders, random = _orders(min(len(question.scan), BASE_SEGMENTS)), options.sampling == "random"
+    orders, random = _orders(_segments_of_bases(len(question.scan))), options.sampling == "random"
     plan = begin(question, index.runs, index.area, *orders, progress, 0.0 if random else math.log(REUSE), random)
     return plan._replace(bases=_drawn(plan.bases, options)) if random else plan
 
@@ -189,7 +191,12 @@ def _drawn(bases: Records, options: AssociationOptions) -> Records:
     return bases
 
 
-@lru_cache(maxsize=BASE_SEGMENTS + 1)
+def _segments_of_bases(count: int) -> int:
+    """Return among how many of a scan's segments bases are drawn."""
+    return max((n for n in (min(count, BASE_SEGMENTS), *TELLING_SEGMENTS) if n <= count), default=0)
+
+
+@lru_cache(maxsize=BASE_SEGMENTS + 1 + len(TELLING_SEGMENTS))
 def _orders(n: int) -> tuple[Integers, Integers]:
     """Draw orders of n segments (samples, n), all as likely; return the places of each segment, too, (n, samples)."""
     orders = np.random.default_rng(SAMPLE_SEED).random((SAMPLES, n)).argsort(axis=1)

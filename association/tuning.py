@@ -95,7 +95,9 @@ START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
 
 # --- Proposing: bases, sweeps and slides ------------------------------------------------------------------------------
 
-BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the most telling segments
+BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the longest segments; and, in scans of more,
+# those that tell enough among as many of these as there are: else what all others could add keeps a search going.
+TELLING_SEGMENTS = (48, 56, 64, 72, 80, 88, 96)  # tables
 BASE_SLACK = 0.2  # m, tables; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length, tables
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base, tables

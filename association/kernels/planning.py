@@ -10,6 +10,7 @@ from registration.layout import Floats, Record, Records
 from ..layout import BASE, Integers
 from ..tables import Plan, Question, Samples, Walls
 from ..tuning import (
+    BASE_SEGMENTS,
     COST_ANCHOR,
     COST_BASE,
     COST_HYPOTHESIS,
@@ -93,7 +94,8 @@ def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool
 def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
     """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`.
 
-    The merit is what the base can tell (the lesser gain) over what it will cost. `area` is that of the map, m^2.
+    Beyond the first `BASE_SEGMENTS` only those that tell enough. The merit is what the base can tell (the lesser
+    gain) over what it will cost. `area` is that of the map, m^2.
     """
     slides, fitting = slack_tables(scan, count, runs)
     middle = middle_of(scan)
@@ -121,7 +123,8 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
         for j in range(i + 1, count):
             turn = scan[j].angle - scan[i].angle
             sine = abs(math.sin(turn))
-            if sine < MIN_CROSSING_BASE:
+            telling = is_telling(scan[i], scan[j], middle)
+            if sine < MIN_CROSSING_BASE or (j >= BASE_SEGMENTS and not telling):
                 continue
             sweep_i = COST_ANCHOR * fitting[i] + COST_SLIDE * total[i]
             sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]
@@ -135,7 +138,7 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
             bases[k].sliding = i if sweep_i <= sweep_j else j
             bases[k].crossing = j if sweep_i <= sweep_j else i
             merit = GAIN_POWER * min(tells[i], tells[j]) - math.log(cost)
-            if not is_telling(scan[i], scan[j], middle):
+            if not telling:
                 merit += math.log(UNTELLING)
             bases[k].merit = merit
             k += 1

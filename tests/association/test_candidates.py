@@ -14,7 +14,15 @@ import pytest
 from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, SearchReport
 from association.candidates import Candidates, find_candidates
 from association.kernels.planning import plan_bases
-from association.tuning import BASE_SEGMENTS, KEPT_SHARE, KEPT_SHARE_FOR_BEAMS, REUSE, RIVAL_SHARE, ROUNDS
+from association.tuning import (
+    BASE_SEGMENTS,
+    KEPT_SHARE,
+    KEPT_SHARE_FOR_BEAMS,
+    REUSE,
+    RIVAL_SHARE,
+    ROUNDS,
+    TELLING_SEGMENTS,
+)
 from registration import RigidTransform
 from registration.layout import Records
 
@@ -189,7 +197,19 @@ def test_a_scan_of_many_segments_is_not_gone_through_whole(count: int, exhaustiv
     rng = np.random.default_rng(0)
     begins, turns = rng.uniform(-9.0, 9.0, (count, 2)), rng.uniform(-math.pi, math.pi, count)
     scan = scan_of(np.hstack([begins, begins + np.stack([np.cos(turns), np.sin(turns)], axis=1)]))
-    assert found(ROOM_INDEX, scan, exhaustive=True).report.exhaustive is exhaustive
+    report = found(ROOM_INDEX, scan, exhaustive=True).report
+    assert report.exhaustive is exhaustive
+    assert (report.confidence == 1.0) is exhaustive, "what others may hold was not looked for"
+
+
+@pytest.mark.parametrize("clutter", [20, 40])
+def test_a_scan_of_many_segments_needs_no_more_bases(clutter: int) -> None:
+    """Half of the segments are of no wall; those of the walls are more than the longest forty hold."""
+    scan = scan_of(seen(maze(1), pose(15.0, 14.0, 0.5), noise=0.02, cut=0.2, clutter=clutter, radius=14.0)[0])
+    assert len(context_of(MAZE_INDEX, scan).lines.rows) > TELLING_SEGMENTS[0]
+    report = found(MAZE_INDEX, scan).report
+    assert report.confidence >= 0.9999
+    assert report.bases < 60
 
 
 def missed(index: MapIndex, scan: Scan, bases: int, fewest: int) -> float:

@@ -14,7 +14,7 @@ from association.kernels import advancing, planning, sliding, stopping
 from association.kernels.proposing import search_base
 from association.layout import FOUND, PROGRESS, RULES, SCAN_LINE, WALL, record
 from association.tables import Plan, Question, Samples
-from association.tuning import PARALLEL_SINE, REUSE
+from association.tuning import BASE_SEGMENTS, PARALLEL_SINE, REUSE
 from registration.layout import Records
 
 from ..reference import planning as twin
@@ -51,6 +51,16 @@ def test_is_telling(seed: int) -> None:
     scan = uncertain(d)
     for a, b in itertools.combinations(range(len(scan)), 2):
         assert bool(planning.is_telling(scan[a], scan[b], planning.middle_of(scan))) is twin.is_telling(scan, a, b)
+
+
+@given(SEEDS)
+@settings(max_examples=4, deadline=None)
+def test_beyond_the_longest_segments_only_what_tells_makes_a_base(seed: int) -> None:
+    scan = np.concatenate([uncertain(drawn(seed + k)) for k in range(6)])[: BASE_SEGMENTS + 8]
+    assert len(scan) == BASE_SEGMENTS + 8
+    bases, expected = (plan(scan, len(scan), INDEX.runs, 400.0) for plan in (planning.plan_bases, twin.plan_bases))
+    assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
+    assert any(max(base[:2]) >= BASE_SEGMENTS for base in expected)
 
 
 def test_a_base_tells_as_long_as_it_lays_the_others_off_by_a_quarter_of_a_metre() -> None:

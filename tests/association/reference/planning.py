@@ -9,6 +9,7 @@ import numpy as np
 
 from association.tables import Walls
 from association.tuning import (
+    BASE_SEGMENTS,
     COST_ANCHOR,
     COST_BASE,
     COST_HYPOTHESIS,
@@ -62,7 +63,7 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> list[Base
         for j in range(i + 1, count):
             turn = scan[j]["angle"] - scan[i]["angle"]
             sine = abs(math.sin(turn))
-            if sine < MIN_CROSSING_BASE:
+            if sine < MIN_CROSSING_BASE or (j >= BASE_SEGMENTS and not is_telling(scan, i, j)):
                 continue
             shift = round(turn * bins / math.tau)
             # The runs under j have the turned direction, up to a neighbouring bin.
