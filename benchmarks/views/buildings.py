@@ -67,9 +67,8 @@ def lookalike_drives(quick: int) -> list[Row]:
         places = way_back(segments, pose, 10.0, rng)
         looks = [look(SCANNER, scan(segments, at, SCANNER, rng).ranges, at) for at in places]
         asked = drive(looks, rng)
-        others = [
-            one.pose for one in associate(index, asked, None, AssociationOptions(max_alternatives=50)).alternatives
-        ]
+        found = associate(index, asked, None, MANY)
+        others = [one.pose for one in found.alternatives] + ([] if found.pose is None else [found.pose])
         beside = [pose.compose(RigidTransform(x, y, 0.0)) for x, y in ((BESIDE, 0.0), (0.0, BESIDE))]
         turned = [RigidTransform(pose.x + x, pose.y + y, pose.theta) for x, y in ((BESIDE, 0.0), (0.0, BESIDE))]
         unique = all(

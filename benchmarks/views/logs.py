@@ -24,6 +24,7 @@ def drives_in_logs(quick: int) -> list[Row]:
     """Search scans that are not usable alone with the views of the last metres; and in the map of the next log."""
     found: dict[float, list[Trial]] = {length: [] for length in (0.0, *LENGTHS)}
     away: dict[float, list[Trial]] = {length: [] for length in (0.0, *LENGTHS)}
+    unseen = dict.fromkeys(LENGTHS, 0)  # nothing else was seen on so many metres
     collections = logs(5 * quick)
     for k, collection in enumerate(collections):
         log, index = Log.load(collection.name), collection.index((collection.name, collection.name))
@@ -34,7 +35,9 @@ def drives_in_logs(quick: int) -> list[Row]:
             found[0.0].append(alone)
             for length in LENGTHS:
                 asked = log_drive(log, query, length)
-                if not alone.usable:
+                if not alone.usable and asked.views is None:
+                    unseen[length] += 1
+                elif not alone.usable:
                     found[length].append(tried(index, asked, query.pose, NEAR, TURNED))
                 if n % 2 == 0 and length >= 5.0:
                     away[length].append(tried(elsewhere, asked, None, NEAR, TURNED))
@@ -44,7 +47,9 @@ def drives_in_logs(quick: int) -> list[Row]:
     rows = [usable_share("usable alone", found[0.0])]
     for length in LENGTHS:
         trials = found[length]
-        rows.append(usable_share(f"not usable alone, with the views of the last {length:g} m", trials, USABLE[length]))
+        beside = f"; {unseen[length]} more have none" if unseen[length] else ""
+        what = f"not usable alone, with the views of the last {length:g} m{beside}"
+        rows.append(usable_share(what, trials, USABLE[length]))
         rows.append(wrong_share(trials))
     rows += [
         at_most(f"in another log's map, {length:g} m: usable of {len(trials)}", mean(t.usable for t in trials), 0.001)

@@ -58,7 +58,8 @@ def test_is_telling(seed: int) -> None:
 def test_beyond_the_longest_segments_only_what_tells_makes_a_base(seed: int) -> None:
     scan = np.concatenate([uncertain(drawn(seed + k)) for k in range(6)])[: BASE_SEGMENTS + 8]
     assert len(scan) == BASE_SEGMENTS + 8
-    bases, expected = (plan(scan, len(scan), INDEX.runs, 400.0) for plan in (planning.plan_bases, twin.plan_bases))
+    bases = planning.plan_bases(scan, len(scan), INDEX.runs, 400.0)
+    expected = twin.plan_bases(scan, len(scan), INDEX.runs, 400.0)
     assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
     assert any(max(base[:2]) >= BASE_SEGMENTS for base in expected)
 
