@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from .context import SearchContext
 from .explain import Answer
 from .null import Null
@@ -48,7 +50,8 @@ class Features(NamedTuple):
     deviation : standard deviation of the position along its weakest direction, m, up to `MOST_DEVIATION`
     misfit : log of the mean squared offset over what the sigmas expect
     inverse_count : one over the number of matched segments
-    longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`
+    longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`; of a drive
+        the mean over its views
     agreement : share of directions in which the scan shows what the map does
     read, passed : shares of the beams that read the wall they should, and that passed through one; 0 without beams
     root_farther, root_nearer : roots of the shares of the beams that read farther, and nearer, than the map shows
@@ -64,7 +67,8 @@ class Features(NamedTuple):
     walls : root of the number of walls that hold a match
     misfit_of_many : misfit times the number of matched segments over `MANY`
     beyond_nearly_all : share of the length beyond `NEARLY_ALL`
-    root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`
+    root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`; of a drive
+        that of the mean over its views
     squared_solitude : square of `solitude`
     """
 
@@ -104,7 +108,7 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
     lead = -max(gap for gap, _ in weighed) if rivals else best.value
     crowd = math.log(_evidence(weighed, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
     count = int(best.matched.sum())
-    unmatched = context.lines.rows["length"][~best.matched]
+    longest, unmatched = _unmatched(context, best)
     misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
     return Features(
         constant=1.0,
@@ -116,7 +120,7 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
         deviation=min(answer.settled.weakest, MOST_DEVIATION),
         misfit=misfit,
         inverse_count=1.0 / max(1, count),
-        longest_unmatched=min(float(unmatched.max(initial=0.0)), LONGEST_UNMATCHED),
+        longest_unmatched=longest,
         agreement=answer.agreement,
         read=best.read,
         passed=best.passed,
@@ -133,9 +137,26 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
         walls=math.sqrt(len(hinges)),
         misfit_of_many=misfit * min(count, MANY) / MANY,
         beyond_nearly_all=max(0.0, best.share - NEARLY_ALL),
-        root_unmatched=math.sqrt(min(float(unmatched.sum()), MOST_UNMATCHED)),
+        root_unmatched=math.sqrt(min(unmatched, MOST_UNMATCHED)),
         squared_solitude=crowd**2,
     )
+
+
+def _unmatched(context: SearchContext, best: Ranked) -> tuple[float, float]:
+    """Return the length of the longest segment that is not matched, and of all of them, metres; of a drive by view.
+
+    The models know scans from one place: each view of a drive adds to what no map shows as it adds to what is matched.
+    """
+    views = context.scan.views
+    if views is None or not views.uncertain:
+        lengths = context.lines.rows["length"][~best.matched]
+        return min(float(lengths.max(initial=0.0)), LONGEST_UNMATCHED), float(lengths.sum())
+    seen = context.lines.sightings
+    seen = seen[~best.matched[seen["row"]]]
+    longest, sums = np.zeros((2, len(views)))
+    np.maximum.at(longest, seen["sensor"], np.minimum(seen["length"], LONGEST_UNMATCHED))
+    np.add.at(sums, seen["sensor"], seen["length"])
+    return float(longest.mean()), float(sums.mean())
 
 
 def with_null(features: Features, best: Ranked, null: Null) -> Features:

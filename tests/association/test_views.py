@@ -11,6 +11,7 @@ import pytest
 from association import InvalidSearchError, Scan, Status, View, assemble, mirrored
 from association.alignment import aligned
 from association.explain import explain
+from association.features import features_of
 from association.layout import SIGHTING, WALL
 from association.scan import Views, scaled
 from association.tuning import LEAST_IN_STEP, ROUGH_SHARE, SPRING
@@ -279,3 +280,23 @@ def test_a_drive_whose_last_view_does_not_fit_is_not_gone_by() -> None:
     slipped = replace(explained, answer=replace(answer, beams=replace(answer.beams, in_step=LEAST_IN_STEP - 0.01)))
     verdict = judge(context, slipped)
     assert (verdict.status, [one.code for one in verdict.reasons][:1]) == (Status.AMBIGUOUS, ["unexplained"])
+
+
+@pytest.mark.parametrize(("covariance", "longest", "together"), [(STEP, 1.0, 1.0), (None, 1.5, 3.0)])
+def test_what_is_on_no_wall_counts_by_view_of_a_drive(
+    covariance: Floats | None, longest: float, together: float
+) -> None:
+    """Each view shows a thing of its own, 0.5, 1 and 1.5 m long; exact views are one scan, with all three."""
+    views = []
+    for k, length in enumerate((0.5, 1.0, 1.5)):
+        at = pose(0.2 * k, 0.0, 0.1 * k)
+        ends = seen(ROOM, INSIDE.compose(at), noise=0.005, seed=5)[0]
+        thing = at.inverse().apply(np.array([[-1.0 - k, 1.0], [-1.0 - k, 1.0 + length]])).reshape(1, 4)
+        scan = scan_of(np.vstack([ends, thing]), viewpoint=(0.0, 0.0))
+        views.append(View(scan, at, covariance if k else None, k - 1 if k else None))
+    context = context_of(INDEX, assemble(views))
+    answer = explain(context).answer
+    assert answer is not None
+    features = features_of(context, answer, [])
+    assert features.longest_unmatched == pytest.approx(longest, abs=0.01)
+    assert features.root_unmatched**2 == pytest.approx(together, abs=0.02)
