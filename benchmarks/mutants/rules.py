@@ -31,7 +31,11 @@ KERNELS = "/kernels/"
 SUITES = {
     "registration/compiling.py": Suite(("tests/registration/test_compiling.py",)),
     "registration/kernels/": Suite(
-        ("tests/registration/test_kernels.py", "tests/registration/test_pair_kernels.py"), compiled=False
+        tuple(
+            f"tests/registration/test_{name}.py"
+            for name in ("kernels", "pair_kernels", "degenerate", "observability", "joint", "one_step")
+        ),
+        compiled=False,
     ),
     "registration/": Suite(
         tuple(
@@ -57,6 +61,7 @@ SUITES = {
         ("tests/vectorization/test_kernels.py", "tests/vectorization/test_vectorize.py"), compiled=False
     ),
     "vectorization/": Suite(("tests/vectorization",)),
+    "association/kernels/view_settling.py": Suite(("tests/association/test_views.py",)),
     "association/kernels/": Suite(("tests/association/kernels",), compiled=False),
     "association/verdict.py": Suite(
         tuple(f"tests/association/test_{name}.py" for name in ("verdict", "drawn_verdicts", "views"))

@@ -36,6 +36,7 @@ RESULTS = "benchmarks/mutants/results.jsonl"
 WALL_FACTOR = 4.0  # of the processor time allowed, beside the time that processes waited for a processor
 LOOK_SECONDS = 1.0
 LEAST_SECONDS, TIMES = 30.0, 1.5  # of processor time: so much more than what tests took before, times this
+LEAST_SECONDS_OF_A_TEST, TIMES_OF_A_TEST = 10.0, 5.0  # likewise, each by itself: a loop without end is found at once
 BASELINE_SECONDS = 3600.0
 SKIPPED = "long"
 HEAVY = (
@@ -84,7 +85,7 @@ class Ran:
     failed : tuple of str
         Names of tests.
     seconds : dict
-        Of processor time, by file.
+        Of processor time, by test.
     waited : float
         Seconds that its processes waited for a processor, together.
     """
@@ -95,15 +96,22 @@ class Ran:
 
     @property
     def total(self) -> float:
-        """Processor time of all files, seconds."""
+        """Processor time of all tests, seconds."""
         return sum(self.seconds.values())
+
+    def by_file(self) -> dict[str, float]:
+        """Return the processor time of each file's tests, seconds."""
+        out: dict[str, float] = defaultdict(float)
+        for name, seconds in self.seconds.items():
+            out[_file(name)] += seconds
+        return out
 
 
 NOTHING = Ran((), {})
 
 
 class Watcher:
-    """Pytest's plugin: notes what failed and what each file took.
+    """Pytest's plugin: notes what failed and what each test took.
 
     The module's own tests come first, which notice most, then the quick files.
     """
@@ -118,15 +126,18 @@ class Watcher:
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Leave out what fails without any mistake; pytest keeps what is equal in order."""
         items[:] = [item for item in items if item.nodeid not in self._baseline.failed]
-        files = {item: _file(item.nodeid) for item in items}
-        items.sort(key=lambda item: (not files[item].endswith(self._own), self._baseline.seconds.get(files[item], 0.0)))
+        took, files = self._baseline.by_file(), {item: _file(item.nodeid) for item in items}
+        items.sort(key=lambda item: (not files[item].endswith(self._own), took.get(files[item], 0.0)))
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
-        """Count the processor time of a test, and of the processes that it waited for."""
-        before = sum(os.times()[:4])
+        """Count the processor time of a test, and of the processes that it waited for; end this one at its limit."""
+        usual, before = self._baseline.seconds.get(item.nodeid), sum(os.times()[:4])
+        if usual is not None:
+            signal.setitimer(signal.ITIMER_PROF, LEAST_SECONDS_OF_A_TEST + TIMES_OF_A_TEST * usual)
         yield
-        self.seconds[_file(item.nodeid)] += sum(os.times()[:4]) - before
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        self.seconds[item.nodeid] += sum(os.times()[:4]) - before
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note what failed."""

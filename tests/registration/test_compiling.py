@@ -85,7 +85,7 @@ class SmallPackage:
         """Run the kernel in a process of its own, which obeys the permissions of files whoever started the tests."""
         left = ("LINEFIX_KERNELS", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
         clean = {name: value for name, value in os.environ.items() if name not in left}
-        clean |= {"PYTHONPATH": str(self.home.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+        clean |= {"PYTHONPATH": f"{self.home.parent}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1"}
         clean |= {name: str(value) for name, value in environment.items()}
         ended = subprocess.run(
             [sys.executable, "-c", RUN], env=clean, cwd=self.home.parent, capture_output=True, text=True, timeout=120,

@@ -121,6 +121,7 @@ def test_joint_solve_gives_a_wrapped_angle_and_no_negative_cost() -> None:
         assert theta == pytest.approx(-3.1, abs=1e-9)
         costs += [cost, joint.joint_cost(sums, theta, 1.0, 2.0)]
     assert min(costs) == 0.0
+    assert max(costs) < 1e-9
 
 
 def test_joint_solve_of_parallel_lines_gives_the_shortest_translation() -> None:

@@ -142,3 +142,19 @@ def test_a_transform_is_finite(bad: Any) -> None:
     for values in ((bad, 0, 0), (0, bad, 0), (0, 0, bad)):
         with pytest.raises(ValueError, match="finite"):
             RigidTransform(*values)
+
+
+@given(POSES, POSES, st.integers(0, 2**32 - 1))
+def test_a_covariance_is_carried_as_small_changes_are(pose: RigidTransform, by: RigidTransform, seed: int) -> None:
+    """By differences: what a small change of the pose does to the composed one."""
+    step, there = 1e-6, pose.compose(by)
+    columns = []
+    for k in range(3):
+        change = [0.0, 0.0, 0.0]
+        change[k] = step
+        moved = RigidTransform(pose.x + change[0], pose.y + change[1], pose.theta + change[2]).compose(by)
+        columns.append([moved.x - there.x, moved.y - there.y, wrap_angle(moved.theta - there.theta)])
+    jacobian = np.array(columns).T / step
+    root = np.random.default_rng(seed).normal(size=(3, 3))
+    expected = jacobian @ root @ root.T @ jacobian.T
+    np.testing.assert_allclose(pose.carry(root @ root.T, by), expected, rtol=1e-2, atol=1e-2 * np.abs(expected).max())

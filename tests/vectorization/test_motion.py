@@ -73,3 +73,20 @@ def test_one_that_turns_as_fast_as_it_scans_is_refused() -> None:
     with pytest.raises(InvalidScanError) as caught:
         LaserScan(0.0, 0.01, [1.0, 1.0], motion=Motion(0.001, 0.0, 0.0, -8.0))
     assert caught.value.argument == "twist"
+
+
+def test_spans_of_a_scanner_that_moves_run_as_its_beams_do() -> None:
+    """Both ends of a segment are its first and last beam, counted down where it turns clockwise."""
+    for backward in (False, True):
+        scanner = Scanner.over(1.5 * math.pi, 541, sigma=0.0)
+        if backward:
+            scanner = Scanner(541, -scanner.angle_min, -scanner.angle_increment, sigma=0.0)
+        ranges = moving_ranges(scanner, MOTION)
+        laser = LaserScan(scanner.angle_min, scanner.angle_increment, ranges, motion=MOTION)
+        found = vectorize(laser)
+        places = laser.places
+        angles = laser.angles + places[:, 2]
+        ends = places[:, :2] + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        told = found.measured.segments.endpoints.reshape(-1, 2, 2)
+        np.testing.assert_allclose(ends[found.spans], told, atol=0.1)
+        assert ((found.spans[:, 0] > found.spans[:, 1]) == backward).all()

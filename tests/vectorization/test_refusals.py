@@ -20,6 +20,7 @@ from vectorization import InvalidOptionError, InvalidScanError, LaserScan, Vecto
         ("angle_increment", (0.0, 1e-200, [1.0] * 50)),
         ("angle_increment", (0.0, -9e-7, [1.0] * 50)),
         ("angle_increment", (0.0, 0.1, [1.0] * 100)),
+        ("angle_increment", (0.0, 7.0, [1.0])),
         ("ranges", (0.0, 0.1, [[1.0]])),
         ("ranges", (0.0, 0.1, ["1.0"])),
         ("ranges", (0.0, 0.1, ["1.0", None])),
