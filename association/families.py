@@ -11,7 +11,7 @@ from .context import SearchContext
 from .explain import Answer
 from .ranking import Ranked
 from .settling import Settled
-from .tuning import FEW_WALLS
+from .tuning import FEW_WALLS, OFFSET_OF_FEW
 
 
 def is_degenerate(settled: Settled) -> bool:
@@ -19,10 +19,16 @@ def is_degenerate(settled: Settled) -> bool:
     return settled.parallel or settled.weakest > MAX_DEVIATION
 
 
-def is_thin(settled: Settled) -> bool:
-    """Tell whether so few walls fix the pose that one alone decides: any building has such a corner."""
-    free = bool((settled.hinges["deviation"] > MAX_DEVIATION).any())
-    return free and len(settled.hinges) <= FEW_WALLS
+def is_thin(answer: Answer) -> bool:
+    """Tell whether so few walls fix the pose that one alone decides: any building has such a corner.
+
+    Many have three sides of a room that are about as far apart, too, but few to millimetres.
+    """
+    hinges = answer.settled.hinges
+    if len(hinges) > FEW_WALLS or not (hinges["deviation"] > MAX_DEVIATION).any():
+        return False
+    offsets = answer.best.matches["offset"][answer.best.matched]
+    return len(hinges) < FEW_WALLS or float(np.mean(offsets**2)) > OFFSET_OF_FEW**2
 
 
 def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | None:

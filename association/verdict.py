@@ -94,7 +94,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         complete,
         contradicted,
         elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
-        thin=is_thin(answer.settled),
+        thin=is_thin(answer),
         twin=chances.share < USABLE_PROBABILITY,
         out_of_step=_out_of_step(answer),
     )
@@ -149,7 +149,7 @@ class _Chances:
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
         explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))
         likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
-        decidable = not is_degenerate(answer.settled) and not is_thin(answer.settled)
+        decidable = not is_degenerate(answer.settled) and not is_thin(answer)
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
@@ -199,5 +199,5 @@ def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool) -> S
     if is_degenerate(answer.settled):
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= bar and not is_thin(answer.settled) and not _out_of_step(answer)
+    sure = chances.careful >= bar and not is_thin(answer) and not _out_of_step(answer)
     return Status.OK if likely and sure else Status.AMBIGUOUS
