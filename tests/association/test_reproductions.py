@@ -11,7 +11,7 @@ from association import AssociationResult, HardPrior, MapIndex, Status
 from registration import Segments
 from registration.layout import Floats
 
-from .scenes import answer_of, index_of, maze, pose, pose_in, same_pose, scan_of, seen
+from .scenes import answer_of, beams_of, index_of, maze, pose, pose_in, same_pose, scan_of, seen
 
 LOBBY = np.array([[0, 0, 8, 0], [8, 0, 8, 3], [8, 3, 5, 3], [5, 3, 5, 6], [5, 6, 0, 6], [0, 6, 0, 0]], dtype=float)
 SIGMAS = [0.0, 0.03, None]
@@ -83,6 +83,15 @@ def test_three_sides_of_rooms_of_other_buildings_are_not_usable(sigma: float | N
         ends = [[-left, up, -left, -down], [-left, -down, right, -down], [right, -down, right, up]]
         usable += answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0))).usable
     assert usable == 0
+
+
+def test_three_sides_of_rooms_are_not_usable_with_raw_ranges_either() -> None:
+    """What is free before them is free in the map, too."""
+    index, rng = map_of(LOBBY, None), np.random.default_rng(1)
+    for left, right, down, up in rng.uniform(1.0, 4.0, (40, 4)):
+        ends = [[-left, -down, right, -down], [right, -down, right, up], [-left, up, -left, -down]]
+        beams = beams_of(index_of(ends), pose(0.0, 0.0))
+        assert not answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0), beams=beams)).usable
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.05, 0.1, 0.2])
