@@ -38,6 +38,8 @@ def drives_of_strangers(quick: int) -> list[Row]:
                 except (SimulationError, KeyError):
                     continue
                 looks, index = world_looks(case, 5.0), MapIndex.build(case.map)
+                if not looks:  # something of the map is seen from the very place
+                    continue
                 asked = {"one view": looks[0].scan, "drive": drive(looks, np.random.default_rng([number, 3]))}
                 for form, scan_of_form in asked.items():
                     trial = tried(index, scan_of_form, case.truth, NEAR, TURNED)
