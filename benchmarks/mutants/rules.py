@@ -57,12 +57,9 @@ SUITES = {
             )
         )
     ),
-    "vectorization/kernels/": Suite(
-        ("tests/vectorization/test_kernels.py", "tests/vectorization/test_vectorize.py"), compiled=False
-    ),
     "vectorization/": Suite(("tests/vectorization",)),
     "association/kernels/view_settling.py": Suite(("tests/association/test_views.py",)),
-    "association/kernels/": Suite(("tests/association/kernels",), compiled=False),
+    "association/kernels/": Suite(("tests/association/kernels",)),
     "association/verdict.py": Suite(
         tuple(f"tests/association/test_{name}.py" for name in ("verdict", "drawn_verdicts", "views"))
     ),
