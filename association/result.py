@@ -130,11 +130,12 @@ class SearchReport:
     Attributes
     ----------
     complete : bool
-        False when the deadline or the budget ended it before the confidence was reached.
+        False when the deadline ended it before the confidence was reached or the bases were used up.
     exhaustive : bool
         Whether every base was gone through.
     confidence : float
-        Reached chance of not having missed a better consensus set.
+        Reached chance of not having missed a better consensus set; below what was asked where a scan of many segments
+        has few that tell enough together.
     bases, hypotheses, verified : int
         Bases drawn, poses they gave, poses that were scored to the end.
     seed : int
