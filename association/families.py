@@ -19,16 +19,17 @@ def is_degenerate(settled: Settled) -> bool:
     return settled.parallel or settled.weakest > MAX_DEVIATION
 
 
-def is_thin(answer: Answer) -> bool:
+def is_thin(context: SearchContext, answer: Answer) -> bool:
     """Tell whether so few walls fix the pose that one alone decides: any building has such a corner.
 
     Many have three sides of a room that are about as far apart, too, but few to millimetres.
+    Beams move a pose to where those three fit, so that with them it proves less.
     """
     hinges = answer.settled.hinges
     if len(hinges) > FEW_WALLS or not (hinges["deviation"] > MAX_DEVIATION).any():
         return False
     offsets = answer.best.matches["offset"][answer.best.matched]
-    return len(hinges) < FEW_WALLS or float(np.mean(offsets**2)) > OFFSET_OF_FEW**2
+    return len(hinges) < FEW_WALLS or context.with_beams or float(np.mean(offsets**2)) > OFFSET_OF_FEW**2
 
 
 def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | None:

@@ -83,7 +83,8 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
     certain = complete and not contradicted and context.window is None and not _out_of_step(answer)
     chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
-    status = _status(answer, chances, _bar(context), capped=better_elsewhere)
+    thin = is_thin(context, answer)
+    status = _status(answer, chances, _bar(context), capped=better_elsewhere, thin=thin)
     pose = place_on_family(context, answer)
     if context.window is not None and pose is not None and not context.window.contains(pose):
         # It was inside before it was registered: the window is narrower than what the scan says.
@@ -94,7 +95,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         complete,
         contradicted,
         elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
-        thin=is_thin(answer),
+        thin=thin,
         twin=chances.share < USABLE_PROBABILITY,
         out_of_step=_out_of_step(answer),
     )
@@ -149,7 +150,7 @@ class _Chances:
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
         explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))
         likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
-        decidable = not is_degenerate(answer.settled) and not is_thin(answer)
+        decidable = not is_degenerate(answer.settled) and not is_thin(context, answer)
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
@@ -192,12 +193,12 @@ def _bar(context: SearchContext) -> float:
     return USABLE_CAUTIOUS_WITH_BEAMS if context.with_beams else USABLE_CAUTIOUS
 
 
-def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool) -> Status:
+def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool, thin: bool) -> Status:
     """Decide in order of precedence; a `capped` probability is never enough."""
     if chances.explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
     if is_degenerate(answer.settled):
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= bar and not is_thin(answer) and not _out_of_step(answer)
+    sure = chances.careful >= bar and not thin and not _out_of_step(answer)
     return Status.OK if likely and sure else Status.AMBIGUOUS

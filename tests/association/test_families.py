@@ -40,7 +40,11 @@ def test_few_walls_of_which_one_alone_decides_are_thin(walls: int, deviation: fl
     hinges = hinges_of(*((k, 0.0, deviation if k == 0 else 0.01) for k in range(walls)))
     best = ranked(matched=walls)
     best.matches["offset"] = np.where(best.matched, offset, 9.0)
-    assert is_thin(answer_with(best, settled=settled_of(registered_room(), hinges))) is thin
+    answer = answer_with(best, settled=settled_of(registered_room(), hinges))
+    assert is_thin(room(), answer) is thin
+    assert is_thin(room(with_beams=True), answer) is (walls <= 3 and deviation > 0.5), (
+        "beams move poses to where they fit"
+    )
 
 
 def settled_on(walls: Floats, seen_walls: Floats) -> Settled:

@@ -159,7 +159,11 @@ def judge(
     hinges = answer.settled.hinges
     thin = len(hinges) <= tuning.FEW_WALLS and max(hinges["deviation"], default=0.0) > MAX_DEVIATION
     off = [float(match["offset"]) for match in best.matches if match["wall"] >= 0]
-    if len(hinges) == tuning.FEW_WALLS and math.sqrt(np.mean(np.square(off))) <= tuning.OFFSET_OF_FEW:
+    if (
+        not context.with_beams
+        and len(hinges) == tuning.FEW_WALLS
+        and math.sqrt(np.mean(np.square(off))) <= tuning.OFFSET_OF_FEW
+    ):
         thin = False
     chances = _chances(context, explanations, models, usual_deviation)
     likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
