@@ -169,7 +169,9 @@ def _go_through_bases(context: SearchContext, question: Question, found: Records
         stopped = advance(question, tables, plan, found, progress, context.workspace, allowed, chunk)
         if stopped == BUDGET and context.deadline.helped:
             stopped = Sharing(context, question, plan, found, progress, chunk).go_on(allowed)
-    if stopped in (BUDGET, EXHAUSTED) and len(plan.bases) and not plan.random:
+    if len(plan.bases) == 0:
+        progress["missed"] = 0.0  # walls of which no two cross are slid
+    elif stopped in (BUDGET, EXHAUSTED) and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
     return stopped
 

@@ -22,8 +22,8 @@ def is_degenerate(settled: Settled) -> bool:
 def is_thin(context: SearchContext, answer: Answer) -> bool:
     """Tell whether so few walls fix the pose that one alone decides: any building has such a corner.
 
-    Many have three sides of a room that are about as far apart, too, but few to millimetres.
-    Beams move a pose to where those three fit, so that with them it proves less.
+    Many have three sides of a room that are about as far apart, too, but few to millimetres. Beams move a pose to
+    where those three fit, so that with them it proves less.
     """
     hinges = answer.settled.hinges
     if len(hinges) > FEW_WALLS or not (hinges["deviation"] > MAX_DEVIATION).any():

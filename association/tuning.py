@@ -304,7 +304,7 @@ USABLE_CAUTIOUS_DRIVE = 0.95
 # that were usable 1 in 500 came below 0.65; one whose frame was 3.8 degrees off to 0.36. Measured.
 LEAST_IN_STEP = 0.55
 FEW_WALLS = 3  # geometry: three sides of a room; fewer are never enough if one of them alone decides, and as many
-OFFSET_OF_FEW = 0.002  # m, measured; only where they are off by no more, root mean square
+OFFSET_OF_FEW = 0.002  # m, measured; only of segments, and where they are off by no more, root mean square
 NO_TWIN = 8.0  # nats, tables; an explanation that is so much less worth is no twin
 TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not told
 NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a twin of it, other buildings reckoned with

@@ -23,7 +23,7 @@ import numpy as np
 import orjson
 import psycopg
 
-from examples.running import running_service
+from examples.running import free_port, running_service
 from registration import Segments
 
 from .growth import campus, draw_query
@@ -98,7 +98,7 @@ def replicas(quick: int) -> list[Row]:
         settings = {"database_url": stack.enter_context(postgresql_schema()), "cache_bytes": HELD * INDEXED_BYTES}
         urls = [stack.enter_context(running_service(**settings, searches=1, queue=64))[0] for _ in range(COUNT)]
         _put_maps(urls[0], segments)
-        ways = [Way(count, hashed, _free_port()) for count in range(1, COUNT + 1) for hashed in (False, True)[:count]]
+        ways = [Way(count, hashed, free_port()) for count in range(1, COUNT + 1) for hashed in (False, True)[:count]]
         stack.enter_context(_proxy(nginx, folder, ways, urls))
         for maps in (FEW, MANY):
             asked = _requests(segments, maps)
@@ -182,9 +182,3 @@ def postgresql_schema() -> Iterator[str]:
             yield f"{SERVER}?options=-csearch_path%3D{name}"
         finally:
             connection.execute(f"DROP SCHEMA {name} CASCADE".encode())
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])

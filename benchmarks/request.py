@@ -24,7 +24,7 @@ import numpy as np
 import orjson
 
 from association import Deadline
-from examples.running import running_service
+from examples.running import free_port, running_service
 from service.database_url import database_url
 from service.maps import IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.lookup import MapLookup
@@ -185,9 +185,7 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
 @contextmanager
 def bare() -> Iterator[Served]:
     """Give a route of the same server that answers a constant, without application."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with subprocess.Popen([sys.executable, "-c", BARE, str(port)]) as process:
         try:
             for _ in range(600):

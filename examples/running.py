@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import socket
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 START_SECONDS = 300.0  # the first start of all compiles the kernels
@@ -22,12 +23,19 @@ class StartError(Exception):
     """The service did not come up; the message ends with its log."""
 
 
+def free_port() -> int:
+    """Return a port that nobody listens on, below those that clients are given: none of them takes it meanwhile."""
+    while True:
+        port = random.SystemRandom().randrange(10_000, 32_000)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+
+
 @contextmanager
 def running_service(**settings: object) -> Iterator[tuple[str, int]]:
     """Give the URL and the process id of a service that is ready; it and its data are gone afterwards."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     url = f"http://127.0.0.1:{port}"
     # Settings of the caller's own service have no say here.
     environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}

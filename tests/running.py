@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import httpx
+
+from examples.running import free_port
 
 START_SECONDS = 150.0  # the first start may have to compile every kernel
 JSON = {"content-type": "application/json"}
@@ -76,15 +77,6 @@ def client_of(url: str, timeout: float = PATIENCE, **headers: str) -> httpx.Clie
     It looks at no certificates: to load those of the system takes 20 ms of a processor for each client.
     """
     return httpx.Client(base_url=url, timeout=timeout, headers=JSON | headers, verify=False)
-
-
-def free_port() -> int:
-    """Return a port that nobody listens on, below those that clients are given: none of them takes it meanwhile."""
-    while True:
-        port = random.SystemRandom().randrange(10_000, 32_000)
-        with socket.socket() as probe, suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return port
 
 
 def start(data_dir: Path, *, probe: str = "/readyz", port: int | None = None, **settings: object) -> RunningService:

@@ -20,14 +20,13 @@ class Suite:
     tests : tuple of str
         Folders and files.
     compiled : bool
-        Whether kernels are compiled; where each mutant would have to be it is quicker without.
+        Whether kernels are compiled; where few tests call them it is quicker without.
     """
 
     tests: tuple[str, ...]
     compiled: bool = True
 
 
-KERNELS = "/kernels/"
 SUITES = {
     "registration/compiling.py": Suite(("tests/registration/test_compiling.py",)),
     "registration/kernels/": Suite(

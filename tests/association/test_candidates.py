@@ -191,6 +191,14 @@ def test_without_bases_there_is_nothing_to_go_through() -> None:
         assert (report.complete, report.exhaustive, report.confidence, report.bases) == (True, True, 1.0, 0)
 
 
+@pytest.mark.parametrize("sampling", ["ordered", "random"])
+def test_of_many_parallel_walls_nothing_is_missed(sampling: str) -> None:
+    """They make no bases however many they are, and are slid."""
+    walls = np.array([[0.0, 3.0 * k, 30.0, 3.0 * k] for k in range(BASE_SEGMENTS + 5)])
+    report = found(index_of(walls), scan_of(walls - [10.0, 0.0, 10.0, 0.0]), sampling=sampling).report
+    assert (report.bases, report.confidence) == (0, 1.0)
+
+
 @pytest.mark.parametrize(("count", "exhaustive"), [(BASE_SEGMENTS, True), (BASE_SEGMENTS + 1, False)])
 def test_a_scan_of_many_segments_is_not_gone_through_whole(count: int, exhaustive: bool) -> None:
     """Bases are made of the most telling ones."""

@@ -29,10 +29,11 @@ from linefix_client import (
     schema,
 )
 
+from examples.running import free_port
 from formats import StampedPose, pose_message
 from registration import RigidTransform
 from service.schemas import examples
-from tests.running import RunningService, free_port
+from tests.running import RunningService
 
 ROOM: Any = examples.MAP
 QUESTION: Any = examples.ASSOCIATE

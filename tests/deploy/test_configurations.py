@@ -15,10 +15,11 @@ import pytest
 import trustme
 from ruamel.yaml import YAML
 
+from examples.running import free_port
 from service.database_url import database_url
 from service.schemas import examples
 from service.settings import Settings
-from tests.running import JSON, RunningService, free_port, until
+from tests.running import JSON, RunningService, until
 from tests.service.issuing import key_lines
 
 ROOT = Path(__file__).parents[2]

@@ -16,7 +16,8 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from tests.running import RunningService, client_of, free_port, start, stop, until
+from examples.running import free_port
+from tests.running import RunningService, client_of, start, stop, until
 from tests.service.conftest import LOCAL, empty_database
 
 NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/bin:/opt/homebrew/bin")

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from examples.running import free_port
 from service.commands.in_process import InProcess
-from tests.running import RunningService, free_port
+from tests.running import RunningService
 
 from .running import Linefix, refused
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.running import free_port
+from examples.running import free_port
 
 
 def start(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -13,8 +13,9 @@ from pathlib import Path
 import httpx
 import orjson
 
+from examples.running import free_port
 from service.telemetry.logs import WAITING_LINES
-from tests.running import PATIENCE, START_SECONDS, client_of, free_port, until
+from tests.running import PATIENCE, START_SECONDS, client_of, until
 
 LOGS = """
 import logging, logging.config, sys, time

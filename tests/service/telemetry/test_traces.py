@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
+from examples.running import free_port
 from service.schemas import examples
 from service.telemetry.traces import queued, stage, traces_of_environment
-from tests.running import RunningService, free_port, running, until
+from tests.running import RunningService, running, until
 
 pytest.importorskip("opentelemetry.exporter.otlp.proto.http")
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
