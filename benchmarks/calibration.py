@@ -69,11 +69,11 @@ PAIRS_WITH_BEAMS = (
 BENDS = (0.2, 0.5, 0.8)  # quantiles of a feature at which its curve may bend
 TASKS = {
     SEGMENTS: (
-        Task("probability", 0.02, MODELS["probability"], LIKELY, ()),
+        Task("probability", 0.01, MODELS["probability"], LIKELY, ()),
         Task("cautious", 1.0, MODELS["cautious"], CAREFUL, BENDS, PAIRS),
     ),
     RANGES: (
-        Task("probability_with_beams", 0.02, MODELS["probability_with_beams"], LIKELY_WITH_BEAMS, ()),
+        Task("probability_with_beams", 0.01, MODELS["probability_with_beams"], LIKELY_WITH_BEAMS, ()),
         Task("cautious_with_beams", 1.0, MODELS["cautious_with_beams"], CAREFUL_WITH_BEAMS, BENDS, PAIRS_WITH_BEAMS),
     ),
 }
