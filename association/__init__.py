@@ -5,6 +5,7 @@ from registration import Beams
 from .errors import AssociationError, InvalidMapError, InvalidSearchError
 from .map_index import MapIndex
 from .options import (
+    PARTS,
     AssociationOptions,
     CancelledError,
     Deadline,
@@ -31,6 +32,7 @@ from .words import AS_WELL, sentence_of
 __all__ = [
     "AS_WELL",
     "MAX_VIEWS",
+    "PARTS",
     "Alternative",
     "AssociationDiagnostics",
     "AssociationError",

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from .tuning import GREATEST_ANGLE_GATE, REACH
 Estimator = Literal["joint", "one_step"]
 Rotation = Literal["wahba", "mitsuta"]
 Sampling = Literal["ordered", "random"]
+Part = Literal["correspondences", "alternatives", "missing_map"]
+
+PARTS: tuple[Part, ...] = get_args(Part)
 
 MAX_ALTERNATIVES = 50
 
@@ -103,6 +106,9 @@ class AssociationOptions:
         Radians; gate on the angle between them. None: from the sigmas.
     min_overlap : float
         Share of a scan segment's length that must lie on the map, 0 to 1.
+    parts : tuple of str
+        Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
+        them a usable answer has no alternatives; any other has, for `sentence_of` tells how many there are.
     causes : bool
         Whether to look for a mistake of the caller's where the answer is not usable, for twice the time at most.
     estimator, rotation : str
@@ -123,6 +129,7 @@ class AssociationOptions:
     offset_tolerance: float | None = None
     angle_tolerance: float | None = None
     min_overlap: float = 0.5
+    parts: tuple[Part, ...] = PARTS
     causes: bool = False
     estimator: Estimator = "joint"
     rotation: Rotation = "wahba"
@@ -136,6 +143,8 @@ class AssociationOptions:
             ("angle_tolerance", self.angle_tolerance, 1e-3, GREATEST_ANGLE_GATE),
             ("min_overlap", self.min_overlap, 0.0, 1.0),
         ]
+        if unknown := set(self.parts).difference(PARTS):
+            raise InvalidSearchError(f"no parts of an answer: {sorted(unknown)}", argument="options.parts")
         for name, value, low, high in ranges:
             if value is not None and not low <= value <= high:
                 raise InvalidSearchError(f"expected a number from {low:g} to {high:g}", argument=f"options.{name}")

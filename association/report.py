@@ -38,7 +38,7 @@ def report(
     answer = explanations.answer
     if answer is None or verdict.status is Status.NO_MATCH:
         return _no_match(context, explanations, verdict, causes)
-    degenerate = verdict.status is Status.DEGENERATE
+    degenerate, parts = verdict.status is Status.DEGENERATE, context.options.parts
     matched, on_map = set(answer.accepted.scan_indices), set(answer.accepted.map_indices(context.index))
     return AssociationResult(
         status=verdict.status,
@@ -47,12 +47,12 @@ def report(
         pose=verdict.pose,
         covariance=None if degenerate or context.options.estimator == "one_step" else answer.settled.covariance,
         unobservable=answer.settled.direction if degenerate else None,
-        correspondences=_correspondences(context, answer, verdict),
+        correspondences=_correspondences(context, answer, verdict) if "correspondences" in parts else (),
         unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
-        missing_map=tuple(i for i in missing_segments(context, answer.best) if i not in on_map),
+        missing_map=tuple(i for i in _missing_map(context, answer) if i not in on_map),
         diagnostics=_diagnostics(context, answer, verdict),
         reasons=verdict.reasons,
-        alternatives=_alternatives(context, explanations.others),
+        alternatives=_alternatives(context, explanations.others, usable=verdict.usable),
         search=explanations.search,
         warnings=warnings_of(context, explanations.search, verdict, causes),
     )
@@ -81,7 +81,7 @@ def _no_match(
         missing_map=(),
         diagnostics=None,
         reasons=verdict.reasons,
-        alternatives=_alternatives(context, explanations.ranked),
+        alternatives=_alternatives(context, explanations.ranked, usable=False),
         search=explanations.search,
         warnings=warnings_of(context, explanations.search, verdict, causes),
     )
@@ -112,7 +112,13 @@ def _hinge(context: SearchContext, answer: Answer) -> Hinge | None:
     return Hinge(tuple(scan), tuple(on_map), (float(one["dx"]), float(one["dy"])), float(moves.max()))
 
 
-def _alternatives(context: SearchContext, others: tuple[Ranked, ...]) -> tuple[Alternative, ...]:
+def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
+    return missing_segments(context, answer.best) if "missing_map" in context.options.parts else ()
+
+
+def _alternatives(context: SearchContext, others: tuple[Ranked, ...], *, usable: bool) -> tuple[Alternative, ...]:
+    if usable and "alternatives" not in context.options.parts:
+        return ()
     return tuple(_alternative(context, other) for other in others[: context.options.max_alternatives])
 
 

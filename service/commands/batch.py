@@ -70,7 +70,7 @@ def _options(block: int, deadline_ms: float, *, undirected: bool) -> FleetOption
     from association import AssociationOptions
     from fleet import FleetOptions
 
-    search = AssociationOptions(max_alternatives=0, oriented=not undirected)
+    search = AssociationOptions(max_alternatives=0, parts=(), oriented=not undirected)
     return FleetOptions(search, deadline_ms, block, compile_kernels)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from association import AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
+from association import PARTS, AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
 from registration import InvalidArgumentError, MeasuredSegments, RegistrationOptions, RigidTransform, Segments
 
 from ..maps.lookup import is_oriented
@@ -99,6 +99,7 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
         offset_tolerance=options.offset_tolerance,
         angle_tolerance=options.angle_tolerance,
         min_overlap=options.min_overlap,
+        parts=tuple(part for part in PARTS if part in options.include),
         causes="causes" in options.include,
         estimator=options.estimator,
         rotation=options.rotation,

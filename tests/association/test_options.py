@@ -24,6 +24,7 @@ from .scenes import pose
         ("offset_tolerance", [None, 1e-3, 0.4], [0.0, 0.41, 5.0, math.nan]),
         ("angle_tolerance", [None, 1e-3, 0.35], [0.0, 0.36, math.nan]),
         ("min_overlap", [0.0, 1.0], [-0.1, 1.1, math.nan]),
+        ("parts", [(), ("alternatives",)], [("segments",)]),
     ],
 )
 def test_options_have_a_range(name: str, good: list[Any], bad: list[Any]) -> None:

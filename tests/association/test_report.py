@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationResult, MapIndex, Reason, Status
+from association import AssociationResult, MapIndex, Reason, Status, sentence_of
 from association.acceptance import Accepted
 from association.explain import Answer, explain
 from association.report import report
@@ -112,6 +112,32 @@ def test_overlaps_are_those_at_the_pose_that_is_answered(walls: Floats, at: Rigi
             assert pair.overlap == pytest.approx(expected, abs=1e-9)
             compared += 1
     assert compared >= 3
+
+
+@pytest.mark.parametrize("asked", [(), ("correspondences",), ("missing_map",), ("alternatives", "missing_map")])
+def test_parts_that_are_not_asked_for_are_empty_and_change_nothing_else(asked: tuple[Any, ...]) -> None:
+    """Of an answer that is usable, with another pose, and a wall through which it sees."""
+    index = index_of(np.vstack([equal_rooms(2)[:-2], [[4.0, 3.3, 5.0, 3.4]]]))
+    sent = scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0], viewpoint=(0.0, 0.0))
+    explanations = explain(context_of(index, sent))
+
+    def reported(**options: Any) -> AssociationResult:
+        return report(context_of(index, sent, **options), explanations, SURE)
+
+    whole, part = reported(), reported(parts=asked)
+    for name in ("correspondences", "alternatives", "missing_map"):
+        assert getattr(whole, name), name
+        assert bool(getattr(part, name)) == (name in asked), name
+    for name in ("status", "usable", "probability", "pose", "unmatched_scan", "diagnostics", "reasons", "search"):
+        assert getattr(part, name) == getattr(whole, name), name
+
+
+def test_what_is_not_usable_has_its_other_poses() -> None:
+    """They are counted in the sentence, whatever is asked for."""
+    result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())
+    assert not result.usable
+    assert len(result.alternatives) == 2
+    assert "2 other places" in sentence_of(result)
 
 
 @pytest.mark.parametrize("most", [0, 2, 50])

@@ -1,0 +1,20 @@
+"""What the search is asked for is what the request asks for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from association import PARTS
+from service.schemas.parts import SearchOptions
+from service.work.inputs import association_options_of
+
+
+@pytest.mark.parametrize(
+    ("sent", "parts"),
+    [({}, PARTS), ({"include": []}, ()), ({"include": ["segments", "alternatives"]}, ("alternatives",))],
+)
+def test_only_parts_that_are_included_are_worked_out(sent: dict[str, Any], parts: tuple[str, ...]) -> None:
+    asked = SearchOptions.model_validate(sent, strict=False)
+    assert association_options_of(asked, oriented=True).parts == parts
