@@ -107,7 +107,7 @@ def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]
     best, hinges, weighed = answer.best, answer.settled.hinges, weigh(answer.best, rivals)
     lead = -max(gap for gap, _ in weighed) if rivals else best.value
     crowd = math.log(_evidence(weighed, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
-    count = int(best.matched.sum())
+    count = best.count
     longest, unmatched = _unmatched(context, best)
     misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
     return Features(
@@ -202,7 +202,7 @@ def worth(one: Ranked) -> float:
     Student's t: ``log G((n + k) / 2) - log G(k / 2) - n / 2 log(k / 2) - (n + k) / 2 log(1 + cost / k)``. Where the
     walls of a map are off by more, the centimetres that tell rivals apart count that much less.
     """
-    n, k = int(one.matched.sum()), USUAL_WALLS
+    n, k = one.count, USUAL_WALLS
     student = math.lgamma(0.5 * (n + k)) - math.lgamma(0.5 * k) - 0.5 * n * math.log(0.5 * k)
     student -= 0.5 * (n + k) * math.log1p(one.cost / k)
     return one.value + 0.5 * one.cost + student

@@ -71,8 +71,8 @@ VALUE = _fields((_F, "gain cost freedom"))
 # What an estimate is worth: its score; the joint cost in it; what the same sums cost at the paper's estimate; length of
 # the matched segments; its share of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
 # sigmas alone expect; what lines of sight speak against it, nats; the shares of the beams that read the wall they
-# should, and that passed through one, 0 without beams.
-MERIT = _fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed"))
+# should, and that passed through one, 0 without beams; how many rows are matched.
+MERIT = _fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed count"))
 
 # What one wall has in the sums: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of
 # its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs.

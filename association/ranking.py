@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,8 @@ class Ranked:
         What lines of sight speak against it, nats, in the score.
     read, passed : float
         Shares of the beams that read the wall they should, and that passed through one; 0 without beams.
+    count : int
+        Rows of the scan that are matched.
     matches : (n,) of `MATCH`
         By row of the scan.
     """
@@ -87,6 +89,7 @@ class Ranked:
     blocked: float
     read: float
     passed: float
+    count: int
     matches: Records
 
     @property
@@ -147,10 +150,12 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     most = max(LEAST_DISTINCT, context.options.max_alternatives + 1)
     order = _distinct(scored, np.where(scores > 0.0, values, -np.inf), most)
     windowed = context.window is not None
-    return [
-        _explanation(scored, place, merit, value, windowed=windowed)
-        for place, merit, value in zip(order, scored.merits[order].tolist(), values[order].tolist(), strict=True)
-    ]
+    explanations = []
+    for place, merit, value in zip(order, scored.merits[order].tolist(), values[order].tolist(), strict=True):
+        within = value >= INSIDE / 2
+        inside = within or not windowed
+        explanations.append(_explanation(scored, place, merit, merit[0] if within else value, inside=inside))
+    return explanations
 
 
 def score_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[Ranked]:
@@ -165,22 +170,18 @@ def score_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[
     for place, one in enumerate(explanations):
         poses[place] = one.estimate[0]
     scored = _score(context, poses)
-    again = []
-    for place, one in enumerate(explanations):
-        merit = scored.merits[place]
-        merit["read"], merit["passed"] = one.read, one.passed
-        score = float(merit["score"]) + one.score - one.by_segments
-        merit["score"] = score
-        found = _explanation(scored, place, merit.item(), score + one.value - one.score, windowed=False)
-        again.append(replace(found, inside=one.inside))
-    return again
+    merits = scored.merits
+    merits["read"], merits["passed"] = [one.read for one in explanations], [one.passed for one in explanations]
+    merits["score"] += [one.score - one.by_segments for one in explanations]
+    return [
+        _explanation(scored, place, merit, merit[0] + one.value - one.score, inside=one.inside)
+        for place, (one, merit) in enumerate(zip(explanations, merits.tolist(), strict=True))
+    ]
 
 
-def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, windowed: bool) -> Ranked:
-    score, cost, one_step_cost, length, share, reliability, misfit, blocked, read, passed = merit
-    within = value >= INSIDE / 2
+def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, inside: bool) -> Ranked:
+    score, cost, one_step_cost, length, share, reliability, misfit, blocked, read, passed, count = merit
     estimate, matches = scored.estimates[place : place + 1], scored.matches[place]
-    value, inside = score if within else value, within or not windowed
     return Ranked(
         estimate,
         score,
@@ -195,6 +196,7 @@ def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: f
         blocked,
         read,
         passed,
+        int(count),
         matches,
     )
 

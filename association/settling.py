@@ -71,8 +71,7 @@ def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Sett
     covariance = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
     _, variance, weakest, dx, dy, unlike = settled[0].item()
     sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
-    pairs = int(best.matched.sum())
-    parallel = pairs < 2 or unlike <= chi_square_quantile(pairs - 1, THREE_SIGMA_TAIL)
+    parallel = best.count < 2 or unlike <= chi_square_quantile(best.count - 1, THREE_SIGMA_TAIL)
     spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
     alone = Settled(
         pose=RigidTransform(x, y, theta),

@@ -73,6 +73,7 @@ def rank(
                 count += 1
         merit.share = merit.length / length
         merit.misfit /= max(1, count)
+        merit.count = count
         # The candidates come best first: what is far behind is no rival, its score may stay too good.
         if sighted and merit.score > best - FAR_BEHIND:
             count = count_blockers(sights, matches[k], one, place, blockers, work.scratch[0].ray)
