@@ -69,24 +69,34 @@ class Effort:
         Of the best value, below which a pose is not kept.
     rival_share : float
         Of the best value, above which no pose may have been missed.
+    allowed : float
+        The greatest chance of having missed one; -1 goes through all bases.
     known : float
         A value that is known to be reached, nats: what stays below these shares of it is not looked for.
     enough : float
         A value that ends the search, nats.
+    samples : int
+        Consensus sets by which the chance of having missed one is told.
     """
 
     kept: int
     kept_share: float
     rival_share: float
+    allowed: float
     known: float = 0.0
     enough: float = math.inf
+    samples: int = SAMPLES
 
     @classmethod
     def of(cls, context: SearchContext) -> Effort:
         """Keep poses more freely where raw beams are to decide between them."""
-        if context.with_beams:
-            return cls(KEPT_FOR_BEAMS, KEPT_SHARE_FOR_BEAMS, RIVAL_SHARE)
-        return cls(KEPT, KEPT_SHARE, RIVAL_SHARE)
+        kept = (KEPT_FOR_BEAMS, KEPT_SHARE_FOR_BEAMS) if context.with_beams else (KEPT, KEPT_SHARE)
+        return cls(*kept, RIVAL_SHARE, allowed_by(context.options))
+
+
+def allowed_by(options: AssociationOptions) -> float:
+    """Return the chance of having missed a better consensus set that a caller allows; -1 for none."""
+    return -1.0 if options.exhaustive else 1.0 - options.confidence
 
 
 def find_candidates(context: SearchContext, effort: Effort | None = None) -> Candidates:
@@ -125,7 +135,7 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
     # A test of a pose takes longer the more walls lie where it is.
     chunk = int(CHUNK / max(1.0, index.crowd / USUAL_CROWD))
     question = context.question(_rules(effort, DISTINCT_DISTANCE))
-    stopped = _go_through_bases(context, question, found[:kept], progress, chunk)
+    stopped = _go_through_bases(context, effort, question, found[:kept], progress, chunk)
     places = list(range(int(progress["count"][0])))
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slid = _slide(context, effort, found[kept:], progress, chunk)
@@ -160,15 +170,16 @@ def _rules(effort: Effort, distinct_distance: float) -> Records:
     )
 
 
-def _go_through_bases(context: SearchContext, question: Question, found: Records, progress: Records, chunk: int) -> int:
+def _go_through_bases(
+    context: SearchContext, effort: Effort, question: Question, found: Records, progress: Records, chunk: int
+) -> int:
     """Fill `found` and `progress`; return why it ended, `BUDGET` where the deadline did."""
-    tables, plan = context.index.tables, _plan(context, question, progress)
-    allowed = -1.0 if context.options.exhaustive else 1.0 - context.options.confidence
+    tables, plan = context.index.tables, _plan(context, effort, question, progress)
     stopped = EXHAUSTED if len(plan.bases) == 0 else BUDGET
     while stopped == BUDGET and not context.deadline.passed:
-        stopped = advance(question, tables, plan, found, progress, context.workspace, allowed, chunk)
+        stopped = advance(question, tables, plan, found, progress, context.workspace, effort.allowed, chunk)
         if stopped == BUDGET and context.deadline.helped:
-            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(allowed)
+            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(effort.allowed)
     if len(plan.bases) == 0:
         progress["missed"] = 0.0  # walls of which no two cross are slid
     elif stopped in (BUDGET, EXHAUSTED) and not plan.random:
@@ -176,9 +187,9 @@ def _go_through_bases(context: SearchContext, question: Question, found: Records
     return stopped
 
 
-def _plan(context: SearchContext, question: Question, progress: Records) -> Plan:
+def _plan(context: SearchContext, effort: Effort, question: Question, progress: Records) -> Plan:
     index, options = context.index, context.options
-    orders, random = _orders(_segments_of_bases(len(question.scan))), options.sampling == "random"
+    orders, random = _orders(_segments_of_bases(len(question.scan)), effort.samples), options.sampling == "random"
     plan = begin(question, index.runs, index.area, *orders, progress, 0.0 if random else math.log(REUSE), random)
     return plan._replace(bases=_drawn(plan.bases, options)) if random else plan
 
@@ -198,10 +209,10 @@ def _segments_of_bases(count: int) -> int:
     return max((n for n in (min(count, BASE_SEGMENTS), *TELLING_SEGMENTS) if n <= count), default=0)
 
 
-@lru_cache(maxsize=BASE_SEGMENTS + 1 + len(TELLING_SEGMENTS))
-def _orders(n: int) -> tuple[Integers, Integers]:
+@lru_cache(maxsize=2 * (BASE_SEGMENTS + 1 + len(TELLING_SEGMENTS)))
+def _orders(n: int, samples: int) -> tuple[Integers, Integers]:
     """Draw orders of n segments (samples, n), all as likely; return the places of each segment, too, (n, samples)."""
-    orders = np.random.default_rng(SAMPLE_SEED).random((SAMPLES, n)).argsort(axis=1)
+    orders = np.random.default_rng(SAMPLE_SEED).random((samples, n)).argsort(axis=1)
     return orders.astype(np.uint8), np.ascontiguousarray(orders.argsort(axis=1).T, dtype=np.uint8)
 
 

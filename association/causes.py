@@ -10,7 +10,7 @@ from enum import StrEnum
 
 from registration.limits import MAX_LENGTH, MIN_LENGTH
 
-from .candidates import Effort
+from .candidates import Effort, allowed_by
 from .context import SearchContext
 from .explain import Explanations, explain
 from .extents import inner_extent
@@ -134,7 +134,7 @@ def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, Scan]]:
 def _tried(context: SearchContext, mistake: Mistake, factor: float, scan: Scan, known: float) -> Cause | None:
     """Search the scan without a mistake; None where that fits no better."""
     changed = SearchContext.of(context.index, scan, None, context.options, context.deadline)
-    explanations = explain(changed, Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, known))
+    explanations = explain(changed, Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(context.options), known))
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None
     best, verdict = explanations.answer.best, judge(changed, explanations)

@@ -124,6 +124,16 @@ class SearchContext:
         """Return the same search without its prior."""
         return replace(self, prior=None)
 
+    def instead(self, scan: Scan, lines: ScanLines) -> SearchContext:
+        """Return the search, without a prior, for a scan that differs from this one, on the same map.
+
+        Where it has as many lines, what the kernels write to is the same: one of both may search at a time.
+        """
+        other = replace(self, scan=scan, lines=lines, prior=None)
+        if len(lines.rows) == len(self.lines.rows):
+            other.__dict__["workspace"] = self.workspace
+        return other
+
     def in_map(self, pose: RigidTransform) -> RigidTransform:
         """Return a pose of the index frame in the map frame."""
         x, y = self.index.origin

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 from .context import SearchContext
 from .explain import Answer
@@ -32,7 +31,7 @@ def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ra
         return 1.0
     wall_sigma = max(LOOSE_WALLS, LOOSE_FACTOR * answer.settled.wall_sigma)
     more = math.sqrt(wall_sigma**2 - MODEL_OFFSET**2)
-    loose = replace(context, lines=ScanLines.of(context.scan, more, context.options))
+    loose = context.instead(context.scan, ScanLines.of(context.scan, more, context.options))
     best, *others = score_again(loose, (answer.best, *rivals[:LOOSE_RIVALS]))
     return 1.0 / (1.0 + sum(math.exp(min(0.0, _gap(best, one)) / TWIN_TEMPERATURE) for one in others))
 

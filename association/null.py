@@ -7,17 +7,26 @@ of these, and (almost) never was there to be seen: where it scores as high as th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from .candidates import Effort, find_candidates
+from .candidates import Effort, allowed_by, find_candidates
 from .context import SearchContext
 from .kernels.symmetry import mirrored_share
 from .ranking import Ranked, rank_candidates
 from .scan import mirrored
 from .scan_lines import ScanLines
-from .tuning import BEAMS_READ, NULL_CONFIDENCE, NULL_CONFIDENCE_NEAR, NULL_ENOUGH, NULL_KEPT, NULL_MARGIN, NULL_SHARE
+from .tuning import (
+    BEAMS_READ,
+    NULL_ALLOWED,
+    NULL_ALLOWED_NEAR,
+    NULL_ENOUGH,
+    NULL_KEPT,
+    NULL_MARGIN,
+    NULL_SAMPLES,
+    NULL_SHARE,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,30 +51,23 @@ def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
 
     Where it comes to less than `share` of the answer's score it may be told to be none, which takes less of a search.
     """
-    scan = mirrored(context.scan)
-    # The index is the one that the options want already.
-    one_view = scan.views is None
+    scan, one_view = mirrored(context.scan), context.scan.views is None
     lines = context.lines.mirrored() if one_view else ScanLines.of(scan, context.index.sigma, context.options)
-    other = replace(context, scan=scan, lines=lines, prior=None)
+    other = context.instead(scan, lines)
+    allowed = allowed_by(context.options)
     known, wanted = max(0.0, best.by_segments), share * best.score
     # Beams may add to any pose, so that without them nothing is enough.
     enough = math.inf if context.with_beams else NULL_ENOUGH * known
     by_segments = NULL_MARGIN * (wanted - BEAMS_READ if context.with_beams else wanted)
     if by_segments > NULL_SHARE * known > 0.0:
         least = by_segments / known
-        near = _searched(other, Effort(NULL_KEPT, least, least, known, enough), NULL_CONFIDENCE_NEAR)
-        if not near or near[0].score < wanted:
+        near = Effort(NULL_KEPT, least, least, max(allowed, NULL_ALLOWED_NEAR), known, enough, NULL_SAMPLES)
+        found = rank_candidates(other, find_candidates(other, near))
+        if not found or found[0].score < wanted:
             return Null(0.0, 0.0)
-    ranked = _searched(other, Effort(NULL_KEPT, NULL_SHARE, NULL_SHARE, known, enough), NULL_CONFIDENCE)
-    if not ranked:
-        return Null(0.0, 0.0)
-    return Null(ranked[0].score, _symmetry(context, best, ranked[0]))
-
-
-def _searched(context: SearchContext, effort: Effort, confidence: float) -> list[Ranked]:
-    options = replace(context.options, confidence=min(context.options.confidence, confidence), exhaustive=False)
-    context = replace(context, options=options)
-    return rank_candidates(context, find_candidates(context, effort))
+    effort = Effort(NULL_KEPT, NULL_SHARE, NULL_SHARE, max(allowed, NULL_ALLOWED), known, enough, NULL_SAMPLES)
+    found = rank_candidates(other, find_candidates(other, effort))
+    return Null(found[0].score, _symmetry(context, best, found[0])) if found else Null(0.0, 0.0)
 
 
 def _symmetry(context: SearchContext, best: Ranked, null: Ranked) -> float:

@@ -26,6 +26,8 @@ class Standing:
         Whether few walls fix the pose, and one of them alone decides.
     twin : bool
         Whether another explanation alone makes the answer too uncertain.
+    mirrored : bool
+        Whether the scan fits the map better with left and right exchanged.
     out_of_step : bool
         Whether what is seen from the scan's own place fits far worse than what was seen on the way.
     """
@@ -36,6 +38,7 @@ class Standing:
     elsewhere: bool
     thin: bool = False
     twin: bool = False
+    mirrored: bool = False
     out_of_step: bool = False
 
 
@@ -79,7 +82,7 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
         codes.append("prior_contradicted")
     if not standing.complete:
         codes.append("search_incomplete")
-    if standing.elsewhere:
+    if standing.elsewhere or (standing.mirrored and standing.status is Status.AMBIGUOUS):
         codes.append("elsewhere")
     if standing.status is Status.DEGENERATE:
         codes.append("free_direction")

@@ -8,7 +8,7 @@ import numpy as np
 
 from registration.layout import Records
 
-from .candidates import Effort, find_candidates
+from .candidates import Effort, allowed_by, find_candidates
 from .context import SearchContext
 from .ranking import Ranked, rank_candidates
 from .scan import Scan
@@ -38,7 +38,9 @@ def scale_near_one(context: SearchContext) -> float | None:
     """
     options = replace(context.options, offset_tolerance=REACH)
     lax = SearchContext.of(context.index, Scan(context.scan.measured, None, None), None, options, context.deadline)
-    found = rank_candidates(lax, find_candidates(lax, Effort(SCALE_KEPT, SCALE_SHARE, SCALE_SHARE)))
+    found = rank_candidates(
+        lax, find_candidates(lax, Effort(SCALE_KEPT, SCALE_SHARE, SCALE_SHARE, allowed_by(options)))
+    )
     best: tuple[float, float] | None = None
     for one in found[:SCALE_KEPT]:
         if one.share < SCALE_LENGTH:

@@ -101,8 +101,7 @@ class Scan:
 def mirrored(scan: Scan) -> Scan:
     """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left."""
     seen, at, views = scan.measured, scan.viewpoint, scan.views
-    ends = seen.segments.endpoints.reshape(-1, 2, 2)[:, ::-1] * MIRROR
-    measured = replace(seen, segments=Segments.derived(ends.reshape(-1, 4)), centroids=seen.centroids * MIRROR)
+    measured = replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
     beams = None if scan.beams is None else scan.beams.mirrored()
     return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored())
 

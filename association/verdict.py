@@ -24,7 +24,7 @@ from .tuning import (
     ELSEWHERE_PROBABILITY,
     FAR_FROM_PRIOR,
     LEAST_IN_STEP,
-    MOST_NULL,
+    MIRRORED_BETTER,
     NO_MATCH_PROBABILITY,
     NULL_SHARES,
     USABLE_CAUTIOUS,
@@ -97,6 +97,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
         thin=thin,
         twin=chances.share < USABLE_PROBABILITY,
+        mirrored=chances.mirrored,
         out_of_step=_out_of_step(answer),
     )
     return Verdict(
@@ -126,7 +127,7 @@ class _Chances:
     share : float
         Of the answer among the explanations that are about as good; it is in `right` and `careful`.
     features : Features
-        What these come from; with the null where it was needed and might matter.
+        What these come from; with the null where it was needed and matters.
     cautious : Model
         By which the careful one does.
     """
@@ -158,10 +159,14 @@ class _Chances:
             # usable nothing else is told of the null; where it is not, the reasons go by what it comes to.
             certain = certain and _logistic(right) * share >= USABLE_PROBABILITY
             allowed = _allowed_null(cautious, features, answer.best, _bar(context) / share) if certain else 0.0
-            if allowed < MOST_NULL:
-                features = with_null(features, answer.best, null_of(context, answer.best, allowed))
-                careful = cautious.logit(features)
+            features = with_null(features, answer.best, null_of(context, answer.best, allowed))
+            careful = cautious.logit(features)
         return cls(_logistic(right) * share, _logistic(careful) * share, explained, share, features, cautious)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the scan fits the map better with left and right exchanged."""
+        return self.features.null_better >= MIRRORED_BETTER
 
 
 def _logistic(logit: float) -> float:
@@ -177,6 +182,8 @@ def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float)
     def matters(share: float) -> bool:
         return _logistic(cautious.logit(with_null(features, best, Null(share * best.score, 0.0)))) < bar + ROUNDING
 
+    if not matters(NULL_SHARES[-1]):
+        return NULL_SHARES[-1]
     few = bisect_left(NULL_SHARES, True, key=matters)
     return NULL_SHARES[few - 1] if few else 0.0
 
@@ -200,5 +207,5 @@ def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool, thin
     if is_degenerate(answer.settled):
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= bar and not thin and not _out_of_step(answer)
+    sure = chances.careful >= bar and not thin and not chances.mirrored and not _out_of_step(answer)
     return Status.OK if likely and sure else Status.AMBIGUOUS

@@ -116,6 +116,13 @@ class Segments:
         arrays = (self.endpoints, self.directions, self.normals, self.offsets, self.lengths, self.midpoints)
         return Segments(*(_frozen(a[i]) for a in arrays))
 
+    def mirrored(self) -> Segments:
+        """Return them with y for -y, and begin and end exchanged: the free side stays on the left."""
+        e, d, n, middles = self.endpoints[:, [2, 3, 0, 1]], self.directions, self.normals, self.midpoints
+        across, along = np.array([1.0, -1.0]), np.array([-1.0, 1.0])
+        arrays = (e * np.tile(across, 2), d * along, n * across, self.offsets, self.lengths, middles * across)
+        return Segments(*map(_frozen, arrays))
+
     def reversed(self) -> Segments:
         """Return the same segments with begin and end exchanged."""
         return Segments.derived(self.endpoints[:, [2, 3, 0, 1]])

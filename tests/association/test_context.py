@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from association import Deadline, HardPrior, Prior, SoftPrior
+from association import Deadline, HardPrior, Prior, SoftPrior, mirrored
 from association.layout import GATES, HARD_PRIOR, NO_PRIOR, RULES, SOFT_PRIOR, record
 from association.tuning import GATE_SIGMAS, GREATEST_ANGLE_GATE, LEAST_ANGLE_GATE, LEAST_OFFSET_GATE, REACH
 from registration import RigidTransform
 
 from .answers import ROOM_INDEX, SCAN
 from .records import UPPER
-from .scenes import INSIDE, beams_of, context_of, pose, scan_of
+from .scenes import INSIDE, ROOM, beams_of, context_of, pose, scan_of
 
 ENDS = SCAN.measured.segments.endpoints
 BEAMS = beams_of(ROOM_INDEX, INSIDE)
@@ -85,6 +85,16 @@ def test_anywhere_is_the_same_search_without_its_prior() -> None:
     assert free.prior_record[0]["kind"] == NO_PRIOR
     assert (free.index, free.scan, free.options, free.deadline) == (ROOM_INDEX, SCAN, context.options, deadline)
     assert context.prior is HARD
+
+
+def test_another_scan_instead_is_searched_without_the_prior_and_with_room_for_its_lines() -> None:
+    context = context_of(ROOM_INDEX, SCAN, HARD, seed=3)
+    assert len(context.workspace.held) == len(SCAN.measured)
+    for scan, same in ((mirrored(SCAN), True), (scan_of(ROOM[:3]), False)):
+        other = context.instead(scan, context_of(ROOM_INDEX, scan).lines)
+        assert (other.scan, other.prior, other.options) == (scan, None, context.options)
+        assert len(other.workspace.held) == len(scan.measured)
+        assert (other.workspace is context.workspace) is same
 
 
 def test_poses_of_the_index_frame_in_the_map_frame() -> None:

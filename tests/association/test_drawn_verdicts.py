@@ -43,7 +43,7 @@ def test_the_verdict_is_that_of_the_twin(seed: int) -> None:
 def test_the_verdict_changes_where_that_of_the_twin_does() -> None:
     """On both sides of every change of status between two answers; all kinds of changes come up."""
     rng, kinds = np.random.default_rng(5), set()
-    for _ in range(200):
+    for _ in range(500):
         one, other = drawn(rng, (None,)), drawn(rng, (None,))
         if one.expected.status is not one.towards(other, 1.0).expected.status:
             sides = one.border(other)
@@ -51,7 +51,7 @@ def test_the_verdict_changes_where_that_of_the_twin_does() -> None:
                 assert_judged(side)
             kinds.add(kind_of(*sides))
     decided = {f"{kind}{beams}" for kind in ("explained", "right", "careful", "null") for beams in ("", " with beams")}
-    assert kinds >= decided | {"deviation"}
+    assert kinds >= decided | {"deviation", "mirrored with beams"}
 
 
 def kind_of(one: Drawn, other: Drawn) -> str:
@@ -64,5 +64,7 @@ def kind_of(one: Drawn, other: Drawn) -> str:
         return "deviation"
     if min(a.right, b.right) < tuning.USABLE_PROBABILITY <= max(a.right, b.right):
         return f"right{beams}"
+    if a.mirrored is not b.mirrored and max(a.careful, b.careful) >= bar_of(one.context):
+        return f"mirrored{beams}"
     assert min(a.careful, b.careful) < bar_of(one.context) <= max(a.careful, b.careful)
     return f"null{beams}" if a.asked and b.asked else f"careful{beams}"

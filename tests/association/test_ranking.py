@@ -90,11 +90,11 @@ def test_the_best_comes_first_with_what_belongs_to_it() -> None:
     for one, (at, covariance, merit, matches) in zip(found, expected, strict=True):
         assert same_pose(one.pose, at, 1e-6, 1e-6)
         np.testing.assert_allclose(one.covariance, covariance, rtol=1e-4, atol=1e-9)
-        score, cost, one_step_cost, length, share, reliability, misfit, _, read, passed = merit[0].item()
+        score, cost, one_step_cost, length, share, reliability, misfit, _, read, passed, count = merit[0].item()
         assert (one.score, one.value, one.length) == pytest.approx((score, score, length))
         assert (one.cost, one.one_step_cost) == pytest.approx((cost, one_step_cost), rel=1e-5, abs=1e-6)
         assert (one.share, one.reliability, one.misfit) == pytest.approx((share, reliability, misfit), abs=1e-6)
-        assert (one.read, one.passed) == (read, passed) == (0.0, 0.0)
+        assert (one.read, one.passed, one.count) == (read, passed, count) == (0.0, 0.0, one.matched.sum())
         np.testing.assert_array_equal(one.matches["wall"], matches["wall"])
         assert one.inside
     assert [round(one.share, 3) for one in found] == [1.0, round(26.5 / 32.0, 3), round(17.5 / 32.0, 3)]

@@ -151,13 +151,14 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> list[float]:
 def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     """It costs a search: not where a twin, a free direction, the prior or either probability forbids it already."""
     sure = leading(40.0)
-    assert asked_of(sure, monkeypatch) == [], "no null takes anything from it"
+    most = tuning.NULL_SHARES[-1]
+    assert asked_of(sure, monkeypatch) == [most], "no other null takes anything from it"
     assert asked_of(replace(sure, complete=False), monkeypatch) == [0.0], "the reasons are told by it"
-    for matters, share in ((1.11, 1.1), (0.96, 0.95), (0.71, 0.0)):
-        with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, matters, -100.0]}}):
+    for matters, share in ((most + 0.01, most), (1.01, 1.0), (0.96, 0.95), (0.71, 0.0)):
+        with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, matters, -1000.0]}}):
             assert asked_of(sure, monkeypatch) == [share]
     monkeypatch.setattr(verdict, "loose_twin_share", lambda *_: 0.92)
-    for probable, asked in ((0.93, [0.0]), (0.91, [])):
+    for probable, asked in ((0.93, [0.0]), (0.91, [most])):
         with judged_by(SURE, USABLE_PROBABILITY=probable):
             assert asked_of(sure, monkeypatch) == asked, "it is not usable all the same, and the reasons are told by it"
     monkeypatch.undo()
@@ -178,6 +179,17 @@ def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> No
     assert weak.status is Status.AMBIGUOUS
     assert weak.probability == pytest.approx(strong.probability)
     assert weak.reasons[0].code == "elsewhere"
+
+
+@pytest.mark.parametrize(("better", "usable"), [(0.019, True), (0.021, False)])
+def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However sure the models are, and whether the map is symmetric or not: the laser is upside down, or elsewhere."""
+    score = (1.0 + better) * LIKELY.score
+    monkeypatch.setattr(verdict, "null_of", lambda *_: null.Null(score, 1.0))
+    with judged_by(SURE):
+        got = leading(40.0).verdict
+    assert (got.status, got.usable) == (Status.OK if usable else Status.AMBIGUOUS, usable)
+    assert usable or got.reasons[0].code == "elsewhere"
 
 
 def test_nothing_found() -> None:

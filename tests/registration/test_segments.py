@@ -36,6 +36,16 @@ def test_a_segment_in_closed_form() -> None:
     assert len(Segments.from_array([])) == 0
 
 
+def test_mirrored_segments_are_those_of_the_mirrored_ends() -> None:
+    """With begin and end exchanged, so that the normal points to the same side of the wall."""
+    ends = np.random.default_rng(0).uniform(-9.0, 9.0, (40, 4))
+    got = Segments.from_array(ends).mirrored()
+    expected = Segments.from_array(ends[:, [2, 3, 0, 1]] * [1.0, -1.0, 1.0, -1.0])
+    for name in ("endpoints", "directions", "normals", "offsets", "lengths", "midpoints"):
+        np.testing.assert_allclose(getattr(got, name), getattr(expected, name), atol=1e-12, err_msg=name)
+        assert not getattr(got, name).flags.writeable
+
+
 def test_arrays_are_read_only_and_rows_can_be_taken() -> None:
     s = Segments.from_array([[0, 0, 1, 0], [0, 0, 0, 2]])
     with pytest.raises(ValueError, match="read-only"):

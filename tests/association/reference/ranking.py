@@ -44,6 +44,7 @@ def rank(
             merit["one_step_cost"] = pairs.one_step_cost(found.pose)
         merit["reliability"] = reliability(pairs.information(found.pose.theta)[:2, :2])
         merit["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
+        merit["count"] = on.sum()
         if viewpoint is not None and score > best - FAR_BEHIND:
             merit["blocked"] = sight_penalty(count_blockers(scan, on, viewpoint, found.pose, place.walls), place.walls)
             score -= float(merit["blocked"][0])

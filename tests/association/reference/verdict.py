@@ -124,7 +124,7 @@ def logistic(x: float) -> float:
 class Judged:
     """What the verdict should say, and the chances behind it; see `association.verdict`.
 
-    `asked` says whether the scan had to be compared with the mirrored one.
+    `asked` says whether the scan had to be compared with the mirrored one, `mirrored` whether that fits better.
     """
 
     status: Status
@@ -137,6 +137,7 @@ class Judged:
     careful: float = 0.0
     explained: float = 0.0
     asked: bool = False
+    mirrored: bool = False
 
 
 def bar_of(context: SearchContext) -> float:
@@ -174,8 +175,9 @@ def judge(
         if chances.careful >= bar_of(context):
             numbers = features(context, answer, rivals, null_of(context, best))
             careful = logistic(logit(cautious_of(context, models), numbers))
-            chances = replace(chances, careful=less * share * careful, asked=True)
-        likely = likely and chances.right >= tuning.USABLE_PROBABILITY
+            better = numbers["null_better"] >= tuning.MIRRORED_BETTER
+            chances = replace(chances, careful=less * share * careful, asked=True, mirrored=better)
+        likely = likely and chances.right >= tuning.USABLE_PROBABILITY and not chances.mirrored
     status = Status.OK if likely and chances.careful >= bar_of(context) else Status.AMBIGUOUS
     if free:
         status = Status.DEGENERATE
