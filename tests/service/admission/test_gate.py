@@ -174,6 +174,32 @@ def test_who_leaves_the_queue_frees_the_place_and_who_runs_keeps_the_slot() -> N
     in_loop(scenario)
 
 
+@pytest.mark.parametrize("used", [0.0, 0.2])
+def test_a_turn_that_comes_as_its_caller_leaves_is_handed_on_and_costs_nothing(used: float) -> None:
+    """Its holder has used as much as the other one, whose turn it then is, or less."""
+
+    async def scenario() -> None:
+        async with gate_of(1, 8) as gate:
+            order: list[str] = []
+            for holder in (b"one", b"other"):
+                gate.expect(holder)
+            await gate.ask(lambda: time.sleep(used), b"other") if used else None
+            first = await gate.block()
+            leaving = gate.ask(lambda: order.append("leaving"), b"one")
+            await until(lambda: gate.waiting == 1)
+            asked = [gate.ask(lambda: order.append("one"), b"one"), gate.ask(lambda: order.append("other"), b"other")]
+            await until(lambda: gate.waiting == 3)
+            gate.release.set()
+            while gate.waiting == 3:
+                await asyncio.sleep(0)
+            leaving.cancel()
+            await asyncio.gather(first, *asked)
+            assert leaving.cancelled()
+            assert order == (["one", "other"] if used else ["other", "one"])
+
+    in_loop(scenario)
+
+
 def test_a_failure_gives_the_slot_back() -> None:
     async def scenario() -> None:
         async with gate_of(1, 0) as gate:

@@ -41,6 +41,7 @@ def test_as_many_help_as_slots_are_free() -> None:
             asked.append(gate.ask(other, b"other", other.deadline))
             await until(lambda: gate.running == 2)
             assert not one.helpers.welcome
+            assert not one.helpers.free
             more[1].set()
             await until(helping[1].done)
             assert one.helpers.welcome
