@@ -53,6 +53,8 @@ SENTENCES: Mapping[str, str] = {
     "too_little": "Too little of what was seen tells this place from others.",
 }
 
+MIRRORED = "The scan fits this map better with left and right exchanged: is the laser upside down, or this another map?"
+
 # What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
 FEATURES_OF: Mapping[str, tuple[str, ...]] = {
     "twin": ("lead", "solitude", "squared_solitude"),
@@ -91,7 +93,8 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
         codes += ["unexplained"] if standing.out_of_step else []
         codes += ["twin"] if standing.twin else []
         codes += [code for code in _weighed(features, cautious) if code not in codes]
-    return tuple(Reason(code, SENTENCES[code]) for code in codes)
+    sentences = {**SENTENCES, "elsewhere": MIRRORED} if standing.mirrored else SENTENCES
+    return tuple(Reason(code, sentences[code]) for code in codes)
 
 
 def _weighed(features: Features, cautious: Model) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from association import HardPrior, Status, loosening, null, tuning, verdict
+from association import HardPrior, Reason, Status, loosening, null, reasons, tuning, verdict
 from association.context import SearchContext
 from association.ranking import Ranked
 from association.verdict import Verdict, judge
@@ -189,7 +189,7 @@ def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, mo
     with judged_by(SURE):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.OK if usable else Status.AMBIGUOUS, usable)
-    assert usable or got.reasons[0].code == "elsewhere"
+    assert usable or got.reasons[0] == Reason("elsewhere", reasons.MIRRORED)
 
 
 def test_nothing_found() -> None:
