@@ -105,7 +105,10 @@ class MapIndex:
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
         pieces = Pieces(order, starts, as_records(ENDS, local.endpoints))
         grids = near_walls(walls), swept_runs(runs), directions_near(walls, runs)
-        return cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
+        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
+        for name in ("sorted_lengths", "crowd", "agreeing_share", "area", "diagonal", "tables"):
+            getattr(index, name)  # kept from here on, so that the first search does not wait for them
+        return index
 
     @cached_property
     def undirected(self) -> MapIndex:

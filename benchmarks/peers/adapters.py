@@ -57,7 +57,7 @@ class Linefix:
         return MapIndex.build(Segments.from_array(segments))
 
     def locate(self, prepared: MapIndex, query: PeerQuery) -> Answer:
-        """Search; what is not seen from one place is sent as such, two measured points a segment."""
+        """Search for the pose alone; what is not seen from one place is sent so, two measured points a segment."""
         segments = Segments.from_array(query.scan)
         if query.one_place:
             scan = Scan(MeasuredSegments.from_segments(segments, query.sigma))
@@ -65,7 +65,7 @@ class Linefix:
             ends = np.full(len(segments), 2.0), (segments.midpoints, 0.25 * segments.lengths**2)
             scan = Scan(MeasuredSegments.from_segments(segments, query.sigma, *ends), viewpoint=None)
         prior = HardPrior(query.guess, 1.0, math.radians(20.0)) if self.guided else None
-        found = associate(prepared, scan, prior, AssociationOptions())
+        found = associate(prepared, scan, prior, AssociationOptions(parts=()))
         pose = None if found.pose is None else (found.pose.x, found.pose.y, found.pose.theta)
         return Answer(pose, found.usable)
 
