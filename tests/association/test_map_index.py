@@ -226,3 +226,10 @@ def test_refusals(endpoints: Any, sigma: float, argument: str) -> None:
     with pytest.raises(InvalidMapError) as refused:
         index_of(endpoints, sigma)
     assert refused.value.argument == argument
+
+
+def test_what_every_search_asks_of_a_map_is_there_before_the_first() -> None:
+    """Else that one takes as long again, in a small map."""
+    index = index_of(ROOM)
+    assert vars(index).keys() >= {"sorted_lengths", "crowd", "agreeing_share", "area", "diagonal", "tables"}
+    assert "undirected" not in vars(index), "which is as large, and seldom asked for"
