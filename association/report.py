@@ -35,6 +35,8 @@ def report(
     context: SearchContext, explanations: Explanations, verdict: Verdict, causes: Sequence[Cause] = ()
 ) -> AssociationResult:
     """Put an answer together."""
+    if verdict.complete is not explanations.search.complete:
+        explanations = replace(explanations, search=replace(explanations.search, complete=verdict.complete))
     answer = explanations.answer
     if answer is None or verdict.status is Status.NO_MATCH:
         return _no_match(context, explanations, verdict, causes)

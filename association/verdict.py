@@ -56,6 +56,8 @@ class Verdict:
         Whether the prior says that the robot is elsewhere.
     reasons : tuple of Reason
         Why it is not usable, the weightiest first.
+    complete : bool
+        Whether neither the search nor what it was compared with was ended by the deadline.
     """
 
     status: Status
@@ -66,6 +68,7 @@ class Verdict:
     runner_up: float | None
     contradicted: bool
     reasons: tuple[Reason, ...]
+    complete: bool
 
 
 def judge(context: SearchContext, explanations: Explanations) -> Verdict:
@@ -77,12 +80,14 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
             None,
             None,
         )
-        return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked), why)
+        return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked), why, complete)
     best = answer.best
     better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
     certain = complete and not contradicted and context.window is None and not _out_of_step(answer)
     chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
+    # The mirrored scan and the rivals with walls farther off are searched, and scored, no further than the deadline.
+    complete = complete and not context.deadline.passed
     thin = is_thin(context, answer)
     status = _status(answer, chances, _bar(context), capped=better_elsewhere, thin=thin)
     pose = place_on_family(context, answer)
@@ -109,6 +114,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         runner_up=max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,
         contradicted=contradicted,
         reasons=() if usable else reasons_of(standing, chances.features, chances.cautious),
+        complete=complete,
     )
 
 

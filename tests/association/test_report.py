@@ -42,7 +42,7 @@ from .scenes import (
     seen,
 )
 
-SURE = Verdict(Status.OK, 0.97, True, pose(1.0, 2.0, 0.3), 20.0, 0.75, False, ())
+SURE = Verdict(Status.OK, 0.97, True, pose(1.0, 2.0, 0.3), 20.0, 0.75, False, (), True)
 WHY = (Reason("twin", "Another pose explains the scan about as well."),)
 ROOMS = index_of(equal_rooms(4))
 
@@ -255,7 +255,7 @@ def test_where_a_direction_is_free_it_is_named_instead_of_a_covariance() -> None
 
 def test_no_match() -> None:
     """All that was found is an alternative, also what would have been the answer."""
-    nothing = Verdict(Status.NO_MATCH, 0.01, False, pose(), None, None, False, WHY)
+    nothing = Verdict(Status.NO_MATCH, 0.01, False, pose(), None, None, False, WHY, True)
     context = context_of(ROOMS, SCAN)
     explanations = explain(context)
     for answer, status in ((explanations.answer, Status.NO_MATCH), (None, Status.OK)):
@@ -319,6 +319,6 @@ def test_what_the_verdict_and_the_search_say_is_told() -> None:
     for contradicted, complete in ((False, True), (True, True), (False, False), (True, False)):
         explanations = explanations_of(answer, complete=complete)
         for status in (Status.OK, Status.NO_MATCH):
-            verdict = replace(SURE, contradicted=contradicted, status=status)
+            verdict = replace(SURE, contradicted=contradicted, status=status, complete=complete)
             expected = ["prior_contradicted"] * contradicted + ["search_incomplete"] * (not complete)
             assert [w.code for w in report(context, explanations, verdict).warnings] == expected

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from association import HardPrior, Reason, Status, loosening, null, reasons, tuning, verdict
+from association import Deadline, HardPrior, Reason, Status, associate, loosening, null, reasons, tuning, verdict
 from association.context import SearchContext
 from association.ranking import Ranked
 from association.verdict import Verdict, judge
 
 from .answers import answer_with, explanations_of, ranked, registered_corridor, registered_room, room, settled_of
 from .judged import AROUND, BESIDE, LIKELY, PLAIN, SOFT, Drawn, Numbers, crossing, judged_by
-from .scenes import INSIDE, pose, same_pose
+from .scenes import INSIDE, ROOM, equal_rooms, index_of, pose, same_pose, scan_of, seen
 
 SURE = {name: {"constant": [30.0]} for name in PLAIN}  # by which every answer is right
 BARS = {"USABLE_PROBABILITY": 0.7, "USABLE_CAUTIOUS": 0.6, "USABLE_CAUTIOUS_WITH_BEAMS": 0.9}
@@ -195,7 +198,7 @@ def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, mo
 def test_nothing_found() -> None:
     """Outside of the window there may be something."""
     nothing = judge(room(), explanations_of(None))
-    assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, False, ())
+    assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, False, (), True)
     assert [reason.code for reason in nothing.reasons] == ["elsewhere"]
     outside = judge(room(), explanations_of(None, ranked(inside=False)))
     assert replace(outside, reasons=()) == replace(nothing, reasons=(), contradicted=True)
@@ -209,6 +212,28 @@ def test_an_incomplete_search_is_never_usable() -> None:
     assert (stopped.status, stopped.usable, stopped.contradicted) == (Status.OK, False, False)
     assert stopped.probability == sure.verdict.probability
     assert [reason.code for reason in stopped.reasons] == ["search_incomplete"]
+
+
+@pytest.mark.parametrize("during", ["null_of", "loose_twin_share"])
+def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search was done in time, but the mirrored scan or the rivals were looked at no further."""
+    index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
+    sent, compared = scan_of(seen(ROOM, INSIDE)[0]), getattr(verdict, during)
+
+    def late(context: SearchContext, *arguments: Any) -> Any:
+        context.deadline.at = 0.0
+        return compared(context, *arguments)
+
+    in_time = associate(index, sent, None, deadline=Deadline(time.monotonic() + 60.0))
+    assert in_time.usable
+    assert in_time.search.complete
+    monkeypatch.setattr(verdict, during, late)
+    got = associate(index, sent, None, deadline=Deadline(time.monotonic() + 60.0))
+    assert not got.usable
+    assert not got.search.complete
+    assert got.pose == in_time.pose
+    assert got.reasons[0].code == "search_incomplete"
+    assert "search_incomplete" in [warning.code for warning in got.warnings]
 
 
 @pytest.mark.parametrize(("weakest", "usable"), [(0.499, True), (0.501, False)])
