@@ -132,6 +132,17 @@ def test_parts_that_are_not_asked_for_are_empty_and_change_nothing_else(asked: t
         assert getattr(part, name) == getattr(whole, name), name
 
 
+def test_a_twin_is_as_ambiguous_as_the_best() -> None:
+    """Its pairs are the same ones, with the same weights."""
+    endpoints = seen(ROOM, INSIDE, noise=0.01, seed=1)[0]
+    result = answer_of(index_of(equal_rooms(2)), scan_of(endpoints, 0.03))
+    assert result.diagnostics is not None
+    best, twin = result.diagnostics.registration, result.alternatives[0]
+    assert twin.ambiguity.translation == pytest.approx(best.ambiguity.translation, rel=0.02)
+    assert twin.ambiguity.rotation == pytest.approx(best.ambiguity.rotation, rel=0.02)
+    assert twin.reliability == pytest.approx(best.reliability, rel=1e-3)
+
+
 def test_what_is_not_usable_has_its_other_poses() -> None:
     """They are counted in the sentence, whatever is asked for."""
     result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())

@@ -14,6 +14,7 @@ from association.explain import explain
 from association.features import features_of
 from association.layout import SIGHTING, WALL
 from association.scan import Views, scaled
+from association.scan_lines import parts_of
 from association.tuning import LEAST_IN_STEP, ROUGH_SHARE, SPRING
 from association.verdict import judge
 from association.view_settling import SeenOnWalls
@@ -202,6 +203,42 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
     together_covariance[: len(noise), : len(noise)] += variance * same
     information = jacobian.T @ np.linalg.solve(together_covariance, jacobian) + np.diag([SPRING, SPRING, 0.0])
     np.testing.assert_allclose(settled.covariance, np.linalg.inv(information), rtol=1e-6)
+
+
+def test_what_is_not_known_of_a_view_is_not_known_of_its_lines() -> None:
+    """By the offset at the middle of their points, were the view elsewhere, and by the angle."""
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(3, 3)) * 0.02
+    scan = assemble([View(scan_of(ENDS)), View(scan_of(ENDS), pose(1.5, -0.8, 0.3), root @ root.T)])
+    assert scan.views is not None
+    at, covariance = scan.views.poses[1], scan.views.covariance[3:, 3:]
+    assert np.linalg.eigvalsh(covariance).min() > 0.0
+    _, parts, of_view = parts_of(scan.measured, scan.views)
+    assert set(of_view.tolist()) == {0, 1}
+    step = 1e-6
+    for part, view in zip(parts, of_view.tolist(), strict=True):
+        seen_from, normal = np.array([at.x, at.y]), np.array([-part["dy"], part["dx"]])
+        middle = np.array([part["centroid_x"], part["centroid_y"]])
+        turned = RigidTransform(0.0, 0.0, step).apply(middle - seen_from) + seen_from
+        gradient = np.array([*normal, normal @ (turned - middle) / step])
+        offset, angle = (gradient @ covariance @ gradient, covariance[2, 2]) if view else (0.0, 0.0)
+        assert part["common_offset"] == pytest.approx(offset, rel=1e-4)
+        assert part["common_angle"] == pytest.approx(angle)
+
+
+def test_walls_are_as_far_off_as_one_view_shows_them_to_be() -> None:
+    """From views that are nearly exact, each of which sees walls of its own."""
+    off = np.vstack([ROOM[:3] + np.array([0.0, 0.05, 0.0, 0.05]), ROOM[3:]])
+    ends = seen(off, INSIDE, noise=0.005, seed=3)[0]
+    exact = [View(scan_of(ends[:4])), View(scan_of(ends[4:]))]
+    nearly = [exact[0], replace(exact[1], covariance=1e-12 * np.eye(3))]
+    one, other = (explain(context_of(INDEX, assemble(views))).answer for views in (exact, nearly))
+    assert one is not None
+    assert other is not None
+    assert one.settled.views is None
+    assert other.settled.views is not None
+    assert one.settled.wall_sigma > 0.021
+    assert other.settled.wall_sigma == pytest.approx(one.settled.wall_sigma, rel=1e-3)
 
 
 def test_views_are_laid_on_one_another_where_their_walls_are_one() -> None:
