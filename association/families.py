@@ -10,13 +10,7 @@ from registration.observability import MAX_DEVIATION
 from .context import SearchContext
 from .explain import Answer
 from .ranking import Ranked
-from .settling import Settled
 from .tuning import FEW_WALLS, OFFSET_OF_FEW
-
-
-def is_degenerate(settled: Settled) -> bool:
-    """Tell whether a direction of the position is not fixed: parallel walls, or a deviation beyond 0.5 m."""
-    return settled.parallel or settled.weakest > MAX_DEVIATION
 
 
 def is_thin(context: SearchContext, answer: Answer) -> bool:

@@ -13,7 +13,6 @@ from .acceptance import correspondences, overlaps_at
 from .causes import Cause
 from .context import SearchContext
 from .explain import Answer, Explanations
-from .families import is_degenerate
 from .kernels.settling import pairs_of
 from .ranking import Ranked
 from .result import (
@@ -26,15 +25,20 @@ from .result import (
 )
 from .settling import settle
 from .sight import missing_segments
+from .to_scale import Factor
 from .tuning import HINGES
 from .verdict import Verdict
 from .warnings import warnings_of
 
 
 def report(
-    context: SearchContext, explanations: Explanations, verdict: Verdict, causes: Sequence[Cause] = ()
+    context: SearchContext,
+    explanations: Explanations,
+    verdict: Verdict,
+    causes: Sequence[Cause] = (),
+    factor: Factor | None = None,
 ) -> AssociationResult:
-    """Put an answer together."""
+    """Put an answer together; `factor` is what the scan was put to scale by."""
     if verdict.complete is not explanations.search.complete:
         explanations = replace(explanations, search=replace(explanations.search, complete=verdict.complete))
     answer = explanations.answer
@@ -56,7 +60,7 @@ def report(
         reasons=verdict.reasons,
         alternatives=_alternatives(context, explanations.others, usable=verdict.usable),
         search=explanations.search,
-        warnings=warnings_of(context, explanations.search, verdict, causes),
+        warnings=warnings_of(context, explanations.search, verdict, causes, factor),
     )
 
 
@@ -131,7 +135,7 @@ def _alternative(context: SearchContext, other: Ranked) -> Alternative:
     translation, rotation = sums.costs(settled.pose, context.options.rotation)
     return Alternative(
         pose=context.in_map(settled.pose),
-        covariance=None if is_degenerate(settled) else settled.covariance,
+        covariance=None if settled.degenerate else settled.covariance,
         score=other.score_by(context.options.estimator),
         ambiguity=Ambiguity(translation, rotation),
         reliability=sums.reliability,

@@ -6,12 +6,12 @@ import time
 
 from .causes import find_causes
 from .context import SearchContext
-from .explain import explain
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, Prior
 from .report import report
 from .result import AssociationResult
 from .scan import Scan
+from .to_scale import explain_to_scale
 from .verdict import judge
 
 DEFAULT_OPTIONS = AssociationOptions()
@@ -50,7 +50,7 @@ def associate(
     """
     began = time.monotonic()
     context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
-    explanations = explain(context)
-    verdict = judge(context, explanations)
-    causes = find_causes(context, explanations, verdict, began)
-    return report(context, explanations, verdict, causes)
+    found = explain_to_scale(context)
+    verdict = judge(found.context, found.explanations)
+    causes = find_causes(context, found.explanations, verdict, began)
+    return report(found.context, found.explanations, verdict, causes, found.factor)

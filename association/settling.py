@@ -10,7 +10,7 @@ import numpy as np
 from registration import RigidTransform
 from registration.chi_square import chi_square_quantile
 from registration.layout import Floats, Records
-from registration.observability import THREE_SIGMA_TAIL
+from registration.observability import MAX_DEVIATION, THREE_SIGMA_TAIL
 
 from .context import SearchContext
 from .kernels.settling import settle as settle_matches
@@ -56,6 +56,11 @@ class Settled:
     parallel: bool
     hinges: Records
     views: ViewsSettled | None = None
+
+    @property
+    def degenerate(self) -> bool:
+        """Whether a direction of the position is not fixed: parallel walls, or a deviation beyond 0.5 m."""
+        return self.parallel or self.weakest > MAX_DEVIATION
 
 
 def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Settled:

@@ -171,6 +171,13 @@ LOOSE_WALLS = 0.05  # m, tables
 LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
 LOOSE_BEAMS = 0.5  # tables; and with that share of what beams say, which read centimetres
 LOOSE_RIVALS = 8  # tables; the best and that many others
+# A factor that is as far from one is tried, if it is so many of its standard deviations; and taken, if the answer then
+# scores so much more, nats.
+LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables
+FACTOR_DEVIATIONS = 1.5  # tables
+FACTOR_GAP = 6.0  # tables
+FACTOR_ROUNDS = 3  # tables
+FACTOR_WALLS = 2.0  # tables; that have to agree beyond those that it takes
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 
 # --- Ranking ----------------------------------------------------------------------------------------------------------

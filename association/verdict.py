@@ -10,7 +10,7 @@ from registration import RigidTransform
 
 from .context import SearchContext
 from .explain import Answer, Explanations
-from .families import is_degenerate, is_thin, place_on_family
+from .families import is_thin, place_on_family
 from .features import Features, features_of, twin_share, with_null
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
@@ -157,7 +157,7 @@ class _Chances:
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
         explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))
         likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
-        decidable = not is_degenerate(answer.settled) and not is_thin(context, answer)
+        decidable = not answer.settled.degenerate and not is_thin(context, answer)
         if likely and decidable and _logistic(careful) * share >= _bar(context):
             share = min(share, loose_twin_share(context, answer, rivals))
         if likely and decidable and _logistic(careful) * share >= _bar(context):
@@ -210,7 +210,7 @@ def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool, thin
     """Decide in order of precedence; a `capped` probability is never enough."""
     if chances.explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
-    if is_degenerate(answer.settled):
+    if answer.settled.degenerate:
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
     sure = chances.careful >= bar and not thin and not chances.mirrored and not _out_of_step(answer)

@@ -12,6 +12,7 @@ from .causes import Cause, Mistake
 from .context import SearchContext
 from .extents import diagonal, inner_extent
 from .result import AssociationWarning, SearchReport
+from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .verdict import Verdict
 
@@ -34,9 +35,13 @@ SENTENCES: Mapping[Mistake, str] = {
 
 
 def warnings_of(
-    context: SearchContext, search: SearchReport, verdict: Verdict, causes: Sequence[Cause] = ()
+    context: SearchContext,
+    search: SearchReport,
+    verdict: Verdict,
+    causes: Sequence[Cause] = (),
+    factor: Factor | None = None,
 ) -> tuple[AssociationWarning, ...]:
-    """List what is strange about the scan, then about the search, then what mistakes would explain."""
+    """List what is strange about the scan, about the search, and about the map; then what mistakes would explain."""
     found = {
         "no_segments": _no_segments(context),
         "stuck_ranges": _stuck_ranges(context.scan.beams),
@@ -48,6 +53,7 @@ def warnings_of(
         "search_incomplete": None
         if search.complete
         else "The deadline ended the search; a better pose may have been missed.",
+        str(Mistake.SCALE): None if factor is None else _off_scale(factor),
     }
     found |= {str(cause.mistake): _mistaken(cause) for cause in causes}
     return tuple(AssociationWarning(code, message) for code, message in found.items() if message is not None)
@@ -61,6 +67,13 @@ def _mistaken(cause: Cause) -> str:
     return (
         f"With all lengths times {cause.factor:.4g} the scan fits much better: {what}. Send both in metres: multiply "
         "the scan by this, or divide the map."
+    )
+
+
+def _off_scale(factor: Factor) -> str:
+    return (
+        f"With its lengths times {factor.value:.4f} (+-{factor.deviation:.4f}) the scan fits much better, and so it "
+        "was searched: the map, or the laser's ranges, are not to scale. The pose is in the map as it is."
     )
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.explain import explain
-from association.families import is_degenerate
 from association.features import Features, features_of, weigh, with_null
 from association.null import null_of
 from registration import RigidTransform
@@ -123,7 +122,7 @@ class Case:
             gaps=np.minimum(0.0, [one.gap for one in weighed]),
             counted=np.array([one.counted for one in weighed]),
             right=right,
-            degenerate=is_degenerate(found.answer.settled),
+            degenerate=found.answer.settled.degenerate,
             told=not right and (self.told is None or pose is None or self.told(pose)),
         )
 

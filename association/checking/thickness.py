@@ -8,10 +8,11 @@ import numpy as np
 
 from registration import Segments
 
+from ..context import SearchContext
+from ..explain import explain
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
 from ..scan import Scan, mirrored
-from ..search import associate
 from .result import Finding
 from .tuning import (
     BETTER_THICKNESS,
@@ -104,8 +105,9 @@ def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
 
 def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
     index, options = MapIndex.build(faces, THICKNESS_SIGMA), AssociationOptions()
-    found = (associate(index, scan, None, options, deadline).diagnostics for scan in scans)
-    return sum(max(0.0, one.score) for one in found if one is not None)
+    # As they were sent: a scan that may be put to scale fits a room of walls too thick as well.
+    found = (explain(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
+    return sum(max(0.0, one.best.score) for one in found if one is not None)
 
 
 def _best(scores: Scores) -> float:

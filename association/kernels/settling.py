@@ -121,6 +121,23 @@ def estimated_variance(pose: Record, of_wall: Integers, wall_variance: float, us
 
 
 @kernel
+def walls_of(scan: Records, matches: Records) -> Integers:
+    """Return the walls that hold a match, each once, in the order of the scan's lines."""
+    of_wall = np.empty(len(scan), dtype=np.int64)
+    count = 0
+    for i in range(len(scan)):
+        w = matches[i].wall
+        if w >= 0:
+            known = False
+            for k in range(count):
+                known = known or of_wall[k] == w
+            if not known:
+                of_wall[count] = w
+                count += 1
+    return of_wall[:count]
+
+
+@kernel
 def settle(
     question: Question, walls: Records, matches: Records, start: Records, map_variance: float, settled: Records,
     hinges: Records, work: Workspace,
@@ -136,18 +153,9 @@ def settle(
     information = work.scratch[0].information
     value = work.scratch[0].value
     sums = work.scratch[0].sums
-    of_wall = np.empty(len(scan), dtype=np.int64)
-    count = 0
+    of_wall = walls_of(scan, matches)
+    count = len(of_wall)
     add_all(scan, matches, walls, USUAL_WALL_ERROR**2, work)
-    for i in range(len(scan)):
-        w = matches[i].wall
-        if w >= 0:
-            known = False
-            for k in range(count):
-                known = known or of_wall[k] == w
-            if not known:
-                of_wall[count] = w
-                count += 1
     copy_estimate(start[0], pose)
     out.wall_variance = max(map_variance, LEAST_KNOWN_VARIANCE) if map_variance >= 0.0 else USUAL_WALL_ERROR**2
     for _ in range(1 if map_variance >= 0.0 else SETTLING_ROUNDS):
@@ -155,7 +163,7 @@ def settle(
         if not solve(sums, pose, information, value):
             break
         if map_variance < 0.0:
-            out.wall_variance = estimated_variance(pose, of_wall[:count], out.wall_variance, USUAL_WALL_ERROR**2, work)
+            out.wall_variance = estimated_variance(pose, of_wall, out.wall_variance, USUAL_WALL_ERROR**2, work)
     other = np.zeros(1, dtype=ESTIMATE)
     add_all(scan, matches, walls, max(out.wall_variance, COMMON_WALL_ERROR**2), work)
     copy_estimate(pose, other[0])
@@ -165,7 +173,7 @@ def settle(
     add_all(scan, matches, walls, out.wall_variance, work)
     solve(sums, pose, information, value)
     if len(hinges) > 0:
-        leave_each_out(question, walls, matches, of_wall[:count], settled, hinges, work)
+        leave_each_out(question, walls, matches, of_wall, settled, hinges, work)
     keep_alive(other)
     return count
 

@@ -10,7 +10,7 @@ import pytest
 
 from association import HardPrior, MapIndex, SoftPrior
 from association.explain import explain
-from association.families import is_degenerate, is_thin, place_on_family
+from association.families import is_thin, place_on_family
 from association.settling import Settled
 from registration import RigidTransform
 from registration.layout import Floats
@@ -25,7 +25,7 @@ from .scenes import INSIDE, context_of, index_of, pose, scan_of
 )
 def test_a_position_is_fixed_to_half_a_metre(weakest: float, parallel: bool, degenerate: bool) -> None:
     """Along its weakest direction; and by walls that are not all parallel."""
-    assert is_degenerate(replace(settled_of(registered_room()), weakest=weakest, parallel=parallel)) is degenerate
+    assert replace(settled_of(registered_room()), weakest=weakest, parallel=parallel).degenerate is degenerate
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_the_direction_that_is_not_fixed(angle: float) -> None:
     by = RigidTransform(7.0, -3.0, angle)
     settled = settled_on(by.apply(WALLS.reshape(-1, 2, 2)).reshape(-1, 4), SEEN)
     assert settled.parallel
-    assert is_degenerate(settled)
+    assert settled.degenerate
     d = np.array([math.cos(angle), math.sin(angle)])
     expected = d if d[0] > 1e-9 or (abs(d[0]) < 1e-9 and d[1] > 0.0) else -d
     assert abs(settled.direction[0] * d[1] - settled.direction[1] * d[0]) < 1e-6
@@ -78,7 +78,7 @@ def test_two_walls_that_are_nearly_parallel_fix_no_position(degrees: float, dege
     seen_walls = np.array(
         [[-6.0, -2.0, 6.0, -2.0], [6.0, 2.0, 6.0 - 12.0 * math.cos(turn), 2.0 - 12.0 * math.sin(turn)]]
     )
-    assert is_degenerate(settled_on(walls, seen_walls)) is degenerate
+    assert settled_on(walls, seen_walls).degenerate is degenerate
 
 
 def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | None = None) -> RigidTransform:
@@ -86,7 +86,7 @@ def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | No
     context = context_of(index, scan_of(endpoints), prior)
     answer = explain(context).answer
     assert answer is not None
-    assert is_degenerate(answer.settled)
+    assert answer.settled.degenerate
     found = place_on_family(context, answer)
     assert found is not None
     return found
