@@ -73,7 +73,7 @@ def explain_to_scale(context: SearchContext) -> Explained:
     found, factor = Explained(context, explain(context)), 1.0
     similarity = _similarity(found)
     for _ in range(FACTOR_ROUNDS):
-        if similarity is None or not _is_off(similarity):
+        if similarity is None or not is_off(similarity):
             break
         factor *= similarity.factor
         if not abs(factor - 1.0) <= MOST_FACTOR:
@@ -82,10 +82,6 @@ def explain_to_scale(context: SearchContext) -> Explained:
         scan = scaled(context.scan, factor, context.scan.viewpoint or (0.0, 0.0))
         again = SearchContext.of(context.index, scan, context.prior, context.options, context.deadline)
         stretched = Explained(again, explain(again), Factor(factor, similarity.deviation))
-        if not stretched.explanations.search.complete:
-            # As sent it is known to be off.
-            search = replace(found.explanations.search, complete=False)
-            return replace(found, explanations=replace(found.explanations, search=search))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.
         if fitted is None or fitted.more < FACTOR_WALLS or stretched.score <= found.score + FACTOR_GAP:
@@ -95,14 +91,14 @@ def explain_to_scale(context: SearchContext) -> Explained:
 
 
 def _similarity(found: Explained) -> Similarity | None:
-    """Fit a similarity where a pose is fixed at all, and nothing but the pose was solved for."""
+    """Fit a similarity where nothing but the pose was solved for, and all that was."""
     context, answer = found.context, found.explanations.answer
-    if answer is None or answer.settled.degenerate or answer.settled.free or context.scan.views is not None:
+    if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
         return None
-    return None if context.options.estimator != "joint" else fit_similarity(context, answer.best)
+    return fit_similarity(context, answer.best)
 
 
-def _is_off(similarity: Similarity) -> bool:
+def is_off(similarity: Similarity) -> bool:
     """Tell whether a similarity says that the scan is not to scale."""
     return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
 

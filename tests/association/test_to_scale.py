@@ -1,0 +1,245 @@
+"""Where a map is off by a factor the pose is where the map has it, the covariance says so, and a warning tells it."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    Beams,
+    Deadline,
+    HardPrior,
+    MapIndex,
+    Scan,
+    View,
+    assemble,
+    associate,
+    to_scale,
+)
+from association.context import SearchContext
+from association.explain import Explanations, explain
+from association.scan import scaled
+from association.similarity import Similarity, fit_similarity
+from association.to_scale import explain_to_scale
+from registration import RigidTransform, Segments
+from registration.layout import Floats
+from registration.options import Estimator
+
+from .scenes import (
+    ANGLES,
+    INSIDE,
+    ROOM,
+    answer_of,
+    context_of,
+    equal_rooms,
+    index_of,
+    maze,
+    pose,
+    pose_in,
+    same_pose,
+    scan_of,
+    seen,
+)
+from .test_settling import off_by
+
+WALLS = maze(1)
+AT = pose(15.0, 14.0, 0.5)
+HERE = pose()
+SCAN = scan_of(seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0])
+
+
+def at_scale(factor: float, at: RigidTransform = AT) -> RigidTransform:
+    """Return a place where a map has it that is too large by a factor."""
+    return pose(factor * at.x, factor * at.y, at.theta)
+
+
+def answer(walls: Floats, seed: int = 1, estimator: Estimator = "joint") -> AssociationResult:
+    return answer_of(
+        index_of(walls), scan_of(seen(WALLS, AT, noise=0.01, seed=seed, radius=12.0)[0]), estimator=estimator
+    )
+
+
+def told(result: AssociationResult) -> list[str]:
+    return [warning.message for warning in result.warnings if warning.code == "scale"]
+
+
+def squared_error(result: AssociationResult, truth: RigidTransform) -> float:
+    found = pose_in(result)
+    error = np.array([found.x - truth.x, found.y - truth.y, math.remainder(found.theta - truth.theta, math.tau)])
+    assert result.covariance is not None
+    return float(error @ np.linalg.solve(result.covariance, error))
+
+
+@pytest.mark.parametrize("factor", [0.98, 0.99, 1.01, 1.02])
+def test_the_pose_is_where_the_map_has_it(factor: float) -> None:
+    """Its covariance holds: 3 is the mean, 16.3 the quantile of .1 %."""
+    for seed in range(6):
+        found = answer(factor * WALLS, seed)
+        assert found.usable
+        assert same_pose(pose_in(found), at_scale(factor), 0.03, 0.01)
+        assert squared_error(found, at_scale(factor)) < 16.3
+        assert found.unmatched_scan == ()
+
+
+def test_pose_and_covariance_are_those_of_the_similarity() -> None:
+    """What is not known of the factor is in the covariance, and the residuals are those at that pose."""
+    found = explain_to_scale(context_of(index_of(1.02 * WALLS), SCAN))
+    one = found.explanations.answer
+    assert one is not None
+    similarity = fit_similarity(found.context, one.best)
+    assert similarity is not None
+    assert one.settled.pose == similarity.pose
+    assert one.registered.pose == found.context.in_map(similarity.pose)
+    np.testing.assert_array_equal(one.settled.covariance, similarity.covariance)
+
+
+@pytest.mark.parametrize(
+    ("factor", "deviation", "off"),
+    [(1.01, 0.001, True), (0.99, 0.001, True), (1.003, 0.0001, False), (0.997, 0.0001, False), (1.01, 0.01, False)],
+)
+def test_a_factor_is_tried_where_it_may_matter_and_is_not_noise(factor: float, deviation: float, off: bool) -> None:
+    assert to_scale.is_off(Similarity(pose(), np.eye(3), 0.01, factor, deviation, 5.0)) == off
+
+
+@pytest.mark.parametrize("factor", [0.99, 1.02])
+def test_the_factor_is_told(factor: float) -> None:
+    [message] = told(answer(factor * WALLS))
+    assert float(message.split(" times ")[1].split(" ")[0]) == pytest.approx(factor, abs=0.002)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.003])
+def test_maps_to_scale_are_told_nothing_of(factor: float) -> None:
+    assert told(answer(factor * WALLS)) == []
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_walls_that_are_off_one_by_one_are_no_factor(seed: int) -> None:
+    assert told(answer(off_by(WALLS, 0.05, seed), seed)) == []
+
+
+def test_the_papers_estimator_has_no_factor() -> None:
+    assert told(answer(1.02 * WALLS, estimator="one_step")) == []
+
+
+def test_where_the_sensor_sits_on_the_robot_is_not_stretched() -> None:
+    """The same scan in the frame of a robot whose sensor is 3 m from its middle."""
+    mount = pose(3.0, -0.5, 0.3)
+    ends = seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0]
+    index = MapIndex.build(Segments.from_array(1.02 * WALLS), oriented=False)
+    alone = pose_in(answer_of(index, scan_of(ends, viewpoint=(0.0, 0.0)), oriented=False))
+    moved = mount.apply(ends.reshape(-1, 2, 2)).reshape(-1, 4)
+    scan: Scan = scan_of(moved, viewpoint=(mount.x, mount.y))
+    robot = pose_in(answer_of(index, scan, oriented=False))
+    assert same_pose(robot.compose(mount), alone, 1e-3, 1e-4)
+
+
+def test_residuals_are_those_of_the_scan_to_scale() -> None:
+    """Every wall is matched, and none is off by more than noise."""
+    found = answer(1.02 * WALLS)
+    scan = seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0]
+    at, where = pose_in(found), float(told(found)[0].split(" times ")[1].split(" ")[0])
+    assert len(found.correspondences) == len(scan)
+    for one in found.correspondences:
+        begin, end = (1.02 * WALLS[one.map]).reshape(2, 2)
+        d = (end - begin) / np.hypot(*(end - begin))
+        middle = at.apply(where * scan[one.scan].reshape(2, 2)).mean(axis=0)
+        off = float(d[0] * (middle - begin)[1] - d[1] * (middle - begin)[0])
+        assert max(abs(off), abs(one.offset)) < 0.06
+
+
+def test_two_exact_views_are_put_to_scale_together() -> None:
+    ends = seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0]
+    halves = [View(scan_of(part, viewpoint=(0.0, 0.0))) for part in (ends[::2], ends[1::2])]
+    index = index_of(1.02 * WALLS)
+    found = associate(index, assemble(halves), None, AssociationOptions(oriented=False))
+    assert told(found) != []
+    assert same_pose(pose_in(found), at_scale(1.02), 0.03, 0.01)
+
+
+def test_views_that_are_not_exact_are_as_they_were_sent() -> None:
+    """What odometry does not know of them may be a factor as well."""
+    ends = seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0]
+    spread = np.diag([0.02**2, 0.02**2, 0.02**2])
+    views = [
+        View(scan_of(ends[::2], viewpoint=(0.0, 0.0))),
+        View(scan_of(ends[1::2], viewpoint=(0.0, 0.0)), HERE, spread),
+    ]
+    assert told(associate(index_of(1.02 * WALLS), assemble(views), None, AssociationOptions(oriented=False))) == []
+
+
+def test_a_window_holds_the_pose_in_the_map_as_it_is() -> None:
+    """Of two rooms that are alike."""
+    index, scan = index_of(1.02 * equal_rooms(2)), scan_of(seen(ROOM, INSIDE)[0], sigma=0.005)
+    for shift in (0.0, 12.0):
+        at = at_scale(1.02, pose(INSIDE.x + shift, INSIDE.y, INSIDE.theta))
+        found = answer_of(index, scan, HardPrior(at, 0.5, 0.1))
+        assert told(found) != []
+        assert same_pose(pose_in(found), at, 0.03, 0.01)
+
+
+def test_what_has_no_time_to_be_put_to_scale_is_not_usable(monkeypatch: pytest.MonkeyPatch) -> None:
+    index, searched = index_of(1.02 * WALLS), explain
+    in_time = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
+    assert in_time.usable
+
+    def late(context: SearchContext) -> Explanations:
+        if context.scan is not SCAN:
+            context.deadline.at = 0.0
+        return searched(context)
+
+    monkeypatch.setattr(to_scale, "explain", late)
+    got = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
+    assert not got.usable
+    assert not got.search.complete
+    assert got.reasons[0].code == "search_incomplete"
+
+
+def test_what_fits_no_better_is_left_as_it_was_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(to_scale, "FACTOR_GAP", 1e6)
+    assert told(answer(1.02 * WALLS)) == []
+
+
+@pytest.mark.parametrize(("most", "scaled"), [(0.015, False), (0.025, True)])
+def test_a_factor_that_no_drawing_has_is_none(most: float, scaled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(to_scale, "MOST_FACTOR", most)
+    assert (told(answer(1.02 * WALLS)) != []) == scaled
+
+
+def test_sides_of_a_room_do_not_fit_another_by_a_factor() -> None:
+    """Four walls and a factor leave nothing that could speak against it; ten do."""
+    room = np.array([[0.0, 0.0, 9.0, 0.0], [9.0, 0.0, 9.0, 6.0], [9.0, 6.0, 0.0, 6.0], [0.0, 6.0, 0.0, 0.0]])
+    assert told(answer_of(index_of(1.02 * room), scan_of(seen(room, pose(3.0, 2.0, 0.4))[0], sigma=0.005))) == []
+    assert told(answer_of(index_of(1.02 * ROOM), scan_of(seen(ROOM, INSIDE)[0], sigma=0.005))) != []
+
+
+def test_a_scan_is_stretched_about_a_point() -> None:
+    """Everything of it: begin and end, centroids, viewpoints, views and where beams begin."""
+    about, factor = (2.0, -1.0), 1.5
+    beams = Beams(ANGLES, np.full(240, 3.0), 8.0, np.tile([0.5, 0.25], (240, 1)))
+    ends, mount = seen(ROOM, INSIDE)[0], pose(0.4, -0.3, 2.0)
+    one, other = (scan_of(ends, viewpoint=at, beams=beams) for at in ((0.0, 0.0), (0.1, 0.2)))
+    scan = assemble([View(one), View(other, mount)])
+    got = scaled(scan, factor, about)
+
+    def moved(points: Any) -> Floats:
+        return np.asarray(np.asarray(about) + factor * (np.asarray(points) - about))
+
+    ends = scan.measured.segments.endpoints.reshape(-1, 2)
+    np.testing.assert_allclose(got.measured.segments.endpoints.reshape(-1, 2), moved(ends))
+    np.testing.assert_allclose(got.measured.centroids, moved(scan.measured.centroids))
+    assert got.viewpoint == pytest.approx(moved(scan.viewpoint).tolist())
+    assert got.views is not None
+    assert scan.views is not None
+    np.testing.assert_allclose(got.views.viewpoints, moved(scan.views.viewpoints))
+    at, before = ([[one.x, one.y] for one in views.poses] for views in (got.views, scan.views))
+    np.testing.assert_allclose(at, moved(before))
+    assert got.beams is not None
+    assert got.beams.origins is not None
+    assert scan.beams is not None
+    np.testing.assert_allclose(got.beams.origins, moved(scan.beams.origins))
