@@ -7,20 +7,31 @@ the factor, if they are not held to one; with the scan's lengths multiplied by i
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from registration import wrap_angle
+
 from .acceptance import register_accepted
+from .candidates import Candidates
 from .context import SearchContext
 from .explain import Explanations, explain
+from .ranking import Ranked, rank_candidates
 from .scan import scaled
 from .similarity import Similarity, fit_similarity
 from .tuning import (
+    DISTINCT_ANGLE,
     FACTOR_DEVIATIONS,
     FACTOR_GAP,
     FACTOR_ROUNDS,
     FACTOR_WALLS,
+    LEAST_AS_SENT,
     LEAST_FACTOR,
+    LEAST_OFF_WALLS,
+    LOOSE_RIVALS,
     MOST_FACTOR,
+    SAME_PLACE,
 )
 
 
@@ -70,32 +81,53 @@ def explain_to_scale(context: SearchContext) -> Explained:
     CancelledError
         When the deadline was cancelled.
     """
-    found, factor = Explained(context, explain(context)), 1.0
-    similarity = _similarity(found)
+    first = Explained(context, explain(context))
+    found = _put_to_scale(first, _similarity(first)) if _may_be_off(first) else first
+    if found.factor is None:
+        return first
+    rivals = beside(found.explanations, _at_their_scales(first, found))
+    return _with_what_is_not_known(replace(found, explanations=rivals))
+
+
+def _may_be_off(first: Explained) -> bool:
+    """Tell whether a factor may matter, and nothing but the pose was solved for, and all that was.
+
+    What is off its walls by millimetres leaves nothing to a factor.
+    """
+    context, answer = first.context, first.explanations.answer
+    if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
+        return False
+    return context.index.sigma is not None or answer.settled.wall_sigma >= LEAST_OFF_WALLS
+
+
+def _put_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
+    """Search again with the factor of a similarity, until it is right; what fits no better is left as it was."""
+    found, factor = first, 1.0
     for _ in range(FACTOR_ROUNDS):
         if similarity is None or not is_off(similarity):
             break
         factor *= similarity.factor
         if not abs(factor - 1.0) <= MOST_FACTOR:
             break
-        # The scan is stretched about where it was seen from, not about the middle of the robot.
-        scan = scaled(context.scan, factor, context.scan.viewpoint or (0.0, 0.0))
-        again = SearchContext.of(context.index, scan, context.prior, context.options, context.deadline)
+        again = _at_scale(first.context, factor)
         stretched = Explained(again, explain(again), Factor(factor, similarity.deviation))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.
         if fitted is None or fitted.more < FACTOR_WALLS or stretched.score <= found.score + FACTOR_GAP:
             break
         found, similarity = stretched, fitted
-    return found if found.factor is None or similarity is None else _with_what_is_not_known(found, similarity)
+    return found
+
+
+def _at_scale(context: SearchContext, factor: float) -> SearchContext:
+    """Prepare the search of a stretched scan; about where it was seen from, not about the middle of the robot."""
+    scan = scaled(context.scan, factor, context.scan.viewpoint or (0.0, 0.0))
+    return SearchContext.of(context.index, scan, context.prior, context.options, context.deadline)
 
 
 def _similarity(found: Explained) -> Similarity | None:
-    """Fit a similarity where nothing but the pose was solved for, and all that was."""
-    context, answer = found.context, found.explanations.answer
-    if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
-        return None
-    return fit_similarity(context, answer.best)
+    answer = found.explanations.answer
+    return None if answer is None else fit_similarity(found.context, answer.best)
 
 
 def is_off(similarity: Similarity) -> bool:
@@ -103,11 +135,53 @@ def is_off(similarity: Similarity) -> bool:
     return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
 
 
-def _with_what_is_not_known(found: Explained, similarity: Similarity) -> Explained:
-    """Return what was put to scale with the pose of the similarity, and the covariance that comes with its factor."""
-    answer, factor = found.explanations.answer, found.factor
-    assert answer is not None
-    assert factor is not None
+def _at_their_scales(first: Explained, found: Explained) -> list[Ranked]:
+    """Return what explained the scan as it was sent, each at the scale that fits it best.
+
+    Of two rooms that differ by a factor the one fits with a map too large, the other with one too small.
+    """
+    if len(first.context.lines.rows) != len(found.context.lines.rows):
+        return []
+    near = [one for one in first.explanations.ranked if one.score >= LEAST_AS_SENT * first.score]
+    return [_at_its_scale(first, one) for one in near[:LOOSE_RIVALS]]
+
+
+def _at_its_scale(first: Explained, one: Ranked) -> Ranked:
+    similarity = fit_similarity(first.context, one)
+    if similarity is None or not abs(similarity.factor - 1.0) <= MOST_FACTOR:
+        return one
+    again = _at_scale(first.context, similarity.factor)
+    if len(again.lines.rows) != len(one.matches):
+        return one
+    found = rank_candidates(again, Candidates(one.estimate, first.explanations.search))
+    return found[0] if found else one
+
+
+def beside(explanations: Explanations, rivals: Sequence[Ranked]) -> Explanations:
+    """Return explanations with rivals that fit at other scales among them, none of them above the answer."""
+    if explanations.answer is None:
+        return explanations
+    best, ranked = explanations.answer.best, list(explanations.ranked)
+    for rival in rivals:
+        one = replace(rival, score=min(rival.score, best.score), value=min(rival.value, best.value))
+        place = next((k for k, other in enumerate(ranked) if _same_place(one, other)), len(ranked))
+        if place == len(ranked) or ranked[place].value < one.value:
+            ranked[place : place + 1] = [one]
+    ranked.sort(key=lambda one: (not one.inside, -one.value))
+    return replace(explanations, ranked=tuple(ranked))
+
+
+def _same_place(one: Ranked, other: Ranked) -> bool:
+    """Tell whether two poses are of one place, at whatever scales."""
+    a, b = one.pose, other.pose
+    return math.hypot(a.x - b.x, a.y - b.y) <= SAME_PLACE and abs(wrap_angle(a.theta - b.theta)) <= DISTINCT_ANGLE
+
+
+def _with_what_is_not_known(found: Explained) -> Explained:
+    """Return what was put to scale with the pose of a similarity, and the covariance that comes with its factor."""
+    answer, factor, similarity = found.explanations.answer, found.factor, _similarity(found)
+    if answer is None or factor is None or similarity is None:
+        return found
     settled = replace(answer.settled, pose=similarity.pose, covariance=similarity.covariance)
     registered = register_accepted(found.context, answer.accepted, settled)
     assert registered is not None  # of pairs that it was registered of before

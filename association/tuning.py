@@ -177,6 +177,9 @@ LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables
 FACTOR_DEVIATIONS = 1.5  # tables
 FACTOR_GAP = 6.0  # tables
 FACTOR_ROUNDS = 3  # tables
+LEAST_OFF_WALLS = 0.01  # m; walls that are off by less, as estimated, leave nothing to a factor
+LEAST_AS_SENT = 0.5  # of the best score; what comes to less as it was sent is no rival at a scale of its own
+SAME_PLACE = 1.0  # m; what a factor may move a pose
 FACTOR_WALLS = 2.0  # tables; that have to agree beyond those that it takes
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
 

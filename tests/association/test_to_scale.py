@@ -24,6 +24,7 @@ from association import (
 )
 from association.context import SearchContext
 from association.explain import Explanations, explain
+from association.ranking import Ranked
 from association.scan import scaled
 from association.similarity import Similarity, fit_similarity
 from association.to_scale import explain_to_scale
@@ -31,6 +32,7 @@ from registration import RigidTransform, Segments
 from registration.layout import Floats
 from registration.options import Estimator
 
+from .answers import answer_with, explanations_of, ranked
 from .scenes import (
     ANGLES,
     INSIDE,
@@ -218,6 +220,48 @@ def test_sides_of_a_room_do_not_fit_another_by_a_factor() -> None:
     assert told(answer_of(index_of(1.02 * ROOM), scan_of(seen(ROOM, INSIDE)[0], sigma=0.005))) != []
 
 
+@pytest.mark.parametrize("larger", [1.02, 1.03, 1.05])
+@pytest.mark.parametrize("where", [0, 1])
+@pytest.mark.parametrize("lies", [-1.0, 0.0, 1.0])
+def test_two_rooms_that_differ_by_a_factor_are_twins_in_a_map_that_is_off_by_half_of_it(
+    larger: float, where: int, lies: float
+) -> None:
+    """As sent they fit as badly, and each fits well at a scale of its own."""
+    both = np.vstack([ROOM, larger * ROOM + np.tile([40.0, 3.0], 2)])
+    at = (INSIDE, pose(larger * INSIDE.x + 40.0, larger * INSIDE.y + 3.0, INSIDE.theta))[where]
+    scan = scan_of(seen(both[:8] if where == 0 else both[8:], at, noise=0.005, seed=3)[0], sigma=0.01)
+    off = larger ** (0.5 * lies)
+    found = answer_of(index_of(off * both), scan)
+    right = same_pose(pose_in(found), at_scale(off, at), 0.1, 0.02)
+    if lies == 0.0:
+        assert found.usable
+        assert right
+        return
+    assert right or not found.usable
+
+
+def test_rivals_at_other_scales_are_put_beside_the_answer() -> None:
+    """One of a place that is known counts if it is better, once; none is above the answer or is it again."""
+    best, one, other = ranked(100.0), ranked(80.0, at=pose(9.0, 9.0)), ranked(60.0, at=pose(-9.0, 0.0), inside=False)
+    known = explanations_of(answer_with(best), one, other)
+    assert to_scale.beside(explanations_of(None, one), [best]) == explanations_of(None, one)
+
+    def beside(*rivals: Ranked) -> list[tuple[float, float]]:
+        found = to_scale.beside(known, rivals).ranked
+        assert found[0] is best
+        return [(each.pose.x, each.value) for each in found[1:]]
+
+    as_they_are = [(9.0, 80.0), (-9.0, 60.0)]
+    assert beside() == as_they_are
+    assert beside(ranked(90.0, at=pose(9.5, 9.0))) == [(9.5, 90.0), (-9.0, 60.0)]
+    assert beside(ranked(70.0, at=pose(9.5, 9.0))) == as_they_are
+    assert beside(ranked(99.0), ranked(120.0)) == as_they_are
+    assert beside(ranked(90.0, at=pose(9.5, 9.0, 1.0))) == [(9.5, 90.0), *as_they_are]
+    assert beside(ranked(90.0, at=pose(10.5, 9.0))) == [(10.5, 90.0), *as_they_are]
+    assert beside(ranked(130.0, 20.0, at=pose(0.0, 20.0))) == [(0.0, 100.0), *as_they_are]
+    assert beside(ranked(90.0, at=pose(0.0, 20.0), inside=False)) == [(9.0, 80.0), (0.0, 90.0), (-9.0, 60.0)]
+
+
 def test_a_scan_is_stretched_about_a_point() -> None:
     """Everything of it: begin and end, centroids, viewpoints, views and where beams begin."""
     about, factor = (2.0, -1.0), 1.5
@@ -243,3 +287,39 @@ def test_a_scan_is_stretched_about_a_point() -> None:
     assert got.beams.origins is not None
     assert scan.beams is not None
     np.testing.assert_allclose(got.beams.origins, moved(scan.beams.origins))
+
+
+@pytest.mark.parametrize(("error", "asked"), [(0.0, False), (0.05, True)])
+def test_what_fits_to_millimetres_is_not_asked_for_a_factor(
+    error: float, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nobody says how good the map is; what somebody says may be wrong."""
+    calls: list[SearchContext] = []
+
+    def counted(context: SearchContext, best: Ranked) -> Similarity | None:
+        calls.append(context)
+        return fit_similarity(context, best)
+
+    monkeypatch.setattr(to_scale, "fit_similarity", counted)
+    answer(off_by(WALLS, error, 2))
+    assert (calls != []) == asked
+    calls.clear()
+    answer_of(index_of(WALLS, 0.001), SCAN)
+    assert calls != []
+
+
+def test_a_rival_at_a_scale_of_its_own_is_told_once_and_not_above_the_answer() -> None:
+    both = np.vstack([ROOM, 1.03 * ROOM + np.tile([40.0, 3.0], 2)])
+    off = 1.03**-0.5
+    scan = scan_of(seen(ROOM, INSIDE, noise=0.005, seed=3)[0], sigma=0.01)
+    found = answer_of(index_of(off * both), scan)
+    assert found.diagnostics is not None
+    assert told(found) != []
+    places = [pose_in(found), *(one.pose for one in found.alternatives)]
+    scores = [found.diagnostics.score, *(one.score for one in found.alternatives)]
+    assert scores == sorted(scores, reverse=True)
+    assert scores[1] > 0.9 * scores[0]
+    rooms = [(one.x > 20.0) for one in places[:2]]
+    assert sorted(rooms) == [False, True]
+    for k, one in enumerate(places):
+        assert not any(same_pose(one, other, 0.3, 0.1) for other in places[:k])
