@@ -59,12 +59,15 @@ class Explained:
     context : SearchContext
         With the scan to scale.
     explanations : Explanations
+    as_sent : Explanations
+        Of the scan as it was sent; the same where it is not put to scale.
     factor : Factor or None
         By which the scan was put to scale; None where it is as it was sent.
     """
 
     context: SearchContext
     explanations: Explanations
+    as_sent: Explanations
     factor: Factor | None = None
 
     @property
@@ -81,7 +84,8 @@ def explain_to_scale(context: SearchContext) -> Explained:
     CancelledError
         When the deadline was cancelled.
     """
-    first = Explained(context, explain(context))
+    as_sent = explain(context)
+    first = Explained(context, as_sent, as_sent)
     found = _put_to_scale(first, _similarity(first)) if _may_be_off(first) else first
     if found.factor is None:
         return first
@@ -110,7 +114,7 @@ def _put_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
         if not abs(factor - 1.0) <= MOST_FACTOR:
             break
         again = _at_scale(first.context, factor)
-        stretched = Explained(again, explain(again), Factor(factor, similarity.deviation))
+        stretched = Explained(again, explain(again), first.explanations, Factor(factor, similarity.deviation))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.
         if fitted is None or fitted.more < FACTOR_WALLS or stretched.score <= found.score + FACTOR_GAP:
@@ -187,4 +191,4 @@ def _with_what_is_not_known(found: Explained) -> Explained:
     assert registered is not None  # of pairs that it was registered of before
     answer = replace(answer, settled=settled, registered=registered)
     factor = Factor(factor.value * similarity.factor, similarity.deviation)
-    return Explained(found.context, replace(found.explanations, answer=answer), factor)
+    return replace(found, explanations=replace(found.explanations, answer=answer), factor=factor)

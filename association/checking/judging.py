@@ -17,6 +17,7 @@ from .tuning import (
     BETTER_USABLE,
     GREATEST_SIGMA,
     HIDDEN_SCALE,
+    LEAST_SCALE,
     LEAST_SIGMA,
     LITTLE,
     MANY,
@@ -45,7 +46,7 @@ def judge_samples(samples: Sequence[Sample], *, sigma: float | None, oriented: b
     off = _sigma_of(samples, directed)
     best = _nearest_way(samples, present, directed, off)
     usable, would_be = (sum(one.trials[way].usable for one in samples if way in one.trials) for way in (present, best))
-    scale = _scaled(samples, least=SAME_FACTOR if directed else HIDDEN_SCALE)
+    scale = _scaled(samples, least=LEAST_SCALE if directed else HIDDEN_SCALE)
     mistakes = [found for found in (_mirrored(samples, present), _reversed(samples), scale) if found is not None]
     # What is off because of a mistake is no measure of the walls.
     advice = Advice() if mistakes or off is None else Advice(off, directed)

@@ -10,14 +10,14 @@ from registration import RigidTransform
 
 from ..causes import Cause, Mistake, find_causes
 from ..context import SearchContext
-from ..explain import explain
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
 from ..report import report
 from ..result import AssociationResult
 from ..scaling import scale_near_one
 from ..scan import Scan, mirrored, scaled
-from ..verdict import judge
+from ..to_scale import Explained, explain_to_scale
+from ..verdict import Verdict, judge
 from .tuning import (
     BETTER_SCALED,
     LEAST_SHARE,
@@ -101,17 +101,18 @@ def try_sample(
     """
     began, present = time.monotonic(), (oriented, index.sigma)
     context = SearchContext.of(index, scan, None, AssociationOptions(oriented=oriented, causes=True), deadline)
-    explanations = explain(context)
-    verdict = judge(context, explanations)
-    result = report(context, explanations, verdict)
-    trials = {present: _trial(result)}
+    found = explain_to_scale(context)
+    result, trial, verdict = _judged(context, found)
+    trials = {present: trial}
     for way in _other_ways(present):
         if not deadline.passed:
-            trials[way] = _trial(_searched(index, scan, way, deadline))
-    other = None if deadline.passed else _trial(_searched(index, mirrored(scan), present, deadline))
+            trials[way] = _tried(index, scan, way, deadline)
+    other = None if deadline.passed else _tried(index, mirrored(scan), present, deadline)
     # As much time as all of this took may go into mistakes.
-    causes = find_causes(context, explanations, verdict, began)
+    causes = find_causes(context, found.as_sent, verdict, began)
     factor = _factor(context, max(trial.score for trial in trials.values()), causes)
+    if factor is None and found.factor is not None:
+        factor = found.factor.value
     mistakes = tuple(cause.mistake for cause in causes if cause.mistake is not Mistake.SCALE)
     moved = None if said is None or not result.usable or result.pose is None else result.pose.compose(said.inverse())
     return Sample(result, trials, other, mistakes, factor, moved)
@@ -124,12 +125,25 @@ def _other_ways(present: Way) -> Iterator[Way]:
                 yield directed, sigma
 
 
-def _searched(index: MapIndex, scan: Scan, way: Way, deadline: Deadline) -> AssociationResult:
+def _tried(index: MapIndex, scan: Scan, way: Way, deadline: Deadline) -> Trial:
     directed, sigma = way
     place = replace(index if directed else index.undirected, sigma=sigma)
     context = SearchContext.of(place, scan, None, AssociationOptions(oriented=directed), deadline)
-    explanations = explain(context)
-    return report(context, explanations, judge(context, explanations))
+    return _judged(context, explain_to_scale(context))[1]
+
+
+def _judged(context: SearchContext, found: Explained) -> tuple[AssociationResult, Trial, Verdict]:
+    """Return the answer, and the trial and the verdict of the scan as it was sent.
+
+    By these ways are compared: any may be made up for by a factor. Usable is in each what its answer is.
+    """
+    verdict = judge(found.context, found.explanations)
+    result = report(found.context, found.explanations, verdict, factor=found.factor)
+    if found.factor is None:
+        return result, _trial(result), verdict
+    verdict = judge(context, found.as_sent)
+    trial = _trial(report(context, found.as_sent, verdict))
+    return result, replace(trial, usable=result.usable), verdict
 
 
 def _trial(result: AssociationResult) -> Trial:
@@ -156,5 +170,5 @@ def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> fl
     if near is None or context.deadline.passed:
         return None
     way = context.options.oriented, context.index.sigma
-    found = _trial(_searched(context.index, scaled(context.scan, near), way, context.deadline))
+    found = _tried(context.index, scaled(context.scan, near), way, context.deadline)
     return near if found.score > least else None

@@ -69,3 +69,8 @@ def sampled(count: int = 6) -> tuple[tuple[RigidTransform, Scan], ...]:
         seen = vectorize(LaserScan(scanner.angle_min, scanner.angle_increment, taken.ranges, 0.0, scanner.range_max))
         found.append((truth, Scan(seen.measured, (0.0, 0.0), seen.beams)))
     return tuple(found)
+
+
+def two_faces(thickness: float) -> Floats:
+    lines = Segments.from_array(centre_lines())
+    return np.vstack([one.moved_left(0.5 * thickness).endpoints for one in (lines, lines.reversed())])

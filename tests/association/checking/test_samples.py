@@ -14,7 +14,7 @@ from association.checking import Sample, SampleReport, judge_samples, try_sample
 from registration import RigidTransform
 from registration.layout import Floats
 
-from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled
+from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled, two_faces
 
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0])
 MOVE = RigidTransform(-1.0, 2.0, 0.3)
@@ -91,12 +91,30 @@ def test_a_map_the_wrong_way_round() -> None:
     assert report.advice.sigma is None
 
 
-@pytest.mark.parametrize("factor", [1.03, 1.0 / 0.3048])
+@pytest.mark.parametrize("factor", [0.98, 1.01, 1.03, 1.0 / 0.3048])
 def test_a_map_that_is_not_to_scale(factor: float) -> None:
     report = told(faces() * factor)
     assert codes(report) == ["scale"]
     said = float(report.findings[0].message.partition("divide the map by ")[2].partition(",")[0])
     assert said == pytest.approx(factor, rel=0.004)
+
+
+@pytest.mark.parametrize("drawn", [0.04, 0.1, 0.35])
+def test_walls_too_thick_or_too_thin_are_no_scale(drawn: float) -> None:
+    """A room between them is too large or too small by as much, whatever its size."""
+    assert "scale" not in codes(told(two_faces(drawn)))
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.02])
+def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None:
+    """What is off by 2 % is put to scale in both; the check still says that it is off."""
+    index = index_of(factor * faces())
+    asked = [associate(index, scan).usable for _, scan in sampled()]
+    samples = [try_sample(index, scan, Deadline(), oriented=True) for _, scan in sampled()]
+    assert [one.result.usable for one in samples] == asked
+    assert [one.trials[True, None].usable for one in samples] == asked
+    assert sum(asked) > len(asked) / 2
+    assert codes(judge_samples(samples, sigma=None, oriented=True)) == ([] if factor == 1.0 else ["scale"])
 
 
 def test_poses_in_another_frame() -> None:

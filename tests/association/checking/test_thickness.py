@@ -12,7 +12,7 @@ from association.checking import find_thickness, fit_better_mirrored, thickness_
 from registration import MeasuredSegments, Segments
 from registration.layout import Floats
 
-from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled
+from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled, two_faces
 
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0])
 
@@ -20,11 +20,6 @@ MIRROR = np.array([1.0, -1.0, 1.0, -1.0])
 def found(walls: Floats, *, oriented: bool = True, deadline: Deadline | None = None) -> float | None:
     scans = [scan for _, scan in sampled()]
     return find_thickness(index_of(walls), scans, deadline or Deadline(), oriented=oriented)
-
-
-def two_faces(thickness: float) -> Floats:
-    lines = Segments.from_array(centre_lines())
-    return np.vstack([one.moved_left(0.5 * thickness).endpoints for one in (lines, lines.reversed())])
 
 
 def test_of_centre_lines() -> None:
