@@ -65,12 +65,11 @@ class Views:
         of_beam = np.ascontiguousarray(self.of_beam[::-1])
         return replace(self, poses=poses, viewpoints=self.viewpoints * MIRROR, of_beam=of_beam, root=root)
 
-    def scaled(self, factor: float, about: tuple[float, float] = (0.0, 0.0)) -> Views:
-        """Return them with all lengths multiplied, a point of the common frame held where it is."""
-        x, y = about[0] * (1.0 - factor), about[1] * (1.0 - factor)
-        poses = tuple(RigidTransform(p.x * factor + x, p.y * factor + y, p.theta) for p in self.poses)
+    def scaled(self, factor: float) -> Views:
+        """Return them with all lengths multiplied."""
+        poses = tuple(RigidTransform(p.x * factor, p.y * factor, p.theta) for p in self.poses)
         root = self.root * np.tile([factor, factor, 1.0], len(self))[:, None]
-        return replace(self, poses=poses, viewpoints=self.viewpoints * factor + (x, y), root=root)
+        return replace(self, poses=poses, viewpoints=self.viewpoints * factor, root=root)
 
     def blind(self) -> Views:
         """Return them without lines of sight and beams."""
@@ -118,16 +117,15 @@ def turned_round(scan: Scan) -> Scan:
     return Scan(measured, None, None, scan.views and scan.views.blind())
 
 
-def scaled(scan: Scan, factor: float, about: tuple[float, float] = (0.0, 0.0)) -> Scan:
-    """Return a scan of which all lengths are multiplied, a point of its frame held where it is."""
+def scaled(scan: Scan, factor: float) -> Scan:
+    """Return a scan of which all lengths are multiplied."""
     seen, at, beams, views = scan.measured, scan.viewpoint, scan.beams, scan.views
-    x, y = about[0] * (1.0 - factor), about[1] * (1.0 - factor)
     measured = replace(
         seen,
-        segments=Segments.from_array(seen.segments.endpoints * factor + (x, y, x, y)),
+        segments=Segments.from_array(seen.segments.endpoints * factor),
         sigma=seen.sigma * factor,
-        centroids=seen.centroids * factor + (x, y),
+        centroids=seen.centroids * factor,
         spreads=seen.spreads * factor**2,
     )
-    place = at and (at[0] * factor + x, at[1] * factor + y)
-    return Scan(measured, place, beams and beams.scaled(factor, about), views and views.scaled(factor, about))
+    place = at and (at[0] * factor, at[1] * factor)
+    return Scan(measured, place, beams and beams.scaled(factor), views and views.scaled(factor))

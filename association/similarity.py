@@ -55,9 +55,5 @@ def fit_similarity(context: SearchContext, best: Ranked) -> Similarity | None:
         return None
     factor, spread = pose_of_similarity(solution, covariance, pose[0])
     theta, x, y, xx, xy, xt, yy, yt, tt = pose[0].item()
-    if context.scan.viewpoint is not None:
-        # What the factor stretches is what was seen from there, not where the sensor sits on the robot.
-        lever = RigidTransform(0.0, 0.0, theta).apply(np.array([context.scan.viewpoint]))[0] * (factor - 1.0)
-        x, y = x + float(lever[0]), y + float(lever[1])
     of_pose = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
     return Similarity(RigidTransform(x, y, theta), of_pose, math.sqrt(variance), factor, math.sqrt(spread), more)

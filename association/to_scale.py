@@ -96,12 +96,13 @@ def explain_to_scale(context: SearchContext) -> Explained:
 def _may_be_off(first: Explained) -> bool:
     """Tell whether a factor may matter, and nothing but the pose was solved for, and all that was.
 
-    What is off its walls by millimetres leaves nothing to a factor.
+    What is off its walls by millimetres leaves nothing to a factor; nor does a map of which the caller says how good
+    it is.
     """
     context, answer = first.context, first.explanations.answer
     if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
         return False
-    return context.index.sigma is not None or answer.settled.wall_sigma >= LEAST_OFF_WALLS
+    return context.index.sigma is None and answer.settled.wall_sigma >= LEAST_OFF_WALLS
 
 
 def _put_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
@@ -124,8 +125,8 @@ def _put_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
 
 
 def _at_scale(context: SearchContext, factor: float) -> SearchContext:
-    """Prepare the search of a stretched scan; about where it was seen from, not about the middle of the robot."""
-    scan = scaled(context.scan, factor, context.scan.viewpoint or (0.0, 0.0))
+    """Prepare the search of a stretched scan; the origin of its frame, whose pose is asked, stays where it is."""
+    scan = scaled(context.scan, factor)
     return SearchContext.of(context.index, scan, context.prior, context.options, context.deadline)
 
 

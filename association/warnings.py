@@ -119,8 +119,10 @@ def _facing_away(context: SearchContext) -> str | None:
     """Tell where segments have another left, where free space is, than where the sensor stood."""
     if context.scan.viewpoint is None or not context.options.oriented:
         return None
-    segments = context.scan.measured.segments
-    fronts = np.einsum("ij,ij->i", segments.normals, np.asarray(context.scan.viewpoint) - segments.midpoints)
+    segments, views = context.scan.measured.segments, context.scan.views
+    # What has no viewpoint, nan, shows its back to none.
+    seen_from = np.asarray(context.scan.viewpoint) if views is None else views.viewpoints[views.of_segment]
+    fronts = np.einsum("ij,ij->i", segments.normals, seen_from - segments.midpoints)
     away = int((fronts < -FACING).sum())
     if not away:
         return None

@@ -37,9 +37,9 @@ class Beams:
         angles, ranges = np.ascontiguousarray(-self.angles[::-1]), np.ascontiguousarray(self.ranges[::-1])
         return Beams(angles, ranges, self.range_max, origins)
 
-    def scaled(self, factor: float, about: tuple[float, float] = (0.0, 0.0)) -> Beams:
-        """Return them with all lengths multiplied, a point of the scan frame held where it is."""
-        origins = None if self.origins is None else (self.origins - about) * factor + about
+    def scaled(self, factor: float) -> Beams:
+        """Return them with all lengths multiplied."""
+        origins = None if self.origins is None else self.origins * factor
         return Beams(self.angles, self.ranges * factor, self.range_max * factor, origins)
 
     def moved(self, by: RigidTransform, viewpoint: tuple[float, float]) -> Beams:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationResult, MapIndex, Reason, Status, sentence_of
+from association import AssociationResult, MapIndex, Reason, Status, View, assemble, sentence_of
 from association.acceptance import Accepted
 from association.explain import Answer, explain
 from association.report import report
@@ -309,6 +309,24 @@ def test_segments_that_show_their_back_are_told() -> None:
     assert codes(endpoints)["faces_away"].startswith("1 of 4 segments")
     assert codes(endpoints, oriented=False) == {}
     assert codes(endpoints, viewpoint=None) == {}
+
+
+def test_a_segment_of_a_view_faces_the_sensor_of_that_view() -> None:
+    """Whatever the others look at; one without a viewpoint shows nobody its back."""
+    room, pillar = SQUARE, np.array([[2.2, 3.0, 2.2, 2.0], [2.0, 2.0, 2.0, 3.0]])  # its faces to the right and left
+    right, left = pose(4.0, 2.5), pose(1.0, 2.5)
+    ends = [seen(np.vstack([room, face]), at)[0] for face, at in zip(pillar[:, None], (right, left), strict=True)]
+    step = right.inverse().compose(left)
+
+    def warned(*viewpoints: tuple[float, float] | None) -> list[str]:
+        views = [View(scan_of(one, viewpoint=at)) for one, at in zip(ends, viewpoints, strict=True)]
+        scan = assemble([views[0], replace(views[1], pose=step)])
+        return [warning.code for warning in answer_of(index_of(room), scan).warnings]
+
+    assert warned((0.0, 0.0), (0.0, 0.0)) == []
+    assert warned((0.0, 0.0), None) == []
+    ends[1] = ends[1][:, [2, 3, 0, 1]]
+    assert warned((0.0, 0.0), (0.0, 0.0)) == ["faces_away"]
 
 
 @pytest.mark.parametrize(("beside", "told"), [(0.04, False), (0.06, True)])
