@@ -96,6 +96,9 @@ def warm_up_searching() -> None:
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
+    # Nothing is said of this map, which is not to scale.
+    too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
+    associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
 
 
 def _with_beams() -> Scan:
