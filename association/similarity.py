@@ -26,19 +26,16 @@ class Similarity:
         Without the factor.
     covariance : (3, 3)
         Of additive (x, y, theta), with what is not known of the factor.
-    wall_sigma : float
-        Standard deviation of the walls' own offsets that remains, metres.
     factor : float
         What the scan's lengths have to be multiplied with.
     deviation : float
         Its standard deviation.
     more : float
-        How many more walls there are than it takes to fix it; those that show nothing else count as parts.
+        How many more walls there are than it takes to fix it; those that others say little of count as parts.
     """
 
     pose: RigidTransform
     covariance: Floats
-    wall_sigma: float
     factor: float
     deviation: float
     more: float
@@ -48,12 +45,11 @@ def fit_similarity(context: SearchContext, best: Ranked) -> Similarity | None:
     """Fit a similarity to the sums of a consensus set; None where it does not fix one."""
     solution, covariance, pose = np.zeros(4), np.zeros((4, 4)), np.zeros(1, ESTIMATE)
     variance, more = settle_similarity(
-        context.question_of_a_pose, context.index.walls.rows, best.matches, (context.index.sigma or 0.0) ** 2,
-        solution, covariance, context.workspace,
-    )  # fmt: skip
+        context.question_of_a_pose, context.index.walls.rows, best.matches, solution, covariance, context.workspace
+    )
     if variance < 0.0:
         return None
     factor, spread = pose_of_similarity(solution, covariance, pose[0])
     theta, x, y, xx, xy, xt, yy, yt, tt = pose[0].item()
     of_pose = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
-    return Similarity(RigidTransform(x, y, theta), of_pose, math.sqrt(variance), factor, math.sqrt(spread), more)
+    return Similarity(RigidTransform(x, y, theta), of_pose, factor, math.sqrt(spread), more)

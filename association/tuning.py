@@ -171,17 +171,18 @@ LOOSE_WALLS = 0.05  # m, tables
 LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
 LOOSE_BEAMS = 0.5  # tables; and with that share of what beams say, which read centimetres
 LOOSE_RIVALS = 8  # tables; the best and that many others
-# A factor that is as far from one is tried, if it is so many of its standard deviations; and taken, if the answer then
-# scores so much more, nats.
-LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables
-FACTOR_DEVIATIONS = 1.5  # tables
-FACTOR_GAP = 6.0  # tables
-FACTOR_ROUNDS = 3  # tables
-LEAST_OFF_WALLS = 0.01  # m; walls that are off by less, as estimated, leave nothing to a factor
-LEAST_AS_SENT = 0.5  # of the best score; what comes to less as it was sent is no rival at a scale of its own
-SAME_PLACE = 1.0  # m; what a factor may move a pose
-FACTOR_WALLS = 2.0  # tables; that have to agree beyond those that it takes
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
+
+# --- Scan and map that differ by a factor -----------------------------------------------------------------------------
+
+LEAST_OFF_WALLS = 0.01  # m, tables; walls that are off by less, as estimated, leave nothing to a factor
+LEAST_FACTOR, MOST_FACTOR = 0.004, 0.04  # tables; a factor is tried that is so far from one,
+FACTOR_DEVIATIONS = 1.5  # tables; and by so many of its standard deviations
+FACTOR_ROUNDS = 3  # tables
+FACTOR_GAP = 6.0  # nats, tables; it is taken where the answer scores so much more,
+FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes
+LEAST_AS_SENT = 0.5  # of the best score, tables; what comes to less as it was sent is no rival at a scale of its own
+SAME_PLACE = 1.0  # m, geometry; what a factor may move a pose
 
 # --- Ranking ----------------------------------------------------------------------------------------------------------
 

@@ -100,10 +100,9 @@ def variance_left(
 
 @kernel
 def settle_similarity(
-    question: Question, walls: Records, matches: Records, least_variance: float, solution: Floats, covariance: Floats,
-    work: Workspace,
-) -> tuple[float, float]:  # fmt: skip
-    """Fit a similarity to a consensus set, walls off as their residuals show it, by `least_variance`, m^2, at least.
+    question: Question, walls: Records, matches: Records, solution: Floats, covariance: Floats, work: Workspace
+) -> tuple[float, float]:
+    """Fit a similarity to a consensus set, walls off as their residuals show it.
 
     Writes a, b, t_x, t_y, (4,), and their covariance, (4, 4); returns the variance of a wall's error, or -1 where no
     similarity is fixed, and how many walls more there are than it takes.
@@ -111,7 +110,7 @@ def settle_similarity(
     scan = question.scan
     sums = work.scratch[0].sums
     of_wall = walls_of(scan, matches)
-    wall_variance = max(least_variance, USUAL_WALL_ERROR**2)
+    wall_variance = USUAL_WALL_ERROR**2
     used = wall_variance
     more = 0.0
     for _ in range(SETTLING_ROUNDS + 1):
@@ -119,8 +118,7 @@ def settle_similarity(
         if not solve_similarity(sums, solution, covariance):
             return -1.0, 0.0
         used = wall_variance
-        shown, more = variance_left(solution, covariance, of_wall, wall_variance, work)
-        wall_variance = max(least_variance, shown)
+        wall_variance, more = variance_left(solution, covariance, of_wall, wall_variance, work)
     if solution[0] == 0.0 and solution[1] == 0.0:
         return -1.0, 0.0
     return used, more

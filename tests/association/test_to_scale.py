@@ -100,7 +100,7 @@ def test_pose_and_covariance_are_those_of_the_similarity() -> None:
     [(1.01, 0.001, True), (0.99, 0.001, True), (1.003, 0.0001, False), (0.997, 0.0001, False), (1.01, 0.01, False)],
 )
 def test_a_factor_is_tried_where_it_may_matter_and_is_not_noise(factor: float, deviation: float, off: bool) -> None:
-    assert to_scale.is_off(Similarity(pose(), np.eye(3), 0.01, factor, deviation, 5.0)) == off
+    assert to_scale.is_off(Similarity(pose(), np.eye(3), factor, deviation, 5.0)) == off
 
 
 @pytest.mark.parametrize("factor", [0.99, 1.02])

@@ -31,12 +31,12 @@ def stretched(one: Set, factor: float) -> Set:
     return Set(scan, one.walls, one.held, one.start)
 
 
-def settled(one: Set, least_variance: float) -> tuple[float, Floats, Floats]:
+def settled(one: Set) -> tuple[float, Floats, Floats]:
     """Return the walls' variance, (a, b, x, y) and their covariance."""
     solution, covariance = np.zeros(4), np.zeros((4, 4))
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = matches_on(one.held)
-    variance, _ = settle_similarity(question, one.walls, matches, least_variance, solution, covariance, work)
+    variance, _ = settle_similarity(question, one.walls, matches, solution, covariance, work)
     return variance, solution, covariance
 
 
@@ -59,24 +59,22 @@ def dense(one: Set, variance: float) -> tuple[Floats, Floats]:
 @settings(max_examples=40, deadline=None)
 def test_it_is_that_of_dense_least_squares(seed: int) -> None:
     one = stretched(some(seed), FACTORS[seed % len(FACTORS)])
-    for least in (0.0, 0.05**2):
-        variance, solution, covariance = settled(one, least)
-        normal_matrix, right = dense(one, max(least, variance))
-        size = 1.0 / np.sqrt(normal_matrix.diagonal() + 1.0)
-        regular = np.linalg.eigvalsh(size[:, None] * normal_matrix * size)[0]
-        if variance < 0.0:
-            assert regular < 1e-5
-        elif regular > 1e-5:
-            assert variance >= least
-            np.testing.assert_allclose(solution, np.linalg.solve(normal_matrix, right), rtol=1e-5, atol=1e-5)
-            np.testing.assert_allclose(covariance @ normal_matrix, np.eye(4), atol=1e-4)
+    variance, solution, covariance = settled(one)
+    normal_matrix, right = dense(one, max(0.0, variance))
+    size = 1.0 / np.sqrt(normal_matrix.diagonal() + 1.0)
+    regular = np.linalg.eigvalsh(size[:, None] * normal_matrix * size)[0]
+    if variance < 0.0:
+        assert regular < 1e-5
+    elif regular > 1e-5:
+        np.testing.assert_allclose(solution, np.linalg.solve(normal_matrix, right), rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(covariance @ normal_matrix, np.eye(4), atol=1e-4)
 
 
 @given(SEEDS)
 @settings(max_examples=40, deadline=None)
 def test_its_pose_has_the_covariance_that_derivatives_give(seed: int) -> None:
     one = some(seed)
-    variance, solution, covariance = settled(one, 0.0)
+    variance, solution, covariance = settled(one)
     if variance < 0.0:
         return
     pose = np.zeros(1, ESTIMATE)
@@ -97,8 +95,8 @@ def test_its_pose_has_the_covariance_that_derivatives_give(seed: int) -> None:
 def test_the_walls_error_is_what_the_factor_leaves() -> None:
     """Walls that a factor of 3 % puts off by decimetres are on their places with it."""
     exact = [some(seed, 0.0) for seed in range(40)]
-    plain = [settled(one, 0.0)[0] for one in exact]
-    off = [settled(stretched(one, 1.03), 0.0)[0] for one in exact]
+    plain = [settled(one)[0] for one in exact]
+    off = [settled(stretched(one, 1.03))[0] for one in exact]
     np.testing.assert_allclose(off, plain, rtol=0.1)
 
 
