@@ -191,7 +191,7 @@ async def _get_ready(services: Services) -> None:
         logger.error("the store does not open: %s", error, extra={"store": where})
     threads, parser = services.parse_threads, services.parser
     if not is_compiled():
-        logger.info("compiling, which takes half a minute; what comes of it is kept for the next start")
+        logger.info("compiling, which takes half a minute, or two where cores are busy; it is kept for the next start")
         with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
             await threads.run(partial(parser.call, compile_kernels))
         parser.close()
