@@ -20,6 +20,8 @@ from ..to_scale import Explained, explain_to_scale
 from ..verdict import Verdict, judge
 from .tuning import (
     BETTER_SCALED,
+    LADDER,
+    LADDER_SECONDS,
     LEAST_SHARE,
     SIGMAS,
 )
@@ -110,9 +112,13 @@ def try_sample(
     other = None if deadline.passed else _tried(index, mirrored(scan), present, deadline)
     # As much time as all of this took may go into mistakes.
     causes = find_causes(context, found.as_sent, verdict, began)
-    factor = _factor(context, max(trial.score for trial in trials.values()), causes)
+    known = max(trial.score for trial in trials.values())
+    factor = _factor(context, known, causes)
     if factor is None and found.factor is not None:
         factor = found.factor.value
+    tried = [*trials.values()] if other is None else [*trials.values(), other]
+    if factor is None and not causes and not any(trial.usable for trial in tried):
+        factor = _any_factor(context, known)
     mistakes = tuple(cause.mistake for cause in causes if cause.mistake is not Mistake.SCALE)
     moved = None if said is None or not result.usable or result.pose is None else result.pose.compose(said.inverse())
     return Sample(result, trials, other, mistakes, factor, moved)
@@ -172,3 +178,31 @@ def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> fl
     way = context.options.oriented, context.index.sigma
     found = _tried(context.index, scaled(context.scan, near), way, context.deadline)
     return near if found.score > least else None
+
+
+def _any_factor(context: SearchContext, known: float) -> float | None:
+    """Return the factor with which a scan scores most, if that is clearly more than it does anyhow, `known` nats.
+
+    A grid whose resolution is wrong is off by two as likely as by a hundredth.
+    """
+    hurried = replace(context, deadline=context.deadline.within(time.monotonic() + LADDER_SECONDS))
+    best: Explained | None = None
+    factor = 1.0
+    for rung in LADDER:
+        near = scale_near_one(replace(hurried, scan=scaled(context.scan, rung))) or 1.0
+        found = _at_scale(hurried, rung * near)
+        if hurried.deadline.passed:
+            return None
+        if best is None or found.score > best.score:
+            best, factor = found, rung * near
+    # Shrunk, a hall fits the next best room: what is told has to stand up as an answer.
+    if best is None or best.score <= BETTER_SCALED * known or not judge(best.context, best.explanations).usable:
+        return None
+    return factor if best.factor is None else factor * best.factor.value
+
+
+def _at_scale(context: SearchContext, factor: float) -> Explained:
+    """Search the scan with its lengths times a factor."""
+    options = AssociationOptions(oriented=context.options.oriented)
+    scan = scaled(context.scan, factor)
+    return explain_to_scale(SearchContext.of(context.index, scan, None, options, context.deadline))
