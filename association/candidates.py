@@ -136,13 +136,13 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
     chunk = int(CHUNK / max(1.0, index.crowd / USUAL_CROWD))
     question = context.question(_rules(effort, DISTINCT_DISTANCE))
     stopped = _go_through_bases(context, effort, question, found[:kept], progress, chunk)
-    places = list(range(int(progress["count"][0])))
+    places = [*range(int(progress["count"][0]))]
     # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
     slid = _slide(context, effort, found[kept:], progress, chunk)
     places += range(kept, kept + int(progress["count"][0]))
     if context.deadline.cancelled:
         raise CancelledError
-    order = np.argsort(-found["value"][places], kind="stable")
+    poses = found[np.array(places, dtype=np.intp)]
     exhaustive = stopped == EXHAUSTED and len(scan) <= BASE_SEGMENTS
     report = SearchReport(
         complete=stopped != BUDGET and slid,
@@ -155,7 +155,7 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    return Candidates(found[np.array(places, dtype=np.intp)[order]], report)
+    return Candidates(poses[np.argsort(-poses["value"], kind="stable")] if places else poses, report)
 
 
 @lru_cache

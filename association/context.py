@@ -11,7 +11,20 @@ from registration import RigidTransform
 from registration.layout import Records
 
 from .alignment import aligned
-from .layout import HARD_PRIOR, NO_PRIOR, POINT, PRIOR, RULES, SIGHTING, SOFT_PRIOR, TERMS, as_records, record
+from .layout import (
+    GATES,
+    HARD_PRIOR,
+    MODEL,
+    NO_PRIOR,
+    POINT,
+    PRIOR,
+    RULES,
+    SIGHTING,
+    SOFT_PRIOR,
+    TERMS,
+    as_records,
+    record,
+)
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
@@ -26,6 +39,15 @@ NOTHING_KEPT = record(RULES)
 @lru_cache
 def _place(x: float, y: float) -> Records:
     return record(POINT, x=x, y=y)
+
+
+@lru_cache
+def _terms(gates: bytes, prior: bytes, model: bytes) -> Records:
+    """Put records together, which numpy does field by field: those of most searches on a map are the same."""
+    terms = np.zeros(1, TERMS)
+    terms["gates"], terms["prior"] = np.frombuffer(gates, GATES), np.frombuffer(prior, PRIOR)
+    terms["model"] = np.frombuffer(model, MODEL)
+    return terms
 
 
 @dataclass(frozen=True)
@@ -116,8 +138,7 @@ class SearchContext:
     @cached_property
     def question_of_a_pose(self) -> Question:
         """The same for kernels that keep no poses."""
-        terms = np.zeros(1, TERMS)
-        terms["gates"], terms["prior"], terms["model"] = self.gates, self.prior_record, self.lines.model
+        terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes()).copy()
         return Question(self.lines.rows, terms, NOTHING_KEPT)
 
     def anywhere(self) -> SearchContext:

@@ -13,7 +13,8 @@ def diagonal(segments: Segments) -> float:
     """Return the diagonal of the box around segments, metres; 0 without any."""
     if not len(segments):
         return 0.0
-    return float(np.hypot(*np.ptp(segments.endpoints.reshape(-1, 2), axis=0)))
+    low, high = segments.endpoints.min(axis=0).tolist(), segments.endpoints.max(axis=0).tolist()
+    return float(np.hypot(max(high[0::2]) - min(low[0::2]), max(high[1::2]) - min(low[1::2])))
 
 
 def inner_extent(segments: Segments) -> float:

@@ -142,8 +142,10 @@ class _Scored:
 
 def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Ranked]:
     """Refine and order the candidates: within the prior's window first, then by value; ties by the search's order."""
+    if not len(candidates.poses):
+        return []
     scored = _score(context, candidates.poses)
-    if context.with_beams and len(candidates.poses):
+    if context.with_beams:
         scored = _weigh_beams(context, scored)
     scores = scored.merits["score"]
     values = scores if context.prior is None else scores + _prior_values(context, scored.estimates)

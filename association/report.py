@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from registration import Ambiguity, Correspondences, OneStepSums
+from registration import Ambiguity
 
 from .acceptance import correspondences, overlaps_at
 from .causes import Cause
 from .context import SearchContext
 from .explain import Answer, Explanations
-from .kernels.settling import pairs_of
+from .kernels.measures import paper_measures
 from .ranking import Ranked
 from .result import (
     Alternative,
@@ -130,14 +130,15 @@ def _alternatives(context: SearchContext, others: tuple[Ranked, ...], *, usable:
 
 def _alternative(context: SearchContext, other: Ranked) -> Alternative:
     settled = settle(context, other, hinges=False)
-    pairs = Correspondences(pairs_of(context.lines.rows, other.matches, context.index.walls.rows))
-    sums = OneStepSums.of_set(pairs, 1.0 / (pairs.rows["scan"]["variance"] + settled.wall_sigma**2), settled.pose)
-    translation, rotation = sums.costs(settled.pose, context.options.rotation)
+    pose = settled.pose
+    translation, mitsuta, wahba, reliability = paper_measures(
+        context.lines.rows, other.matches, context.index.walls.rows, settled.wall_sigma, pose.theta, pose.x, pose.y
+    )
     return Alternative(
-        pose=context.in_map(settled.pose),
+        pose=context.in_map(pose),
         covariance=None if settled.degenerate else settled.covariance,
         score=other.score_by(context.options.estimator),
-        ambiguity=Ambiguity(translation, rotation),
-        reliability=sums.reliability,
+        ambiguity=Ambiguity(translation, wahba if context.options.rotation == "wahba" else mitsuta),
+        reliability=reliability,
         inlier_fraction=other.share,
     )

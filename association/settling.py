@@ -72,9 +72,8 @@ def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Sett
         context.question_of_a_pose, context.index.walls.rows, best.matches, best.estimate,
         -1.0 if known is None else known**2, settled, without, context.workspace,
     )  # fmt: skip
-    theta, x, y, xx, xy, xt, yy, yt, tt = settled["pose"][0].item()
+    (theta, x, y, xx, xy, xt, yy, yt, tt), variance, weakest, dx, dy, unlike = settled[0].item()
     covariance = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
-    _, variance, weakest, dx, dy, unlike = settled[0].item()
     sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
     parallel = best.count < 2 or unlike <= chi_square_quantile(best.count - 1, THREE_SIGMA_TAIL)
     spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)

@@ -122,8 +122,8 @@ def _facing_away(context: SearchContext) -> str | None:
     segments, views = context.scan.measured.segments, context.scan.views
     # What has no viewpoint, nan, shows its back to none.
     seen_from = np.asarray(context.scan.viewpoint) if views is None else views.viewpoints[views.of_segment]
-    fronts = np.einsum("ij,ij->i", segments.normals, seen_from - segments.midpoints)
-    away = int((fronts < -FACING).sum())
+    sights = segments.normals * (seen_from - segments.midpoints)
+    away = np.count_nonzero(sights[:, 0] + sights[:, 1] < -FACING)
     if not away:
         return None
     return (

@@ -12,6 +12,11 @@ from .errors import InvalidArgumentError, InvalidSegmentsError
 from .layout import Floats
 from .limits import MAX_COORDINATE, MAX_LENGTH, MAX_POINTS, MAX_SIGMA, MIN_LENGTH
 
+ALONG, ACROSS = (
+    np.array([-1.0, 1.0]),
+    np.array([1.0, -1.0]),
+)  # of y for -y
+ACROSS_BOTH = np.tile(ACROSS, 2)
 DEFAULT_POINT_SPACING = 0.05  # m, what a segment without a count of points is taken to have
 
 
@@ -119,8 +124,7 @@ class Segments:
     def mirrored(self) -> Segments:
         """Return them with y for -y, and begin and end exchanged: the free side stays on the left."""
         e, d, n, middles = self.endpoints[:, [2, 3, 0, 1]], self.directions, self.normals, self.midpoints
-        across, along = np.array([1.0, -1.0]), np.array([-1.0, 1.0])
-        arrays = (e * np.tile(across, 2), d * along, n * across, self.offsets, self.lengths, middles * across)
+        arrays = (e * ACROSS_BOTH, d * ALONG, n * ACROSS, self.offsets, self.lengths, middles * ACROSS)
         return Segments(*map(_frozen, arrays))
 
     def reversed(self) -> Segments:

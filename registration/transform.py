@@ -42,7 +42,8 @@ class RigidTransform:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.x) and math.isfinite(self.y) and math.isfinite(self.theta)):
             raise ValueError("a rigid transform takes finite x, y and theta")
-        object.__setattr__(self, "theta", wrap_angle(self.theta))
+        if not -math.pi < self.theta <= math.pi:
+            object.__setattr__(self, "theta", wrap_angle(self.theta))
 
     def compose(self, other: RigidTransform) -> RigidTransform:
         """Return the transform that applies `other` first, then this one."""

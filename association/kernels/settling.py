@@ -6,7 +6,7 @@ import numpy as np
 
 from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
-from registration.layout import PAIR, Record, Records
+from registration.layout import Record, Records
 
 from ..layout import ESTIMATE, Integers
 from ..tables import Question, Workspace
@@ -216,38 +216,3 @@ def leave_each_out(
                 hinge.dx = x / hinge.moves
                 hinge.dy = y / hinge.moves
     keep_alive(one)
-
-
-@kernel
-def pairs_of(scan: Records, matches: Records, walls: Records) -> Records:
-    """Return the matches as pairs, (n,) of `PAIR`, a line of the scan and the wall that it lies on each."""
-    count = 0
-    for i in range(len(scan)):
-        if matches[i].wall >= 0:
-            count += 1
-    pairs = np.zeros(count, dtype=PAIR)
-    k = 0
-    for i in range(len(scan)):
-        if matches[i].wall < 0:
-            continue
-        wall = walls[matches[i].wall]
-        line = pairs[k].map
-        seen = pairs[k].scan
-        k += 1
-        middle = 0.5 * (wall.begin + wall.end)
-        line.dx = wall.dx
-        line.dy = wall.dy
-        line.offset = wall.offset
-        line.x = wall.dx * middle - wall.dy * wall.offset
-        line.y = wall.dy * middle + wall.dx * wall.offset
-        line.length = wall.end - wall.begin
-        seen.dx = scan[i].dx
-        seen.dy = scan[i].dy
-        seen.centroid_x = scan[i].centroid_x
-        seen.centroid_y = scan[i].centroid_y
-        seen.spread = scan[i].spread
-        seen.x = scan[i].x
-        seen.y = scan[i].y
-        seen.length = scan[i].length
-        seen.variance = 1.0 / scan[i].weight - ROUGHNESS * ROUGHNESS
-    return pairs

@@ -6,6 +6,7 @@ Nothing here validates: callers hand over finite numbers and indices in range. E
 
 from .joint import joint_add, joint_cost, joint_information, joint_solve
 from .matrices import carried, eigen2, invert3, invert3_scaled, is_regular3
+from .one_step import one_step_add
 from .records import keep_alive
 
 __all__ = [
@@ -19,4 +20,5 @@ __all__ = [
     "joint_information",
     "joint_solve",
     "keep_alive",
+    "one_step_add",
 ]

@@ -1,0 +1,60 @@
+"""The paper's measures of a consensus set are those of the same pairs handed to `registration`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from association.kernels.measures import paper_measures
+from association.tuning import ROUGHNESS
+from registration import Correspondences, MeasuredSegments, OneStepSums, RigidTransform, Segments
+from registration.layout import Floats, Records
+
+from ..reference.consensus import matches_on
+from ..reference.geometry import normal
+from .drawn import SEEDS
+from .test_settling import Set, some
+
+
+def ends(rows: Records, middles: Floats, lengths: Floats) -> Floats:
+    half = 0.5 * lengths[:, None] * np.stack([rows["dx"], rows["dy"]], axis=1)
+    return np.hstack([middles - half, middles + half])
+
+
+def sums_of(one: Set, wall_sigma: float) -> OneStepSums:
+    """Return the sums of its pairs by the library, about its pose."""
+    lines, walls = one.scan[one.held >= 0], one.walls[one.held[one.held >= 0]]
+    normals = np.array([normal(wall) for wall in walls])
+    along = 0.5 * (walls["begin"] + walls["end"])
+    on_walls = along[:, None] * np.stack([walls["dx"], walls["dy"]], axis=1) + walls["offset"][:, None] * normals
+    drawn = Segments.from_array(ends(walls, on_walls, walls["end"] - walls["begin"]))
+    seen = Segments.from_array(ends(lines, np.stack([lines["x"], lines["y"]], axis=1), lines["length"]))
+    rows = np.repeat(np.arange(len(lines)), 2).reshape(-1, 2)
+    pairs = Correspondences.of(drawn, MeasuredSegments.from_segments(seen, 0.01), rows)
+    variances = 1.0 / lines["weight"] - ROUGHNESS**2 + wall_sigma**2
+    return OneStepSums.of_set(pairs, 1.0 / variances, one.start)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_they_are_those_of_the_one_step_sums(seed: int) -> None:
+    one, wall_sigma = some(seed), 0.02 * (seed % 3)
+    at = one.start
+    translation, mitsuta, wahba, reliability = paper_measures(
+        one.scan, matches_on(one.held), one.walls, wall_sigma, at.theta, at.x, at.y
+    )
+    sums = sums_of(one, wall_sigma)
+    assert (translation, mitsuta) == pytest.approx(sums.costs(at, "mitsuta"), rel=1e-6)
+    assert (translation, wahba) == pytest.approx(sums.costs(at, "wahba"), rel=1e-6)
+    assert reliability == pytest.approx(sums.reliability, rel=1e-6, abs=1e-6)
+
+
+def test_of_no_pair_there_is_nothing_to_tell() -> None:
+    one = some(1)
+    nothing = matches_on(np.full_like(one.held, -1))
+    assert paper_measures(one.scan, nothing, one.walls, 0.0, *pose_numbers(one.start)) == (0.0, 0.0, 0.0, 0.0)
+
+
+def pose_numbers(at: RigidTransform) -> tuple[float, float, float]:
+    return at.theta, at.x, at.y
