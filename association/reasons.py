@@ -30,6 +30,8 @@ class Standing:
         Whether the scan fits the map better with left and right exchanged.
     out_of_step : bool
         Whether what is seen from the scan's own place fits far worse than what was seen on the way.
+    off_scale : bool
+        Whether scan and map differ by a factor that is too great to be made up for.
     """
 
     status: Status
@@ -40,6 +42,7 @@ class Standing:
     twin: bool = False
     mirrored: bool = False
     out_of_step: bool = False
+    off_scale: bool = False
 
 
 SENTENCES: Mapping[str, str] = {
@@ -54,6 +57,10 @@ SENTENCES: Mapping[str, str] = {
 }
 
 MIRRORED = "The scan fits this map better with left and right exchanged: is the laser upside down, or this another map?"
+OFF_SCALE = (
+    "The scan would fit this map better if it were larger or smaller by more than 4 %: are both in metres, and is this "
+    "the map of the place?"
+)
 
 # What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
 FEATURES_OF: Mapping[str, tuple[str, ...]] = {
@@ -90,10 +97,14 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
         codes.append("free_direction")
     elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
         codes += ["too_little", "one_wall_decides"] if standing.thin else []
-        codes += ["unexplained"] if standing.out_of_step else []
+        codes += ["unexplained"] if standing.out_of_step or standing.off_scale else []
         codes += ["twin"] if standing.twin else []
         codes += [code for code in _weighed(features, cautious) if code not in codes]
-    sentences = {**SENTENCES, "elsewhere": MIRRORED} if standing.mirrored else SENTENCES
+    sentences = dict(SENTENCES)
+    if standing.mirrored:
+        sentences["elsewhere"] = MIRRORED
+    if standing.off_scale:
+        sentences["unexplained"] = OFF_SCALE
     return tuple(Reason(code, sentences[code]) for code in codes)
 
 

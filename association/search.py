@@ -51,6 +51,6 @@ def associate(
     began = time.monotonic()
     context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
     found = explain_to_scale(context)
-    verdict = judge(found.context, found.explanations)
+    verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     causes = find_causes(context, found.explanations, verdict, began)
     return report(found.context, found.explanations, verdict, causes, found.factor)

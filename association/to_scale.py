@@ -22,6 +22,7 @@ from .scan import scaled
 from .similarity import Similarity, fit_similarity
 from .tuning import (
     DISTINCT_ANGLE,
+    DOUBTING_WALLS,
     FACTOR_DEVIATIONS,
     FACTOR_GAP,
     FACTOR_ROUNDS,
@@ -63,12 +64,15 @@ class Explained:
         Of the scan as it was sent; the same where it is not put to scale.
     factor : Factor or None
         By which the scan was put to scale; None where it is as it was sent.
+    off_scale : bool
+        Whether it is as it was sent, and what matched says that it is off by more than a scan is put to scale.
     """
 
     context: SearchContext
     explanations: Explanations
     as_sent: Explanations
     factor: Factor | None = None
+    off_scale: bool = False
 
     @property
     def score(self) -> float:
@@ -86,9 +90,12 @@ def explain_to_scale(context: SearchContext) -> Explained:
     """
     as_sent = explain(context)
     first = Explained(context, as_sent, as_sent)
-    found = _put_to_scale(first, _similarity(first)) if _may_be_off(first) else first
-    if found.factor is None:
+    if not _may_be_off(first):
         return first
+    similarity = _similarity(first)
+    found = _put_to_scale(first, similarity)
+    if found.factor is None:
+        return replace(first, off_scale=similarity is not None and is_far_off(similarity))
     rivals = beside(found.explanations, _at_their_scales(first, found))
     return _with_what_is_not_known(replace(found, explanations=rivals))
 
@@ -138,6 +145,14 @@ def _similarity(found: Explained) -> Similarity | None:
 def is_off(similarity: Similarity) -> bool:
     """Tell whether a similarity says that the scan is not to scale."""
     return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
+
+
+def is_far_off(similarity: Similarity) -> bool:
+    """Tell whether a similarity says that the scan is off by more than what is put to scale.
+
+    Then its pose is off by decimetres, or it is in another room of the same shape.
+    """
+    return is_off(similarity) and abs(similarity.factor - 1.0) > MOST_FACTOR and similarity.more >= DOUBTING_WALLS
 
 
 def _at_their_scales(first: Explained, found: Explained) -> list[Ranked]:

@@ -71,8 +71,11 @@ class Verdict:
     complete: bool
 
 
-def judge(context: SearchContext, explanations: Explanations) -> Verdict:
-    """Weigh the best explanation against the others and against none being right."""
+def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool = False) -> Verdict:
+    """Weigh the best explanation against the others and against none being right.
+
+    `off_scale`: whether scan and map differ by a factor that nothing was done about.
+    """
     answer, rivals, complete = explanations.answer, explanations.rivals, explanations.search.complete
     if answer is None:
         why = reasons_of(
@@ -84,12 +87,13 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
     best = answer.best
     better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
-    certain = complete and not contradicted and context.window is None and not _out_of_step(answer)
+    doubted = off_scale or _out_of_step(answer)
+    certain = complete and not contradicted and context.window is None and not doubted
     chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
     # The mirrored scan and the rivals with walls farther off are searched, and scored, no further than the deadline.
     complete = complete and not context.deadline.passed
     thin = is_thin(context, answer)
-    status = _status(answer, chances, _bar(context), capped=better_elsewhere, thin=thin)
+    status = _status(answer, chances, _bar(context), capped=better_elsewhere, doubted=doubted or thin)
     pose = place_on_family(context, answer)
     if context.window is not None and pose is not None and not context.window.contains(pose):
         # It was inside before it was registered: the window is narrower than what the scan says.
@@ -104,6 +108,7 @@ def judge(context: SearchContext, explanations: Explanations) -> Verdict:
         twin=chances.share < USABLE_PROBABILITY,
         mirrored=chances.mirrored,
         out_of_step=_out_of_step(answer),
+        off_scale=off_scale,
     )
     return Verdict(
         status=status,
@@ -206,12 +211,12 @@ def _bar(context: SearchContext) -> float:
     return USABLE_CAUTIOUS_WITH_BEAMS if context.with_beams else USABLE_CAUTIOUS
 
 
-def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool, thin: bool) -> Status:
+def _status(answer: Answer, chances: _Chances, bar: float, *, capped: bool, doubted: bool) -> Status:
     """Decide in order of precedence; a `capped` probability is never enough."""
     if chances.explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
     if answer.settled.degenerate:
         return Status.DEGENERATE
     likely = chances.right >= USABLE_PROBABILITY and not capped
-    sure = chances.careful >= bar and not thin and not chances.mirrored and not _out_of_step(answer)
+    sure = chances.careful >= bar and not doubted and not chances.mirrored
     return Status.OK if likely and sure else Status.AMBIGUOUS

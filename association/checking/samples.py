@@ -143,7 +143,7 @@ def _judged(context: SearchContext, found: Explained) -> tuple[AssociationResult
 
     By these ways are compared: any may be made up for by a factor. Usable is in each what its answer is.
     """
-    verdict = judge(found.context, found.explanations)
+    verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     result = report(found.context, found.explanations, verdict, factor=found.factor)
     if found.factor is None:
         return result, _trial(result), verdict
@@ -196,7 +196,7 @@ def _any_factor(context: SearchContext, known: float) -> float | None:
         if best is None or found.score > best.score:
             best, factor = found, rung * near
     # Shrunk, a hall fits the next best room: what is told has to stand up as an answer.
-    if best is None or best.score <= BETTER_SCALED * known or not judge(best.context, best.explanations).usable:
+    if best is None or best.score <= BETTER_SCALED * known or not _judged(context, best)[0].usable:
         return None
     return factor if best.factor is None else factor * best.factor.value
 

@@ -13,6 +13,7 @@ from association import (
     AssociationResult,
     Deadline,
     HardPrior,
+    Scan,
     View,
     assemble,
     associate,
@@ -28,6 +29,8 @@ from registration.layout import Floats
 from registration.options import Estimator
 
 from .answers import answer_with, explanations_of, ranked
+from .checking.drawn import faces, sampled
+from .checking.drawn import index_of as index_of_floor
 from .scenes import (
     INSIDE,
     ROOM,
@@ -101,6 +104,33 @@ def test_pose_and_covariance_are_those_of_the_similarity() -> None:
 )
 def test_a_factor_is_tried_where_it_may_matter_and_is_not_noise(factor: float, deviation: float, off: bool) -> None:
     assert to_scale.is_off(Similarity(pose(), np.eye(3), factor, deviation, 5.0)) == off
+
+
+@pytest.mark.parametrize(
+    ("factor", "deviation", "more", "far"),
+    [
+        (1.05, 0.005, 1.0, True),
+        (0.95, 0.005, 1.0, True),
+        (1.03, 0.005, 5.0, False),
+        (1.05, 0.04, 5.0, False),
+        (1.05, 0.005, 0.5, False),
+    ],
+)
+def test_a_factor_that_is_too_great_is_a_doubt(factor: float, deviation: float, more: float, far: bool) -> None:
+    assert to_scale.is_far_off(Similarity(pose(), np.eye(3), factor, deviation, more)) == far
+
+
+@pytest.mark.parametrize("factor", [1.045, 1.055])
+def test_no_answer_is_usable_that_hides_a_greater_factor(factor: float) -> None:
+    """A pose makes up for part of it: such answers were usable, .1 to .3 m off with 2 cm stated."""
+    index, told_of = index_of_floor(factor * faces()), 0
+    for truth, sent in sampled(30):
+        for scan in (sent, Scan(sent.measured, sent.viewpoint, None)):
+            found = associate(index, scan)
+            there = pose(factor * truth.x, factor * truth.y, truth.theta)
+            assert not found.usable or same_pose(pose_in(found), there, 0.05, 0.02)
+            told_of += any(one.code == "unexplained" and "more than 4 %" in one.message for one in found.reasons)
+    assert told_of
 
 
 @pytest.mark.parametrize("factor", [0.99, 1.02])
