@@ -122,7 +122,7 @@ def scaled(scan: Scan, factor: float) -> Scan:
     seen, at, beams, views = scan.measured, scan.viewpoint, scan.beams, scan.views
     measured = replace(
         seen,
-        segments=Segments.from_array(seen.segments.endpoints * factor),
+        segments=Segments.derived(seen.segments.endpoints * factor),
         sigma=seen.sigma * factor,
         centroids=seen.centroids * factor,
         spreads=seen.spreads * factor**2,

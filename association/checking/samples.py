@@ -196,7 +196,9 @@ def _any_factor(context: SearchContext, known: float) -> float | None:
         if best is None or found.score > best.score:
             best, factor = found, rung * near
     # Shrunk, a hall fits the next best room: what is told has to stand up as an answer.
-    if best is None or best.score <= BETTER_SCALED * known or not _judged(context, best)[0].usable:
+    if best is None or best.score <= BETTER_SCALED * known:
+        return None
+    if not judge(best.context, best.explanations, off_scale=best.off_scale).usable:
         return None
     return factor if best.factor is None else factor * best.factor.value
 

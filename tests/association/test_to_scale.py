@@ -326,3 +326,11 @@ def test_a_rival_at_a_scale_of_its_own_is_told_once_and_not_above_the_answer() -
     assert sorted(rooms) == [False, True]
     for k, one in enumerate(places):
         assert not any(same_pose(one, other, 0.3, 0.1) for other in places[:k])
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+@pytest.mark.parametrize("limit", [[3.0, 3.0, 3.0 + 1e-6, 3.0], [-5000.0, 30.0, 5000.0, 30.0]])
+def test_a_segment_at_the_limits_of_length_is_put_to_scale_like_any(factor: float, limit: list[float]) -> None:
+    """It was refused in the middle of a search."""
+    ends = np.vstack([seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0], [limit]])
+    assert answer_of(index_of(factor * WALLS), scan_of(ends)).pose is not None
