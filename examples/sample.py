@@ -1,13 +1,13 @@
 """Write files to try Linefix on, as a robot's are: ``hq.yaml`` with ``hq.pgm``, and ``drive.mcap``.
 
-``python -m examples.sample [FOLDER]`` draws an office floor, and drives through it with a laser and with odometry that
-drifts. Furniture that is on no map stands in the rooms.
+``python -m examples.sample [FOLDER]``, by default into ``out``, draws an office floor, and drives through it
+with a laser and with odometry that drifts. Furniture that is on no map stands in the rooms.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 import tempfile
 from itertools import pairwise
 from pathlib import Path
@@ -38,7 +38,17 @@ BOXES = 5
 
 def main() -> None:
     """Write the files, and say what they are."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    parser = argparse.ArgumentParser(prog="python -m examples.sample", description="Write a map and a drive to try.")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("out"), help="where to, by default out")
+    folder: Path = parser.parse_args().folder
+    try:
+        write_sample(folder)
+    except OSError as error:
+        parser.error(f"{folder} cannot be written to: {error.strerror}")
+
+
+def write_sample(folder: Path) -> None:
+    """Write the files into a folder, which is made if need be."""
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(SEED)
     floor = offices(rng, OfficePlan(rooms=4, corridors=1))

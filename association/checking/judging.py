@@ -51,7 +51,8 @@ def judge_samples(samples: Sequence[Sample], *, sigma: float | None, oriented: b
     # What is off because of a mistake is no measure of the walls.
     advice = Advice() if mistakes or off is None else Advice(off, directed)
     findings = [found for found in (*mistakes, _moved(samples)) if found is not None]
-    if directed != oriented and _reversed(samples) is None:  # which fits either way round, too
+    # What is reversed fits either way round, too; and what is not to scale fits by chance, more so without directions.
+    if directed != oriented and _reversed(samples) is None and (scale is None or would_be > usable):
         findings.insert(0, _undirected(len(samples), usable, would_be))
     return SampleReport(tuple(findings), advice, usable, usable if advice.oriented is None else would_be)
 

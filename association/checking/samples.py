@@ -118,7 +118,9 @@ def try_sample(
         factor = found.factor.value
     tried = [*trials.values()] if other is None else [*trials.values(), other]
     if factor is None and not causes and not any(trial.usable for trial in tried):
-        factor = _any_factor(context, known)
+        now = time.monotonic()
+        until = context.deadline.within(now + max(LADDER_SECONDS, now - began))
+        factor = _any_factor(replace(context, deadline=until), known)
     mistakes = tuple(cause.mistake for cause in causes if cause.mistake is not Mistake.SCALE)
     moved = None if said is None or not result.usable or result.pose is None else result.pose.compose(said.inverse())
     return Sample(result, trials, other, mistakes, factor, moved)
@@ -185,13 +187,12 @@ def _any_factor(context: SearchContext, known: float) -> float | None:
 
     A grid whose resolution is wrong is off by two as likely as by a hundredth.
     """
-    hurried = replace(context, deadline=context.deadline.within(time.monotonic() + LADDER_SECONDS))
     best: Explained | None = None
     factor = 1.0
     for rung in LADDER:
-        near = scale_near_one(replace(hurried, scan=scaled(context.scan, rung))) or 1.0
-        found = _at_scale(hurried, rung * near)
-        if hurried.deadline.passed:
+        near = scale_near_one(replace(context, scan=scaled(context.scan, rung))) or 1.0
+        found = _at_scale(context, rung * near)
+        if context.deadline.passed:
             return None
         if best is None or found.score > best.score:
             best, factor = found, rung * near

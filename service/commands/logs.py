@@ -12,6 +12,7 @@ import typer
 
 from registration import RigidTransform
 
+from .errors import WrongUseError
 from .inputs import needing_formats
 from .service import Json
 
@@ -59,9 +60,13 @@ def opened(path: Path, topic: str | None) -> Log:
 
     Raises
     ------
+    WrongUseError
+        When there is no such file.
     RefusedError
         When it cannot be read.
     """
+    if not path.exists():
+        raise WrongUseError(f"{path}: there is no such file")
     with needing_formats(f"reading {path.name}"):
         from formats import LogOptions, read_log
 

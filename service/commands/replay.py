@@ -44,6 +44,8 @@ REFUSED: Json = {
 
 
 HOPELESS = 20  # scans from the first on
+FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
+HINT = "linefix map check MAP --log LOG tells whether the map is to scale, mirrored, or without directions"
 
 
 class Mode(StrEnum):
@@ -59,6 +61,7 @@ class Tally:
 
     verdicts: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
+    warnings: Counter[str] = field(default_factory=Counter)
     times: list[float] = field(default_factory=list)  # ms
     usable: list[StampedPose] = field(default_factory=list)
     others: list[RigidTransform] = field(default_factory=list)
@@ -79,6 +82,7 @@ class Tally:
             return
         self.verdicts[answer["status"] + (", usable" if answer["usable"] else ", not usable")] += 1
         self.reasons.update(one["code"] for one in answer["reasons"][:1])
+        self.warnings.update(one["code"] for one in answer["warnings"])
         self.times.append(answer["timing_ms"]["total"])
         found = answer["pose"]
         if found is not None:
@@ -212,6 +216,10 @@ def _tell(tally: Tally) -> None:
     print_table(("verdict", "scans", "share"), table)
     if tally.reasons:
         print_table(("why not usable", "scans"), tally.reasons.most_common())
+    if tally.warnings:
+        print_table(("warning", "scans"), tally.warnings.most_common())
+    if len(tally.usable) < FEW * tally.count or "scale" in tally.warnings:
+        print_rows([("hint", HINT)])
     if tally.refused is not None:
         print_rows([("refused", str(tally.refused))])
     if tally.times:

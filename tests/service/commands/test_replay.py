@@ -83,7 +83,7 @@ def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, tr
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("nowhere.log", "--map", "floor.json"), 3, "nowhere.log: there is no such file"),
+        (("nowhere.log", "--map", "floor.json"), 2, "nowhere.log: there is no such file"),
         (("empty.log", "--map", "floor.json"), 3, "empty.log: has no scan"),
         (("drive.log", "--map", "floor.json", "--topic", "FLASER"), 3, "FLASER"),
         (("drive.log", "--map", "hall"), 3, "hall: no such file, and no map is stored"),
