@@ -22,6 +22,7 @@ from .scan import scaled
 from .similarity import Similarity, fit_similarity
 from .tuning import (
     DISTINCT_ANGLE,
+    DOUBTING_DEVIATIONS,
     DOUBTING_WALLS,
     FACTOR_DEVIATIONS,
     FACTOR_GAP,
@@ -152,7 +153,9 @@ def is_far_off(similarity: Similarity) -> bool:
 
     Then its pose is off by decimetres, or it is in another room of the same shape.
     """
-    return is_off(similarity) and abs(similarity.factor - 1.0) > MOST_FACTOR and similarity.more >= DOUBTING_WALLS
+    off = abs(similarity.factor - 1.0)
+    shown = similarity.more >= DOUBTING_WALLS or off >= DOUBTING_DEVIATIONS * similarity.deviation
+    return is_off(similarity) and off > MOST_FACTOR and shown
 
 
 def _at_their_scales(first: Explained, found: Explained) -> list[Ranked]:

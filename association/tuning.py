@@ -181,7 +181,9 @@ FACTOR_DEVIATIONS = 1.5  # tables; and by so many of its standard deviations
 FACTOR_ROUNDS = 3  # tables
 FACTOR_GAP = 6.0  # nats, tables; it is taken where the answer scores so much more,
 FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes
-DOUBTING_WALLS = 1.0  # tables; that have to agree so that a greater factor puts the answer in doubt
+# A greater factor puts the answer in doubt, if so many walls agree beyond those that it takes, or it is beyond noise.
+DOUBTING_WALLS = 1.0  # tables
+DOUBTING_DEVIATIONS = 3.0
 LEAST_AS_SENT = 0.5  # of the best score, tables; what comes to less as it was sent is no rival at a scale of its own
 SAME_PLACE = 1.0  # m, geometry; what a factor may move a pose
 
