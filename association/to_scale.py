@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from registration import wrap_angle
 
 from .acceptance import register_accepted
-from .candidates import Candidates
+from .candidates import Candidates, find_candidates
 from .context import SearchContext
 from .explain import Explanations, explain
 from .ranking import Ranked, rank_candidates
@@ -33,6 +33,8 @@ from .tuning import (
     LEAST_OFF_WALLS,
     LOOSE_RIVALS,
     MOST_FACTOR,
+    RIVAL_FACTOR,
+    RIVAL_SCALES,
     SAME_PLACE,
 )
 
@@ -159,21 +161,28 @@ def is_far_off(similarity: Similarity) -> bool:
 
 
 def _at_their_scales(first: Explained, found: Explained) -> list[Ranked]:
-    """Return what explained the scan as it was sent, each at the scale that fits it best.
+    """Return what explains the scan at other scales, each at the one that fits it best.
 
     Of two rooms that differ by a factor the one fits with a map too large, the other with one too small.
     """
-    if len(first.context.lines.rows) != len(found.context.lines.rows):
-        return []
-    near = [one for one in first.explanations.ranked if one.score >= LEAST_AS_SENT * first.score]
-    return [_at_its_scale(first, one) for one in near[:LOOSE_RIVALS]]
+    rivals: list[Ranked] = []
+    for scale in RIVAL_SCALES:
+        context = first.context if scale == 1.0 else _at_scale(first.context, scale)
+        if len(context.lines.rows) != len(found.context.lines.rows):
+            continue
+        ranked = first.explanations.ranked
+        if scale != 1.0:
+            ranked = tuple(rank_candidates(context, find_candidates(context)))
+        near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
+        rivals += [_at_its_scale(first, context, scale, one) for one in near[:LOOSE_RIVALS]]
+    return rivals
 
 
-def _at_its_scale(first: Explained, one: Ranked) -> Ranked:
-    similarity = fit_similarity(first.context, one)
-    if similarity is None or not abs(similarity.factor - 1.0) <= MOST_FACTOR:
+def _at_its_scale(first: Explained, context: SearchContext, scale: float, one: Ranked) -> Ranked:
+    similarity = fit_similarity(context, one)
+    if similarity is None or not abs(scale * similarity.factor - 1.0) <= RIVAL_FACTOR:
         return one
-    again = _at_scale(first.context, similarity.factor)
+    again = _at_scale(first.context, scale * similarity.factor)
     if len(again.lines.rows) != len(one.matches):
         return one
     found = rank_candidates(again, Candidates(one.estimate, first.explanations.search))
