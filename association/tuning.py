@@ -183,10 +183,10 @@ FACTOR_GAP = 6.0  # nats, tables; it is taken where the answer scores so much mo
 FACTOR_WALLS = 2.0  # tables; and so many walls agree beyond those that it takes
 # A greater factor puts the answer in doubt, if so many walls agree beyond those that it takes, or it is beyond noise.
 DOUBTING_WALLS = 1.0  # tables
-DOUBTING_DEVIATIONS = 3.0
+DOUBTING_DEVIATIONS = 3.0  # geometry
 RIVAL_SCALES = (1.0, 0.94, 0.96, 0.98, 1.02, 1.04, 1.06)  # tables; at which rivals are looked for, where one is taken
 RIVAL_FACTOR = 0.08  # tables; what rivals may be off by in the end
-LEAST_AS_SENT = 0.5  # of the best score, tables; what comes to less as it was sent is no rival at a scale of its own
+LEAST_AS_SENT = 0.5  # of the answer's score, tables; what comes to less there is no rival at a scale of its own
 SAME_PLACE = 1.0  # m, geometry; what a factor may move a pose
 
 # --- Ranking ----------------------------------------------------------------------------------------------------------
