@@ -11,7 +11,7 @@ from registration.layout import Records
 
 from .kernels.walls import direction_raster, grid_cells
 from .layout import ENDS, GRID_SHAPE, as_records, record
-from .tables import Grid, Raster, Walls
+from .tables import Grid, Raster, Sweep, Walls
 from .tuning import (
     CELL,
     CELL_GROWTH,
@@ -20,6 +20,7 @@ from .tuning import (
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
     NARROW_REACH,
+    NEIGHBOURHOOD,
     RASTER_CELL,
     REACH,
     SECTORS,
@@ -36,10 +37,19 @@ def near_walls(walls: Walls) -> Grid:
     return _grid(ends_of(walls), CELL, REACH, MAX_CELLS)
 
 
-def swept_runs(runs: Walls) -> Grid:
-    """List in each cell the runs on it, ``run * SECTORS + sector`` with the sector of its direction."""
-    swept = _grid(ends_of(runs), SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
-    return swept._replace(items=swept.items * np.int32(SECTORS) + _sectors(runs)[swept.items])
+def swept_runs(runs: Walls) -> Sweep:
+    """Return the runs, those that are near one another together, and which of them lie on each cell."""
+    ends = ends_of(runs)
+    squares = np.round(0.5 * (ends[:, :2] + ends[:, 2:]) / NEIGHBOURHOOD)
+    order = np.lexsort((squares[:, 0], squares[:, 1]))
+    rows, swept = runs.rows[order], _grid(ends[order], SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+    sectors = _sectors(rows)[swept.items]
+    present = np.zeros(len(swept.starts) - 1, np.uint16)
+    np.bitwise_or.at(
+        present, np.repeat(np.arange(len(present)), np.diff(swept.starts)), (1 << sectors).astype(np.uint16)
+    )
+    swept = swept._replace(items=swept.items * np.int32(SECTORS) + sectors)
+    return Sweep(rows, rows["end"] - rows["begin"], swept, present)
 
 
 def directions_near(walls: Walls, runs: Walls) -> Raster:
@@ -47,16 +57,16 @@ def directions_near(walls: Walls, runs: Walls) -> Raster:
     # The line of a run may pass its walls by as much as they were merged with.
     both = np.vstack([ends_of(walls), ends_of(runs)])
     shape = _shape(both, RASTER_CELL, REACH + MERGE_LATERAL, MAX_CELLS)
-    sectors, ends = np.concatenate([_sectors(walls), _sectors(runs)]), as_records(ENDS, both)
+    sectors, ends = np.concatenate([_sectors(walls.rows), _sectors(runs.rows)]), as_records(ENDS, both)
     bits = np.zeros(int(shape["columns"][0] * shape["rows"][0]), dtype=np.uint32)
     direction_raster(ends, REACH + MERGE_LATERAL, shape, sectors, bits)
     direction_raster(ends, NARROW_REACH + MERGE_LATERAL, shape, sectors + SECTORS, bits)
     return Raster(shape, bits)
 
 
-def _sectors(walls: Walls) -> NDArray[np.int32]:
-    """Return the sector of each direction, of `SECTORS`."""
-    return np.floor((walls.rows["angle"] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int32) % np.int32(SECTORS)
+def _sectors(walls: Records) -> NDArray[np.int32]:
+    """Return the sector of the direction of each wall, of `SECTORS`."""
+    return np.floor((walls["angle"] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int32) % np.int32(SECTORS)
 
 
 def _grid(ends: Floats, size: float, reach: float, most: int) -> Grid:

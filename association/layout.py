@@ -110,15 +110,50 @@ TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 # Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs.
 BASE = _fields((_I, "sliding crossing"), (_F, "merit"))
 
+# What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, and
+# the angle between them; the point about which a pose turns, and the variance of its rotation; by how much the two
+# angles may disagree, by how much the rotation may be off until the final one is known, and by how many metres b then
+# is; half of what has to lie within its run of a and of b.
+FIGURE = _fields((_F, "x y turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
+
+# Segment a of a base laid on a run, and b while a slides: which run; the column, row and number of the cell where b is,
+# and how these go on; which sectors the direction of b may lie in, as bits; directions of the run and of b; midpoint of
+# b with a at abscissa 0 of the run; the slide where b enters the cell, and the last of all; those at which it comes to
+# the next column and row, and what lies between two of them.
+LAID = _fields(
+    (_I, "run column row step step_x step_y sectors"),
+    (_F, "dx dy b_dx b_dy x y at high next_x next_y pace_x pace_y"),
+)
+
+# A cell that b sweeps, and that lists runs of its direction: which of those that a is laid on; the number of the cell
+# on the way, and in the grid; the slides between which b is in it.
+SWEPT = _fields((_I, "laid step here"), (_F, "at until"))
+
+# A run of the direction of b on the list of such a cell: which run; which of the cells swept; the entry of its list; in
+# the first of an array, which of all of them b lies on.
+MET = _fields((_I, "run cell entry hit"))
+
+# A pose to be tried: the pose; from the sensor to where it is held, in the scan frame, rotated, and the variance of its
+# turning about that; what the prior says of
+# it, and what its score has to come to; the rotation and the sensor in cells of the raster, the heading in sectors;
+# what its lines can add at most; where the search goes on behind it; whether it may score that.
+POSED = np.dtype(
+    [
+        *POSE.descr,
+        *_fields((_F, "lever_x lever_y angle_variance bonus floor cosine sine left bottom turned total")).descr,
+        *_fields((_I, "anchor step entry possible")).descr,
+    ]
+)
+
 # How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
-# through, poses proposed, poses scored to the end; where to go on: at which base or -1, the anchor, the step along it
-# or the item of a cell, and the slide or -inf, with the cell of it and the slides at which the next column and row of
-# cells begin; how many poses were tried ahead of their turn; bound on the gain of a pose that contains no base so far;
-# chance of having missed a better consensus set; the freedom that any set takes at least whose score would be kept.
+# through, poses proposed, poses scored to the end; where to go on: at which base or -1, the anchor, the step along it,
+# and the entry of the list there; how many poses were tried ahead of their turn; bound on the gain of a pose that
+# contains no base so far; chance of having missed a better consensus set; the freedom that any set takes at least whose
+# score would be kept.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
-    (_I, "count bases hypotheses verified current anchor step column row tried"),
-    (_F, "slide next_x next_y bound missed least_freedom"),
+    (_I, "count bases hypotheses verified current anchor step entry tried"),
+    (_F, "bound missed least_freedom"),
 )
 
 # A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
@@ -154,8 +189,8 @@ BEND = _fields((_F, "start more"))
 TWO_FEATURES = _fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
 # What kernels write to while they look at one pose: the pose; the information of its consensus set, its sums, and what
-# it is worth; the end of a beam; a ray; what the beams say. A record that a kernel takes from an array of its own would
-# outlive the array, whose last use ends it: hence these come from outside.
+# it is worth; the end of a beam; a ray; what the beams say; what the search of a base goes by. A record that a kernel
+# takes from an array of its own would outlive the array, whose last use ends it: hence these come from outside.
 SCRATCH = np.dtype(
     [
         ("estimate", ESTIMATE),
@@ -165,6 +200,7 @@ SCRATCH = np.dtype(
         ("point", SEEN),
         ("ray", RAY),
         ("evidence", BEAM_EVIDENCE),
+        ("figure", FIGURE),
     ]
 )
 

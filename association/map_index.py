@@ -46,9 +46,9 @@ class MapIndex:
         The walls joined across doorways: where a scan segment may lie that bridges one.
     grid : Grid
         Walls within `REACH` of each cell, whatever their direction: what lies at a point?
-    sectors : Grid
-        Runs on each cell, ``run * SECTORS + sector`` with the sector of its direction: which runs of that direction
-        does a sweep meet? Told from the list alone, since a look at a run costs more than all else.
+    sweep : Sweep
+        Which runs of a direction does a sweep meet? Told from the list alone, since a look at a run costs more than all
+        else.
     raster : Raster
         The quickest way to see that a segment cannot lie at a place.
     """
@@ -62,7 +62,7 @@ class MapIndex:
     walls: Walls
     runs: Walls
     grid: Grid
-    sectors: Grid
+    sweep: Sweep
     raster: Raster
 
     @classmethod
@@ -152,12 +152,12 @@ class MapIndex:
     @cached_property
     def tables(self) -> MapTables:
         """What the kernels of the search are handed."""
-        sweep = Sweep(self.runs.rows, self.runs.bin_starts, self.sectors)
-        return MapTables(Place(self.walls.rows, self.walls.bin_starts, self.grid), sweep, self.raster)
+        return MapTables(Place(self.walls.rows, self.walls.bin_starts, self.grid), self.sweep, self.raster)
 
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        tables: list[Any] = [self.pieces, self.walls, self.runs, self.grid, self.sectors, self.raster]
+        tables: list[Any] = [self.pieces, self.walls, self.runs, self.grid, self.sweep.sectors, self.raster]
+        tables.append((self.sweep.runs, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
         return sum(array.nbytes for array in [self.wall_of_piece, *lines, *(a for table in tables for a in table)])

@@ -126,7 +126,7 @@ class Sharing:
         state, plan = self._progress.copy(), self._plan
         if self._progress["current"][0] < 0 or self._pending:
             state["current"] = next_base(plan.bases, plan.uses, plan.fade)
-            state["anchor"], state["step"], state["slide"] = 0, 0, -np.inf
+            state["anchor"] = state["step"] = state["entry"] = 0
             if state["current"][0] < 0:
                 return None
         state["hypotheses"] = state["tried"] = 0

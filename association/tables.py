@@ -12,7 +12,8 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import MATCH, SCRATCH, WALL_SHARE, Indices, Integers
+from .layout import MATCH, POSED, SCRATCH, WALL_SHARE, Indices, Integers
+from .tuning import AT_ONCE
 
 
 class Walls(NamedTuple):
@@ -81,15 +82,17 @@ class Sweep(NamedTuple):
 
     Attributes
     ----------
-    runs : (m,) of `WALL`
-    bin_starts : (bins + 1,) where each direction bin of the runs begins
+    runs : (m,) of `WALL`, those that lie near one another together
+    lengths : (m,) of the runs, metres
     sectors : Grid
         Runs on each cell, ``run * SECTORS + sector``.
+    present : (columns * rows,) bit s of a cell is set where it lists a run of direction sector s
     """
 
     runs: Records
-    bin_starts: Integers
+    lengths: Floats
     sectors: Grid
+    present: Integers
 
 
 class Pieces(NamedTuple):
@@ -293,6 +296,8 @@ class Workspace(NamedTuple):
     spreads : (n,) angle gates in sectors
     shifts : (n,) where in the raster's cells the bits for the offset gate begin
     possible : (n,) what each scan line can add at a pose, nats, -1 where it can lie on no wall
+    posed : (k,) of `POSED`, poses to be tried
+    possible_of : (k, n) what each scan line can add at each of them
     held : (n,) which wall of each scan line is in the sums, or -1
     shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
@@ -302,6 +307,8 @@ class Workspace(NamedTuple):
     spreads: Floats
     shifts: Integers
     possible: Floats
+    posed: Records
+    possible_of: Floats
     held: Integers
     shares: Records
     scratch: Records
@@ -312,4 +319,6 @@ class Workspace(NamedTuple):
         held = np.full(count, -1, np.int64)
         spreads, possible, shares = np.zeros(count), np.zeros(count), np.zeros(walls, WALL_SHARE)
         shifts = np.zeros(count, np.int64)
-        return cls(np.zeros(count, MATCH), spreads, shifts, possible, held, shares, np.zeros(1, SCRATCH))
+        posed, possible_of = np.empty(AT_ONCE, POSED), np.empty((AT_ONCE, count))
+        matches, scratch = np.zeros(count, MATCH), np.zeros(1, SCRATCH)
+        return cls(matches, spreads, shifts, possible, posed, possible_of, held, shares, scratch)

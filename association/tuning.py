@@ -27,6 +27,7 @@ SWEEP_CELL = 2.0  # m, tables
 SWEEP_REACH = 0.02  # m, rounding
 RASTER_CELL = 0.5  # m, tables
 NARROW_REACH = 0.15  # m, tables; a wall is in the raster of narrow gates where it is this near
+NEIGHBOURHOOD = 64.0  # m, squares of which the runs are numbered together; measured: 8 to 128 are as good
 MAX_CELLS = 4_000_000  # memory: some 50 MB
 MAX_SWEEP_CELLS = 1_000_000  # memory
 MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about
@@ -133,10 +134,12 @@ SAMPLE_SEED = 20190901
 # Work between two looks at the clock, in tests of a wall: a few milliseconds. Measured.
 CHUNK = 300_000
 USUAL_CROWD = 8.0  # walls on the list that a place on a wall has
+TESTS_BASE = 100
 TESTS_ANCHOR = 5
 TESTS_REJECTED = 10
 TESTS_HYPOTHESIS = 50
 TESTS_REFINED = 800
+AT_ONCE = 256  # runs, cells and poses that go through a stage together; measured: with 64 it takes a tenth longer
 
 # Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
 # of a place. More than all poses of a usual search, and some seconds where thousands of walls lie in one place.

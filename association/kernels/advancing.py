@@ -52,7 +52,7 @@ def advance(
                 return EXHAUSTED
         base = bases[state.current]
         spent += search_base(question, tables, base, found, nothing, state, work, budget - spent)
-        if state.anchor > 0 or state.slide > -math.inf:
+        if state.anchor > 0 or state.step > 0 or state.entry > 0:
             return BUDGET
         why = after_base(question, plan, state, allowed)
         if why != BUDGET:
@@ -111,7 +111,7 @@ def search_ahead(
     state = ahead[0]
     nothing = np.empty(0, dtype=FOUND)
     search_base(question, tables, plan.bases[state.current], nothing, tried, state, work, budget)
-    return state.anchor == 0 and state.slide == -math.inf
+    return state.anchor == 0 and state.step == 0 and state.entry == 0
 
 
 @kernel
@@ -140,6 +140,6 @@ def merge(
     state.current = ahead[0].current
     state.anchor = 0
     state.step = 0
-    state.slide = -math.inf
+    state.entry = 0
     keep_tried(question, tried, found, state, work)
     return after_base(question, plan, state, allowed)

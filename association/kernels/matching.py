@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
@@ -175,45 +177,64 @@ def gates_about(
 
 @kernel
 def may_score(
-    scan: Records,
-    pose: Record,
-    spreads: Floats,
-    shifts: Integers,
-    raster: Raster,
-    threshold: float,
-    possible: Floats,
-) -> bool:
-    """Tell whether the scan may score `threshold` at a pose: no segment counts where no wall of its direction is near.
+    scan: Records, posed: Records, count: int, spreads: Floats, shifts: Integers, raster: Raster, possible: Floats
+) -> None:
+    """Tell of poses whether the scan may score there: no segment counts where no wall of its direction is near.
 
-    Writes to `possible` (n,) what each segment can add, nats, -1 where it can lie on no wall.
+    Of the first `count` of `posed`, (k,) of `POSED`, against the ``floor`` of each. Writes to `possible` (k, n) what
+    each segment can add, nats, -1 where it can lie on no wall, as far as it takes to tell.
 
     Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or
     is between two; and a tenth of the price of `match_scan`. `spreads` and `shifts` as of `gates_about`.
+
+    Line by line, for all poses that are left: so it does not wait for one place of the raster before the next.
     """
     shape = raster.shape[0]
     bits = raster.bits
-    c = math.cos(pose.theta)
-    s = math.sin(pose.theta)
+    columns = shape.columns
+    rows = shape.rows
     per_cell = 1.0 / shape.cell
-    left = (pose.x - shape.x0) * per_cell
-    bottom = (pose.y - shape.y0) * per_cell
-    turned = (pose.theta + math.pi) * PER_RADIAN + 0.5
-    c *= per_cell
-    s *= per_cell
-    total = 0.0
+    open_ones = np.empty(count, np.int32)
+    for p in range(count):
+        one = posed[p]
+        one.cosine = math.cos(one.theta) * per_cell
+        one.sine = math.sin(one.theta) * per_cell
+        one.left = (one.x - shape.x0) * per_cell
+        one.bottom = (one.y - shape.y0) * per_cell
+        one.turned = (one.theta + math.pi) * PER_RADIAN + 0.5
+        one.total = 0.0
+        one.possible = 0
+        open_ones[p] = p
+    left = count
     for i in range(len(scan)):
-        possible[i] = -1.0
-        fx = c * scan[i].x - s * scan[i].y + left
-        fy = s * scan[i].x + c * scan[i].y + bottom
-        if fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows:
-            here = bits[int(fy) * shape.columns + int(fx)] >> shifts[i]
-            if here != 0:
-                middle = turned + scan[i].angle * PER_RADIAN
-                for raw in range(math.floor(middle - spreads[i]), math.floor(middle + spreads[i]) + 1):
-                    if (here >> (raw & (SECTORS - 1))) & 1:
-                        total += scan[i].gain
-                        possible[i] = scan[i].gain
-                        break
-        if total + scan[i].later_gain < threshold:
-            return False
-    return True
+        x = scan[i].x
+        y = scan[i].y
+        gain = scan[i].gain
+        later = scan[i].later_gain
+        angle = scan[i].angle * PER_RADIAN
+        kept = 0
+        for k in range(left):
+            p = open_ones[k]
+            one = posed[p]
+            fx = one.cosine * x - one.sine * y + one.left
+            fy = one.sine * x + one.cosine * y + one.bottom
+            near = False
+            if fx >= 0.0 and fy >= 0.0 and fx < columns and fy < rows:
+                here = bits[int(fy) * columns + int(fx)] >> shifts[i]
+                near = (here & sectors_about(one.turned + angle, spreads[i])) != 0
+            possible[p, i] = gain if near else -1.0
+            one.total += gain if near else 0.0
+            open_ones[kept] = p
+            kept += 1 if one.total + later >= one.floor else 0
+        left = kept
+    for k in range(left):
+        posed[open_ones[k]].possible = 1
+
+
+@inlined
+def sectors_about(middle: float, spread: float) -> int:
+    """Return which sectors there are within `spread` of `middle`, both in sectors, as bits."""
+    first = math.floor(middle - spread)
+    more = min(SECTORS - 1, math.floor(middle + spread) - first)
+    found = ((2 << more) - 1) << (first & (SECTORS - 1))
+    return (found | (found >> SECTORS)) & ((1 << SECTORS) - 1)

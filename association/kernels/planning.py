@@ -25,7 +25,7 @@ from ..tuning import (
     UNTELLING,
 )
 from .ordering import ascending
-from .proposing import least_length
+from .sweeping import least_length
 
 
 @kernel
@@ -189,7 +189,6 @@ def begin(
     count, n = orders.shape
     state = progress[0]
     state.current = -1
-    state.slide = -math.inf
     state.bound = 0.0
     state.missed = 1.0
     residual = np.empty(len(scan))

@@ -10,10 +10,9 @@ from registration.layout import Records
 from ..layout import HARD_PRIOR, TRIED, Integers
 from ..tables import MapTables, Question, Workspace
 from ..tuning import PARALLEL_SINE, WINDOW_TURN
-from .consensus import turning
 from .matching import gates_about, wrap
-from .proposing import anchors, end_slack
-from .trying import try_pose
+from .sweeping import anchors, end_slack
+from .trying import try_poses
 
 
 @kernel
@@ -62,21 +61,20 @@ def search_slides(
     found = borrowed(found)
     work = borrowed(work)
     state = progress[0]
-    place = tables.place
-    raster = tables.raster
     runs = tables.sweep.runs
     prior = question.terms[0].prior
-    pose = work.scratch[0].estimate
+    posed = work.posed
     a = question.scan[sliding]
-    spent = 0
+    variance = a.angle_variance
     nothing = np.empty(0, dtype=TRIED)
-    gates_about(question.scan, a.angle_variance, a.x, a.y, 0.0, question.terms[0].gates, work.spreads, work.shifts)
+    gates_about(question.scan, variance, a.x, a.y, 0.0, question.terms[0].gates, work.spreads, work.shifts)
     anchor_list = np.empty(len(runs), dtype=np.int32)
-    n_anchors = anchors(a.length, runs, tables.sweep.bin_starts, anchor_list)
-    while state.anchor < n_anchors:
-        w = anchor_list[state.anchor]
+    n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
+    left = budget
+    n = 0
+    for anchor in range(state.anchor, n_anchors):
+        w = anchor_list[anchor]
         wall = runs[w]
-        state.anchor += 1
         first = state.step
         state.step = 0
         half = 0.5 * a.length - end_slack(a.length)
@@ -95,14 +93,22 @@ def search_slides(
                 continue
         steps = max(1, math.ceil((high - low) / spacing))
         for j in range(first, steps):
-            if spent > budget:
-                state.anchor -= 1
-                state.step = j
-                return False
             slide = low + (j + 0.5) / steps * (high - low)
-            pose.theta = theta
-            pose.x = wall.dx * slide - wall.dy * wall.offset - gx
-            pose.y = wall.dy * slide + wall.dx * wall.offset - gy
-            turning(a.angle_variance, gx, gy, pose)
-            spent += try_pose(question, place, raster, found, nothing, state, work)
-    return True
+            one = posed[n]
+            one.theta = theta
+            one.x = wall.dx * slide - wall.dy * wall.offset - gx
+            one.y = wall.dy * slide + wall.dx * wall.offset - gy
+            one.lever_x = gx
+            one.lever_y = gy
+            one.angle_variance = variance
+            one.anchor = anchor
+            one.step = j + 1
+            one.entry = 0
+            n += 1
+            if n == len(posed):
+                cost, stopped = try_poses(question, tables, n, found, nothing, state, work, left)
+                if stopped:
+                    return False
+                left -= cost
+                n = 0
+    return not try_poses(question, tables, n, found, nothing, state, work, left)[1]

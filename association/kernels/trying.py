@@ -1,54 +1,98 @@
-"""Compiled trial of one pose: refused as early as can be, or refined and kept."""
+"""Compiled trial of poses: refused as early as can be, or refined and kept."""
 
 import math
 
-from registration.compiling import kernel
+from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
 from ..layout import HARD_PRIOR
-from ..tables import Place, Question, Raster, Workspace
+from ..tables import MapTables, Place, Question, Workspace
 from ..tuning import TESTS_HYPOTHESIS, TESTS_REFINED, TESTS_REJECTED, WHOLE_OVERLAP, WINDOW_MARGIN, WINDOW_TURN
 from .best_poses import floor_of, offer, prior_value
-from .consensus import refine
-from .matching import allow_all, match_scan, may_score, wrap
+from .consensus import refine, turning
+from .matching import match_scan, may_score, wrap
 
 
 @kernel
-def try_pose(
-    question: Question, place: Place, raster: Raster, found: Records, tried: Records, progress: Record, work: Workspace
-) -> int:
-    """Score the pose of the workspace, given with its covariance; keep it if it is among the best.
+def try_poses(
+    question: Question,
+    tables: MapTables,
+    count: int,
+    found: Records,
+    tried: Records,
+    progress: Record,
+    work: Workspace,
+    budget: int,
+) -> tuple[int, bool]:
+    """Score the first `count` poses of the workspace, in order; keep them if they are among the best.
 
-    Where there is room in `tried` (k,) it is noted there instead, for `keep_tried`. Returns what it cost, in tests of a
-    wall.
+    Where there is room in `tried` (k,) they are noted there instead, for `keep_tried`. Returns what it cost, in tests
+    of a wall, and whether `budget`, or that room, was used up: then `progress` stands behind the last one tried.
     """
     scan = question.scan
+    posed = work.posed
     terms = question.terms[0]
-    gates = terms.gates
-    rules = question.rules[0]
     prior = terms.prior
+    for k in range(count):
+        one = posed[k]
+        one.bonus = 0.0 if prior.kind == HARD_PRIOR else prior_value(prior, one)
+        one.floor = floor_of(question.rules[0], progress, one.bonus) + progress.least_freedom
+        if prior.kind == HARD_PRIOR and not _is_about(prior, one):
+            one.floor = math.inf
+    if terms.gates.least_overlap >= WHOLE_OVERLAP:
+        may_score(scan, posed, count, work.spreads, work.shifts, tables.raster, work.possible_of)
+    else:
+        for k in range(count):
+            posed[k].possible = posed[k].floor < math.inf
+            for i in range(len(scan)):
+                work.possible_of[k, i] = scan[i].gain
     pose = work.scratch[0].estimate
-    progress.hypotheses += 1
-    bonus = prior_value(prior, pose)
-    if prior.kind == HARD_PRIOR:
-        bonus = 0.0
-        if (
-            math.hypot(pose.x - prior.x, pose.y - prior.y) > prior.radius + WINDOW_MARGIN
-            or abs(wrap(pose.theta - prior.theta)) > prior.angle + WINDOW_TURN
-        ):
-            return TESTS_REJECTED
-    floor = floor_of(rules, progress, bonus) + progress.least_freedom
-    possible = work.possible
-    if gates.least_overlap < WHOLE_OVERLAP:
-        allow_all(scan, possible)
-    elif not may_score(scan, pose, work.spreads, work.shifts, raster, floor, possible):
-        return TESTS_REJECTED
-    most = math.inf
-    if len(tried) > 0 and gates.least_overlap >= WHOLE_OVERLAP:
-        most = 0.0
-        for i in range(len(scan)):
-            most += max(0.0, possible[i])
-    matched = match_scan(scan, pose, place, gates, possible, floor, work.matches)
+    spent = 0
+    for k in range(count):
+        one = posed[k]
+        progress.hypotheses += 1
+        if one.possible:
+            pose.theta = one.theta
+            pose.x = one.x
+            pose.y = one.y
+            turning(one.angle_variance, one.lever_x, one.lever_y, pose)
+            spent += _match_and_refine(question, tables.place, k, found, tried, progress, work)
+        else:
+            spent += TESTS_REJECTED
+        if spent > budget or (progress.tried == len(tried) and progress.tried > 0):
+            progress.anchor = one.anchor
+            progress.step = one.step
+            progress.entry = one.entry
+            return spent, True
+    return spent, False
+
+
+@inlined
+def _is_about(prior: Record, pose: Record) -> bool:
+    """Tell whether a pose may be refined into the window of a hard prior."""
+    near = math.hypot(pose.x - prior.x, pose.y - prior.y) <= prior.radius + WINDOW_MARGIN
+    return near and abs(wrap(pose.theta - prior.theta)) <= prior.angle + WINDOW_TURN
+
+
+@kernel
+def _match_and_refine(
+    question: Question, place: Place, k: int, found: Records, tried: Records, progress: Record, work: Workspace
+) -> int:
+    """Match the pose of the workspace, which is the k-th of its poses to be tried, as far as it may still be kept."""
+    scan = question.scan
+    terms = question.terms[0]
+    rules = question.rules[0]
+    one = work.posed[k]
+    possible = work.possible_of[k]
+    pose = work.scratch[0].estimate
+    # Of the poses tried before it one may have been better than what was known when it was looked at.
+    floor = floor_of(rules, progress, one.bonus) + progress.least_freedom
+    most = 0.0
+    for i in range(len(scan)):
+        most += max(0.0, possible[i])
+    if most < floor:
+        return TESTS_REJECTED if terms.gates.least_overlap >= WHOLE_OVERLAP else TESTS_HYPOTHESIS
+    matched = match_scan(scan, pose, place, terms.gates, possible, floor, work.matches)
     if matched < 0.0:
         return TESTS_HYPOTHESIS
     progress.verified += 1
@@ -56,22 +100,22 @@ def try_pose(
     least = floor_of(rules, progress, 0.0) + progress.least_freedom
     score = refine(scan, pose, place, terms, work.matches, work, least)
     if len(tried) == 0:
-        offer(found, progress, rules, prior, pose, score)
+        offer(found, progress, rules, terms.prior, pose, score)
         return TESTS_REFINED
-    one = tried[progress.tried]
+    note = tried[progress.tried]
     progress.tried += 1
-    one.bonus = bonus
-    one.possible = min(most, matched)
-    one.score = score
-    one.theta = pose.theta
-    one.x = pose.x
-    one.y = pose.y
+    note.bonus = one.bonus
+    note.possible = min(most, matched)
+    note.score = score
+    note.theta = pose.theta
+    note.x = pose.x
+    note.y = pose.y
     return TESTS_REFINED
 
 
 @kernel
 def keep_tried(question: Question, tried: Records, found: Records, progress: Record, work: Workspace) -> None:
-    """Keep of the poses that were tried ahead of their turn what `try_pose` would have kept in their turn, in order.
+    """Keep of the poses that were tried ahead of their turn what `try_poses` would have kept in their turn, in order.
 
     It would have known of better ones by then, and left off sooner, where `tried` (k,) shows how much was possible. A
     score that is kept comes of gains that it would not have left off at.

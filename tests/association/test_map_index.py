@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 import tracemalloc
@@ -12,7 +13,17 @@ import pytest
 
 from association import InvalidMapError, MapIndex
 from association.tables import Walls
-from association.tuning import CELL, MAX_CELLS, MAX_ENTRIES, MAX_SWEEP_CELLS, MERGE_LATERAL, REACH, SECTORS, SWEEP_CELL
+from association.tuning import (
+    CELL,
+    MAX_CELLS,
+    MAX_ENTRIES,
+    MAX_SWEEP_CELLS,
+    MERGE_LATERAL,
+    NEIGHBOURHOOD,
+    REACH,
+    SECTORS,
+    SWEEP_CELL,
+)
 from association.walls import ends_of
 from registration import Segments
 from registration.layout import Floats
@@ -137,18 +148,33 @@ def test_built_without_directions_it_is_its_own_undirected() -> None:
 
 
 def test_the_sweep_lists_the_sector_of_every_run() -> None:
-    runs, sectors = np.divmod(MAZE_INDEX.sectors.items, SECTORS)
-    off = (MAZE_INDEX.runs.rows["angle"][runs] + math.pi - sectors * math.tau / SECTORS) % math.tau
+    runs, sectors = np.divmod(MAZE_INDEX.sweep.sectors.items, SECTORS)
+    off = (MAZE_INDEX.sweep.runs["angle"][runs] + math.pi - sectors * math.tau / SECTORS) % math.tau
     assert set(runs) == set(range(len(MAZE_INDEX.runs.rows)))
     assert np.minimum(off, math.tau - off).max() <= math.pi / SECTORS + 1e-9
 
 
 def test_the_sweep_lists_runs_where_they_are() -> None:
-    starts, shape, ends = MAZE_INDEX.sectors.starts, MAZE_INDEX.sectors.shape, ends_of(MAZE_INDEX.runs)
-    runs = MAZE_INDEX.sectors.items // SECTORS
+    sweep = MAZE_INDEX.sweep
+    starts, shape, ends = sweep.sectors.starts, sweep.sectors.shape, ends_of(MAZE_INDEX.runs._replace(rows=sweep.runs))
+    runs = sweep.sectors.items // SECTORS
     cells = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     for cell, run in zip(cells[::3].tolist(), runs[::3].tolist(), strict=True):
         assert distance_to_cell(ends[run], cell, shape) < 0.1
+    for cell, present in enumerate(sweep.present.tolist()):
+        there = set((sweep.sectors.items[starts[cell] : starts[cell + 1]] % SECTORS).tolist())
+        assert {s for s in range(SECTORS) if present >> s & 1} == there
+
+
+def test_runs_that_are_near_one_another_are_numbered_together() -> None:
+    """What is swept one after the other is then read from one place."""
+    corners = np.random.default_rng(0).uniform(0.0, 300.0, (400, 2))
+    index = index_of(np.hstack([corners, corners + np.array([3.0, 0.0])]))
+    assert sorted(index.sweep.runs.tolist()) == sorted(index.runs.rows.tolist())
+    np.testing.assert_array_equal(index.sweep.lengths, index.sweep.runs["end"] - index.sweep.runs["begin"])
+    middles = ends_of(index.runs._replace(rows=index.sweep.runs)).reshape(-1, 2, 2).mean(axis=1)
+    squares = [tuple(square) for square in np.round(middles / NEIGHBOURHOOD).tolist()]
+    assert len([*itertools.groupby(squares)]) == len(set(squares)) > 20
 
 
 def test_what_the_verdict_takes_from_a_map() -> None:
@@ -198,7 +224,7 @@ def test_memory_is_capped_however_long_the_walls_are() -> None:
 
 def test_memory_is_capped_whatever_the_extent() -> None:
     index = index_of([[0, 0, 1, 0], [99_000, 99_000, 99_001, 99_000]])
-    for grid, size, most in ((index.grid, CELL, MAX_CELLS), (index.sectors, SWEEP_CELL, MAX_SWEEP_CELLS)):
+    for grid, size, most in ((index.grid, CELL, MAX_CELLS), (index.sweep.sectors, SWEEP_CELL, MAX_SWEEP_CELLS)):
         shape = grid.shape[0]
         assert shape["cell"] > size
         assert shape["columns"] * shape["rows"] < 1.01 * most

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +13,11 @@ from hypothesis import strategies as st
 
 from association import AssociationOptions
 from association.kernels import matching
-from association.layout import MATCH
+from association.layout import MATCH, POSED
 from association.scan_lines import gates
+from association.tables import Raster
 from registration import RigidTransform
-from registration.layout import Records
+from registration.layout import Floats, Records
 
 from ..records import NOTHING_KNOWN, assert_records, estimate_of
 from ..reference import matching as twin
@@ -92,6 +95,22 @@ def test_gates_about(seed: int, theta_var: float, gates: Records) -> None:
     assert shifts.tolist() == begins.tolist()
 
 
+def may_score(
+    scan: Records,
+    poses: Sequence[RigidTransform],
+    floors: Sequence[float],
+    spreads: Floats,
+    shifts: Any,
+    raster: Raster,
+) -> tuple[list[bool], Floats]:
+    """Return of each pose whether the scan may come to its floor there, and what each line can add."""
+    posed, possible = np.zeros(len(poses) + 1, POSED), np.zeros((len(poses) + 1, len(scan)))
+    for one, at, floor in zip(posed, poses, floors, strict=False):
+        one["x"], one["y"], one["theta"], one["floor"] = at.x, at.y, at.theta, floor
+    matching.may_score(scan, posed, len(poses), spreads, shifts, raster, possible)
+    return [bool(told) for told in posed["possible"][:-1]], possible[:-1]
+
+
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
 def test_may_score(seed: int) -> None:
@@ -99,14 +118,20 @@ def test_may_score(seed: int) -> None:
     d = drawn(seed)
     theta_var, pin, slip = 10.0 ** d.rng.uniform(-6.0, -3.0), d.rng.uniform(-5.0, 5.0, 2), d.rng.uniform(0.0, 0.2)
     spreads, shifts = twin.gates_about(d.scan, theta_var, pin, slip, GATES)
-    possible, matches, others = np.zeros(len(d.scan)), np.zeros(len(d.scan), MATCH), np.zeros(len(d.scan), MATCH)
-    for at in (d.at, d.near(0.3, 3.0, 3.0), d.near(2.0, 9.0, 9.0)):
-        bound = twin.reachable(d.scan, at, spreads, shifts, TABLES.raster)
+    matches, others = np.zeros(len(d.scan), MATCH), np.zeros(len(d.scan), MATCH)
+    places = [d.at, d.near(0.3, 3.0, 3.0), d.near(2.0, 9.0, 9.0)]
+    bounds = [twin.reachable(d.scan, at, spreads, shifts, TABLES.raster) for at in places]
+
+    def told(margin: float) -> tuple[list[bool], Floats]:
+        return may_score(d.scan, places, [bound + margin for bound in bounds], spreads, shifts, TABLES.raster)
+
+    assert told(1e-6)[0] == [False] * 3
+    told_so, gains = told(-1e-6)
+    assert told_so == [True] * 3
+    for at, bound, possible in zip(places, bounds, gains, strict=True):
         x, y = RigidTransform(0.0, 0.0, at.theta + d.rng.choice([-slip, 0.0, slip])).apply(pin)
         turning = np.array([y, -x, 1.0])
         one = estimate_of(at, theta_var * np.outer(turning, turning))[0]
-        assert not matching.may_score(d.scan, one, spreads, shifts, TABLES.raster, bound + 1e-6, possible)
-        assert matching.may_score(d.scan, one, spreads, shifts, TABLES.raster, bound - 1e-6, possible)
         assert possible[possible > 0.0].sum() == pytest.approx(bound)
         np.testing.assert_array_equal(possible[possible > 0.0], d.scan["gain"][possible > 0.0])
         total = matching.match_scan(d.scan, one, PLACE, GATES[0], d.scan["gain"].copy(), 0.0, others)
@@ -114,8 +139,11 @@ def test_may_score(seed: int) -> None:
         assert matching.match_scan(d.scan, one, PLACE, GATES[0], possible, total - 1e-9, matches) == total
         np.testing.assert_array_equal(matches["wall"], others["wall"])
     far = moved(d.at, [0.0, 1e3, 0.0])
-    assert not matching.may_score(d.scan, estimate_of(far)[0], spreads, shifts, TABLES.raster, 1e-9, possible)
-    assert (possible[0] < 0.0).all()
+    # Of many each is told by itself.
+    floors = [bound + 1e-6 if k == 1 else bound - 1e-6 for k, bound in enumerate(bounds)]
+    told_so, gains = may_score(d.scan, [*places, far], [*floors, 1e-9], spreads, shifts, TABLES.raster)
+    assert told_so == [True, False, True, False]
+    assert gains[3, 0] < 0.0
 
 
 def test_a_pose_over_a_doorway_may_score() -> None:
@@ -125,7 +153,7 @@ def test_a_pose_over_a_doorway_may_score() -> None:
     for jamb in np.linspace(3.0, 3.5, 11):
         index = index_of([[0.0, 0.0, jamb, 0.0], [jamb + 1.45, 0.0, 9.0, 0.0], [9.0, 5.0, 0.0, 5.0]])
         for slide in np.linspace(-3.0, 6.0, 46):
-            at = estimate_of(local(index, pose(float(slide))))[0]
+            at = local(index, pose(float(slide)))
             gains = segments["gain"].copy()
-            total = matching.match_scan(segments, at, index.tables.place, GATES[0], gains, 0.0, matches)
-            assert matching.may_score(segments, at, spreads, shifts, index.raster, total - 1e-9, gains), (jamb, slide)
+            total = matching.match_scan(segments, estimate_of(at)[0], index.tables.place, GATES[0], gains, 0.0, matches)
+            assert may_score(segments, [at], [total - 1e-9], spreads, shifts, index.raster)[0] == [True], (jamb, slide)

@@ -209,12 +209,11 @@ def test_begin(seed: int) -> None:
     """A scan of more segments than bases are made of, and of fewer; the best value that is known stays."""
     d = drawn(seed)
     question, n = context_of(INDEX, scan_of(d.endpoints)).question(RULE), int(d.rng.integers(1, len(d.scan) + 1))
-    samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0, slide=2.0)
+    samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0)
     plan = planning.begin(
         question, INDEX.runs, INDEX.area, samples.orders, samples.ranks, progress, math.log(REUSE), seed % 2 == 0
     )
     assert progress[0]["current"] == -1
-    assert progress[0]["slide"] == -math.inf
     assert progress[0]["bound"] == pytest.approx(d.scan["gain"].sum())
     assert progress[0]["missed"] == 1.0
     assert progress[0]["best_value"] == 3.0
@@ -244,7 +243,7 @@ def test_sliding_segments(seed: int) -> None:
 
 
 def start_of(scan: Records) -> Records:
-    return record(PROGRESS, current=-1, slide=-np.inf, bound=scan["gain"].sum(), missed=1.0)
+    return record(PROGRESS, current=-1, bound=scan["gain"].sum(), missed=1.0)
 
 
 @dataclass(frozen=True)

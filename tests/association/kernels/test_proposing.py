@@ -11,14 +11,15 @@ import pytest
 from hypothesis import example, given, settings
 
 from association import HardPrior
-from association.kernels import proposing, trying
+from association.kernels import proposing, sweeping, trying
 from association.kernels.sliding import search_slides
 from association.layout import BASE, ESTIMATE, FOUND, PROGRESS, RULES, record
 from association.tables import Question
-from association.tuning import ROUNDS, TESTS_HYPOTHESIS, TESTS_REFINED, TESTS_REJECTED
+from association.tuning import AT_ONCE, ROUNDS, TESTS_HYPOTHESIS, TESTS_REFINED, TESTS_REJECTED
+from registration import RigidTransform
 from registration.layout import Records
 
-from ..records import estimate_of, pose_of
+from ..records import pose_of
 from ..reference import proposing as twin
 from ..reference.consensus import refine
 from ..reference.geometry import moved
@@ -42,9 +43,9 @@ def base_of(d: Drawn, least: float = 1.0) -> tuple[int, int] | None:
 def test_anchors(seed: int) -> None:
     rng = np.random.default_rng(seed)
     runs, out, length = oblique(rng).runs, np.zeros(60, np.int64), rng.uniform(0.3, 7.0)
-    count = proposing.anchors(length, runs.rows, runs.bin_starts, out)
-    need = length - 2.0 * twin.end_slack(length)
-    assert out[:count].tolist() == np.nonzero(runs.rows["end"] - runs.rows["begin"] >= need)[0].tolist()
+    lengths = runs.rows["end"] - runs.rows["begin"]
+    count = sweeping.anchors(length, lengths, out)
+    assert out[:count].tolist() == np.nonzero(lengths >= length - 2.0 * twin.end_slack(length))[0].tolist()
 
 
 @given(SEEDS)
@@ -102,18 +103,18 @@ def asked(d: Drawn, window: HardPrior | None = None) -> Question:
 
 def swept(question: Question, base: tuple[int, int], budget: int = 10**9) -> Found:
     """Go through a base."""
-    found, progress = np.zeros(20_000, FOUND), record(PROGRESS, slide=-np.inf)
+    found, progress = np.zeros(20_000, FOUND), record(PROGRESS)
     chosen, work, calls = record(BASE, sliding=base[0], crossing=base[1]), workspace_of(question.scan), 0
     while progress["bases"][0] == 0:
         calls += 1
         assert proposing.search_base(question, TABLES, chosen[0], found, NOTHING, progress[0], work, budget) > 0
-    assert (progress["anchor"][0], progress["slide"][0]) == (0, -math.inf)
+    assert (progress["anchor"][0], progress["step"][0], progress["entry"][0]) == (0, 0, 0)
     return Found(found[: int(progress["count"][0])], progress, calls)
 
 
 def slid(question: Question, sliding: int, spacing: float, budget: int = 10**9) -> Found:
     """Slide a segment."""
-    found, progress = np.zeros(20_000, FOUND), record(PROGRESS, slide=-np.inf)
+    found, progress = np.zeros(20_000, FOUND), record(PROGRESS)
     work, calls, done = workspace_of(question.scan), 0, False
     while not done:
         calls += 1
@@ -135,28 +136,6 @@ def assert_found(found: Found, scan: Records, proposals: list[twin.Proposal], wi
     assert (off.min(axis=1, initial=np.inf) < 1e-4).all()
 
 
-def test_a_walk_goes_on_from_the_cell_where_it_stood() -> None:
-    """And not from the one that the slide says, which is another one to rounding where cells meet."""
-    lost = 0
-    for seed in range(8):
-        d = drawn(seed, radius=7.0)
-        base = base_of(d)
-        if base is None:
-            continue
-        question, chosen, work = asked(d), record(BASE, sliding=base[0], crossing=base[1]), workspace_of(d.scan)
-        found, progress = np.zeros(20_000, FOUND), record(PROGRESS, slide=-np.inf)
-        whole = swept(question, base).proposed
-        while progress["bases"][0] == 0:
-            proposing.search_base(question, TABLES, chosen[0], found, NOTHING, progress[0], work, 1)
-            if progress["slide"][0] > -np.inf:
-                away = progress.copy()
-                away["column"] = away["row"] = -1000  # far off the map
-                proposing.search_base(question, TABLES, chosen[0], found, NOTHING, away[0], work, 10**9)
-                lost += whole - int(away["hypotheses"][0])
-        assert progress["hypotheses"][0] == whole
-    assert lost > 0
-
-
 @given(SEEDS)
 @example(100)  # left in one cell, and taken up again, it goes on to the one before it in memory
 @settings(max_examples=12, deadline=None)
@@ -172,29 +151,54 @@ def test_a_base_is_swept_whole(seed: int) -> None:
         pieces = swept(asked(d), base, budget)
         assert whole.proposed == pieces.proposed == len(expected)
         np.testing.assert_array_equal(pieces.poses, whole.poses)
-        assert whole.calls == 1 < pieces.calls
+        assert whole.calls == 1
+        assert pieces.calls > 1 or not expected
 
 
-def test_a_crowded_cell_is_gone_through_in_pieces() -> None:
-    """10,000 walls through one point held a search for 5 s beyond its deadline."""
-    x, y = 0.04 * np.arange(30), np.full(30, 5.0)
-    index = index_of(np.vstack([[[-5.0, 0.0, 5.0, 0.0]], np.stack([x, -y, x, y], axis=1)]))
+@pytest.mark.parametrize(("count", "apart"), [(30, 0.04), (AT_ONCE + 44, 0.035), (AT_ONCE + 44, 2.5)])
+def test_what_is_met_at_once_is_gone_through_in_pieces(count: int, apart: float) -> None:
+    """10,000 walls through one point held a search for 5 s beyond its deadline.
+
+    Few of them; more than fit a stage, in few cells; and in more cells than fit one.
+    """
+    x, y = apart * np.arange(count), np.full(count, 5.0)
+    index = index_of(np.vstack([[[-5.0, 0.0, x[-1] + 5.0, 0.0]], np.stack([x, -y, x, y], axis=1)]))
     scan = scan_of([[-2.0, 0.0, 2.0, 0.0], [0.0, -2.0, 0.0, 2.0]])
     question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1)
 
     def steps(budget: int) -> tuple[list[int], Records]:
         """Return how many poses each call proposed, and what was found."""
-        found, progress, proposed = np.zeros(20_000, FOUND), record(PROGRESS, slide=-np.inf), [0]
-        work = workspace_of(question.scan)
+        found, progress, proposed = np.zeros(20_000, FOUND), record(PROGRESS), [0]
+        work = workspace_of(question.scan, index)
         while progress["bases"][0] == 0:
             proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, budget)
             proposed.append(int(progress["hypotheses"][0]))
         return np.diff(proposed).tolist(), found
 
     (all_at_once, whole), (one_by_one, pieces) = steps(10**9), steps(1)
-    assert all_at_once[0] == sum(one_by_one) == 30
+    assert all_at_once[0] == sum(one_by_one) == count
     assert max(one_by_one) == 1
     np.testing.assert_array_equal(pieces, whole)
+    for most in (20, AT_ONCE + 10):  # it stops where a stage was begun anew, too
+        some, again = steps(most * TESTS_REFINED)
+        assert sum(some) == count
+        assert max(some) <= most
+        np.testing.assert_array_equal(again, whole)
+
+
+def test_what_is_met_and_does_not_fit_is_not_met_again() -> None:
+    """Of many runs in one place most are too far off: between these the search stops, too."""
+    count = AT_ONCE + 5
+    x, low = 0.0005 * np.arange(count), np.where(np.arange(count) < AT_ONCE, 0.9, -9.0)
+    index = index_of(np.vstack([[[-5.0, 0.0, 7.0, 0.0]], np.stack([x, low, x, low + 18.0], axis=1)]))
+    scan = scan_of([[-2.0, 0.0, 2.0, 0.0], [0.0, -1.9, 0.0, 1.9]])
+    question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1)
+    found, progress, work, stood = np.zeros(20_000, FOUND), record(PROGRESS), workspace_of(question.scan, index), set()
+    while progress["bases"][0] == 0:
+        proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 1)
+        stood.add(progress[["anchor", "step", "entry"]][0].item())
+    assert progress["hypotheses"][0] == 5
+    assert len(stood) > 5 + 1
 
 
 @given(SEEDS)
@@ -240,37 +244,53 @@ def test_a_segment_slides_along_every_wall(seed: int) -> None:
 
 @given(SEEDS)
 @settings(max_examples=40, deadline=None)
-def test_try_pose(seed: int) -> None:
-    """A pose is looked at only as far as it may still be kept, and each step is counted."""
+def test_try_poses(seed: int) -> None:
+    """Each is looked at only as far as it may still be kept beside those before it, and each step is counted."""
     d = drawn(seed, radius=7.0)
-    covariance = SMALL * 10.0 ** d.rng.uniform(-1.0, 1.0)
+    variance, pin = SMALL[2, 2] * 10.0 ** d.rng.uniform(-1.0, 1.0), d.rng.uniform(-2.0, 2.0, 2)
     window = HardPrior(d.near(), 0.5, 0.2) if seed % 2 else None
     question, work = asked(d, window), workspace_of(d.scan)
     question.rules["kept_share"] = 0.65
     if whole := d.rng.random() < 0.7:
-        work.spreads[:], _ = gates_about(d.scan, covariance[2, 2], np.zeros(2), 0.0, GATES)
+        work.spreads[:], _ = gates_about(d.scan, variance, np.zeros(2), 0.0, GATES)
     else:
         question.terms["gates"]["least_overlap"] = 0.4  # a midpoint may then be off the map: the raster knows nothing
     gates = question.terms["gates"]
-    for at in (d.at, d.near(), d.near(0.1, 0.5, 0.5), d.near(0.3, 3.0, 3.0)):
-        progress, found = (
-            record(PROGRESS, best_value=d.rng.uniform(0.0, 1.5) * d.scan["gain"].sum()),
-            np.zeros(9, FOUND),
-        )
-        progress["least_kept"] = d.rng.choice([0.0, 0.7]) * progress["best_value"]
-        progress["least_freedom"] = d.rng.choice([0.0, 10.0])
-        least = max(0.65 * progress["best_value"][0], progress["least_kept"][0])
+    places = [d.near(0.3, 3.0, 3.0), d.near(0.1, 0.5, 0.5), d.near(), d.at, d.near(0.1, 0.5, 0.5)]
+    best_value = d.rng.uniform(0.0, 1.0) * d.scan["gain"].sum()
+    progress, found = record(PROGRESS, best_value=best_value), np.zeros(9, FOUND)
+    progress["least_freedom"] = d.rng.choice([0.0, 10.0])
+    for k, (one, at) in enumerate(zip(work.posed, places, strict=False)):
+        one["x"], one["y"], one["theta"] = at.x, at.y, at.theta
+        one["lever_x"], one["lever_y"] = RigidTransform(0.0, 0.0, at.theta).apply(pin)
+        one["angle_variance"] = variance
+        one["anchor"], one["step"], one["entry"] = 100 + k, 10 + k, k
+    expected, kept_scores = [], [0.0]
+    for at in places:
+        least = 0.65 * best_value
         floor = least + progress["least_freedom"][0]
-        work.scratch["estimate"] = estimate_of(at, covariance)
-        spent = trying.try_pose(question, PLACE, TABLES.raster, found, NOTHING, progress[0], work)
+        x, y = RigidTransform(0.0, 0.0, at.theta).apply(pin)
+        turning = np.array([y, -x, 1.0])
+        covariance = variance * np.outer(turning, turning)
         outside = window is not None and not twin.may_be_refined_into(window, at)
         if outside or (whole and reachable(d.scan, at, work.spreads, work.shifts, TABLES.raster) < floor):
-            steps = (0, 0, TESTS_REJECTED)
+            expected.append((0, TESTS_REJECTED))
         elif match_scan(d.scan, at, covariance, PLACE, gates)[1] < floor:
-            steps = (0, 0, TESTS_HYPOTHESIS)
+            expected.append((0, TESTS_HYPOTHESIS))
         else:
             refined = refine(d.scan, at, covariance, PLACE, gates, MODEL, ROUNDS)
             inside = window is None or window.contains(refined.pose)
-            steps = (1, int(refined.score > 0.0 and refined.score >= least and inside), TESTS_REFINED)
-        assert (progress["verified"][0], progress["count"][0], spent) == steps
-        assert progress["hypotheses"][0] == 1
+            kept = refined.score > 0.0 and refined.score >= least and inside
+            expected.append((1, TESTS_REFINED))
+            kept_scores += [refined.score] if kept else []
+            best_value = max(best_value, *kept_scores)
+    # All of them; and one at a time, each from where the one before it left off.
+    spent, stopped = trying.try_poses(question, TABLES, len(places), found, NOTHING, progress[0], work, 10**9)
+    assert not stopped
+    assert (progress["hypotheses"][0], progress["verified"][0]) == (len(places), sum(one[0] for one in expected))
+    assert spent == sum(one[1] for one in expected)
+    assert found["value"].max() == pytest.approx(max(kept_scores))
+    progress["hypotheses"] = 0
+    spent, stopped = trying.try_poses(question, TABLES, len(places), found, NOTHING, progress[0], work, 0)
+    assert stopped
+    assert progress[0][["hypotheses", "anchor", "step", "entry"]].item() == (1, 100, 10, 0)
