@@ -27,7 +27,8 @@ from .table import Row, at_most, mean, print_rows, print_table, quantile
 
 PAIRS = (10, 100, 1_000, 10_000, 100_000, 1_000_000)
 SIZES = (200, 2_000, 20_000, 200_000)
-TIMES = {200: (0.3, 1.0), 2_000: (1.0, 5.0), 20_000: (5.0, 20.0), 200_000: (40.0, 150.0)}  # ms, median and p95
+TIMES = {200: (0.3, 0.8), 2_000: (1.0, 3.0), 20_000: (3.0, 12.0), 200_000: (30.0, 120.0)}  # ms, median and p95
+CLUTTERED = (5.0, 25.0)  # of the most clutter
 INDEX_SECONDS, INDEX_MEGABYTES = 5.0, 500.0  # of the greatest map
 SCAN_SEGMENTS = 25
 CLUTTER = 0.3
@@ -256,6 +257,10 @@ def growth(queries: int, sizes: tuple[int, ...], pairs: tuple[int, ...] = PAIRS)
         list(zip(pairs, times, strict=True)),
     )  # fmt: skip
     rows = growth_rows(found)
+    most, (median, p95) = clutters[-1], CLUTTERED
+    what = f"{SWEPT:,} map segments, {CLUTTERS[-1]:.0%} of clutter: search"
+    rows.append(at_most(f"{what}, median ms", most.median, None, median, ".2f"))
+    rows.append(at_most(f"{what}, p95 ms", most.p95, None, p95, ".2f"))
     if SIZES[-1] in sizes:
         ratio = shared(SIZES[-1], queries)
         rows.append(at_most(f"{SIZES[-1]:,} map segments: two threads over one, of the time", ratio, None, 0.6, ".2f"))

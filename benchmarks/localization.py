@@ -24,6 +24,7 @@ from .reliability import print_reliability, reliability_row
 from .table import Row, at_least, at_most, mean, print_rows, print_table, quantile
 
 IDENTIFIABLE = 0.02  # of lead
+LARGE = 400  # segments
 
 # What must be reached and what is aimed at, by level or log.
 RIGHT_FIRST = {"scan": (0.93, 0.95), "scan_30": (0.87, 0.92), "scan_50": (0.72, 0.80)}
@@ -87,6 +88,15 @@ def time_rows(outcomes: Sequence[Outcome], *, goals: bool) -> list[Row]:
         Row("  without ranking and verdict, median / p95 ms", _two(pure, ".2f")),
         Row("  hypotheses, median / p95", _two(hypotheses, ".0f")),
         Row("  search complete", f"{mean(o.result.search.complete for o in outcomes):.4f}"),
+    ]
+
+
+def large_rows(outcomes: Sequence[Outcome]) -> list[Row]:
+    """Judge the times of scans with clutter in large plans."""
+    cpu, what = [o.cpu for o in outcomes], f"scan_30, plans of {LARGE} segments or more ({len(outcomes)}): search"
+    return [
+        at_most(f"{what}, median ms", quantile(cpu, 0.5), None, 1.6, ".2f"),
+        at_most(f"{what}, p95 ms", quantile(cpu, 0.95), None, 12.0, ".2f"),
     ]
 
 
@@ -163,6 +173,7 @@ def localization(only: set[str], stride: int, *, listing: bool, engine: Engine |
             [
                 *level_rows(found, goals=real),
                 *time_rows(found, goals=real),
+                *large_rows([o for o in found if o.query.level == "scan_30" and len(plans.maps[o.map]) >= LARGE]),
                 stranger_row("another building: not usable", away),
             ],
         )
