@@ -76,9 +76,9 @@ def _best_directions(samples: Sequence[Sample], present: Way) -> bool:
     both = [one for one in samples if {(True, WIDEST), (False, WIDEST)} <= one.trials.keys()]
     (usable, score), (usable_otherwise, score_otherwise) = worth(present[0]), worth(not present[0])
     clearly = max(1.0, BETTER_USABLE * len(samples))
-    # A score without directions may well come from chance: then clearly fewer scans are usable.
+    # A score without directions may well come from chance: then clearly fewer scans are usable, or none.
     better = usable_otherwise > usable + clearly or (
-        score_otherwise > BETTER_SCORE * score and usable_otherwise >= usable - clearly
+        score_otherwise > BETTER_SCORE * score and usable_otherwise >= max(1.0, usable - clearly)
     )
     return present[0] is not better
 
@@ -94,7 +94,8 @@ def _nearest_way(samples: Sequence[Sample], present: Way, directed: bool, off: f
 def _mirrored(samples: Sequence[Sample], present: Way) -> Finding | None:
     both = [(one.trials[present], one.mirrored) for one in samples if one.mirrored is not None]
     score, usable = sum(a.score for a, _ in both), sum(a.usable for a, _ in both)
-    if sum(b.score for _, b in both) <= BETTER_SCORE * score or sum(b.usable for _, b in both) < usable:
+    # Scans of another building fit hardly better either way: of these none is usable.
+    if sum(b.score for _, b in both) <= BETTER_SCORE * score or sum(b.usable for _, b in both) < max(1, usable):
         return None
     count = sum(b.score > a.score for a, b in both)
     return Finding(

@@ -14,6 +14,7 @@ from association.checking import Sample, SampleReport, judge_samples, try_sample
 from registration import RigidTransform
 from registration.layout import Floats
 
+from ..scenes import maze
 from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled, two_faces
 
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0])
@@ -115,6 +116,14 @@ def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None
     assert [one.trials[True, None].usable for one in samples] == asked
     assert sum(asked) > len(asked) / 2
     assert codes(judge_samples(samples, sigma=None, oriented=True)) == ([] if factor == 1.0 else ["scale"])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_scans_of_another_building_say_nothing_of_this_one(seed: int) -> None:
+    """They fit a little better mirrored, without directions, or shrunk to one room: all by chance."""
+    report = told(maze(seed))
+    assert codes(report) == []
+    assert report.usable == 0
 
 
 def test_poses_in_another_frame() -> None:
