@@ -94,7 +94,7 @@ def _nearest_way(samples: Sequence[Sample], present: Way, directed: bool, off: f
 def _mirrored(samples: Sequence[Sample], present: Way) -> Finding | None:
     both = [(one.trials[present], one.mirrored) for one in samples if one.mirrored is not None]
     score, usable = sum(a.score for a, _ in both), sum(a.usable for a, _ in both)
-    # Scans of another building fit hardly better either way: of these none is usable.
+    # Scans of another building fit better one way or the other by chance: none of them is usable.
     if sum(b.score for _, b in both) <= BETTER_SCORE * score or sum(b.usable for _, b in both) < max(1, usable):
         return None
     count = sum(b.score > a.score for a, b in both)
