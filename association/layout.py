@@ -172,6 +172,9 @@ VARIANCES = _fields((_F, "map common least_offset least_angle"))
 # A ray from a place in the index frame: unit direction; how far it is followed.
 RAY = _fields((_F, "x y dx dy limit"))
 
+# A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return.
+BEAM = _fields((_F, "x y dx dy range"))
+
 # How many rays pass through a wall on their way to a segment of the consensus set, and to another one.
 BLOCKER = _fields((_I, "to_matched to_clutter"))
 

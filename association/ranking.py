@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from registration import RigidTransform
 from registration.layout import Records
@@ -17,7 +17,7 @@ from .context import SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
-from .layout import BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, POINT, as_records
+from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT
 from .options import CancelledError, Estimator
 from .tables import Rays
 from .tuning import (
@@ -290,11 +290,15 @@ def rays_of(context: SearchContext, most: int) -> Rays:
     """Return at most `most` of the beams of which something is known, evenly spread."""
     beams = context.scan.beams
     assert beams is not None
-    known = ~np.isnan(beams.ranges)
-    step = max(1, math.ceil(int(known.sum()) / most))
-    angles, ranges = (np.ascontiguousarray(column[known][::step]) for column in (beams.angles, beams.ranges))
-    if beams.origins is None:
-        origins = np.tile(context.scan.viewpoint or (0.0, 0.0), (len(angles), 1))
-    else:
-        origins = beams.origins[known][::step]
-    return Rays(angles, ranges, as_records(POINT, origins), beams.range_max)
+    known = np.flatnonzero(~np.isnan(beams.ranges))
+    chosen = known[:: max(1, math.ceil(len(known) / most))]
+    begins = (context.scan.viewpoint or (0.0, 0.0)) if beams.origins is None else beams.origins[chosen].T
+    return Rays(beam_rows(begins, beams.angles[chosen], beams.ranges[chosen]), beams.range_max)
+
+
+def beam_rows(begins: ArrayLike, angles: Floats, ranges: Floats) -> Records:
+    """Return beams as records (n,) of `BEAM`, of where they begin, (2,) for all of them or (2, n), m."""
+    rows = np.empty(len(angles), BEAM)
+    rows["x"], rows["y"] = np.asarray(begins)
+    rows["dx"], rows["dy"], rows["range"] = np.cos(angles), np.sin(angles), ranges
+    return rows

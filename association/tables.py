@@ -165,16 +165,12 @@ class Rays(NamedTuple):
 
     Attributes
     ----------
-    angles : (m,) radians in the scan frame
-    ranges : (m,) metres, inf where nothing was met
-    places : (m,) of `POINT`, where each begins, in the scan frame
+    beams : (m,) of `BEAM`
     reach : float
         Metres; how far a beam without return is known to be free.
     """
 
-    angles: Floats
-    ranges: Floats
-    places: Records
+    beams: Records
     reach: float
 
 

@@ -27,27 +27,25 @@ from .sight import first_hit
 
 @inlined
 def across_wall(
-    ray: Record, angle: float, distance: float, walls: Records, starts: Integers, items: Integers, shape: Record
+    ray: Record, distance: float, walls: Records, starts: Integers, items: Integers, shape: Record
 ) -> tuple[float, int]:
     """Return how much farther than the map shows a beam reads, metres across the wall, and the wall; -1 for none.
 
     At a grazing angle the pose decides the range, so that it counts across the wall.
     """
-    dx = math.cos(angle)
-    dy = math.sin(angle)
-    ray.dx = dx
-    ray.dy = dy
     expected, w = first_hit(ray, walls, starts, items, shape)
     if w < 0:
         return 0.0, w
-    return (distance - expected) * max(LEAST_INCIDENCE, abs(walls[w].dx * dy - walls[w].dy * dx)), w
+    return (distance - expected) * max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx)), w
 
 
 @inlined
-def put_sensor(ray: Record, at: Record, c: float, s: float, pose: Record) -> None:
-    """Let a ray begin where the sensor was; `c` and `s` are cosine and sine of the pose's heading."""
-    ray.x = c * at.x - s * at.y + pose.x
-    ray.y = s * at.x + c * at.y + pose.y
+def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> None:
+    """Let a ray go where a beam did; `c` and `s` are cosine and sine of the pose's heading."""
+    ray.x = c * beam.x - s * beam.y + pose.x
+    ray.y = s * beam.x + c * beam.y + pose.y
+    ray.dx = c * beam.dx - s * beam.dy
+    ray.dy = s * beam.dx + c * beam.dy
 
 
 @kernel
@@ -57,9 +55,7 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
     A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
     proves little, black or mirror walls give none.
     """
-    angles = rays.angles
-    ranges = rays.ranges
-    places = rays.places
+    beams = rays.beams
     walls = place.walls
     starts = place.grid.starts
     items = place.grid.items
@@ -68,18 +64,18 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
     s = math.sin(pose.theta)
     read = 0.0
     passed = 0.0
-    for i in range(len(angles)):
-        if math.isinf(ranges[i]):
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
             continue
-        put_sensor(ray, places[i], c, s, pose)
-        ray.limit = min(rays.reach, ranges[i] + BEHIND)
-        across, w = across_wall(ray, pose.theta + angles[i], ranges[i], walls, starts, items, shape)
+        put_beam(ray, beams[i], c, s, pose)
+        ray.limit = min(rays.reach, beams[i].range + BEHIND)
+        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
         if w < 0:
             continue
         read += math.exp(-0.5 * across * across / (NEAR * NEAR))
         if across > CERTAIN:
             passed += min(1.0, (walls[w].end - walls[w].begin) / SURE_LENGTH)
-    n = max(1, len(angles))
+    n = max(1, len(beams))
     evidence.read = read / n
     evidence.passed = passed / n
 
@@ -90,9 +86,7 @@ def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tu
 
     Where the map shows nothing, and where nothing came back, nothing is compared. `poses` (1,).
     """
-    angles = rays.angles
-    ranges = rays.ranges
-    places = rays.places
+    beams = rays.beams
     walls = place.walls
     starts = place.grid.starts
     items = place.grid.items
@@ -103,19 +97,19 @@ def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tu
     s = math.sin(pose.theta)
     farther = 0
     nearer = 0
-    for i in range(len(angles)):
-        if math.isinf(ranges[i]):
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
             continue
-        put_sensor(ray, places[i], c, s, pose)
-        ray.limit = min(rays.reach, ranges[i] + WALL_BEHIND)
-        across, w = across_wall(ray, pose.theta + angles[i], ranges[i], walls, starts, items, shape)
+        put_beam(ray, beams[i], c, s, pose)
+        ray.limit = min(rays.reach, beams[i].range + WALL_BEHIND)
+        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
         if w < 0:
             continue
         if across > FARTHER_BY:
             farther += 1
         elif across < -NEARER_BY:
             nearer += 1
-    n = max(1, len(angles))
+    n = max(1, len(beams))
     return farther / n, nearer / n
 
 
@@ -126,9 +120,7 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
     One round of point-to-line least squares by the same sums; a point is a pair without spread. A direction that no
     wall fixes is held where it is.
     """
-    angles = rays.angles
-    ranges = rays.ranges
-    places = rays.places
+    beams = rays.beams
     walls = place.walls
     starts = place.grid.starts
     items = place.grid.items
@@ -138,11 +130,11 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
     clear(sums)
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
-    for i in range(len(angles)):
-        if math.isinf(ranges[i]):
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
             continue
-        px = places[i].x + ranges[i] * math.cos(angles[i])
-        py = places[i].y + ranges[i] * math.sin(angles[i])
+        px = beams[i].x + beams[i].range * beams[i].dx
+        py = beams[i].y + beams[i].range * beams[i].dy
         x = c * px - s * py + pose.x
         y = s * px + c * py + pose.y
         fx = (x - shape.x0) / shape.cell

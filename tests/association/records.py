@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from association.layout import ESTIMATE, POINT, SIGHTING, as_records, record
+from association.layout import ESTIMATE, POINT, SIGHTING, record
+from association.ranking import beam_rows
 from association.tables import Rays, Sights
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
@@ -40,7 +41,7 @@ def assert_records(got: Records, expected: Records, **tolerance: Any) -> None:
 
 def rays_of(angles: Floats, ranges: Floats, viewpoint: Any = (0.0, 0.0), reach: float = 20.0) -> Rays:
     """Return beams that all begin at one place."""
-    return Rays(angles, ranges, as_records(POINT, np.tile(np.asarray(viewpoint, float), (len(angles), 1))), reach)
+    return Rays(beam_rows(viewpoint, angles, ranges), reach)
 
 
 def sights_of(scan: Records, viewpoint: Any = (0.0, 0.0), *, sighted: bool = True) -> Sights:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import beams
-from association.layout import BEAM_EVIDENCE, POINT, RAY, as_records
+from association.layout import BEAM_EVIDENCE, RAY
+from association.ranking import beam_rows
 from association.tables import Rays, Workspace
 from registration import RigidTransform
 
@@ -33,7 +34,7 @@ def drawn_rays(rng: np.random.Generator, count: int) -> tuple[Rays, RigidTransfo
     ranges += rng.normal(size=len(ranges)) * 0.02
     ranges *= np.where(rng.random(len(ranges)) < 0.2, rng.uniform(0.3, 1.5, len(ranges)), 1.0)
     some = np.sort(rng.permutation(len(ANGLES))[:count])
-    return Rays(ANGLES[some], ranges[some], as_records(POINT, places[sensor[some]]), 20.0), at
+    return Rays(beam_rows(places[sensor[some]].T, ANGLES[some], ranges[some]), 20.0), at
 
 
 def evidence_of(ranges: np.ndarray) -> tuple[float, float]:
@@ -100,8 +101,8 @@ def test_refine_by_beams(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rays, truth = drawn_rays(rng, 60)
     work = Workspace.of(1, 1)
-    for count in (len(rays.angles), 16, 12):
-        some = Rays(rays.angles[:count], rays.ranges[:count], rays.places[:count], rays.reach)
+    for count in (len(rays.beams), 16, 12):
+        some = rays._replace(beams=rays.beams[:count])
         start = moved(truth, rng.normal(size=3) * [0.02, 0.05, 0.05])
         for gate in (0.35, 0.15):
             estimate = estimate_of(start)

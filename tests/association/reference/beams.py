@@ -31,14 +31,20 @@ from .sight import first_hit
 Evidence = tuple[float, float]  # read, passed
 
 
+def angles_of(rays: Rays) -> Floats:
+    """Return the directions of beams, radians."""
+    angles: Floats = np.arctan2(rays.beams["dy"], rays.beams["dx"])
+    return angles
+
+
 def begins(rays: Rays) -> Floats:
     """Return where beams begin, (m, 2)."""
-    return np.stack([rays.places["x"], rays.places["y"]], axis=1)
+    return np.stack([rays.beams["x"], rays.beams["y"]], axis=1)
 
 
 def offsets(rays: Rays, pose: RigidTransform, place: Place, behind: float) -> Iterator[tuple[float, np.void]]:
     """Yield how much farther each beam reads than the first wall on its way, metres across that, and the wall."""
-    for angle, distance, begin in zip(rays.angles + pose.theta, rays.ranges, begins(rays), strict=True):
+    for angle, distance, begin in zip(angles_of(rays) + pose.theta, rays.beams["range"], begins(rays), strict=True):
         if distance == math.inf:
             continue
         limit = min(rays.reach, distance + behind)
@@ -55,20 +61,20 @@ def beam_evidence(rays: Rays, pose: RigidTransform, place: Place) -> Evidence:
     for across, wall in offsets(rays, pose, place, BEHIND):
         read += math.exp(-0.5 * (across / NEAR) ** 2)
         passed += min(1.0, (wall["end"] - wall["begin"]) / SURE_LENGTH) if across > CERTAIN else 0.0
-    return read / max(1, len(rays.angles)), passed / max(1, len(rays.angles))
+    return read / max(1, len(rays.beams)), passed / max(1, len(rays.beams))
 
 
 def beam_shares(rays: Rays, pose: RigidTransform, place: Place) -> tuple[float, float]:
     """Count the beams that read farther than the map shows, and nearer."""
     across = np.array([offset for offset, _ in offsets(rays, pose, place, WALL_BEHIND)])
-    n = max(1, len(rays.angles))
+    n = max(1, len(rays.beams))
     return float((across > FARTHER_BY).sum()) / n, float((across < -NEARER_BY).sum()) / n
 
 
 def refine_by_beams(rays: Rays, pose: RigidTransform, place: Place, gate: float) -> RigidTransform:
     """Lay the ends of the beams on the nearest of the walls that are listed where they are."""
     ends, lines = [], []
-    for angle, distance, begin in zip(rays.angles, rays.ranges, begins(rays), strict=True):
+    for angle, distance, begin in zip(angles_of(rays), rays.beams["range"], begins(rays), strict=True):
         if distance == math.inf:
             continue
         end = begin + distance * np.array([math.cos(angle), math.sin(angle)])
