@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from registration import RegistrationResult
+from registration import RegistrationResult, RigidTransform
 
 from .acceptance import Accepted, accept, register_accepted
-from .candidates import Effort, find_candidates
+from .candidates import Candidates, Effort, find_candidates
 from .context import SearchContext
+from .layout import FOUND, record
 from .ranking import Ranked, rank_candidates
 from .result import SearchReport
 from .settling import Settled, settle
 from .sight import BeamShares, agreement, compare_beams
 from .significance import significance
 from .views import corrected
+
+NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +86,22 @@ def explain(context: SearchContext, effort: Effort | None = None) -> Explanation
     CancelledError
         When the deadline was cancelled.
     """
-    candidates = find_candidates(context, effort)
+    return _explain_by(context, find_candidates(context, effort))
+
+
+def explain_at(context: SearchContext, pose: RigidTransform) -> Explanations:
+    """Explain the scan from a pose in the map, m and radians, as if a search had found that alone.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    x, y = context.index.origin
+    return _explain_by(context, Candidates(record(FOUND, x=pose.x - x, y=pose.y - y, theta=pose.theta), NOT_SEARCHED))
+
+
+def _explain_by(context: SearchContext, candidates: Candidates) -> Explanations:
     ranked = rank_candidates(context, candidates)
     # What the deadline left unranked may have been better.
     search = replace(candidates.report, complete=False) if context.deadline.passed else candidates.report

@@ -23,7 +23,7 @@ import tempfile
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -89,6 +89,7 @@ def kernel(function: Function) -> Function:
     if not hasattr(compiled, "_cache"):
         raise ImportError(UNKNOWN_NUMBA)
     compiled._cache = KernelCache(function)
+    compiled.get_call_template = partial(_call_template, compiled.get_call_template)  # type: ignore[method-assign]
     return cast(Function, compiled)
 
 
@@ -96,6 +97,12 @@ def inlined(function: Function) -> Function:
     """Compile a small function into each kernel that calls it."""
     compiled = njit(inline="always")(function)
     return cast(Function, compiled) if isinstance(compiled, Dispatcher) else interpreted(function)
+
+
+def _call_template(template: Callable[..., Any], args: tuple[types.Type, ...], kws: dict[str, types.Type]) -> Any:
+    """Call a kernel from another one with a constant as with any number: it is not compiled once more for its sake."""
+    plain: Callable[[types.Type], types.Type] = types.unliteral
+    return template(tuple(map(plain, args)), {name: plain(kind) for name, kind in kws.items()})
 
 
 def borrowed(value: Value) -> Value:

@@ -11,7 +11,7 @@ from registration import compiling
 
 from ..parsing.own_modules import command_of
 
-BESIDE = "service.work.warmup"  # as a program it compiles what registers and vectorizes
+BESIDE = "service.work.warmup"  # as a program it compiles what the search comes to late, or needs first
 PACKAGES = ("registration", "vectorization", "association")
 
 
@@ -23,17 +23,19 @@ def is_compiled() -> bool:
 def compile_kernels() -> None:
     """Compile everything, or wait for another process that does.
 
-    The compiler keeps 330 MB, so whoever is to go on afterwards loads what another process has compiled. What registers
-    and vectorizes is compiled by a process beside this one, where there is another core: the compiler takes one.
+    The compiler keeps 330 MB, so whoever is to go on afterwards loads what another process has compiled. Where there is
+    another core a process beside this one takes half: the compiler takes one core. Each kernel is kept as soon as it is
+    compiled, so that the other process loads it; the halves are laid so that they seldom meet at one.
     """
     place = compiling.cache_directory("association").parent
     place.mkdir(parents=True, exist_ok=True)
     with FileLock(place / "linefix.lock"):
         if is_compiled():
             return
-        from .warmup import warm_up, warm_up_searching
+        from .warmup import warm_up, warm_up_registering, warm_up_searching
 
         if (os.cpu_count() or 1) > 1:
             with subprocess.Popen(command_of(BESIDE)):
+                warm_up_registering()
                 warm_up_searching()
         warm_up()

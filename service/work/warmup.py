@@ -10,6 +10,7 @@ from association import (
     Deadline,
     HardPrior,
     MapIndex,
+    Prior,
     Scan,
     SoftPrior,
     View,
@@ -17,6 +18,9 @@ from association import (
     associate,
 )
 from association.checking import check_map, try_sample
+from association.context import SearchContext
+from association.explain import explain_at
+from association.scan_lines import ScanLines
 from registration import Beams, MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
 
@@ -51,7 +55,8 @@ TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
 def warm_up() -> None:
     """Register, vectorize, associate, check and analyze a map once in each way that has kernels of its own."""
-    warm_up_measuring()
+    warm_up_registering()
+    warm_up_vectorizing()
     warm_up_searching()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
@@ -65,8 +70,8 @@ def warm_up() -> None:
         analysis.look(number)
 
 
-def warm_up_measuring() -> None:
-    """Register and vectorize once in each way that has kernels of its own."""
+def warm_up_registering() -> None:
+    """Register once in each way that has kernels of its own."""
     room = Segments.from_array(ROOM)
     pairs = np.repeat(np.arange(len(room))[:, None], 2, axis=1)
     for options in (
@@ -75,6 +80,10 @@ def warm_up_measuring() -> None:
         RegistrationOptions(estimator="one_step", evaluate_at=RigidTransform(0.0, 0.0, 0.0)),
     ):
         register(room, MeasuredSegments.from_segments(room), pairs, 0.0, options)
+
+
+def warm_up_vectorizing() -> None:
+    """Vectorize once in each way that has kernels of its own."""
     ranges = room_ranges(TURN)
     vectorize(LaserScan(-np.pi, TURN[1] - TURN[0], ranges, 0.1, 30.0))
     points = np.stack([ranges * np.cos(TURN), ranges * np.sin(TURN)], axis=1)
@@ -82,16 +91,22 @@ def warm_up_measuring() -> None:
     vectorize(points, viewpoint=None)
 
 
+def warm_up_scans() -> None:
+    """Join the segments of a scan as every search does."""
+    ScanLines.of(Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM))), 0.0, AssociationOptions())
+
+
+def warm_up_explaining() -> None:
+    """Work out the answer to scans that nobody searches for: their pose is given."""
+    index = MapIndex.build(Segments.from_array(ROOM), 0.0)
+    for scan, prior, how in _asked():
+        explain_at(SearchContext.of(index, scan, prior, how, Deadline()), RigidTransform(0, 0, 0))
+
+
 def warm_up_searching() -> None:
     """Associate once in each way that has kernels of its own."""
-    room = Segments.from_array(ROOM)
-    measured, index, pose = MeasuredSegments.from_segments(room), MapIndex.build(room, 0.0), RigidTransform(0, 0, 0)
-    for scan, prior, how in (
-        (Scan(measured), None, AssociationOptions()),
-        (_with_beams(), SoftPrior(pose, np.eye(3)), AssociationOptions()),
-        (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
-        (assemble([View(Scan(measured)), View(Scan(measured), pose, 1e-4 * np.eye(3))]), None, AssociationOptions()),
-    ):
+    index = MapIndex.build(Segments.from_array(ROOM), 0.0)
+    for scan, prior, how in _asked():
         associate(index, scan, prior, how, Deadline())
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
@@ -99,6 +114,18 @@ def warm_up_searching() -> None:
     # Nothing is said of this map, which is not to scale.
     too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
     associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
+
+
+def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
+    """Return the scan, the prior and the options of requests in each way that has kernels of its own."""
+    measured, pose = MeasuredSegments.from_segments(Segments.from_array(ROOM)), RigidTransform(0, 0, 0)
+    views = assemble([View(Scan(measured)), View(Scan(measured), pose, 1e-4 * np.eye(3))])
+    return [
+        (Scan(measured), None, AssociationOptions()),
+        (_with_beams(), SoftPrior(pose, np.eye(3)), AssociationOptions()),
+        (Scan(measured, None), HardPrior(pose, 1.0, 1.0), AssociationOptions(oriented=False)),
+        (views, None, AssociationOptions()),
+    ]
 
 
 def _with_beams() -> Scan:
@@ -122,4 +149,6 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
 
 
 if __name__ == "__main__":
-    warm_up_measuring()
+    warm_up_scans()
+    warm_up_vectorizing()
+    warm_up_explaining()

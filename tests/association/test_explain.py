@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from association import Deadline, HardPrior
-from association.explain import explain
+from association.explain import explain, explain_at
 from association.settling import settle
 from association.sight import agreement
 from association.significance import significance
@@ -69,3 +69,14 @@ def test_what_is_worked_out_of_the_answer() -> None:
 def test_the_report_of_the_search_is_handed_on() -> None:
     assert not explain(context_of(ROOM_INDEX, SCAN, deadline=Deadline(at=0.0))).search.complete
     assert explain(context_of(ROOM_INDEX, scan_of(np.zeros((0, 4))), seed=9)).search.seed == 9
+
+
+def test_a_pose_that_is_given_is_explained_as_one_that_was_found() -> None:
+    context = context_of(index_of(ROOM + 50.0), SCAN)
+    found, given = explain(context).answer, explain_at(context, pose(INSIDE.x + 50.0, INSIDE.y + 50.0, INSIDE.theta))
+    assert found is not None
+    assert given.answer is not None
+    assert given.rivals == ()
+    assert not given.search.complete
+    assert given.answer.best.score == pytest.approx(found.best.score, abs=1e-6)
+    assert same_pose(given.answer.settled.pose, found.settled.pose, 1e-6, 1e-6)

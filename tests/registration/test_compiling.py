@@ -81,15 +81,15 @@ class SmallPackage:
         (directory,) = (self.home / "kernels" / "__pycache__").iterdir()
         return directory
 
-    def run(self, **environment: object) -> Ran:
+    def run(self, more: str = "", **environment: object) -> Ran:
         """Run the kernel in a process of its own, which obeys the permissions of files whoever started the tests."""
         left = ("LINEFIX_KERNELS", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
         clean = {name: value for name, value in os.environ.items() if name not in left}
         clean |= {"PYTHONPATH": f"{self.home.parent}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1"}
         clean |= {name: str(value) for name, value in environment.items()}
         ended = subprocess.run(
-            [sys.executable, "-c", RUN], env=clean, cwd=self.home.parent, capture_output=True, text=True, timeout=120,
-            preexec_fn=_obey_permissions, check=False,
+            [sys.executable, "-c", RUN + more], env=clean, cwd=self.home.parent, capture_output=True, text=True,
+            timeout=120, preexec_fn=_obey_permissions, check=False,
         )  # fmt: skip
         assert ended.returncode == 0, ended.stderr
         answer, hits, before, after, directory = ended.stdout.split()
@@ -213,6 +213,16 @@ def test_old_source_is_forgotten_in_the_end(small: SmallPackage) -> None:
         os.utime(path, (age, age))
     newest = small.run().directory
     assert set(place.iterdir()) == {newest, *others, *stamps[: compiling.KEPT_STAMPS - 1]}
+
+
+def test_a_constant_is_no_variant_of_its_own(small: SmallPackage) -> None:
+    """A count that begins at 0 is a constant to Numba at first."""
+    counting = "    n = 0\n    for _ in range(3):\n        n = inner(n) - 9\n    return inner(True) + n"
+    small.edit("kernels/outer.py", "    return 2.0 * inner(x)", counting)
+    small.edit("layout.py", "10.0", "10")
+    small.edit("kernels/inner.py", "+ 1.0", "+ 1")
+    variants = "\nfrom small.kernels.inner import inner\nassert len(inner.signatures) == 2, inner.signatures"
+    assert small.run(variants).answer == 11 + 10 * (10 * (10 * 0 - 8) - 8) - 8
 
 
 def test_a_kernel_elsewhere_is_refused() -> None:

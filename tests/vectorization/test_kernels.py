@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from registration.layout import Floats, Record, Records
-from vectorization.kernels import lines, pieces, tracing
+from vectorization.kernels import lines, ordering, pieces, tracing
 from vectorization.kernels import rays as beams
 from vectorization.layout import FITTED, POINT, SCANNER, SUMS
 from vectorization.tuning import MEDIAN_CHI, TRUSTED, TRUSTED_MEAN_SQUARE, WINDOW, WORST_ANGLE, WORST_FIT
@@ -62,6 +62,18 @@ def line_with(**fields: float) -> Record:
 def bounds(pieces: Records) -> list[tuple[int, int]]:
     """Return pieces as pairs."""
     return [(int(piece["first"]), int(piece["end"])) for piece in pieces]
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    values=st.lists(st.floats(0.0, 9.0) | st.sampled_from([1.0, 2.0]), min_size=1, max_size=60), place=st.floats(0, 1)
+)
+def test_select(values: list[float], place: float) -> None:
+    k, got = int(place * (len(values) - 1)), np.array(values)
+    ordering.select(got, k)
+    assert got[k] == np.partition(values, k)[k]
+    assert got[:k].max(initial=-1.0) <= got[k] <= got[k:].min()
+    assert sorted(got) == sorted(values)
 
 
 @settings(deadline=None, max_examples=40)

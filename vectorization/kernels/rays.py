@@ -22,6 +22,7 @@ from ..tuning import (
     TRUSTED_MEAN_SQUARE,
     WINDOW,
 )
+from .ordering import select
 
 
 @kernel
@@ -134,10 +135,10 @@ def ray_noise(points: Records, increment: float) -> float:
     if count < LEAST_TRIPLES:
         return 0.0
     k = int(TRUSTED * count)
-    least = np.partition(z[:count], k)
+    select(z[:count], k)
     squares = 0.0
     for i in range(k):
-        squares += least[i] * least[i]
+        squares += z[i] * z[i]
     return math.sqrt(squares / (k * TRUSTED_MEAN_SQUARE))
 
 
@@ -168,4 +169,5 @@ def window_noise(points: Records) -> float:
         root = math.hypot(cxx - cyy, 2.0 * cxy)
         squares[a] = max(0.0, 0.5 * (cxx + cyy - root)) / (WINDOW - 2)
     k = windows // 2
-    return math.sqrt(np.partition(squares, k)[k] / MEDIAN_CHI)
+    select(squares, k)
+    return math.sqrt(squares[k] / MEDIAN_CHI)
