@@ -45,6 +45,8 @@ def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats
         for b in range(bins):
             low = bin_starts[b]
             high = bin_starts[b + 1]
+            if low == high:
+                continue
             while low < high:
                 middle = (low + high) // 2
                 if longest[middle] >= need:
@@ -99,24 +101,25 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
     """
     slides, fitting = slack_tables(scan, count, runs)
     middle = middle_of(scan)
-    bin_starts = runs.bin_starts
-    bins = len(bin_starts) - 1
+    bins = slides.shape[1]
     total = np.zeros(count)
-    smooth = np.empty((count, bins))
-    taken = np.empty(bins, dtype=np.int64)
-    n_taken = 0
-    for b in range(bins):
-        if bin_starts[b + 1] > bin_starts[b]:
-            taken[n_taken] = b
-            n_taken += 1
+    # Twice around, so that a bin that is turned needs no division to be found.
+    smooth = np.empty((count, 2 * bins))
+    taken = np.empty((count, bins), dtype=np.int64)
+    n_taken = np.zeros(count, dtype=np.int64)
     short = np.empty(count)
     tells = np.empty(count)
     for i in range(count):
         tells[i] = math.log(scan[i].gain)
         short[i] = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
         for b in range(bins):
-            total[i] += slides[i, b]
-            smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, (b + 1) % bins]
+            after = b + 1 if b + 1 < bins else 0
+            smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, after]
+            smooth[i, b + bins] = smooth[i, b]
+            if slides[i, b] > 0.0:
+                total[i] += slides[i, b]
+                taken[i, n_taken[i]] = b
+                n_taken[i] += 1
     bases = np.empty(count * (count - 1) // 2, dtype=BASE)
     k = 0
     for i in range(count):
@@ -128,11 +131,11 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
                 continue
             sweep_i = COST_ANCHOR * fitting[i] + COST_SLIDE * total[i]
             sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]
-            shift = round(turn / (2.0 * math.pi / bins))
+            shift = round(turn / (2.0 * math.pi / bins)) % bins
             expected = 0.0
-            for t in range(n_taken):
-                b = taken[t]
-                expected += slides[i, b] * smooth[j, (b + shift) % bins]
+            for t in range(n_taken[i]):
+                b = taken[i, t]
+                expected += slides[i, b] * smooth[j, b + shift]
             expected *= HYPOTHESIS_SCALE / area * sine**SINE_POWER * max(short[i], short[j])
             cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
             bases[k].sliding = i if sweep_i <= sweep_j else j
