@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from registration import Segments
+from registration.layout import Floats
 
 from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
+
+_ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
+DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # in which extents are looked for
 
 
 def diagonal(segments: Segments) -> float:
@@ -17,18 +21,31 @@ def diagonal(segments: Segments) -> float:
     return float(np.hypot(max(high[0::2]) - min(low[0::2]), max(high[1::2]) - min(low[1::2])))
 
 
+def extent(segments: Segments) -> float:
+    """Return how wide segments lie apart in the direction in which that is most, metres; 0 without any."""
+    if not len(segments):
+        return 0.0
+    along = _along(segments)
+    return float((along.max(axis=1) - along.min(axis=1)).max())
+
+
 def inner_extent(segments: Segments) -> float:
-    """Return how wide segments lie apart in the direction in which that is most, metres.
+    """Return the extent without what is outermost, metres.
 
     Of their length a share of `OUTERMOST_SHARE` at either end does not count: some beams leave through a window.
     """
     if not len(segments):
         return 0.0
-    angles = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
-    along = segments.endpoints.reshape(-1, 2) @ np.stack([np.cos(angles), np.sin(angles)])
-    order = np.argsort(along, axis=0)
-    shares = np.cumsum(np.repeat(segments.lengths, 2)[order], axis=0) / (2.0 * segments.lengths.sum())
-    low = np.argmax(shares >= OUTERMOST_SHARE, axis=0)
-    high = np.argmax(shares >= 1.0 - OUTERMOST_SHARE, axis=0)
-    columns = np.arange(EXTENT_ANGLES)
-    return float((along[order[high, columns], columns] - along[order[low, columns], columns]).max())
+    along = _along(segments)
+    order = np.argsort(along, axis=1)
+    shares = np.cumsum(np.repeat(segments.lengths, 2)[order], axis=1) / (2.0 * segments.lengths.sum())
+    low = np.argmax(shares >= OUTERMOST_SHARE, axis=1)
+    high = np.argmax(shares >= 1.0 - OUTERMOST_SHARE, axis=1)
+    rows = np.arange(EXTENT_ANGLES)
+    return float((along[rows, order[rows, high]] - along[rows, order[rows, low]]).max())
+
+
+def _along(segments: Segments) -> Floats:
+    """Return where the ends of n segments lie along each of the directions, (directions, 2 n) metres."""
+    found: Floats = DIRECTIONS @ segments.endpoints.reshape(-1, 2).T
+    return found

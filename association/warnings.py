@@ -10,7 +10,7 @@ from registration import Beams
 
 from .causes import Cause, Mistake
 from .context import SearchContext
-from .extents import diagonal, inner_extent
+from .extents import extent, inner_extent
 from .result import AssociationWarning, SearchReport
 from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
@@ -103,8 +103,8 @@ def _stuck_ranges(beams: Beams | None) -> str | None:
 def _exceeding(context: SearchContext) -> str | None:
     """Tell where the scan, but for its outermost pieces, would not fit into the box around the map."""
     segments, room = context.scan.measured.segments, context.index.diagonal
-    # The diagonal of its box is no less than its extent in any direction, and much sooner told.
-    if diagonal(segments) <= EXCEEDING * room:
+    # With its outermost pieces it is no less wide, which is sooner told.
+    if extent(segments) <= EXCEEDING * room:
         return None
     reach = inner_extent(segments)
     if reach <= EXCEEDING * room:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError, InvalidSegmentsError
+from .kernels.segments import are_within, lines_of
 from .layout import Floats
 from .limits import MAX_COORDINATE, MAX_LENGTH, MAX_POINTS, MAX_SIGMA, MIN_LENGTH
 
@@ -78,17 +79,14 @@ class Segments:
                 f"expected numbers of shape (n, 4), got {raw.dtype} of shape {raw.shape}", argument=argument
             )
         e = np.array(raw, dtype=np.float64, order="C")
-        _refuse(~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
-        _refuse(
-            (np.abs(e) > MAX_COORDINATE).any(axis=1),
-            f"has a coordinate beyond {MAX_COORDINATE:g} m",
-            argument,
-        )
-        span = e[:, 2:] - e[:, :2]
-        lengths = np.hypot(span[:, 0], span[:, 1])
-        _refuse(lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
-        _refuse(lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
-        return cls._lines(e)
+        if not are_within(e.reshape(-1), -MAX_COORDINATE, MAX_COORDINATE):
+            _refuse(~np.isfinite(e).all(axis=1), "has a coordinate that is not finite", argument)
+            _refuse((np.abs(e) > MAX_COORDINATE).any(axis=1), f"has a coordinate beyond {MAX_COORDINATE:g} m", argument)
+        found = cls._lines(e)
+        if not are_within(found.lengths, MIN_LENGTH, MAX_LENGTH):
+            _refuse(found.lengths < MIN_LENGTH, f"is shorter than {MIN_LENGTH:g} m", argument)
+            _refuse(found.lengths > MAX_LENGTH, f"is longer than {MAX_LENGTH:g} m", argument)
+        return found
 
     @classmethod
     def derived(cls, endpoints: Floats) -> Segments:
@@ -103,14 +101,7 @@ class Segments:
 
     @classmethod
     def _lines(cls, e: Floats) -> Segments:
-        span = e[:, 2:] - e[:, :2]
-        lengths = np.hypot(span[:, 0], span[:, 1])
-        d = span / lengths[:, None]
-        n = np.stack([-d[:, 1], d[:, 0]], axis=1)
-        middles = e[:, :2] + 0.5 * span
-        # The offset at the midpoint: endpoints far from the origin round least there.
-        offsets = np.einsum("ij,ij->i", n, middles)
-        return cls(*(_frozen(np.ascontiguousarray(a)) for a in (e, d, n, offsets, lengths, middles)))
+        return cls(*map(_frozen, (e, *lines_of(e))))
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -209,8 +200,7 @@ class MeasuredSegments:
         counted = points is not None
         centroids, spreads = moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
         ranges: list[tuple[str, Any, tuple[int, ...], float, float]] = [
-            ("sigma", np.broadcast_to(np.asarray(sigma, dtype=np.float64), (n,)) if np.ndim(sigma) == 0 else sigma,
-             (n,), 0.0, MAX_SIGMA),
+            ("sigma", np.full(n, sigma, dtype=np.float64) if np.ndim(sigma) == 0 else sigma, (n,), 0.0, MAX_SIGMA),
             ("points", points if counted else segments.lengths / DEFAULT_POINT_SPACING,
              (n,), 1.0 if counted else 0.0, MAX_POINTS),
             ("centroids", centroids, (n, 2), -MAX_COORDINATE, MAX_COORDINATE),
@@ -230,8 +220,8 @@ def _checked(values: Any, shape: tuple[int, ...], low: float, high: float, argum
         array = array.reshape(shape)
     if array.shape != shape:
         raise InvalidArgumentError(f"expected shape {shape}, got {array.shape}", argument=argument)
-    bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
-    if bad.any():
+    if not are_within(array.reshape(-1), low, high):
+        bad = ~(np.isfinite(array) & (array >= low) & (array <= high))
         index = int(np.argmax(bad.reshape(len(array), -1).any(axis=1)))
         raise InvalidArgumentError(f"expected a number from {low:g} to {high:g}", argument=argument, index=index)
     return _frozen(array)

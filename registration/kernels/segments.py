@@ -1,0 +1,55 @@
+"""Checks of segments as they are sent, and the lines that they lie on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiling import kernel
+from ..layout import Floats, X, Y
+
+X2, Y2 = 2, 3  # columns of (n, 4) end points, behind `X` and `Y` of the begin
+
+Lines = tuple[Floats, Floats, Floats, Floats, Floats]
+
+
+@kernel
+def are_within(values: Floats, low: float, high: float) -> bool:
+    """Tell whether all values (n,) are finite numbers from `low` to `high`."""
+    for value in values:
+        # Written so that nan is not.
+        if not (low <= value <= high and math.isfinite(value)):
+            return False
+    return True
+
+
+@kernel
+def lines_of(endpoints: Floats) -> Lines:
+    """Return of segments (n, 4) the directions and normals (n, 2), offsets and lengths (n,), and midpoints (n, 2)."""
+    count = len(endpoints)
+    directions = np.empty((count, 2))
+    normals = np.empty((count, 2))
+    offsets = np.empty(count)
+    lengths = np.empty(count)
+    midpoints = np.empty((count, 2))
+    for i in range(count):
+        along_x = endpoints[i, X2] - endpoints[i, X]
+        along_y = endpoints[i, Y2] - endpoints[i, Y]
+        length = math.hypot(along_x, along_y)
+        # That one has no length is told by its length.
+        dx = along_x / length if length > 0.0 else 0.0
+        dy = along_y / length if length > 0.0 else 0.0
+        x = endpoints[i, X] + 0.5 * along_x
+        y = endpoints[i, Y] + 0.5 * along_y
+        directions[i, X] = dx
+        directions[i, Y] = dy
+        normals[i, X] = -dy
+        normals[i, Y] = dx
+        # The offset at the midpoint: end points far from the origin round least there.
+        offsets[i] = dx * y - dy * x
+        lengths[i] = length
+        midpoints[i, X] = x
+        midpoints[i, Y] = y
+    return directions, normals, offsets, lengths, midpoints
+
