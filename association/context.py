@@ -42,12 +42,12 @@ def _place(x: float, y: float) -> Records:
 
 
 @lru_cache
-def _terms(gates: bytes, prior: bytes, model: bytes) -> Records:
+def _terms(gates: bytes, prior: bytes, model: bytes) -> bytes:
     """Put records together, which numpy does field by field: those of most searches on a map are the same."""
     terms = np.zeros(1, TERMS)
     terms["gates"], terms["prior"] = np.frombuffer(gates, GATES), np.frombuffer(prior, PRIOR)
     terms["model"] = np.frombuffer(model, MODEL)
-    return terms
+    return terms.tobytes()
 
 
 @dataclass(frozen=True)
@@ -138,8 +138,8 @@ class SearchContext:
     @cached_property
     def question_of_a_pose(self) -> Question:
         """The same for kernels that keep no poses."""
-        terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes()).copy()
-        return Question(self.lines.rows, terms, NOTHING_KEPT)
+        terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes())
+        return Question(self.lines.rows, np.frombuffer(bytearray(terms), TERMS), NOTHING_KEPT)
 
     def anywhere(self) -> SearchContext:
         """Return the same search without its prior."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -102,10 +103,10 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
-def features_of(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]) -> Features:
-    """Return the features of an answer beside its rivals, best first; with the least null there is."""
-    best, hinges, weighed = answer.best, answer.settled.hinges, weigh(answer.best, rivals)
-    lead = -max(gap for gap, _ in weighed) if rivals else best.value
+def features_of(context: SearchContext, answer: Answer, weighed: Sequence[Weighed]) -> Features:
+    """Return the features of an answer beside its rivals, with the least null there is."""
+    best, hinges = answer.best, answer.settled.hinges
+    lead = -max(gap for gap, _ in weighed) if weighed else best.value
     crowd = math.log(_evidence(weighed, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
     count = best.count
     longest, unmatched = _unmatched(context, best)
@@ -203,14 +204,19 @@ def worth(one: Ranked) -> float:
     walls of a map are off by more, the centimetres that tell rivals apart count that much less.
     """
     n, k = one.count, USUAL_WALLS
-    student = math.lgamma(0.5 * (n + k)) - math.lgamma(0.5 * k) - 0.5 * n * math.log(0.5 * k)
-    student -= 0.5 * (n + k) * math.log1p(one.cost / k)
+    student = _student_constant(n) - 0.5 * (n + k) * math.log1p(one.cost / k)
     return one.value + 0.5 * one.cost + student
 
 
-def twin_share(best: Ranked, rivals: Sequence[Ranked]) -> float:
-    """Return the chance of the best explanation among those that are about as good, above 0 and up to 1."""
-    return 1.0 / (1.0 + _evidence(weigh(best, rivals), TWIN_TEMPERATURE))
+@lru_cache
+def _student_constant(n: int) -> float:
+    k = USUAL_WALLS
+    return math.lgamma(0.5 * (n + k)) - math.lgamma(0.5 * k) - 0.5 * n * math.log(0.5 * k)
+
+
+def twin_share(weighed: Sequence[Weighed]) -> float:
+    """Return the chance of the best explanation among its rivals that are about as good, above 0 and up to 1."""
+    return 1.0 / (1.0 + _evidence(weighed, TWIN_TEMPERATURE))
 
 
 def _evidence(weighed: Sequence[Weighed], temperature: float) -> float:

@@ -17,7 +17,7 @@ from .context import SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import distinct, rank
-from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT
+from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Integers
 from .options import CancelledError, Estimator
 from .tables import Rays
 from .tuning import (
@@ -153,7 +153,7 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     order = _distinct(scored, np.where(scores > 0.0, values, -np.inf), most)
     windowed = context.window is not None
     explanations = []
-    for place, merit, value in zip(order, scored.merits[order].tolist(), values[order].tolist(), strict=True):
+    for place, merit, value in zip(order.tolist(), scored.merits[order].tolist(), values[order].tolist(), strict=True):
         within = value >= INSIDE / 2
         inside = within or not windowed
         explanations.append(_explanation(scored, place, merit, merit[0] if within else value, inside=inside))
@@ -203,16 +203,12 @@ def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: f
     )
 
 
-def _distinct(scored: _Scored, values: Floats, most: int) -> list[int]:
-    """Order the best `most` by value, ties by index, without those that a better one stands for."""
-    order = np.argsort(-values, kind="stable")
-    order = order[: int(np.isfinite(values).sum())]
+def _distinct(scored: _Scored, values: Floats, most: int) -> Integers:
+    """Return the places of the best `most` by value, ties by place, without those that a better one stands for."""
     scores = np.ascontiguousarray(scored.merits["score"])
-    kept = distinct(
-        scored.estimates, scores, order, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
+    return distinct(
+        scored.estimates, scores, values, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
     )
-    places: list[int] = kept.tolist()
-    return places
 
 
 def _score(context: SearchContext, poses: Records) -> _Scored:

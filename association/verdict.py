@@ -11,7 +11,7 @@ from registration import RigidTransform
 from .context import SearchContext
 from .explain import Answer, Explanations
 from .families import is_thin, place_on_family
-from .features import Features, features_of, twin_share, with_null
+from .features import Features, features_of, twin_share, weigh, with_null
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
 from .null import Null, null_of
@@ -157,7 +157,8 @@ class _Chances:
         """Work them out; `certain`: whether the answer is usable if they suffice."""
         form = "_with_beams" if context.with_beams else ""
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
-        features, share = features_of(context, answer, rivals), twin_share(answer.best, rivals)
+        weighed = weigh(answer.best, rivals)
+        features, share = features_of(context, answer, weighed), twin_share(weighed)
         right, careful = usual.logit(features), cautious.logit(features)
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
         explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))

@@ -118,7 +118,7 @@ class Case:
             group=self.group,
             condition=self.condition,
             fold=self.fold,
-            features=with_null(features_of(context, found.answer, rivals), best, null_of(context, best)),
+            features=with_null(features_of(context, found.answer, weighed), best, null_of(context, best)),
             gaps=np.minimum(0.0, [one.gap for one in weighed]),
             counted=np.array([one.counted for one in weighed]),
             right=right,

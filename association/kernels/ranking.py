@@ -13,6 +13,7 @@ from ..tables import Blockers, Place, Question, Sights, Workspace
 from ..tuning import FAR_BEHIND, START_ANGLE_VARIANCE, START_VARIANCE
 from .consensus import one_step_cost, refine
 from .matching import allow_all, match_scan, wrap
+from .ordering import ascending
 from .sight import count_blockers, sight_penalty
 
 
@@ -86,27 +87,27 @@ def rank(
 def distinct(
     poses: Records,
     scores: Floats,
-    order: Integers,
+    values: Floats,
     most: int,
     distance: float,
     angle: float,
     same_family: float,
     much_better: float,
 ) -> Integers:
-    """Pick from `order`, the best first, at most `most` poses without those that a better one stands for.
+    """Pick at most `most` poses without those that a better one stands for, that of the greatest value first.
 
     A pose stands for those that are near, within `distance` metres and `angle` radians, and for those that its own
     covariance does not tell from it, at less than `same_family` squared deviations: a family along a corridor is one
     explanation. It does not stand for one of its family with a score that is better by more than `much_better` nats: a
     prior may put that one behind it, and is contradicted by it. `poses` (k,) of `ESTIMATE`, `scores` (k,) without the
-    prior. Returns the places in them.
+    prior and `values` (k,) with it, -inf of what is no explanation; ties by place. Returns the places in them.
     """
-    kept = np.empty(min(most, len(order)), dtype=np.int64)
+    kept = np.empty(min(most, len(values)), dtype=np.int64)
     informations = np.empty(len(kept), dtype=SYMMETRIC3)
     known = np.empty(len(kept), dtype=np.bool_)
     count = 0
-    for i in order:
-        if count == len(kept):
+    for i in ascending(-values):
+        if count == len(kept) or values[i] == -math.inf:
             break
         stands = False
         for k in range(count):

@@ -16,12 +16,11 @@ Lines = tuple[Floats, Floats, Floats, Floats, Floats]
 
 @kernel
 def are_within(values: Floats, low: float, high: float) -> bool:
-    """Tell whether all values (n,) are finite numbers from `low` to `high`."""
+    """Tell whether all values (n,) are numbers from `low` to `high`, which are finite."""
+    within = True
     for value in values:
-        # Written so that nan is not.
-        if not (low <= value <= high and math.isfinite(value)):
-            return False
-    return True
+        within &= low <= value <= high  # so written that nan is not
+    return within
 
 
 @kernel
@@ -52,4 +51,3 @@ def lines_of(endpoints: Floats) -> Lines:
         midpoints[i, X] = x
         midpoints[i, Y] = y
     return directions, normals, offsets, lengths, midpoints
-

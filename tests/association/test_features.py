@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 
 from association import tuning
 from association.explain import Answer
-from association.features import Features, features_of, twin_share, with_null
+from association.features import Features, features_of, twin_share, weigh, with_null
 from association.null import Null
+from association.ranking import Ranked
 from association.sight import BeamShares
 from registration.layout import Records
 
@@ -23,6 +25,10 @@ CONTEXT = room()
 LENGTHS = CONTEXT.lines.rows["length"].tolist()  # 9, 5.5, 4, 4, 3, 3, 2, 1.5: the longest first
 
 SCORES = st.floats(1.0, 150.0)
+
+
+def features_beside(answer: Answer, rivals: Sequence[Ranked]) -> Features:
+    return features_of(CONTEXT, answer, weigh(answer.best, rivals))
 
 
 def hinging(hinges: Records | None = None, weakest: float = 0.01, score: float = 100.0, **merits: Any) -> Answer:
@@ -64,30 +70,30 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         squared_solitude=math.log(crowd) ** 2,
     )
     settled = settled_of(registered_room(), hinges_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
-    got = features_of(CONTEXT, answer_with(best, settled=settled, agreement=0.85, beams=BeamShares(0.09, 0.16)), rivals)
+    got = features_beside(answer_with(best, settled=settled, agreement=0.85, beams=BeamShares(0.09, 0.16)), rivals)
     assert got._asdict() == pytest.approx(expected._asdict())
 
 
 def test_features_say_no_more_beyond_their_limits() -> None:
     """A lone answer, or a much better one; a worse one; nothing matched; all of it; a position that is not fixed."""
-    alone = features_of(CONTEXT, answer_with(ranked(30.0)), [])
+    alone = features_beside(answer_with(ranked(30.0)), [])
     assert (alone.lead, alone.solitude, alone.squared_solitude) == pytest.approx((30.0, 12.0, 144.0))
-    assert features_of(CONTEXT, answer_with(ranked(90.0)), []).lead == tuning.MAX_LEAD
-    assert features_of(CONTEXT, answer_with(ranked(90.0)), [ranked(30.0)]).lead == tuning.MAX_LEAD
-    worse = features_of(CONTEXT, answer_with(ranked(30.0)), [ranked(50.0)])
+    assert features_beside(answer_with(ranked(90.0)), []).lead == tuning.MAX_LEAD
+    assert features_beside(answer_with(ranked(90.0)), [ranked(30.0)]).lead == tuning.MAX_LEAD
+    worse = features_beside(answer_with(ranked(30.0)), [ranked(50.0)])
     assert (worse.lead, worse.solitude) == pytest.approx((-20.0, 0.0), abs=1e-5)
-    nothing = features_of(CONTEXT, answer_with(ranked(matched=0, share=0.0, misfit=0.0), significance=1e-300), [])
+    nothing = features_beside(answer_with(ranked(matched=0, share=0.0, misfit=0.0), significance=1e-300), [])
     assert (nothing.root_count, nothing.inverse_count, nothing.beyond_nearly_all) == (0.0, 1.0, 0.0)
     assert nothing.misfit == math.log(tuning.LEAST_MISFIT)
     assert (nothing.longest_unmatched, nothing.root_unmatched) == (tuning.LONGEST_UNMATCHED, 4.0)
     assert nothing.chance == tuning.LEAST_CHANCE_FEATURE
     assert (nothing.hinge_moves, nothing.hinge_deviation, nothing.walls) == (0.0, 0.0, 0.0)
-    whole = features_of(CONTEXT, answer_with(ranked(share=1.0, misfit=1e9)), [])
+    whole = features_beside(answer_with(ranked(share=1.0, misfit=1e9)), [])
     assert (whole.longest_unmatched, whole.root_unmatched) == (0.0, 0.0)
     assert whole.misfit == whole.misfit_of_many == math.log(tuning.MOST_MISFIT)
-    loose = features_of(CONTEXT, hinging(hinges_of((0, 3.0, 0.0), (1, 0.0, 10.0)), 2.0), [])
+    loose = features_beside(hinging(hinges_of((0, 3.0, 0.0), (1, 0.0, 10.0)), 2.0), [])
     assert (loose.deviation, loose.hinge_moves, loose.hinge_deviation) == (tuning.MOST_DEVIATION,) * 3
-    by_beams = features_of(CONTEXT, hinging(score=40.0, read=0.9), [])
+    by_beams = features_beside(hinging(score=40.0, read=0.9), [])
     assert by_beams.root_score == 0.0
 
 
@@ -108,7 +114,7 @@ def test_features_are_those_of_the_twin(
         ranked(score, matched=max(0, matched - k), cost=5.0 * abs(k - 2), **parts) for k, score in enumerate(scores)
     )
     answer = answer_with(best, agreement=agreement)
-    got = features_of(CONTEXT, answer, rivals)
+    got = features_beside(answer, rivals)
     assert got._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals), abs=1e-9)
     mirrored = with_null(got, best, Null(*null))
     assert mirrored._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals, Null(*null)), abs=1e-9)
@@ -132,7 +138,7 @@ def test_the_mirrored_scan_says_less_the_more_the_map_is_symmetric(
     score: float, symmetry: float, null: float, gap: float, better: float
 ) -> None:
     """Of an answer with 100 nats: from 70 on, and up to 120; but for what it scores more than the answer."""
-    before = features_of(CONTEXT, answer_with(ranked(100.0)), [])
+    before = features_beside(answer_with(ranked(100.0)), [])
     got = with_null(before, ranked(100.0), Null(score, symmetry))
     assert (got.null, got.null_better) == pytest.approx((null, better))
     assert math.copysign(got.null_gap**2, got.null_gap) == pytest.approx(100.0 * gap)
@@ -142,19 +148,21 @@ def test_the_mirrored_scan_says_less_the_more_the_map_is_symmetric(
 
 def test_the_gap_to_the_mirrored_scan_has_an_end_and_an_answer_without_score_none() -> None:
     strong = ranked(300.0)
-    assert features_of(CONTEXT, answer_with(strong), []).null_gap ** 2 == pytest.approx(tuning.MAX_GAP)
+    assert features_beside(answer_with(strong), []).null_gap ** 2 == pytest.approx(tuning.MAX_GAP)
     none = ranked(0.0)
-    assert with_null(features_of(CONTEXT, answer_with(none), []), none, Null(5.0, 0.0)).null == tuning.MOST_NULL
+    assert with_null(features_beside(answer_with(none), []), none, Null(5.0, 0.0)).null == tuning.MOST_NULL
 
 
 def test_twins_share_the_chance() -> None:
     """One that scores 1.5 nats less is one to e as likely; one that scores more is as likely and no more."""
     best = ranked(50.0)
-    assert twin_share(best, []) == 1.0
-    assert twin_share(best, [ranked(50.0)] * 3) == pytest.approx(0.25)
-    assert twin_share(best, [ranked(80.0)]) == pytest.approx(0.5)
-    assert twin_share(best, [ranked(48.5)]) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
-    assert twin_share(best, [ranked(52.0, -3.5)]) == pytest.approx(1.0 / (1.0 + math.exp(-1.0))), "with the prior"
+    assert twin_share(weigh(best, [])) == 1.0
+    assert twin_share(weigh(best, [ranked(50.0)] * 3)) == pytest.approx(0.25)
+    assert twin_share(weigh(best, [ranked(80.0)])) == pytest.approx(0.5)
+    assert twin_share(weigh(best, [ranked(48.5)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
+    assert twin_share(weigh(best, [ranked(52.0, -3.5)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0))), (
+        "with the prior"
+    )
 
 
 @pytest.mark.parametrize(("cost", "lead"), [(0.0, 11.99), (6.0, 6.26), (60.0, 1.40)])
@@ -164,14 +172,14 @@ def test_the_farther_walls_are_off_the_less_centimetres_tell_rivals_apart(cost: 
     With 8 matches, and 2 walls for what was supposed: ``10 - 20 / 2 + 5 log((cost + 22) / (cost + 2))``.
     """
     answer, rival = answer_with(ranked(50.0, cost=cost)), ranked(40.0, cost=cost + 20.0)
-    features = features_of(CONTEXT, answer, [rival])
+    features = features_beside(answer, [rival])
     assert features.lead == pytest.approx(lead, abs=0.01)
     assert features.solitude == pytest.approx(lead / tuning.CROWD_TEMPERATURE, abs=0.01)
-    assert twin_share(answer.best, [rival]) == pytest.approx(
+    assert twin_share(weigh(answer.best, [rival])) == pytest.approx(
         1.0 / (1.0 + math.exp(-lead / tuning.TWIN_TEMPERATURE)), abs=0.002
     )
-    assert features_of(CONTEXT, answer, [ranked(40.0, cost=cost)]).lead == pytest.approx(10.0)
-    nearest = features_of(CONTEXT, answer, [ranked(42.0, cost=cost), rival])
+    assert features_beside(answer, [ranked(40.0, cost=cost)]).lead == pytest.approx(10.0)
+    nearest = features_beside(answer, [ranked(42.0, cost=cost), rival])
     assert nearest.lead == pytest.approx(min(lead, 8.0), abs=0.01)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from association.context import SearchContext
 from association.explain import Answer, explain
-from association.features import twin_share
+from association.features import twin_share, weigh
 from association.loosening import loose_twin_share
 from association.ranking import Ranked
 from association.tuning import BEAMS_READ, LOOSE_BEAMS, TWIN_TEMPERATURE
@@ -37,7 +37,7 @@ def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:
     close, loose = [], []
     for seed in range(24):
         context, answer, rivals = explained(seed)
-        close.append(twin_share(answer.best, rivals) > 0.95)
+        close.append(twin_share(weigh(answer.best, rivals)) > 0.95)
         loose.append(loose_twin_share(context, answer, rivals) > 0.95)
     assert sum(close) > 0.7 * len(close)
     assert sum(loose) < 0.3 * len(close)
@@ -47,7 +47,7 @@ def test_that_the_answer_fits_well_shows_not_that_walls_are_where_they_are_drawn
     """Of many twins one always fits well, and seems to show that the map is exact."""
     context, answer, rivals = explained(0)
     well = replace(answer, settled=replace(answer.settled, wall_sigma=0.001))
-    assert twin_share(answer.best, rivals) > 0.95
+    assert twin_share(weigh(answer.best, rivals)) > 0.95
     assert loose_twin_share(context, well, rivals) < 0.9
     ill = replace(answer, settled=replace(answer.settled, wall_sigma=0.1))
     assert loose_twin_share(context, ill, rivals) < loose_twin_share(context, well, rivals)
