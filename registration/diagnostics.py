@@ -9,7 +9,7 @@ import numpy as np
 
 from .estimate import Fit, Problem
 from .joint import JointSums
-from .kernels.of_arrays import carried_matrix, inverse
+from .kernels.of_arrays import carried_matrix
 from .kernels.pairs import residuals
 from .layout import Floats
 from .options import RegistrationOptions
@@ -45,6 +45,8 @@ class Residuals:
         At the midpoints, metres, and radians; of all pairs.
     chi2, rms_offset, rms_angle : float
         Of the pairs that count.
+    against : bool
+        Whether any scan segment runs against its map segment; lines fit either way round, so chi2 does not see it.
     """
 
     offsets: Floats
@@ -52,6 +54,7 @@ class Residuals:
     chi2: float
     rms_offset: float
     rms_angle: float
+    against: bool
 
     @classmethod
     def of(cls, problem: Problem, fit: Fit) -> Residuals:
@@ -67,13 +70,13 @@ def covariance_of(problem: Problem, fit: Fit) -> Floats:
     information ``i``, ``F(w)^-1 F(w^2 / i) F(w)^-1``.
     """
     weights, theta = problem.weights, fit.local_from_scan.theta
-    covariance = inverse(fit.sums.information(theta))
+    covariance = fit.sums.covariance(theta)
     if weights.information is not weights.used:
         scatter = JointSums.of_set(problem.centred, weights.used**2 / weights.information).information(theta)
         covariance = covariance @ scatter @ covariance
     # From the middle of the scan segments to the origin of the scan frame.
-    lever = RigidTransform(0.0, 0.0, theta).compose(problem.scan_from_centred)
-    return carried_matrix(covariance, lever.x, lever.y)
+    lever = problem.scan_from_centred
+    return carried_matrix(covariance, theta, lever.x, lever.y)
 
 
 def diagnose(problem: Problem, fit: Fit, residuals: Residuals, options: RegistrationOptions) -> RegistrationDiagnostics:

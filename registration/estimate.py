@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 from .correspondences import Correspondences
 from .joint import JointSums
+from .kernels.one_step import wahba_angle
 from .kernels.pairs import middles
 from .observability import Freedom, are_parallel, find_freedom
 from .one_step import OneStepSums
 from .options import RegistrationOptions, Rotation
 from .orientation import choose_rotation
-from .transform import RigidTransform
+from .transform import RigidTransform, wrap_angle
 from .weights import PairWeights
 
 
@@ -57,7 +58,7 @@ class Problem:
             theta, unique = choose_rotation(centred, judged, is_noise=weights.noise is not None)
             against = centred.runs_against(theta)
             local, centred = local.turned(against), centred.turned(against)
-        angle = OneStepSums.of_set(local, weights.used).solve("wahba")[0].theta
+        angle = wrap_angle(wahba_angle(local.rows, weights.used))
         shifts = RigidTransform(map_x, map_y, 0.0), RigidTransform(scan_x, scan_y, 0.0)
         return cls(local, centred, weights, *shifts, count, angle, unique)
 

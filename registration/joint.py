@@ -76,14 +76,6 @@ class JointSums:
         """Number of pairs."""
         return round(float(self.compensated["count"][0]))
 
-    @property
-    def normal_moments(self) -> tuple[float, float, float]:
-        """``sum w n n'`` of the map normals, its elements xx, xy and yy.
-
-        The information of a translation when the rotation is known.
-        """
-        return of_arrays.normal_moments(self.compensated)
-
     def solve(self, start: float) -> tuple[float, Floats, bool]:
         """Minimise the cost.
 
@@ -113,13 +105,6 @@ class JointSums:
         """Return the information of additive (x, y, theta) in the map frame at rotation `theta`, (3, 3)."""
         return of_arrays.information(self.compensated, float(theta))
 
-    def is_regular(self, theta: float, least: float) -> bool:
-        """Tell whether `information`, scaled to a unit diagonal, has only eigenvalues over `least`."""
-        return of_arrays.is_regular(self.compensated, float(theta), least)
-
-    def marginal(self, theta: float) -> tuple[float, float, float]:
-        """Return what is known of the translation when the rotation is not, its elements xx, xy and yy.
-
-        The Schur complement of the rotation in `information`, which must not be 0 there.
-        """
-        return of_arrays.marginal(self.compensated, float(theta))
+    def covariance(self, theta: float) -> Floats:
+        """Return the inverse of `information`, which has to be regular, (3, 3)."""
+        return of_arrays.covariance(self.compensated, float(theta))

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
 from .joint import JointSums
-from .kernels import eigen2
-from .kernels.matrices import PARALLEL_RATIO
+from .kernels.observability import FIXED, FREE, MAX_DEVIATION, PARALLEL, freedom
 from .kernels.pairs import angle_chi_square
 from .layout import Floats
 
-THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
+__all__ = ["MAX_DEVIATION", "THREE_SIGMA_TAIL", "Freedom", "are_parallel", "find_freedom"]
 
-MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
-SLACK = 3.0  # standard deviations that a fit may move and still be one
+THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,26 +75,10 @@ def find_freedom(used: JointSums, noise: JointSums | None, theta: float, *, para
     parallel : bool
         Whether the lines are parallel within the noise.
     """
-    small, big, *axis = eigen2(*used.normal_moments)
-    if small <= PARALLEL_RATIO * big:
-        return Freedom(True, True, _signed(*axis), math.inf)
-    if noise is not None and parallel:
-        _, _, *axis = eigen2(*noise.normal_moments)
-        return Freedom(True, True, _signed(*axis), _slack(noise, *axis))
-    if not used.is_regular(theta, PARALLEL_RATIO):
-        return Freedom(True)
-    if noise is not None:
-        # What is known of the translation when the rotation is not.
-        least, _, *axis = eigen2(*noise.marginal(theta))
-        if least < MAX_DEVIATION**-2:
-            return Freedom(True, False, _signed(*axis), _slack(noise, *axis))
-    return Freedom(False)
-
-
-def _slack(sums: JointSums, x: float, y: float) -> float:
-    xx, xy, yy = sums.normal_moments
-    curvature = x * (xx * x + xy * y) + y * (xy * x + yy * y)
-    return SLACK / math.sqrt(curvature) if curvature > 0.0 else math.inf
+    weighing = used if noise is None else noise
+    what, x, y, slack = freedom(used.compensated, weighing.compensated, float(theta), noise is not None, parallel)
+    direction = _signed(x, y) if what in (FREE, PARALLEL) else None
+    return Freedom(what != FIXED, what == PARALLEL, direction, slack)
 
 
 def _signed(x: float, y: float) -> tuple[float, float]:

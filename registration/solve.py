@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from .chi_square import chi_square_quantile
@@ -69,8 +68,7 @@ def register(
 
     residuals = Residuals.of(problem, fit)
     diagnostics = diagnose(problem, fit, residuals, options)
-    # Lines fit either way round, so chi2 does not see it.
-    reversed_pair = options.oriented and bool((np.abs(residuals.angles) > 0.5 * np.pi).any())
+    reversed_pair = options.oriented and residuals.against
     has_covariance = not degenerate and options.estimator == "joint"
     return RegistrationResult(
         degenerate=degenerate,

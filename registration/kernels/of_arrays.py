@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..compiling import kernel
 from ..layout import INFORMATION, SYMMETRIC3, Floats, Records
 from .joint import joint_cost, joint_information, joint_solve
-from .matrices import carried, invert3_scaled, is_regular3
+from .matrices import carried, invert3_scaled
 from .one_step import one_step_solve
-from .records import keep_alive
 
 
 @kernel
@@ -50,27 +51,6 @@ def information(sums: Records, theta: float) -> Floats:
 
 
 @kernel
-def is_regular(sums: Records, theta: float, least: float) -> bool:
-    """Tell whether the information of (x, y, theta) is; see `is_regular3`."""
-    out = np.empty(1, INFORMATION)
-    joint_information(sums[0], theta, out[0])
-    regular = is_regular3(out[0], least)
-    keep_alive(out)
-    return regular
-
-
-@kernel
-def marginal(sums: Records, theta: float) -> tuple[float, float, float]:
-    """Return the information of (x, y) when theta is not known, its elements xx, xy and yy."""
-    out = np.empty(1, INFORMATION)
-    f = out[0]
-    joint_information(sums[0], theta, f)
-    left = (f.xx - f.xt * f.xt / f.tt, f.xy - f.xt * f.yt / f.tt, f.yy - f.yt * f.yt / f.tt)
-    keep_alive(out)
-    return left
-
-
-@kernel
 def upper_triangle(matrix: Floats) -> Records:
     """Return the upper triangle of a (3, 3) matrix, an array of one SYMMETRIC3."""
     out = np.empty(1, SYMMETRIC3)
@@ -85,25 +65,22 @@ def upper_triangle(matrix: Floats) -> Records:
 
 
 @kernel
-def inverse(matrix: Floats) -> Floats:
-    """Do as `invert3_scaled` with a (3, 3) matrix."""
-    m = upper_triangle(matrix)
-    invert3_scaled(m[0], m[0])
-    return full_matrix(m)
+def covariance(sums: Records, theta: float) -> Floats:
+    """Return the inverse of the information of (x, y, theta), (3, 3); see `invert3_scaled`."""
+    out = np.empty(1, INFORMATION)
+    joint_information(sums[0], theta, out[0])
+    invert3_scaled(out[0], out[0])
+    return full_matrix(out)
 
 
 @kernel
-def carried_matrix(covariance: Floats, x: float, y: float) -> Floats:
-    """Do as `carried` with a (3, 3) matrix."""
+def carried_matrix(covariance: Floats, theta: float, x: float, y: float) -> Floats:
+    """Do as `carried` with a (3, 3) matrix, by a lever that is turned by `theta` as the frame is."""
     m = upper_triangle(covariance)
-    carried(m[0], x, y, m[0])
+    c = math.cos(theta)
+    s = math.sin(theta)
+    carried(m[0], c * x - s * y, s * x + c * y, m[0])
     return full_matrix(m)
-
-
-@kernel
-def normal_moments(sums: Records) -> tuple[float, float, float]:
-    """Return ``sum w n n'``, its elements xx, xy and yy."""
-    return sums[0].xx, sums[0].xy, sums[0].yy
 
 
 @kernel

@@ -100,6 +100,15 @@ def one_step_solve(values: Record, use_wahba: bool) -> tuple[float, float, float
 
 
 @kernel
+def wahba_angle(pairs: Records, weights: Floats) -> float:
+    """Return Wahba's rotation of pairs, Eq. (15), radians; those of weight 0 do not count."""
+    sums = one_step_sums(pairs, 0.0, 0.0, 0.0, weights)
+    angle = one_step_solve(sums[0], True)[0]
+    keep_alive(sums)
+    return angle
+
+
+@kernel
 def one_step_moved(sums: Records, dx: float, dy: float, turn: float) -> Records:
     """Return the sums about a reference that is moved by ``(dx, dy)`` and turned by `turn`."""
     out = sums.copy()

@@ -190,10 +190,11 @@ def offset_at(line: Record, x: float, y: float, c: float, s: float, tx: float, t
 @kernel
 def residuals(
     pairs: Records, used: Floats, information: Floats, theta: float, tx: float, ty: float
-) -> tuple[Floats, Floats, float, float, float]:
+) -> tuple[Floats, Floats, float, float, float, bool]:
     """Return offsets at the midpoints and angles, (n,) each, then chi2 and the root mean squares of both.
 
-    `information` are the weights of chi2; the last three are of the pairs that count, whose `used` is over 0.
+    `information` are the weights of chi2; these three are of the pairs that count, whose `used` is over 0. At last,
+    whether any scan segment runs against its map segment.
     """
     c = math.cos(theta)
     s = math.sin(theta)
@@ -202,10 +203,12 @@ def residuals(
     chi2 = 0.0
     squared_offsets = 0.0
     squared_angles = 0.0
+    against = False
     count = 0
     for i in range(len(pairs)):
         line = pairs[i].map
         seen = pairs[i].scan
+        against |= abs(angles[i]) > 0.5 * math.pi
         offsets[i] = offset_at(line, seen.x, seen.y, c, s, tx, ty)
         if used[i] > 0.0:
             at_mean = offset_at(line, seen.centroid_x, seen.centroid_y, c, s, tx, ty)
@@ -214,4 +217,4 @@ def residuals(
             squared_offsets += offsets[i] * offsets[i]
             squared_angles += angles[i] * angles[i]
             count += 1
-    return offsets, angles, chi2, math.sqrt(squared_offsets / count), math.sqrt(squared_angles / count)
+    return offsets, angles, chi2, math.sqrt(squared_offsets / count), math.sqrt(squared_angles / count), against

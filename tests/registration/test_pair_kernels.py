@@ -72,7 +72,7 @@ def test_residuals(seed: int) -> None:
     rng, pairs, weights, measured = drawn(seed)
     at = RigidTransform(*rng.uniform(-3.0, 3.0, 3))
     counts = np.append(rng.random(6) < 0.5, True)
-    offsets, angles, chi2, rms_offset, rms_angle = pairing.residuals(
+    offsets, angles, chi2, rms_offset, rms_angle, against = pairing.residuals(
         pairs.rows, np.where(counts, 1.0, 0.0), np.where(counts, weights, 0.0), at.theta, at.x, at.y
     )
     expected = np.sum(pairs.map_normals * at.apply(pairs.midpoints), axis=1) - pairs.map_offsets
@@ -86,6 +86,9 @@ def test_residuals(seed: int) -> None:
     assert chi2 == pytest.approx(cost, rel=1e-9)
     assert rms_offset == pytest.approx(math.sqrt(np.mean(offsets[counts] ** 2)))
     assert rms_angle == pytest.approx(math.sqrt(np.mean(angles[counts] ** 2)))
+    assert against == any(abs(turn) > 0.5 * math.pi for turn in turns)
+    alone = pairing.residuals(pairs.rows[:1], np.ones(1), np.ones(1), at.theta, at.x, at.y)
+    assert alone[-1] == (abs(turns[0]) > 0.5 * math.pi)
 
 
 def definite(rng: np.random.Generator, size: int, spread: float = 3.0) -> Floats:
