@@ -76,6 +76,7 @@ def warm_up_registering() -> None:
     pairs = np.repeat(np.arange(len(room))[:, None], 2, axis=1)
     for options in (
         RegistrationOptions(),
+        RegistrationOptions(weighting="uniform"),
         RegistrationOptions(estimator="one_step", rotation="mitsuta", oriented=False),
         RegistrationOptions(estimator="one_step", evaluate_at=RigidTransform(0.0, 0.0, 0.0)),
     ):

@@ -36,6 +36,16 @@ def test_a_segment_in_closed_form() -> None:
     assert len(Segments.from_array([])) == 0
 
 
+def test_segments_in_any_direction() -> None:
+    ends = np.random.default_rng(0).uniform(-9.0, 9.0, (40, 4))
+    s, begins, along = Segments.from_array(ends), ends[:, :2], ends[:, 2:] - ends[:, :2]
+    np.testing.assert_allclose(s.directions * s.lengths[:, None], along, atol=1e-14)
+    np.testing.assert_allclose(np.hypot(*s.directions.T), 1.0)
+    np.testing.assert_array_equal(s.normals, s.directions @ [[0.0, 1.0], [-1.0, 0.0]])
+    np.testing.assert_allclose(s.offsets, np.sum(s.normals * begins, axis=1), atol=1e-13)
+    np.testing.assert_allclose(s.midpoints, begins + 0.5 * along, atol=1e-15)
+
+
 def test_mirrored_segments_are_those_of_the_mirrored_ends() -> None:
     """With begin and end exchanged, so that the normal points to the same side of the wall."""
     ends = np.random.default_rng(0).uniform(-9.0, 9.0, (40, 4))
@@ -70,6 +80,7 @@ def test_what_is_made_of_segments_may_be_longer_than_they_may() -> None:
         ([0, 0, math.inf, 0], "not finite"),
         ([2e9, 0, 2e9, 1], "beyond"),
         ([0, 0, 1e-7, 0], "shorter"),
+        ([1, 1, 1, 1], "shorter"),
         ([0, 0, 2e4, 0], "longer"),
     ],
 )
