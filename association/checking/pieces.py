@@ -223,4 +223,5 @@ def drawn_sigma(index: MapIndex) -> float | None:
     ends = index.segments.endpoints[: index.directed]
     ends = ends - ends[0, [0, 1, 0, 1]]
     step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
-    return step / math.sqrt(12.0) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None
+    # A caller copies what is advised: to a tenth of a millimetre.
+    return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None

@@ -114,7 +114,7 @@ def opened(path: Path) -> Iterator[Bag]:
     first = path.suffix.lower() == ".bag"
     if (path / METADATA).is_file():
         _refuse_packed(path / METADATA, name)
-    with refusing(name):
+    with refusing(name, _mended_by(path)):
         reader: Any = Reader1(path) if first else Reader2(path)
         reader.open()
     try:
@@ -134,8 +134,17 @@ def _definitions(first: bool) -> Any:
     return types
 
 
+def _mended_by(path: Path) -> str:
+    """Return how a bag is mended that ends early, as of a robot whose power went; empty where no tool is known."""
+    if path.suffix.lower() == ".bag":
+        return "; where it was cut off, `rosbag reindex` mends it"
+    if path.suffix.lower() == ".mcap" or any(path.glob("*.mcap")):
+        return "; where it was cut off, `mcap recover` mends it"
+    return ""
+
+
 @contextmanager
-def refusing(name: str) -> Iterator[None]:
+def refusing(name: str, mended_by: str = "") -> Iterator[None]:
     """Turn what a broken bag brings about into an error of this package."""
     try:
         yield
@@ -143,7 +152,7 @@ def refusing(name: str) -> Iterator[None]:
         raise
     except BROKEN as error:
         lines = str(error).splitlines() or [type(error).__name__]
-        raise MalformedFileError(f"is a broken bag: {shown(lines[0])}", argument=name) from error
+        raise MalformedFileError(f"is a broken bag: {shown(lines[0])}{mended_by}", argument=name) from error
 
 
 def _refuse_packed(metadata: Path, name: str) -> None:

@@ -282,9 +282,9 @@ def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "spoilt", "how", "error", "message"),
     [
-        ("bag", "robot.bag", cut, MalformedFileError, "is a broken bag"),
-        ("mcap", "robot_mcap/robot_mcap.mcap", cut, MalformedFileError, "is a broken bag"),
-        ("sqlite3", "robot_sqlite3/robot_sqlite3.db3", cut, MalformedFileError, "is a broken bag"),
+        ("bag", "robot.bag", cut, MalformedFileError, "is a broken bag: .*; .* `rosbag reindex` mends it"),
+        ("mcap", "robot_mcap/robot_mcap.mcap", cut, MalformedFileError, "is a broken bag: .*; .* `mcap recover` mends"),
+        ("sqlite3", "robot_sqlite3/robot_sqlite3.db3", cut, MalformedFileError, "is a broken bag: [^;]*$"),
         ("sqlite3", "robot_sqlite3/metadata.yaml", cut, MalformedFileError, "broken"),
         ("mcap", "robot_mcap/metadata.yaml", packed, UnsupportedFormatError, "unpack it first"),
     ],
