@@ -142,7 +142,6 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
     places += range(kept, kept + int(progress["count"][0]))
     if context.deadline.cancelled:
         raise CancelledError
-    poses = found[np.array(places, dtype=np.intp)]
     exhaustive = stopped == EXHAUSTED and len(scan) <= BASE_SEGMENTS
     report = SearchReport(
         complete=stopped != BUDGET and slid,
@@ -155,7 +154,8 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    return Candidates(poses[np.argsort(-poses["value"], kind="stable")] if places else poses, report)
+    kept_at = np.array(places, dtype=np.intp)
+    return Candidates(found[kept_at[np.argsort(-found["value"][kept_at], kind="stable")]], report)
 
 
 @lru_cache

@@ -51,7 +51,9 @@ def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
 
     Where it comes to less than `share` of the answer's score it may be told to be none, which takes less of a search.
     """
-    scan, one_view = mirrored(context.scan), context.scan.views is None
+    one_view = context.scan.views is None
+    # What is searched are its lines; those of several views are joined anew.
+    scan = mirrored(context.scan, segments=not one_view)
     lines = context.lines.mirrored() if one_view else ScanLines.of(scan, context.index.sigma, context.options)
     other = context.instead(scan, lines)
     allowed = allowed_by(context.options)

@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MIRROR = np.array([1.0, -1.0])
+NOTHING_MEASURED = MeasuredSegments.from_segments(Segments.from_array(()))
 _MIRRORED_ERROR = np.array([1.0, -1.0, -1.0])  # of (x, y, theta)
 
 
@@ -98,12 +99,19 @@ class Scan:
     views: Views | None = None
 
 
-def mirrored(scan: Scan) -> Scan:
-    """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left."""
-    seen, at, views = scan.measured, scan.viewpoint, scan.views
-    measured = replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
+def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
+    """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left.
+
+    Without its `segments` for who has them otherwise.
+    """
+    at, views = scan.viewpoint, scan.views
     beams = None if scan.beams is None else scan.beams.mirrored()
+    measured = _mirrored(scan.measured) if segments else NOTHING_MEASURED
     return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored())
+
+
+def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
+    return replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
 
 
 def turned_round(scan: Scan) -> Scan:
