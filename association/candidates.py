@@ -154,8 +154,8 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    kept_at = np.array(places, dtype=np.intp)
-    return Candidates(found[kept_at[np.argsort(-found["value"][kept_at], kind="stable")]], report)
+    at = np.array(places, dtype=np.intp)
+    return Candidates(found[at[np.argsort(-found["value"][at], kind="stable")]], report)
 
 
 @lru_cache

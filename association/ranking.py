@@ -44,7 +44,7 @@ Floats = NDArray[np.float64]
 class Ranked:
     """One explanation of the scan.
 
-    Not to be changed; `frozen` would make it in eight times the time, and a search makes dozens.
+    Nobody changes one; a frozen dataclass takes eight times as long to make, and a search makes dozens.
 
     Attributes
     ----------
