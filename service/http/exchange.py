@@ -27,6 +27,7 @@ from ..schemas.limits import Limits
 from ..schemas.parts import InlineMap, StoredMap
 from ..telemetry.traces import queued, stage
 from ..work.job import Done, Job, Stopwatch
+from .hanging_up import hang_up, unless
 from .sending import json_response
 from .services import Services, services_of
 from .state import RequestState, state_of
@@ -37,10 +38,6 @@ Reader = Callable[[bytes | bytearray, Limits], T]
 
 STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others for some seconds
 SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
-
-
-class HangUpError(Exception):
-    """The client is gone; there is nobody to answer."""
 
 
 class Exchange:
@@ -147,6 +144,10 @@ class Exchange:
             return
         if not asked.map_id.startswith(self.maps):
             raise ForeignMapError
+        found = self.services.lookup.find_at_once(asked.map_id, oriented=oriented)
+        if found is not None:
+            yield found
+            return
         left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
         find = partial(self.services.lookup.find, asked.map_id, oriented=oriented)
         try:
@@ -188,18 +189,7 @@ class Exchange:
         HangUpError
             When the client is gone.
         """
-        task = asyncio.ensure_future(work)
-        gone = asyncio.ensure_future(_hang_up(self._request))
-        try:
-            await asyncio.wait({task, gone}, return_when=asyncio.FIRST_COMPLETED)
-            if not task.done():
-                raise HangUpError
-            return task.result()
-        finally:
-            if not task.done():
-                deadline.cancel()
-                task.cancel()
-            gone.cancel()
+        return await unless(hang_up(self._request), work, deadline)
 
     def holding_answers(self) -> AbstractContextManager[ByteAccount]:
         """Give an account for answers that come one after the other, until they are sent as one."""
@@ -238,11 +228,3 @@ def searching(request: Request) -> Exchange:
     exchange = Exchange(request)
     exchange.services.readiness.require_warm()
     return exchange
-
-
-async def _hang_up(request: Request) -> None:
-    """Return when the client is gone; the body has been read before."""
-    while True:
-        message = await request.receive()
-        if message["type"] == "http.disconnect":
-            return

@@ -14,7 +14,7 @@ from starlette.routing import Match
 from ..schemas.errors import InvalidRequestError
 from ..schemas.faults import faults_of
 from .errors import MethodNotAllowedError, NotFoundError, RefusedError
-from .exchange import HangUpError
+from .hanging_up import HangUpError
 from .problems import INTERNAL, RAISED, problem_of
 from .state import state_of
 

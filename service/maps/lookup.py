@@ -75,6 +75,16 @@ class MapLookup:
         stored = self._store.load(map_id)
         return FoundMap(stored.record, stored.document)
 
+    def find_at_once(self, map_id: str, *, oriented: bool | None) -> FoundMap | None:
+        """Look up, without waiting for anybody, a map that is indexed; None where it takes a thread that may wait.
+
+        As sure to notice a change as `find`.
+        """
+        record = self._store.record_at_once(map_id)
+        if record is None or not self._cache.has((record, is_oriented(oriented, record.oriented))):
+            return None
+        return FoundMap(record, None)
+
     def takes_long(self, asked: InlineMap | FoundMap) -> bool:
         """Tell whether it may take long until a map is ready to be searched."""
         if isinstance(asked, InlineMap):

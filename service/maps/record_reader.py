@@ -33,13 +33,15 @@ class RecordReader:
         self._statement = f"SELECT {', '.join(SEALED)}, seal, quarantined FROM {maps.name} WHERE map_id = {mark}"
         self._idle: list[Any] = []
 
-    def read(self, map_id: str) -> MapRecord | None:
+    def read(self, map_id: str, *, may_connect: bool = True) -> MapRecord | None:
         """Return what identifies the present content of a map.
 
         None where there is no such map, it is damaged, or the database does not answer: which of these the store finds
-        out, on a connection of its own.
+        out, on a connection of its own. Also where a connection would have to be made that may not be.
         """
         idle = self._idle
+        if not idle and not may_connect:
+            return None
         connection = None
         try:
             connection = idle.pop() if idle else self._connect()

@@ -138,6 +138,16 @@ class MapStore:
         with self._reading() as connection:
             return _trusted(_row(connection, map_id, select(maps)))
 
+    def record_at_once(self, map_id: str) -> MapRecord | None:
+        """Return what identifies the present content where that waits for nobody; None where `record` has to tell.
+
+        A file is read in microseconds, and where another writes at that moment it is not waited for. A server may take
+        any time to answer.
+        """
+        if self._file is None or not self._opened or not self._file.is_the_same:
+            return None
+        return self._reader.read(map_id, may_connect=False)
+
     def load(self, map_id: str) -> StoredMap:
         """Return a map, its checksum tested; a map that fails the test is quarantined."""
         with self._reading() as connection:

@@ -12,9 +12,10 @@ from ...schemas.replies import AssociateAnswer
 from ...schemas.requests import AssociateRequest
 from ...work.job import Done, Job
 from ..exchange import Exchange, searching
+from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
-router = APIRouter(tags=["associate"])
+router = APIRouter(tags=["associate"], route_class=DirectRoute)
 
 
 @router.post(

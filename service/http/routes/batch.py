@@ -21,10 +21,11 @@ from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
 from ..exchange import Exchange, searching
 from ..problems import INTERNAL, problem_of
+from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
 logger = logging.getLogger("linefix")
-router = APIRouter(tags=["associate"])
+router = APIRouter(tags=["associate"], route_class=DirectRoute)
 
 
 @router.post(

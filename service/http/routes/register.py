@@ -12,9 +12,10 @@ from ...schemas.replies import RegisterAnswer
 from ...schemas.requests import RegisterRequest
 from ...work.registration import answer_registration
 from ..exchange import searching
+from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
-router = APIRouter(tags=["register"])
+router = APIRouter(tags=["register"], route_class=DirectRoute)
 
 
 @router.post(

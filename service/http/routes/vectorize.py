@@ -12,9 +12,10 @@ from ...schemas.replies import VectorizeAnswer
 from ...schemas.requests import VectorizeRequest
 from ...work.vectorization import answer_vectorization
 from ..exchange import searching
+from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
-router = APIRouter(tags=["vectorize"])
+router = APIRouter(tags=["vectorize"], route_class=DirectRoute)
 
 
 @router.post(

@@ -117,6 +117,21 @@ def test_a_stored_map_is_the_one_that_is_stored_now(lookup: Lookup) -> None:
     assert (revision, second.frame_id, second.index.sigma) == (2, "new", 0.1)
 
 
+def test_what_is_indexed_is_found_at_once_as_it_is_now(lookup: Lookup) -> None:
+    assert lookup.find_at_once("m", oriented=None) is None
+    lookup.put("m", segments=examples.WALLS, oriented=False)
+    assert lookup.find_at_once("m", oriented=None) is None
+    lookup.look(StoredMap(map_id="m"), oriented=None)
+    assert lookup.find_at_once("m", oriented=None) == lookup.find("m", oriented=None)
+    assert lookup.find_at_once("m", oriented=True) is None  # another index, which nobody has wanted yet
+    lookup.put("m", segments=examples.WALLS)
+    assert lookup.find_at_once("m", oriented=None) is None
+    lookup.look(StoredMap(map_id="m"), oriented=None)
+    found = lookup.find_at_once("m", oriented=None)
+    assert found is not None
+    assert found.record.revision == 2
+
+
 def test_a_map_that_changes_between_two_looks_is_looked_at_again(lookup: Lookup) -> None:
     lookup.put("m", segments=examples.WALLS)
     load, changes = lookup.store.load, [1, 2]

@@ -6,6 +6,7 @@ import os
 import sqlite3
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
@@ -146,6 +147,39 @@ def test_it_waits_for_a_writer_as_the_store_does(tmp_path: Path, monkeypatch: py
             store.record("m")
         writer.rollback()
         assert store.record("m").revision == 1
+
+
+def test_a_file_is_asked_at_once_and_a_server_is_not(store: MapStore, other: Other, database: str) -> None:
+    on_file = database.startswith("sqlite")
+    assert store.record_at_once("m") is None  # no connection is open yet
+    for revision in (1, 2, 3):
+        other.does("put")
+        record = store.record("m")
+        assert record.revision == revision
+        assert store.record_at_once("m") == (record if on_file else None)
+    other.does("put")
+    at_once = store.record_at_once("m")
+    assert (at_once.revision if at_once else None) == (4 if on_file else None)
+    other.does("delete")
+    assert store.record_at_once("m") is None
+
+
+def test_at_once_no_writer_is_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "maps.sqlite3"
+    with closing(MapStore(database_url(f"sqlite:///{path}"))) as store, closing(sqlite3.connect(path)) as writer:
+        store.put("m", b"{}", BOX, ANY)
+        record = store.record("m")
+        assert store.record_at_once("m") == record
+        writer.execute("BEGIN EXCLUSIVE")
+        began = time.monotonic()
+        assert store.record_at_once("m") is None
+        assert time.monotonic() - began < 1.0  # the store waits for five
+        writer.rollback()
+        assert store.record_at_once("m") is None  # whose connection failed; to make another may take long
+        assert store.record("m") == record
+        assert store.record_at_once("m") == record
+        path.rename(tmp_path / "away")
+        assert store.record_at_once("m") is None
 
 
 def test_a_file_in_the_place_of_another_is_noticed(tmp_path: Path) -> None:

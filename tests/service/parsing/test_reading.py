@@ -117,3 +117,9 @@ def test_of_a_map_what_was_sent_is_kept_and_no_more() -> None:
 
 def test_what_was_stored_is_held_to_no_limit() -> None:
     assert len(read_stored(orjson.dumps({"segments": [ROW] * 300_000})).segments) == 300_000
+
+
+def test_options_that_nobody_gives_are_not_copied_for_each_request() -> None:
+    body = orjson.dumps({name: part for name, part in examples.ASSOCIATE.items() if name != "options"})
+    first, second = (read_model(AssociateRequest, body, LIMITS) for _ in range(2))
+    assert first.options is second.options
