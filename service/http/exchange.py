@@ -124,7 +124,7 @@ class Exchange:
     async def looking_up(
         self, asked: InlineMap | StoredMap, deadline: Deadline, *, oriented: bool | None
     ) -> AsyncIterator[InlineMap | FoundMap]:
-        """Look a stored map up before its turn at the gate: a database that hangs holds up nobody else.
+        """Look a stored map up before its turn at the gate: a database server that hangs holds up nobody else.
 
         Its document counts as held until the block ends. `oriented` None is as the map itself says.
 
@@ -189,7 +189,7 @@ class Exchange:
         HangUpError
             When the client is gone.
         """
-        return await unless(hang_up(self._request), work, deadline)
+        return await unless(partial(hang_up, self._request), work, deadline)
 
     def holding_answers(self) -> AbstractContextManager[ByteAccount]:
         """Give an account for answers that come one after the other, until they are sent as one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 from starlette.requests import Request
@@ -11,6 +11,7 @@ from starlette.requests import Request
 from association import Deadline
 
 T = TypeVar("T")
+FIRST_SECONDS = 0.02  # s in which nobody looks whether the client is there: most answers are sooner done
 
 
 class HangUpError(Exception):
@@ -25,15 +26,15 @@ async def hang_up(request: Request) -> None:
             return
 
 
-async def unless(gone: Coroutine[Any, Any, None], work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
+async def unless(gone: Callable[[], Coroutine[Any, Any, None]], work: Coroutine[Any, Any, T], deadline: Deadline) -> T:
     """Wait for work, and cancel it when the client is gone first.
 
-    The work stays in the task of who asks: another would cost each request some ten microseconds.
+    The work stays in the task of who asks, and who watches comes later: each would cost a request tens of microseconds.
 
     Parameters
     ----------
-    gone : coroutine
-        Ends when the client is gone.
+    gone : callable
+        Gives a coroutine that ends when the client is gone.
     work : coroutine
     deadline : Deadline
         Of the work; is cancelled with it.
@@ -45,6 +46,7 @@ async def unless(gone: Coroutine[Any, Any, None], work: Coroutine[Any, Any, T], 
     """
     own = asyncio.current_task()
     assert own is not None
+    watch: asyncio.Task[None] | None = None
     waiting, is_gone = True, False
 
     def give_up(watch: asyncio.Task[None]) -> None:
@@ -54,8 +56,12 @@ async def unless(gone: Coroutine[Any, Any, None], work: Coroutine[Any, Any, T], 
             is_gone = True
             own.cancel()
 
-    watch = asyncio.ensure_future(gone)
-    watch.add_done_callback(give_up)
+    def begin() -> None:
+        nonlocal watch
+        watch = asyncio.ensure_future(gone())
+        watch.add_done_callback(give_up)
+
+    beginning = asyncio.get_running_loop().call_later(FIRST_SECONDS, begin)
     try:
         return await work
     except asyncio.CancelledError:
@@ -66,4 +72,6 @@ async def unless(gone: Coroutine[Any, Any, None], work: Coroutine[Any, Any, T], 
         raise
     finally:
         waiting = False
-        watch.cancel()
+        beginning.cancel()
+        if watch is not None:
+            watch.cancel()
