@@ -45,31 +45,34 @@ class PatientHandler(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__()
-        self._lines: queue.Queue[str | None] = queue.Queue(WAITING_LINES)
+        # Of the queues of the library the one that does not take as long as the rest of a line.
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._handed = self._written = 0
         self._lost = 0
         self._thread = threading.Thread(target=self._write_all, name="log", daemon=True)
         self._thread.start()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Format a record and hand it over."""
+        """Format a record and hand it over; called by one thread at a time, as `logging` does."""
         try:
-            self._lines.put_nowait(self.format(record))
-        except queue.Full:
-            self._lost += 1
+            if self._lines.qsize() >= WAITING_LINES:
+                self._lost += 1
+                return
+            self._lines.put(self.format(record))
+            self._handed += 1
         except Exception:
             self.handleError(record)
 
     def flush(self) -> None:
         """Wait for what was handed over to be written, for a moment."""
         give_up = time.monotonic() + LAST_SECONDS
-        while self._lines.unfinished_tasks and self._thread.is_alive() and time.monotonic() < give_up:
+        while self._written < self._handed and self._thread.is_alive() and time.monotonic() < give_up:
             time.sleep(0.002)
 
     def close(self) -> None:
         """Write what is left and end."""
         self.flush()
-        with suppress(queue.Full):
-            self._lines.put_nowait(None)
+        self._lines.put(None)
         super().close()
 
     def _write_all(self) -> None:
@@ -81,7 +84,7 @@ class PatientHandler(logging.Handler):
                 line = self.format(record) + "\n" + line
             with suppress(OSError):  # nobody reads it any more
                 _write(line.encode("utf-8", "backslashreplace") + b"\n")
-            self._lines.task_done()
+            self._written += 1
 
 
 def _write(data: bytes) -> None:
