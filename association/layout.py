@@ -107,8 +107,14 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # What a pose is judged by.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
-# Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell over what it costs.
-BASE = _fields((_I, "sliding crossing"), (_F, "merit"))
+# Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell (the lesser gain) over
+# what it costs; until it is weighed, over what it costs at least.
+BASE = _fields((_I, "sliding crossing weighed"), (_F, "merit"))
+
+# What a scan segment adds to the cost of its bases: in how many direction bins it can slide; its angle; what its length
+# says of the hypotheses on a wall that crosses; what it costs to slide it everywhere; the logarithm of the least that a
+# base costs in which it slides.
+LINE_COST = _fields((_I, "bins"), (_F, "angle short sweep least"))
 
 # What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, and
 # the angle between them; the point about which a pose turns, and the variance of its rotation; by how much the two

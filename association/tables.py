@@ -255,12 +255,34 @@ class Samples(NamedTuple):
     undecided: Integers
 
 
+class Costs(NamedTuple):
+    """What the bases of n scan segments cost.
+
+    Attributes
+    ----------
+    lines : (n,) of `LINE_COST`
+    slides : (n, bins) how far each could slide on the runs of each direction bin, metres
+    smooth : (n, 2 bins) the same with the neighbouring bins, twice around
+    taken : (n, bins) the bins where it can, as many as there are
+    scale : float
+        Hypotheses for a metre's slide of one on one of the other, 1/m^2.
+    """
+
+    lines: Records
+    slides: Floats
+    smooth: Floats
+    taken: Integers
+    scale: float
+
+
 class Plan(NamedTuple):
     """The bases of a scan, and what tells when enough of them have been gone through.
 
     Attributes
     ----------
     bases : (k,) of `BASE`
+    costs : Costs
+        By which those are weighed whose turn may have come.
     uses : (n,) how often each of the first n scan segments was part of a base so far
     residual : (all scan segments,) what is left of each gain in the bound, nats
     best_gains : (n,) the gains of the first n, the largest first, nats
@@ -274,6 +296,7 @@ class Plan(NamedTuple):
     """
 
     bases: Records
+    costs: Costs
     uses: Floats
     residual: Floats
     best_gains: Floats

@@ -42,15 +42,14 @@ def advance(
     progress = borrowed(progress)
     work = borrowed(work)
     state = progress[0]
-    bases = plan.bases
     nothing = np.empty(0, dtype=TRIED)
     spent = 0
     while True:
         if state.current < 0:
-            state.current = next_base(bases, plan.uses, plan.fade)
+            state.current = next_base(plan)
             if state.current < 0:
                 return EXHAUSTED
-        base = bases[state.current]
+        base = plan.bases[state.current]
         spent += search_base(question, tables, base, found, nothing, state, work, budget - spent)
         if state.anchor > 0 or state.step > 0 or state.entry > 0:
             return BUDGET

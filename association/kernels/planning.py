@@ -7,8 +7,8 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import BASE, Integers
-from ..tables import Plan, Question, Samples, Walls
+from ..layout import BASE, LINE_COST, Integers
+from ..tables import Costs, Plan, Question, Samples, Walls
 from ..tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
@@ -93,78 +93,118 @@ def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool
 
 
 @kernel
-def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> Records:
-    """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`.
+def costs_of(scan: Records, count: int, runs: Walls, area: float) -> Costs:
+    """Return what bases of the first `count` scan segments cost, as far as that is of one segment each.
 
-    Beyond the first `BASE_SEGMENTS` only those that tell enough. The merit is what the base can tell (the lesser
-    gain) over what it will cost. `area` is that of the map, m^2.
+    `area` is that of the map, m^2.
     """
     slides, fitting = slack_tables(scan, count, runs)
-    middle = middle_of(scan)
     bins = slides.shape[1]
-    total = np.zeros(count)
     # Twice around, so that a bin that is turned needs no division to be found.
     smooth = np.empty((count, 2 * bins))
     taken = np.empty((count, bins), dtype=np.int64)
-    n_taken = np.zeros(count, dtype=np.int64)
-    short = np.empty(count)
-    tells = np.empty(count)
+    lines = np.empty(count, dtype=LINE_COST)
     for i in range(count):
-        tells[i] = math.log(scan[i].gain)
-        short[i] = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
+        line = lines[i]
+        total = 0.0
+        line.bins = 0
         for b in range(bins):
             after = b + 1 if b + 1 < bins else 0
             smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, after]
             smooth[i, b + bins] = smooth[i, b]
             if slides[i, b] > 0.0:
-                total[i] += slides[i, b]
-                taken[i, n_taken[i]] = b
-                n_taken[i] += 1
+                total += slides[i, b]
+                taken[i, line.bins] = b
+                line.bins += 1
+        line.angle = scan[i].angle
+        line.short = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
+        line.sweep = COST_ANCHOR * fitting[i] + COST_SLIDE * total
+        line.least = math.log(COST_BASE + line.sweep)
+    return Costs(lines, slides, smooth, taken, HYPOTHESIS_SCALE / area)
+
+
+@kernel
+def list_bases(scan: Records, costs: Costs) -> Records:
+    """List the non-parallel pairs of the scan segments of which the costs are, (k,) of `BASE`, none weighed.
+
+    Beyond the first `BASE_SEGMENTS` only those that tell enough.
+    """
+    lines = costs.lines
+    count = len(lines)
+    middle = middle_of(scan)
+    tells = np.empty(count)
+    for i in range(count):
+        tells[i] = math.log(scan[i].gain)
     bases = np.empty(count * (count - 1) // 2, dtype=BASE)
     k = 0
     for i in range(count):
         for j in range(i + 1, count):
-            turn = scan[j].angle - scan[i].angle
-            sine = abs(math.sin(turn))
+            sine = abs(scan[i].dx * scan[j].dy - scan[i].dy * scan[j].dx)
             telling = is_telling(scan[i], scan[j], middle)
             if sine < MIN_CROSSING_BASE or (j >= BASE_SEGMENTS and not telling):
                 continue
-            sweep_i = COST_ANCHOR * fitting[i] + COST_SLIDE * total[i]
-            sweep_j = COST_ANCHOR * fitting[j] + COST_SLIDE * total[j]
-            shift = round(turn / (2.0 * math.pi / bins)) % bins
-            expected = 0.0
-            for t in range(n_taken[i]):
-                b = taken[i, t]
-                expected += slides[i, b] * smooth[j, b + shift]
-            expected *= HYPOTHESIS_SCALE / area * sine**SINE_POWER * max(short[i], short[j])
-            cost = COST_BASE + min(sweep_i, sweep_j) + COST_HYPOTHESIS * expected
-            bases[k].sliding = i if sweep_i <= sweep_j else j
-            bases[k].crossing = j if sweep_i <= sweep_j else i
-            merit = GAIN_POWER * min(tells[i], tells[j]) - math.log(cost)
+            base = bases[k]
+            slides_i = lines[i].sweep <= lines[j].sweep
+            base.sliding = i if slides_i else j
+            base.crossing = j if slides_i else i
+            base.weighed = 0
+            base.merit = GAIN_POWER * min(tells[i], tells[j]) - min(lines[i].least, lines[j].least)
             if not telling:
-                merit += math.log(UNTELLING)
-            bases[k].merit = merit
+                base.merit += math.log(UNTELLING)
             k += 1
     return bases[:k]
 
 
 @kernel
-def next_base(bases: Records, uses: Floats, fade: float) -> int:
+def weigh(base: Record, costs: Costs) -> None:
+    """Take what the hypotheses of a base will cost off its merit, once."""
+    i = min(base.sliding, base.crossing)
+    j = max(base.sliding, base.crossing)
+    one = costs.lines[i]
+    other = costs.lines[j]
+    slides = costs.slides[i]
+    smooth = costs.smooth[j]
+    taken = costs.taken[i]
+    bins = len(slides)
+    turn = other.angle - one.angle
+    shift = round(turn / (2.0 * math.pi / bins)) % bins
+    expected = 0.0
+    for t in range(one.bins):
+        b = taken[t]
+        expected += slides[b] * smooth[b + shift]
+    expected *= costs.scale * abs(math.sin(turn)) ** SINE_POWER * max(one.short, other.short)
+    cost = COST_BASE + min(one.sweep, other.sweep) + COST_HYPOTHESIS * expected
+    base.merit -= math.log(cost) - min(one.least, other.least)
+    base.weighed = 1
+
+
+@kernel
+def weigh_all(bases: Records, costs: Costs) -> None:
+    """Weigh bases that are to be drawn by their merits."""
+    for k in range(len(bases)):
+        weigh(bases[k], costs)
+
+
+@kernel
+def next_base(plan: Plan) -> int:
     """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
 
-    Each use adds `fade` to the logarithm of its merit.
-
-    Ties go to the pair that comes first, that of the longest segments.
+    What a base is worth before it is weighed it is worth at most, so that few of them need be. Ties go to the pair that
+    comes first, that of the longest segments.
     """
+    bases = plan.bases
+    uses = plan.uses
     best = -1
     best_merit = -math.inf
     for k in range(len(bases)):
-        if bases[k].merit == -math.inf:
-            continue
-        merit = bases[k].merit + fade * (uses[bases[k].sliding] + uses[bases[k].crossing])
-        if merit > best_merit:
-            best_merit = merit
-            best = k
+        base = bases[k]
+        used = plan.fade * (uses[base.sliding] + uses[base.crossing])
+        if base.merit + used > best_merit:
+            if base.weighed == 0:
+                weigh(base, plan.costs)
+            if base.merit + used > best_merit:
+                best_merit = base.merit + used
+                best = k
     if best >= 0:
         bases[best].merit = -math.inf
         uses[bases[best].sliding] += 1
@@ -211,8 +251,13 @@ def begin(
         undecided[s] = s
     undecided[count] = count
     samples = Samples(orders, ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided)
+    costs = costs_of(scan, n, runs, area)
+    bases = list_bases(scan, costs)
+    if random:
+        weigh_all(bases, costs)
     return Plan(
-        plan_bases(scan, n, runs, area),
+        bases,
+        costs,
         np.zeros(n),
         residual,
         residual[ascending(losses)],

@@ -13,7 +13,6 @@ import pytest
 
 from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, SearchReport
 from association.candidates import Candidates, find_candidates
-from association.kernels.planning import plan_bases
 from association.tuning import (
     BASE_SEGMENTS,
     KEPT_SHARE,
@@ -26,6 +25,7 @@ from association.tuning import (
 from registration import RigidTransform
 from registration.layout import Records
 
+from .kernels.plans import bases_of
 from .reference import planning
 from .reference.consensus import refine
 from .scenes import (
@@ -166,14 +166,18 @@ def twelve() -> tuple[MapIndex, Scan]:
     return index_of(walls), scan_of([*walls, *clutter])
 
 
-def bases_of(index: MapIndex, scan: Scan) -> list[planning.Base]:
+BASE = ["sliding", "crossing", "merit"]
+
+
+def bases_in(index: MapIndex, scan: Scan) -> list[planning.Base]:
     rows = context_of(index, scan).lines.rows
-    return [base.item() for base in plan_bases(rows, len(rows), index.runs, index.area)]
+    bases: list[planning.Base] = bases_of(rows, len(rows), index.runs, index.area)[BASE].tolist()
+    return bases
 
 
 def test_an_exhaustive_search_goes_through_all_bases() -> None:
     scan = scan_of(seen(maze(1), pose(15.0, 14.0, 0.5), noise=0.02, cut=0.2, clutter=4, radius=10.0)[0])
-    count = len(bases_of(MAZE_INDEX, scan))
+    count = len(bases_in(MAZE_INDEX, scan))
     whole = found(MAZE_INDEX, scan, exhaustive=True).report
     assert (whole.complete, whole.exhaustive, whole.confidence, whole.bases) == (True, True, 1.0, count)
     usual = found(MAZE_INDEX, scan).report
@@ -222,7 +226,7 @@ def test_a_scan_of_many_segments_needs_no_more_bases(clutter: int) -> None:
 
 def missed(index: MapIndex, scan: Scan, bases: int, fewest: int) -> float:
     """Count the sets of `fewest` segments that hold none of the first bases; return their share."""
-    plan = bases_of(index, scan)
+    plan = bases_in(index, scan)
     tried = [set(plan[k][:2]) for k in planning.order_of(plan, math.log(REUSE))[:bases]]
     sets = list(itertools.combinations(range(len(scan.measured)), fewest))
     return sum(not any(base <= set(one) for base in tried) for one in sets) / len(sets)
@@ -282,7 +286,7 @@ def test_both_searches_of_a_window_are_counted() -> None:
     assert both.complete
     for name in ("bases", "hypotheses", "verified"):
         more = getattr(both, name) - getattr(anywhere, name)
-        assert 0 < more <= len(bases_of(ROOM_INDEX, ROOM_SCAN)) * (1 if name == "bases" else 10), name
+        assert 0 < more <= len(bases_in(ROOM_INDEX, ROOM_SCAN)) * (1 if name == "bases" else 10), name
 
 
 def test_a_search_of_a_window_is_as_sure_as_the_less_sure_one() -> None:
@@ -292,7 +296,7 @@ def test_a_search_of_a_window_is_as_sure_as_the_less_sure_one() -> None:
     assert 0.8 <= anywhere.confidence < 1.0
     assert not anywhere.exhaustive
     both = found(MAZE_INDEX, MAZE_SCAN, prior=nowhere, confidence=0.8).report
-    assert both.bases == anywhere.bases + len(bases_of(MAZE_INDEX, MAZE_SCAN))
+    assert both.bases == anywhere.bases + len(bases_in(MAZE_INDEX, MAZE_SCAN))
     assert (both.exhaustive, both.confidence) == (False, anywhere.confidence)
     exhaustive = found(MAZE_INDEX, MAZE_SCAN, prior=nowhere, exhaustive=True).report
     assert (exhaustive.exhaustive, exhaustive.confidence) == (True, 1.0)
