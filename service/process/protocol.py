@@ -48,7 +48,7 @@ class AdmittingProtocol(ReceiptProtocol):
         if not cycle.more_body:
             state.ticket.announce()
         state.is_unread = partial(_is_unread, cycle, scope)
-        cycle.transport = cast("asyncio.Transport", Exit(self))
+        cycle.transport = cast("asyncio.Transport", Exit(self, has_body=scope["method"] != "HEAD"))
         super()._start_asgi_task(cycle, app)
 
     def on_message_complete(self) -> None:

@@ -251,17 +251,38 @@ class ReceiptProtocol(FramingProtocol):
 
 
 class Exit:
-    """A transport as one request has it: to close it lets the answer arrive first.
+    """A transport as one request has it: an answer leaves it whole, and to close it lets the answer arrive first.
+
+    uvicorn writes the head of an answer and its body one after the other, and each goes out by itself. Who is killed
+    between the two leaves a proxy with a head that it has passed on: it can no longer ask another replica. An answer
+    that fails before its body has not begun either.
 
     Parameters
     ----------
     protocol : ReceiptProtocol
+    has_body : bool
+        Whether something follows the head; nothing does in answers to HEAD.
     """
 
-    def __init__(self, protocol: ReceiptProtocol) -> None:
+    def __init__(self, protocol: ReceiptProtocol, *, has_body: bool) -> None:
         self._protocol = protocol
-        self.write = protocol.transport.write
+        self._transport = protocol.transport
+        self._has_body = has_body
+        self._head: bytes | None = None
         self.is_closing = protocol.transport.is_closing
+
+    def write(self, data: bytes) -> None:
+        """Send what comes of an answer; its head with the first piece of its body."""
+        if not self._has_body or data == STILL_THERE:
+            self._transport.write(data)
+        elif self._head is None:
+            self._head = data
+        elif self._head:
+            # Not joined: a page is one object for all who read it, however long they take.
+            self._transport.writelines((self._head, data))
+            self._head = b""
+        else:
+            self._transport.write(data)
 
     def close(self) -> None:
         """End the connection."""

@@ -52,7 +52,7 @@ class Load:
         try:
             answer = send()  # type: ignore[operator]
         except httpx.TransportError as error:
-            self.statuses.append((0, type(error).__name__))
+            self.statuses.append((0, f"{type(error).__name__}: {error}"))
             return None
         code = "" if answer.status_code < 400 else str(answer.headers.get("content-type")) + answer.text[:300]
         self.statuses.append((answer.status_code, code))

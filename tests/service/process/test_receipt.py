@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 import socket
 import time
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ import orjson
 import pytest
 
 from service.process.listening import listen
+from service.schemas import examples
 from service.settings import Settings
 from tests.running import RunningService, running, until
 
@@ -128,3 +130,26 @@ def test_who_acknowledges_nothing_of_an_answer_is_given_up(tmp_path: Path) -> No
         accepted, _ = listener.accept()
         with accepted:
             assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 9000
+
+
+@pytest.mark.parametrize("path", ["/livez", "/nothing"])
+def test_the_head_of_an_answer_never_comes_alone(service: RunningService, path: str) -> None:
+    """A proxy that has passed a head on can ask no other replica when this one is killed before the body."""
+    with service.connection() as connection:
+        for _ in range(200):
+            connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            head, _, body = connection.recv(65_536).partition(b"\r\n\r\n")
+            length = re.search(rb"content-length: (\d+)", head)
+            assert length is not None
+            assert len(body) == int(length[1])
+
+
+def test_an_answer_without_a_body_comes(service: RunningService) -> None:
+    service.client.put("/v1/maps/brief", json=examples.MAP).raise_for_status()
+    etag = service.client.get("/v1/maps/brief").headers["etag"]
+    assert service.client.get("/v1/maps/brief", headers={"if-none-match": etag}).status_code == 304
+    assert service.client.delete("/v1/maps/brief").status_code == 204
+    with service.connection() as connection:
+        for path in (b"/livez", b"/nothing") * 2:
+            connection.sendall(b"HEAD %b HTTP/1.1\r\nHost: localhost\r\n\r\n" % path)
+            assert connection.recv(65_536).endswith(b"\r\n\r\n")
