@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RegistrationOptions, RegistrationResult, RigidTransform, register
-from registration.layout import Records
 
 from .context import SearchContext
 from .kernels.acceptance import accept_matches
-from .layout import ENDS, as_records
 from .map_index import MapIndex
 from .options import Estimator, Rotation
 from .ranking import Ranked
@@ -56,7 +54,7 @@ class Accepted:
 
 def accept(context: SearchContext, best: Ranked) -> Accepted:
     """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
-    index, ends = context.index, _ends_of(context)
+    index, ends = context.index, context.ends
     lines = Lines(context.lines.rows, context.lines.row_of, float(context.gates["least_overlap"][0]))
     found = accept_matches(best.matches, lines, ends, best.estimate, index.walls.rows, index.pieces)
     return Accepted(*found)
@@ -64,23 +62,13 @@ def accept(context: SearchContext, best: Ranked) -> Accepted:
 
 def overlaps_at(context: SearchContext, best: Ranked, accepted: Accepted, pose: RigidTransform) -> Floats:
     """Return the share of each accepted segment's length that lies on its wall, or run, at a pose in the map, (n,)."""
-    index, ends = context.index, _ends_of(context)
+    index, ends = context.index, context.ends
     at = best.estimate.copy()
     at["x"], at["y"], at["theta"] = pose.x - index.origin[0], pose.y - index.origin[1], pose.theta
     every = Lines(context.lines.rows, context.lines.row_of, 0.0)  # however little of a segment lies there
     pairs, overlaps, _, _ = accept_matches(best.matches, every, ends, at, index.walls.rows, index.pieces)
     shares: Floats = overlaps[np.searchsorted(pairs[:, 0], accepted.pairs[:, 0])]
     return shares
-
-
-def _ends_of(context: SearchContext) -> Records:
-    """Return the ends of the scan's segments, (n,) of `ENDS`.
-
-    Read-only, as those that were sent are: the kernel is not compiled once more for those of views that were moved.
-    """
-    ends = as_records(ENDS, context.scan.measured.segments.endpoints).view()
-    ends.flags.writeable = False
-    return ends
 
 
 def register_accepted(context: SearchContext, accepted: Accepted, settled: Settled) -> RegistrationResult | None:

@@ -143,19 +143,22 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
     if context.deadline.cancelled:
         raise CancelledError
     exhaustive = stopped == EXHAUSTED and len(scan) <= BASE_SEGMENTS
+    state = dict(zip(PROGRESS.names or (), progress[0].item(), strict=True))  # a look at one field takes as long as all
     report = SearchReport(
         complete=stopped != BUDGET and slid,
         exhaustive=exhaustive,
-        confidence=1.0 if exhaustive or stopped == PROVEN else 1.0 - float(progress["missed"][0]),
-        bases=int(progress["bases"][0]),
-        hypotheses=int(progress["hypotheses"][0]),
-        verified=int(progress["verified"][0]),
+        confidence=1.0 if exhaustive or stopped == PROVEN else 1.0 - state["missed"],
+        bases=state["bases"],
+        hypotheses=state["hypotheses"],
+        verified=state["verified"],
         seed=context.options.seed,
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    at = np.array(places, dtype=np.intp)
-    return Candidates(found[at[np.argsort(-found["value"][at], kind="stable")]], report)
+    poses = found[np.array(places, dtype=np.intp)]
+    if len(places) > 1:
+        poses = poses[np.argsort(-poses["value"], kind="stable")]
+    return Candidates(poses, report)
 
 
 @lru_cache

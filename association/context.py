@@ -12,6 +12,7 @@ from registration.layout import Records
 
 from .alignment import aligned
 from .layout import (
+    ENDS,
     GATES,
     HARD_PRIOR,
     MODEL,
@@ -96,6 +97,16 @@ class SearchContext:
         return self.prior if isinstance(self.prior, HardPrior) else None
 
     @cached_property
+    def ends(self) -> Records:
+        """The ends of the scan's segments, (n,) of `ENDS`.
+
+        Read-only, as those that were sent are: a kernel is not compiled once more for those of views that were moved.
+        """
+        ends = as_records(ENDS, self.scan.measured.segments.endpoints).view()
+        ends.flags.writeable = False
+        return ends
+
+    @cached_property
     def sights(self) -> Sights:
         """What was seen from each place, as far as lines of sight are evidence."""
         seen, views = self.lines.sightings, self.scan.views
@@ -133,7 +144,8 @@ class SearchContext:
 
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""
-        return self.question_of_a_pose._replace(rules=rules)
+        scan, terms, _ = self.question_of_a_pose
+        return Question(scan, terms, rules)
 
     @cached_property
     def question_of_a_pose(self) -> Question:

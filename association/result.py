@@ -22,9 +22,11 @@ class Status(StrEnum):
     OK = "ok"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Correspondence:
     """A scan segment found on a map segment.
+
+    Nobody changes one; a frozen dataclass takes several times as long to make, and an answer has dozens.
 
     Attributes
     ----------
