@@ -11,7 +11,7 @@ import numpy as np
 from registration.layout import Records
 
 from .context import SearchContext
-from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance
+from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance, begin_and_advance
 from .kernels.planning import begin
 from .kernels.sliding import search_slides, sliding_segments
 from .kernels.stopping import missed_share
@@ -19,7 +19,7 @@ from .layout import FOUND, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
 from .result import SearchReport
 from .sharing import Sharing
-from .tables import Plan, Question
+from .tables import Plan, Planning, Question
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,
@@ -41,6 +41,8 @@ from .tuning import (
     TELLING_SEGMENTS,
     USUAL_CROWD,
 )
+
+NO_NOISE = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,34 +179,37 @@ def _go_through_bases(
     context: SearchContext, effort: Effort, question: Question, found: Records, progress: Records, chunk: int
 ) -> int:
     """Fill `found` and `progress`; return why it ended, `BUDGET` where the deadline did."""
-    tables, plan = context.index.tables, _plan(context, effort, question, progress)
-    stopped = EXHAUSTED if len(plan.bases) == 0 else BUDGET
-    while stopped == BUDGET and not context.deadline.passed:
-        stopped = advance(question, tables, plan, found, progress, context.workspace, effort.allowed, chunk)
-        if stopped == BUDGET and context.deadline.helped:
-            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(effort.allowed)
+    tables, deadline, work = context.index.tables, context.deadline, context.workspace
+    planning = _planning(context, effort)
+    if deadline.passed:
+        plan: Plan | None = begin(question, planning, progress)
+        stopped = BUDGET
+    else:
+        stopped, plan = begin_and_advance(question, tables, planning, found, progress, work, effort.allowed, chunk)
+    if plan is None:
+        return stopped
     if len(plan.bases) == 0:
         progress["missed"] = 0.0  # walls of which no two cross are slid
-    elif stopped in (BUDGET, EXHAUSTED) and not plan.random:
+        return EXHAUSTED
+    while stopped == BUDGET:
+        if deadline.helped:
+            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(effort.allowed)
+        if stopped != BUDGET or deadline.passed:
+            break
+        stopped = advance(question, tables, plan, found, progress, work, effort.allowed, chunk)
+    if stopped in (BUDGET, EXHAUSTED) and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
     return stopped
 
 
-def _plan(context: SearchContext, effort: Effort, question: Question, progress: Records) -> Plan:
-    index, options = context.index, context.options
-    orders, random = _orders(_segments_of_bases(len(question.scan)), effort.samples), options.sampling == "random"
-    plan = begin(question, index.runs, index.area, *orders, progress, 0.0 if random else math.log(REUSE), random)
-    return plan._replace(bases=_drawn(plan.bases, options)) if random else plan
-
-
-def _drawn(bases: Records, options: AssociationOptions) -> Records:
-    """Put bases in a random order.
-
-    Those with the greatest sums of the logarithm of their merit and a Gumbel variate are draws without replacement with
-    a probability by merit.
-    """
-    bases["merit"] += np.random.default_rng(options.seed).gumbel(size=len(bases))
-    return bases
+def _planning(context: SearchContext, effort: Effort) -> Planning:
+    index, count = context.index, _segments_of_bases(len(context.lines.rows))
+    orders, noise, fade = _orders(count, effort.samples), NO_NOISE, math.log(REUSE)
+    if context.options.sampling == "random":
+        # Those with the greatest sums of the logarithm of their merit and a Gumbel variate are draws without
+        # replacement with a probability by merit.
+        noise, fade = np.random.default_rng(context.options.seed).gumbel(size=max(1, count * (count - 1) // 2)), 0.0
+    return Planning(index.runs, index.area, *orders, fade, noise)
 
 
 def _segments_of_bases(count: int) -> int:

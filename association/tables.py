@@ -275,6 +275,30 @@ class Costs(NamedTuple):
     scale: float
 
 
+class Planning(NamedTuple):
+    """What the bases of a scan are planned by.
+
+    Attributes
+    ----------
+    runs : Walls
+        Of the map.
+    area : float
+        Of the map, m^2.
+    orders : (s, n) as in `Samples`, n being how many segments bases are made of
+    ranks : (n, s) as in `Samples`
+    fade : float
+        As in `Plan`.
+    noise : (k,) what is added to the merits of bases that are drawn at random; empty where they are not
+    """
+
+    runs: Walls
+    area: float
+    orders: Integers
+    ranks: Integers
+    fade: float
+    noise: Floats
+
+
 class Plan(NamedTuple):
     """The bases of a scan, and what tells when enough of them have been gone through.
 

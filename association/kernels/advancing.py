@@ -8,10 +8,20 @@ from registration.compiling import borrowed, kernel
 from registration.layout import Record, Records
 
 from ..layout import FOUND, TRIED
-from ..tables import MapTables, Plan, Question, Workspace
-from .planning import is_telling, middle_of, next_base
+from ..tables import MapTables, Plan, Planning, Question, Workspace
+from .planning import begin, is_telling, middle_of, next_base
 from .proposing import search_base
-from .stopping import cover, drawn_chance, fewest_segments, gain_beyond, least_freedom, missed_sets, needed_of, strike
+from .stopping import (
+    cover,
+    drawn_chance,
+    fewest_segments,
+    gain_beyond,
+    least_freedom,
+    missed_sets,
+    missed_share,
+    needed_of,
+    strike,
+)
 from .trying import keep_tried
 
 # Why `advance` came back.
@@ -58,6 +68,33 @@ def advance(
             return why
         if spent > budget:
             return BUDGET
+
+
+@kernel
+def begin_and_advance(
+    question: Question,
+    tables: MapTables,
+    planning: Planning,
+    found: Records,
+    progress: Records,
+    work: Workspace,
+    allowed: float,
+    budget: int,
+) -> tuple[int, Plan | None]:
+    """Plan a search and do as `advance`; return the plan where the budget ended it, and None where nothing is left.
+
+    Most searches end so: a plan is twenty arrays, which take long to hand to Python and back.
+    """
+    plan = begin(question, planning, progress)
+    if len(plan.bases) == 0:
+        progress[0].missed = 0.0
+        return EXHAUSTED, None
+    why = advance(question, tables, plan, found, progress, work, allowed, budget)
+    if why == BUDGET:
+        return why, plan
+    if why == EXHAUSTED and not plan.random:
+        progress[0].missed = missed_share(question, plan, progress)
+    return why, None
 
 
 @kernel

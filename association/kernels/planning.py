@@ -7,8 +7,8 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import BASE, LINE_COST, Integers
-from ..tables import Costs, Plan, Question, Samples, Walls
+from ..layout import BASE, LINE_COST
+from ..tables import Costs, Plan, Planning, Question, Samples, Walls
 from ..tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
@@ -179,10 +179,11 @@ def weigh(base: Record, costs: Costs) -> None:
 
 
 @kernel
-def weigh_all(bases: Records, costs: Costs) -> None:
-    """Weigh bases that are to be drawn by their merits."""
+def weigh_all(bases: Records, costs: Costs, noise: Floats) -> None:
+    """Weigh bases that are to be drawn by their merits, to which noise is added, (k,) or more."""
     for k in range(len(bases)):
         weigh(bases[k], costs)
+        bases[k].merit += noise[k]
 
 
 @kernel
@@ -213,23 +214,11 @@ def next_base(plan: Plan) -> int:
 
 
 @kernel
-def begin(
-    question: Question,
-    runs: Walls,
-    area: float,
-    orders: Integers,
-    ranks: Integers,
-    progress: Records,
-    fade: float,
-    random: bool,
-) -> Plan:
-    """Plan a search, and put `progress` (1,) at its beginning, at the best value that is known.
-
-    `orders` (samples, n) and `ranks` (n, samples) are those of `Samples`, n being how many segments bases are made of;
-    `area` is that of the map, m^2; `fade` and `random` as in `Plan`.
-    """
+def begin(question: Question, planning: Planning, progress: Records) -> Plan:
+    """Plan a search, and put `progress` (1,) at its beginning, at the best value that is known."""
     scan = question.scan
-    count, n = orders.shape
+    count, n = planning.orders.shape
+    random = len(planning.noise) > 0
     state = progress[0]
     state.current = -1
     state.bound = 0.0
@@ -250,11 +239,13 @@ def begin(
         found[s] = n
         undecided[s] = s
     undecided[count] = count
-    samples = Samples(orders, ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided)
-    costs = costs_of(scan, n, runs, area)
+    samples = Samples(
+        planning.orders, planning.ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided
+    )
+    costs = costs_of(scan, n, planning.runs, planning.area)
     bases = list_bases(scan, costs)
     if random:
-        weigh_all(bases, costs)
+        weigh_all(bases, costs, planning.noise)
     return Plan(
         bases,
         costs,
@@ -263,6 +254,6 @@ def begin(
         residual[ascending(losses)],
         ascending(freedoms),
         samples,
-        fade,
+        planning.fade,
         random,
     )

@@ -42,5 +42,5 @@ def bases_of(scan: Records, count: int, runs: Walls, area: float) -> Records:
     """Return the bases of the first `count` segments of a scan, all of them weighed."""
     costs = planning.costs_of(scan, count, runs, area)
     bases = planning.list_bases(scan, costs)
-    planning.weigh_all(bases, costs)
+    planning.weigh_all(bases, costs, np.zeros(len(bases)))
     return bases

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 
 from association.kernels import planning, sliding
 from association.layout import PROGRESS, record
+from association.tables import Planning
 from association.tuning import BASE_SEGMENTS, PARALLEL_SINE, REUSE
 from registration.layout import Records
 
@@ -110,15 +111,16 @@ def test_begin(seed: int) -> None:
     d = drawn(seed)
     question, n = context_of(INDEX, scan_of(d.endpoints)).question(RULE), int(d.rng.integers(1, len(d.scan) + 1))
     samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0)
-    plan = planning.begin(
-        question, INDEX.runs, INDEX.area, samples.orders, samples.ranks, progress, math.log(REUSE), seed % 2 == 0
-    )
+    noise = d.rng.gumbel(size=n * n if seed % 2 == 0 else 0)
+    by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
+    plan = planning.begin(question, by, progress)
     assert progress[0]["current"] == -1
     assert progress[0]["bound"] == pytest.approx(d.scan["gain"].sum())
     assert progress[0]["missed"] == 1.0
     assert progress[0]["best_value"] == 3.0
     anew = plan_of(question.scan, n, INDEX.runs, INDEX.area)
     weighed = bases_of(question.scan, n, INDEX.runs, INDEX.area)
+    weighed["merit"] += noise[: len(weighed)] if len(noise) else 0.0
     np.testing.assert_array_equal(plan.bases, weighed if plan.random else anew.bases)
     np.testing.assert_array_equal(plan.costs.lines, anew.costs.lines)
     np.testing.assert_array_equal(plan.uses, np.zeros(n))
