@@ -9,16 +9,24 @@ from numpy.typing import NDArray
 
 from registration.layout import Records
 
+from .kernels.crossings import find_crossings, list_crossings, sample_crossings
 from .kernels.walls import direction_raster, grid_cells
-from .layout import ENDS, GRID_SHAPE, as_records, record
-from .tables import Grid, Raster, Sweep, Walls
+from .layout import CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
+from .tables import Crossings, Grid, Raster, Sweep, Walls
 from .tuning import (
     CELL,
     CELL_GROWTH,
+    CROSSING_CELL,
+    CROSSING_REACHES,
+    CROSSING_SAMPLE,
+    CROSSING_SAMPLE_LOOKS,
+    CROSSINGS_A_RUN,
+    FEW_RUNS,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
+    MOST_CROSSINGS,
     NARROW_REACH,
     NEIGHBOURHOOD,
     RASTER_CELL,
@@ -27,7 +35,7 @@ from .tuning import (
     SWEEP_CELL,
     SWEEP_REACH,
 )
-from .walls import ends_of
+from .walls import ends_of, ends_of_rows
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +58,36 @@ def swept_runs(runs: Walls) -> Sweep:
     )
     swept = swept._replace(items=swept.items * np.int32(SECTORS) + sectors)
     return Sweep(rows, rows["end"] - rows["begin"], swept, present)
+
+
+def crossing_runs(runs: Records) -> Crossings:
+    """List the pairs of runs (m,) that cross, up to as far from there as their number allows, or none."""
+    m, ends = len(runs), ends_of_rows(runs)
+    boxes = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
+    order = np.argsort(boxes[:, 0], kind="stable").astype(np.int32)
+    boxed, most = (
+        as_records(ENDS, boxes[order]),
+        np.minimum(np.array(CROSSINGS_A_RUN) * max(m, FEW_RUNS), MOST_CROSSINGS),
+    )
+    reaches, every = np.array(CROSSING_REACHES), max(1, m // CROSSING_SAMPLE)
+    counts = sample_crossings(runs, boxed, order, reaches, every, CROSSING_SAMPLE_LOOKS)
+    allowed = (counts <= most).all(axis=1)
+    for reach, count in zip(reaches[allowed].tolist(), counts[allowed, 0].tolist(), strict=True):
+        rows = np.empty(int(1.2 * count) + FEW_RUNS, CROSSING)
+        found, looks = find_crossings(runs, boxed, order, reach, 2 * int(most[2]), rows)
+        if found > 2 * most[0] or looks > 2 * most[2]:
+            continue  # the sample was not like the rest
+        if found > len(rows):
+            rows = np.empty(found, CROSSING)
+            find_crossings(runs, boxed, order, reach, 2 * int(most[2]), rows)
+        return listed(runs, rows[:found].copy(), reach)
+    return listed(runs, np.zeros(0, CROSSING), -1.0)
+
+
+def listed(runs: Records, rows: Records, reach: float) -> Crossings:
+    """List crossings (k,) of `CROSSING`, all those of the runs that there are up to `reach` metres."""
+    shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / CROSSING_CELL)))
+    return Crossings(shape, rows, *list_crossings(runs, rows, shape))
 
 
 def directions_near(walls: Walls, runs: Walls) -> Raster:

@@ -107,20 +107,31 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # What a pose is judged by.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
-# Two scan segments that fix a pose; the first slides. Merit: the logarithm of what it can tell (the lesser gain) over
-# what it costs; until it is weighed, over what it costs at least.
-BASE = _fields((_I, "sliding crossing weighed"), (_F, "merit"))
+# Two runs whose lines cross, the second one to the left of the first.
+CROSSING = _fields((np.int32, "first second"))
+
+# Where crossings are listed: up to how far from the point where the lines cross, and how many cells there are that way.
+CROSSING_SHAPE = _fields((_F, "reach"), (_I, "columns"))
+
+# A list of crossings on which a base may lie: where it begins and ends; the column and row of its cell; what is asked
+# for in it, from the midpoint of each segment, m; what its codes may be at most.
+LISTED = _fields((_I, "begin end column row"), (_F, "from_first from_second"), (_I, "code"))
+
+# Two scan segments that fix a pose; the first slides, or has the second one to its left where crossings are listed:
+# how many these are, or -1. Merit: the logarithm of what it can tell (the lesser gain) over what it costs; until it is
+# weighed, over what it costs at least.
+BASE = _fields((_I, "sliding crossing listed weighed"), (_F, "merit"))
 
 # What a scan segment adds to the cost of its bases: in how many direction bins it can slide; its angle; what its length
 # says of the hypotheses on a wall that crosses; what it costs to slide it everywhere; the logarithm of the least that a
 # base costs in which it slides.
 LINE_COST = _fields((_I, "bins"), (_F, "angle short sweep least"))
 
-# What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, and
-# the angle between them; the point about which a pose turns, and the variance of its rotation; by how much the two
-# angles may disagree, by how much the rotation may be off until the final one is known, and by how many metres b then
-# is; half of what has to lie within its run of a and of b.
-FIGURE = _fields((_F, "x y turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
+# What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, also
+# along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
+# rotation; by how much the two angles may disagree, by how much the rotation may be off until the final one is known,
+# and by how many metres b then is; half of what has to lie within its run of a and of b.
+FIGURE = _fields((_F, "x y ahead beside turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
 
 # Segment a of a base laid on a run, and b while a slides: which run; the column, row and number of the cell where b is,
 # and how these go on; which sectors the direction of b may lie in, as bits; directions of the run and of b; midpoint of

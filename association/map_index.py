@@ -13,9 +13,9 @@ from registration import Segments
 
 from .errors import InvalidMapError
 from .extents import diagonal
-from .grids import directions_near, near_walls, swept_runs
+from .grids import crossing_runs, directions_near, near_walls, swept_runs
 from .layout import ENDS, Integers, as_records
-from .tables import Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
+from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
 from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
 
@@ -49,6 +49,8 @@ class MapIndex:
     sweep : Sweep
         Which runs of a direction does a sweep meet? Told from the list alone, since a look at a run costs more than all
         else.
+    crossings : Crossings
+        On which pairs of runs may two segments of a scan lie? As far as they are listed no sweep is needed.
     raster : Raster
         The quickest way to see that a segment cannot lie at a place.
     """
@@ -63,6 +65,7 @@ class MapIndex:
     runs: Walls
     grid: Grid
     sweep: Sweep
+    crossings: Crossings
     raster: Raster
 
     @classmethod
@@ -104,7 +107,8 @@ class MapIndex:
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
         pieces = Pieces(order, starts, as_records(ENDS, local.endpoints))
-        grids = near_walls(walls), swept_runs(runs), directions_near(walls, runs)
+        sweep = swept_runs(runs)
+        grids = near_walls(walls), sweep, crossing_runs(sweep.runs), directions_near(walls, runs)
         index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
         for name in ("sorted_lengths", "crowd", "agreeing_share", "area", "diagonal", "tables"):
             getattr(index, name)  # kept from here on, so that the first search does not wait for them
@@ -152,12 +156,22 @@ class MapIndex:
     @cached_property
     def tables(self) -> MapTables:
         """What the kernels of the search are handed."""
-        return MapTables(Place(self.walls.rows, self.walls.bin_starts, self.grid), self.sweep, self.raster)
+        return MapTables(
+            Place(self.walls.rows, self.walls.bin_starts, self.grid), self.sweep, self.crossings, self.raster
+        )
 
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        tables: list[Any] = [self.pieces, self.walls, self.runs, self.grid, self.sweep.sectors, self.raster]
+        tables: list[Any] = [
+            self.pieces,
+            self.walls,
+            self.runs,
+            self.grid,
+            self.sweep.sectors,
+            self.crossings,
+            self.raster,
+        ]
         tables.append((self.sweep.runs, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
         return sum(array.nbytes for array in [self.wall_of_piece, *lines, *(a for table in tables for a in table)])

@@ -95,6 +95,27 @@ class Sweep(NamedTuple):
     present: Integers
 
 
+class Crossings(NamedTuple):
+    """The pairs of runs whose lines cross near both, by how a scan segment would lie on each.
+
+    Attributes
+    ----------
+    shape : (1,) of `CROSSING_SHAPE`
+    rows : (k,) of `CROSSING`
+    bins : (angles,) which of the grids is that of each bin of angles between two runs, -1 where there is none
+    starts, items : cell ``c = (grid * columns + column) * columns + row`` lists ``items[starts[c]:starts[c + 1]]``, the
+        crossings whose first run is `column` cells and whose second one is `row` cells from where they cross, somewhere
+    codes : (entries,) of 32 bits, where the runs of each item begin and end: see `kernels.crossings.code_of`
+    """
+
+    shape: Records
+    rows: Records
+    bins: Integers
+    starts: Integers
+    items: Integers
+    codes: Integers
+
+
 class Pieces(NamedTuple):
     """The map's own segments.
 
@@ -114,6 +135,7 @@ class MapTables(NamedTuple):
 
     place: Place
     sweep: Sweep
+    crossings: Crossings
     raster: Raster
 
 
@@ -260,7 +282,7 @@ class Costs(NamedTuple):
 
     Attributes
     ----------
-    lines : (n,) of `LINE_COST`
+    lines : (n,) of `LINE_COST`; this and what follows is empty where the crossings of all bases are listed
     slides : (n, bins) how far each could slide on the runs of each direction bin, metres
     smooth : (n, 2 bins) the same with the neighbouring bins, twice around
     taken : (n, bins) the bins where it can, as many as there are
@@ -288,6 +310,10 @@ class Planning(NamedTuple):
     ranks : (n, s) as in `Samples`
     fade : float
         As in `Plan`.
+    crossings : Crossings
+        Of the map.
+    figure : (1,) of `FIGURE`
+        To write to.
     noise : (k,) what is added to the merits of bases that are drawn at random; empty where they are not
     """
 
@@ -296,6 +322,8 @@ class Planning(NamedTuple):
     orders: Integers
     ranks: Integers
     fade: float
+    crossings: Crossings
+    figure: Records
     noise: Floats
 
 

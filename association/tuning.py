@@ -112,6 +112,19 @@ SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one fami
 PARALLEL_SINE = 0.1  # tables
 KEPT_SLIDES = 64  # tables
 
+# Pairs of runs that cross are listed up to as far from there as one of these, as three numbers allow: pairs, their
+# entries in all lists, and pairs of runs that are near enough to be looked at.
+CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m
+CROSSING_CELL = 2.0  # m
+CROSSING_ANGLES = 45  # bins of half a turn; the middle one is about a right angle
+CROSSINGS_A_RUN = (40, 250, 4_000)
+MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)  # memory: 16 and 36 MB; and a second of indexing
+FEW_RUNS = 500  # at least so many runs count
+CROSSING_SAMPLE = 128  # runs by which these numbers are estimated,
+CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most
+CROSSING_MARGIN = 1e-3  # m, rounding
+MOST_LISTS = 256  # lists for one base; it is swept where there are more
+
 # --- Planning: the order of bases, and when enough have been gone through ---------------------------------------------
 
 TELLING = 0.25  # m, tables; how far a base may lay the other segments off, root mean square
@@ -119,6 +132,7 @@ UNTELLING = 0.1  # tables; what a base is worth less that lays them farther off
 REUSE = 0.3  # tables; what a base is worth less for each earlier use of one of its segments
 # What a base, a wall that it may slide on, a metre of slide, a hypothesis cost; nanoseconds, measured.
 COST_BASE = 2000.0
+COST_ENTRY = 50.0
 COST_ANCHOR = 60.0
 COST_SLIDE = 3.0
 COST_HYPOTHESIS = 480.0

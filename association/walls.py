@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import Segments
+from registration.layout import Records
 
 from .kernels.walls import collinear_groups
 from .layout import ENDS, POINT, WALL, Integers, as_records
@@ -104,7 +105,12 @@ def direction_bin(angles: Floats) -> NDArray[np.intp]:
 
 def ends_of(walls: Walls) -> Floats:
     """Return (m, 4) begin and end, metres in the index frame."""
-    dx, dy, offset, begin, end = (walls.rows[name] for name in ("dx", "dy", "offset", "begin", "end"))
+    return ends_of_rows(walls.rows)
+
+
+def ends_of_rows(rows: Records) -> Floats:
+    """Return the same of walls or runs, (m,) of `WALL`."""
+    dx, dy, offset, begin, end = (rows[name] for name in ("dx", "dy", "offset", "begin", "end"))
     a = np.column_stack([dx * begin - dy * offset, dy * begin + dx * offset])
     b = np.column_stack([dx * end - dy * offset, dy * end + dx * offset])
     return np.hstack([a, b])

@@ -4,28 +4,31 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import borrowed, inlined, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import BASE, LINE_COST
-from ..tables import Costs, Plan, Planning, Question, Samples, Walls
+from ..layout import BASE, LINE_COST, LISTED
+from ..tables import Costs, Crossings, Plan, Planning, Question, Samples, Walls
 from ..tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
     COST_BASE,
+    COST_ENTRY,
     COST_HYPOTHESIS,
     COST_SLIDE,
     GAIN_POWER,
     HYPOTHESIS_SCALE,
     MIN_CROSSING_BASE,
+    MOST_LISTS,
     SHORT_LENGTH,
     SHORT_POWER,
     SINE_POWER,
     TELLING,
     UNTELLING,
 )
+from .crossings import look_up
 from .ordering import ascending
-from .sweeping import least_length
+from .sweeping import least_length, measure
 
 
 @kernel
@@ -124,40 +127,72 @@ def costs_of(scan: Records, count: int, runs: Walls, area: float) -> Costs:
 
 
 @kernel
-def list_bases(scan: Records, costs: Costs) -> Records:
-    """List the non-parallel pairs of the scan segments of which the costs are, (k,) of `BASE`, none weighed.
+def pair_up(scan: Records, count: int) -> Records:
+    """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`, the second left of the first.
 
-    Beyond the first `BASE_SEGMENTS` only those that tell enough.
+    Beyond the first `BASE_SEGMENTS` only those that tell enough. What they are worth is still to be told.
     """
-    lines = costs.lines
-    count = len(lines)
     middle = middle_of(scan)
-    tells = np.empty(count)
-    for i in range(count):
-        tells[i] = math.log(scan[i].gain)
     bases = np.empty(count * (count - 1) // 2, dtype=BASE)
     k = 0
     for i in range(count):
         for j in range(i + 1, count):
-            sine = abs(scan[i].dx * scan[j].dy - scan[i].dy * scan[j].dx)
+            sine = scan[i].dx * scan[j].dy - scan[i].dy * scan[j].dx
             telling = is_telling(scan[i], scan[j], middle)
-            if sine < MIN_CROSSING_BASE or (j >= BASE_SEGMENTS and not telling):
+            if abs(sine) < MIN_CROSSING_BASE or (j >= BASE_SEGMENTS and not telling):
                 continue
             base = bases[k]
-            slides_i = lines[i].sweep <= lines[j].sweep
-            base.sliding = i if slides_i else j
-            base.crossing = j if slides_i else i
-            base.weighed = 0
-            base.merit = GAIN_POWER * min(tells[i], tells[j]) - min(lines[i].least, lines[j].least)
-            if not telling:
-                base.merit += math.log(UNTELLING)
+            base.sliding = i if sine > 0.0 else j
+            base.crossing = j if sine > 0.0 else i
+            base.merit = 0.0 if telling else math.log(UNTELLING)
             k += 1
     return bases[:k]
 
 
 @kernel
+def count_listed(scan: Records, bases: Records, gates: Record, crossings: Crossings, figures: Records) -> None:
+    """Write how many crossings are listed of each base, the second segment of which is left of the first.
+
+    `figures` (1,) of `FIGURE` is written to.
+    """
+    crossings = borrowed(crossings)
+    figure = figures[0]
+    lists = np.empty(MOST_LISTS, dtype=LISTED)
+    for k in range(len(bases)):
+        base = bases[k]
+        measure(scan[base.sliding], scan[base.crossing], gates, figure)
+        _, base.listed = look_up(figure, crossings, lists)
+
+
+@kernel
+def value(scan: Records, bases: Records, costs: Costs) -> None:
+    """Add to the merits of bases what they can tell, and take off what they cost at least.
+
+    Those whose crossings are listed are weighed then; of the others the one that slides is chosen.
+    """
+    lines = costs.lines
+    tells = np.empty(len(scan))
+    for i in range(len(scan)):
+        tells[i] = math.log(scan[i].gain)
+    for k in range(len(bases)):
+        base = bases[k]
+        i = min(base.sliding, base.crossing)
+        j = max(base.sliding, base.crossing)
+        base.merit += GAIN_POWER * min(tells[i], tells[j])
+        base.weighed = 1 if base.listed >= 0 else 0
+        if base.listed >= 0:
+            base.merit -= math.log(COST_BASE + COST_ENTRY * base.listed)
+        else:
+            base.merit -= min(lines[i].least, lines[j].least)
+            slides = lines[i].sweep <= lines[j].sweep
+            base.sliding = i if slides else j
+            base.crossing = j if slides else i
+
+
+@kernel
 def weigh(base: Record, costs: Costs) -> None:
-    """Take what the hypotheses of a base will cost off its merit, once."""
+    """Take what the hypotheses of a base that is swept will cost off its merit, once."""
+    base.weighed = 1
     i = min(base.sliding, base.crossing)
     j = max(base.sliding, base.crossing)
     one = costs.lines[i]
@@ -175,14 +210,14 @@ def weigh(base: Record, costs: Costs) -> None:
     expected *= costs.scale * abs(math.sin(turn)) ** SINE_POWER * max(one.short, other.short)
     cost = COST_BASE + min(one.sweep, other.sweep) + COST_HYPOTHESIS * expected
     base.merit -= math.log(cost) - min(one.least, other.least)
-    base.weighed = 1
 
 
 @kernel
 def weigh_all(bases: Records, costs: Costs, noise: Floats) -> None:
     """Weigh bases that are to be drawn by their merits, to which noise is added, (k,) or more."""
     for k in range(len(bases)):
-        weigh(bases[k], costs)
+        if bases[k].weighed == 0:
+            weigh(bases[k], costs)
         bases[k].merit += noise[k]
 
 
@@ -242,8 +277,14 @@ def begin(question: Question, planning: Planning, progress: Records) -> Plan:
     samples = Samples(
         planning.orders, planning.ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided
     )
-    costs = costs_of(scan, n, planning.runs, planning.area)
-    bases = list_bases(scan, costs)
+    bases = pair_up(scan, n)
+    count_listed(scan, bases, question.terms[0].gates, planning.crossings, planning.figure)
+    swept = 0
+    for k in range(len(bases)):
+        if bases[k].listed < 0:
+            swept = n
+    costs = costs_of(scan, swept, planning.runs, planning.area)
+    value(scan, bases, costs)
     if random:
         weigh_all(bases, costs, planning.noise)
     return Plan(

@@ -7,12 +7,13 @@ import numpy as np
 from registration.compiling import kernel
 from registration.layout import Record, Records
 
-from ..layout import LAID, MET, SWEPT
+from ..layout import HARD_PRIOR, LAID, LISTED, MET, SWEPT
 from ..tables import MapTables, Question, Workspace
-from ..tuning import AT_ONCE, TESTS_ANCHOR, TESTS_BASE
+from ..tuning import AT_ONCE, MOST_LISTS, TESTS_ANCHOR, TESTS_BASE
+from .crossings import look_up, on_crossings
 from .matching import gates_about, wrap
 from .sweeping import anchors, end_slack, lay, measure, meet, sweep, where_crossed
-from .trying import try_poses
+from .trying import is_about, try_poses
 
 
 @kernel
@@ -88,7 +89,36 @@ def stand_behind(swept: Records, met: Records, last: int, begin: int, progress: 
 
 
 @kernel
-def search_base(
+def pose_listed(
+    a: Record, b: Record, met: Records, count: int, prior: Record, runs: Records, crossings: Records, work: Workspace
+) -> int:
+    """Write the poses that put a and b on the runs of the first `count` crossings that were met; return how many."""
+    figure = work.scratch[0].figure
+    posed = work.posed
+    least_cos = 1.0 - 0.5 * figure.tolerance * figure.tolerance
+    n = 0
+    for k in range(count):
+        crossing = crossings[met[k].run]
+        wa = runs[crossing.first]
+        wb = runs[crossing.second]
+        one = posed[n]
+        c = wa.dx * a.dx + wa.dy * a.dy
+        s = wa.dy * a.dx - wa.dx * a.dy
+        if wb.dx * (c * b.dx - s * b.dy) + wb.dy * (s * b.dx + c * b.dy) < least_cos:
+            continue
+        if base_pose(a, b, wa, wb, one) and (prior.kind != HARD_PRIOR or is_about(prior, one)):
+            one.lever_x = c * figure.pin_x - s * figure.pin_y
+            one.lever_y = s * figure.pin_x + c * figure.pin_y
+            one.anchor = 0
+            one.step = 0
+            one.angle_variance = figure.angle_variance
+            one.entry = met[k].entry
+            n += 1
+    return n
+
+
+@kernel
+def sweep_base(
     question: Question,
     tables: MapTables,
     base: Record,
@@ -156,3 +186,71 @@ def search_base(
     progress.anchor = 0
     progress.bases += 1
     return spent
+
+
+@kernel
+def search_listed(
+    question: Question,
+    tables: MapTables,
+    base: Record,
+    found: Records,
+    tried: Records,
+    progress: Record,
+    work: Workspace,
+    budget: int,
+) -> int:
+    """Do as `sweep_base` where the crossings are listed on which a base may lie, b being to the left of a.
+
+    Goes on from the entry of all lists where `progress` stands.
+    """
+    figure = work.scratch[0].figure
+    runs = tables.sweep.runs
+    crossings = tables.crossings.rows
+    gates = question.terms[0].gates
+    prior = question.terms[0].prior
+    a = question.scan[base.sliding]
+    b = question.scan[base.crossing]
+    measure(a, b, gates, figure)
+    lists = np.empty(MOST_LISTS, dtype=LISTED)
+    met = np.empty(AT_ONCE, dtype=MET)
+    count, entries = look_up(figure, tables.crossings, lists)
+    spent = TESTS_BASE
+    gated = False
+    while progress.entry < entries:
+        at, n = on_crossings(figure, tables.crossings, runs, lists, count, progress.entry, met)
+        spent += (at - progress.entry) // 4
+        poses = pose_listed(a, b, met, n, prior, runs, crossings, work)
+        if poses > 0:
+            if not gated:
+                gated = True
+                gates_about(
+                    question.scan, figure.angle_variance, figure.pin_x, figure.pin_y, figure.slip, gates,
+                    work.spreads, work.shifts,
+                )  # fmt: skip
+            cost, stopped = try_poses(question, tables, poses, found, tried, progress, work, budget - spent)
+            spent += cost
+            if stopped:
+                return spent
+        progress.entry = at
+        if spent > budget and at < entries:
+            return spent
+    progress.entry = 0
+    progress.bases += 1
+    return spent
+
+
+@kernel
+def search_base(
+    question: Question,
+    tables: MapTables,
+    base: Record,
+    found: Records,
+    tried: Records,
+    progress: Record,
+    work: Workspace,
+    budget: int,
+) -> int:
+    """Go through all pairs of runs that fit a base, by the lists of crossings or else by sweeping; see `sweep_base`."""
+    if base.listed >= 0:
+        return search_listed(question, tables, base, found, tried, progress, work, budget)
+    return sweep_base(question, tables, base, found, tried, progress, work, budget)

@@ -26,6 +26,13 @@ def least_length(length: float) -> float:
     return length - 2.0 * end_slack(length)
 
 
+@inlined
+def angle_tolerance(a: Record, b: Record, gates: Record) -> float:
+    """Return by how much the angle between two scan segments may differ from that between their runs."""
+    variance = a.angle_variance + b.angle_variance
+    return min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(variance)))
+
+
 @kernel
 def anchors(length: float, lengths: Floats, out: Integers) -> int:
     """List the runs, of `lengths` (m,), that are long enough for a scan segment of `length` metres; return how many."""
@@ -47,11 +54,13 @@ def measure(a: Record, b: Record, gates: Record, figure: Record) -> None:
     vb = b.angle_variance
     figure.x = b.x - a.x
     figure.y = b.y - a.y
+    figure.ahead = a.dx * figure.x + a.dy * figure.y
+    figure.beside = a.dx * figure.y - a.dy * figure.x
     figure.turn = b.angle - a.angle
     figure.pin_x = 0.5 * (a.x + b.x)
     figure.pin_y = 0.5 * (a.y + b.y)
     figure.angle_variance = va * vb / (va + vb)
-    figure.tolerance = min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(va + vb)))
+    figure.tolerance = angle_tolerance(a, b, gates)
     figure.slip = figure.tolerance * va / (va + vb)
     figure.swing = figure.slip * math.hypot(figure.x, figure.y) / abs(math.sin(figure.turn))
     figure.half_a = 0.5 * a.length - end_slack(a.length) - figure.swing

@@ -37,7 +37,7 @@ def try_poses(
         one = posed[k]
         one.bonus = 0.0 if prior.kind == HARD_PRIOR else prior_value(prior, one)
         one.floor = floor_of(question.rules[0], progress, one.bonus) + progress.least_freedom
-        if prior.kind == HARD_PRIOR and not _is_about(prior, one):
+        if prior.kind == HARD_PRIOR and not is_about(prior, one):
             one.floor = math.inf
     if terms.gates.least_overlap >= WHOLE_OVERLAP:
         may_score(scan, posed, count, work.spreads, work.shifts, tables.raster, work.possible_of)
@@ -68,7 +68,7 @@ def try_poses(
 
 
 @inlined
-def _is_about(prior: Record, pose: Record) -> bool:
+def is_about(prior: Record, pose: Record) -> bool:
     """Tell whether a pose may be refined into the window of a hard prior."""
     near = math.hypot(pose.x - prior.x, pose.y - prior.y) <= prior.radius + WINDOW_MARGIN
     return near and abs(wrap(pose.theta - prior.theta)) <= prior.angle + WINDOW_TURN

@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 
+from association.grids import listed
 from association.kernels import planning
-from association.layout import RULES, record
-from association.tables import Plan, Samples, Walls
-from association.tuning import REUSE
+from association.kernels.crossings import look_up
+from association.kernels.sweeping import measure
+from association.layout import CROSSING, FIGURE, LISTED, RULES, record
+from association.tables import Costs, Crossings, Plan, Samples, Walls
+from association.tuning import MOST_LISTS, REUSE
 from registration.layout import Records
+
+from .drawn import GATES, INDEX
+
+NOT_LISTED = listed(INDEX.sweep.runs, np.zeros(0, CROSSING), -1.0)  # so that every base is swept
 
 RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95, enough=np.inf)
 
@@ -22,11 +29,13 @@ def sampled(n: int, count: int, rng: np.random.Generator) -> Samples:
     return Samples(orders, ranks, found, sizes, gains, np.arange(count + 1, dtype=np.int32))
 
 
-def plan_of(scan: Records, n: int, runs: Walls, area: float, *, by_chance: bool = False) -> Plan:
-    """Return the plan of a search with bases of the first n segments, none of them weighed yet."""
+def plan_of(
+    scan: Records, n: int, runs: Walls, area: float, *, crossings: Crossings = NOT_LISTED, by_chance: bool = False
+) -> Plan:
+    """Return the plan of a search with bases of the first n segments; none that is swept is weighed yet."""
     costs = planning.costs_of(scan, n, runs, area)
     return Plan(
-        bases=planning.list_bases(scan, costs),
+        bases=valued(scan, costs, crossings),
         costs=costs,
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
@@ -38,9 +47,24 @@ def plan_of(scan: Records, n: int, runs: Walls, area: float, *, by_chance: bool 
     )
 
 
-def bases_of(scan: Records, count: int, runs: Walls, area: float) -> Records:
+def bases_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Records:
     """Return the bases of the first `count` segments of a scan, all of them weighed."""
     costs = planning.costs_of(scan, count, runs, area)
-    bases = planning.list_bases(scan, costs)
+    bases = valued(scan, costs, crossings)
     planning.weigh_all(bases, costs, np.zeros(len(bases)))
     return bases
+
+
+def valued(scan: Records, costs: Costs, crossings: Crossings = NOT_LISTED) -> Records:
+    """Return the bases of the segments of which the costs are, with what they are worth at most."""
+    bases = planning.pair_up(scan, len(costs.lines))
+    planning.count_listed(scan, bases, GATES[0], crossings, record(FIGURE))
+    planning.value(scan, bases, costs)
+    return bases
+
+
+def entries_of(scan: Records, base: tuple[int, int], crossings: Crossings) -> int:
+    """Return how many crossings are on the lists of a base, or -1."""
+    figure, lists = record(FIGURE), np.zeros(MOST_LISTS, LISTED)
+    measure(scan[base[0]], scan[base[1]], GATES[0], figure[0])
+    return int(look_up(figure[0], crossings, lists)[1])

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from association.kernels import advancing, stopping
 from association.kernels.planning import begin
 from association.kernels.proposing import search_base
-from association.layout import FOUND, PROGRESS, record
+from association.layout import FIGURE, FOUND, PROGRESS, record
 from association.tables import Plan, Planning, Question
 from association.tuning import REUSE
 from registration.layout import Records
@@ -20,7 +20,7 @@ from registration.layout import Records
 from ..reference import planning as twin
 from ..scenes import context_of, scan_of
 from .drawn import INDEX, NOTHING, SEEDS, TABLES, Drawn, drawn, workspace_of
-from .plans import RULE, bases_of, plan_of, sampled
+from .plans import NOT_LISTED, RULE, bases_of, plan_of, sampled
 
 BASES = 8  # segments that bases are made of
 
@@ -138,7 +138,11 @@ def test_a_search_in_one_call(seed: int) -> None:
         question, work = asked(d, effort), workspace_of(d.scan)
         n = seed % 2 if seed % 5 == 0 else min(len(d.scan), BASES)
         samples, noise = sampled(n, 64, d.rng), d.rng.gumbel(size=BASES**2 if effort.by_chance else 0)
-        by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
+        orders, crossings = (
+            (samples.orders, samples.ranks, math.log(REUSE)),
+            INDEX.crossings if seed % 3 else NOT_LISTED,
+        )
+        by = Planning(INDEX.runs, INDEX.area, *orders, crossings, record(FIGURE), noise)
         apart, found = record(PROGRESS), np.zeros(64, FOUND)
         plan = begin(question, by, apart)
         expected = advancing.EXHAUSTED

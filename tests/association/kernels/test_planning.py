@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from association.grids import listed
 from association.kernels import planning, sliding
-from association.layout import PROGRESS, record
-from association.tables import Planning
-from association.tuning import BASE_SEGMENTS, PARALLEL_SINE, REUSE
+from association.layout import FIGURE, PROGRESS, record
+from association.tables import Crossings, Planning
+from association.tuning import BASE_SEGMENTS, COST_BASE, COST_ENTRY, GAIN_POWER, PARALLEL_SINE, REUSE, UNTELLING
 from registration.layout import Records
 
+from ..reference import crossings as twin_of_crossings
 from ..reference import planning as twin
 from ..scenes import context_of, scan_of
 from .drawn import INDEX, SEEDS, Drawn, drawn, oblique
-from .plans import RULE, bases_of, plan_of, sampled
+from .plans import NOT_LISTED, RULE, bases_of, entries_of, plan_of, sampled, valued
 
 
 def uncertain(d: Drawn) -> Records:
@@ -89,11 +91,41 @@ def test_what_a_base_is_worth_before_it_is_weighed_it_is_worth_at_most(seed: int
     d = drawn(seed)
     scan, runs, area = uncertain(d), oblique(d.rng).runs, 10.0 ** d.rng.uniform(1.0, 4.0)
     costs = planning.costs_of(scan, len(scan), runs, area)
-    listed, weighed = planning.list_bases(scan, costs), bases_of(scan, len(scan), runs, area)
-    assert not listed["weighed"].any()
+    bases, weighed = valued(scan, costs), bases_of(scan, len(scan), runs, area)
+    assert not bases["weighed"].any()
     assert weighed["weighed"].all()
-    assert (listed["merit"] >= weighed["merit"]).all()
-    assert (listed["merit"] > weighed["merit"]).any()
+    assert (bases["merit"] >= weighed["merit"]).all()
+    assert (bases["merit"] > weighed["merit"]).any()
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_a_base_of_which_the_crossings_are_listed_costs_what_there_are(seed: int) -> None:
+    """Its second segment is to the left of the first one then; beyond the lists it is swept as any other."""
+    d = drawn(seed)
+    scan, near = uncertain(d), listed_up_to(4.0)
+    costs = planning.costs_of(scan, len(scan), INDEX.runs, INDEX.area)
+    swept = {frozenset(base[:2]): base for base in valued(scan, costs)[["sliding", "crossing", "merit"]].tolist()}
+    bases = valued(scan, costs, near)
+    assert len(bases) == len(swept)
+    for base in bases:
+        a, b = base["sliding"], base["crossing"]
+        if base["listed"] < 0:
+            assert not base["weighed"]
+            assert base[["sliding", "crossing", "merit"]].item() == swept[frozenset((a, b))]
+            continue
+        assert base["weighed"]
+        assert scan["dx"][a] * scan["dy"][b] > scan["dy"][a] * scan["dx"][b]
+        assert base["listed"] == entries_of(scan, (a, b), near)
+        worth = min(scan["gain"][[a, b]]) ** GAIN_POWER * (1.0 if twin.is_telling(scan, a, b) else UNTELLING)
+        assert base["merit"] == pytest.approx(math.log(worth / (COST_BASE + COST_ENTRY * base["listed"])))
+    assert (bases["listed"] < 0).any()
+    assert (bases["listed"] >= 0).any()
+
+
+def listed_up_to(reach: float) -> Crossings:
+    found, runs = INDEX.crossings.rows, INDEX.sweep.runs
+    return listed(runs, found[[twin_of_crossings.reach_to(*runs[list(one)]) <= reach for one in found.tolist()]], reach)
 
 
 def test_few_bases_are_weighed() -> None:
@@ -112,17 +144,22 @@ def test_begin(seed: int) -> None:
     question, n = context_of(INDEX, scan_of(d.endpoints)).question(RULE), int(d.rng.integers(1, len(d.scan) + 1))
     samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0)
     noise = d.rng.gumbel(size=n * n if seed % 2 == 0 else 0)
-    by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
+    crossings = INDEX.crossings if seed % 3 else NOT_LISTED
+    orders = samples.orders, samples.ranks, math.log(REUSE)
+    by = Planning(INDEX.runs, INDEX.area, *orders, crossings, record(FIGURE), noise)
     plan = planning.begin(question, by, progress)
     assert progress[0]["current"] == -1
     assert progress[0]["bound"] == pytest.approx(d.scan["gain"].sum())
     assert progress[0]["missed"] == 1.0
     assert progress[0]["best_value"] == 3.0
-    anew = plan_of(question.scan, n, INDEX.runs, INDEX.area)
-    weighed = bases_of(question.scan, n, INDEX.runs, INDEX.area)
+    anew = plan_of(question.scan, n, INDEX.runs, INDEX.area, crossings=crossings)
+    weighed = bases_of(question.scan, n, INDEX.runs, INDEX.area, crossings)
     weighed["merit"] += noise[: len(weighed)] if len(noise) else 0.0
     np.testing.assert_array_equal(plan.bases, weighed if plan.random else anew.bases)
-    np.testing.assert_array_equal(plan.costs.lines, anew.costs.lines)
+    if (plan.bases["listed"] < 0).any():
+        np.testing.assert_array_equal(plan.costs.lines, anew.costs.lines)
+    else:
+        assert len(plan.costs.lines) == 0
     np.testing.assert_array_equal(plan.uses, np.zeros(n))
     np.testing.assert_array_equal(plan.residual, d.scan["gain"])
     np.testing.assert_array_equal(plan.best_gains, sorted(d.scan["gain"][:n], reverse=True))

@@ -26,6 +26,7 @@ from ..reference.geometry import moved
 from ..reference.matching import gates_about, match_scan, reachable
 from ..scenes import context_of, index_of, same_pose, scan_of
 from .drawn import GATES, INDEX, MODEL, NOTHING, PLACE, SEEDS, SMALL, TABLES, Drawn, drawn, oblique, workspace_of
+from .plans import entries_of
 
 ALL = record(RULES, kept_share=0.0, distinct_distance=0.0, distinct_angle=0.0, rival_share=0.95)  # keep every pose
 
@@ -101,10 +102,10 @@ def asked(d: Drawn, window: HardPrior | None = None) -> Question:
     return context_of(INDEX, scan_of(d.endpoints), window).question(ALL)
 
 
-def swept(question: Question, base: tuple[int, int], budget: int = 10**9) -> Found:
-    """Go through a base."""
+def swept(question: Question, base: tuple[int, int], budget: int = 10**9, listed: int = -1) -> Found:
+    """Go through a base; where it is `listed`, by the lists of crossings."""
     found, progress = np.zeros(20_000, FOUND), record(PROGRESS)
-    chosen, work, calls = record(BASE, sliding=base[0], crossing=base[1]), workspace_of(question.scan), 0
+    chosen, work, calls = record(BASE, sliding=base[0], crossing=base[1], listed=listed), workspace_of(question.scan), 0
     while progress["bases"][0] == 0:
         calls += 1
         assert proposing.search_base(question, TABLES, chosen[0], found, NOTHING, progress[0], work, budget) > 0
@@ -156,7 +157,8 @@ def test_a_base_is_swept_whole(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("count", "apart"), [(30, 0.04), (AT_ONCE + 44, 0.035), (AT_ONCE + 44, 2.5)])
-def test_what_is_met_at_once_is_gone_through_in_pieces(count: int, apart: float) -> None:
+@pytest.mark.parametrize("listed", [-1, 1])
+def test_what_is_met_at_once_is_gone_through_in_pieces(count: int, apart: float, listed: int) -> None:
     """10,000 walls through one point held a search for 5 s beyond its deadline.
 
     Few of them; more than fit a stage, in few cells; and in more cells than fit one.
@@ -164,7 +166,7 @@ def test_what_is_met_at_once_is_gone_through_in_pieces(count: int, apart: float)
     x, y = apart * np.arange(count), np.full(count, 5.0)
     index = index_of(np.vstack([[[-5.0, 0.0, x[-1] + 5.0, 0.0]], np.stack([x, -y, x, y], axis=1)]))
     scan = scan_of([[-2.0, 0.0, 2.0, 0.0], [0.0, -2.0, 0.0, 2.0]])
-    question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1)
+    question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1, listed=listed)
 
     def steps(budget: int) -> tuple[list[int], Records]:
         """Return how many poses each call proposed, and what was found."""
@@ -192,13 +194,36 @@ def test_what_is_met_and_does_not_fit_is_not_met_again() -> None:
     x, low = 0.0005 * np.arange(count), np.where(np.arange(count) < AT_ONCE, 0.9, -9.0)
     index = index_of(np.vstack([[[-5.0, 0.0, 7.0, 0.0]], np.stack([x, low, x, low + 18.0], axis=1)]))
     scan = scan_of([[-2.0, 0.0, 2.0, 0.0], [0.0, -1.9, 0.0, 1.9]])
-    question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1)
+    question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1, listed=-1)
     found, progress, work, stood = np.zeros(20_000, FOUND), record(PROGRESS), workspace_of(question.scan, index), set()
     while progress["bases"][0] == 0:
         proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 1)
         stood.add(progress[["anchor", "step", "entry"]][0].item())
     assert progress["hypotheses"][0] == 5
     assert len(stood) > 5 + 1
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_a_base_of_which_the_crossings_are_listed_is_gone_through_whole(seed: int) -> None:
+    """As when it is swept; also what tells little of its angle, and sticks out of its runs."""
+    d = drawn(seed, radius=7.0)
+    d.scan["angle_variance"] *= 10.0 ** d.rng.uniform(0.0, 2.0, len(d.scan))
+    base = base_of(d, 0.3)
+    if base is None:
+        return
+    a, b = d.scan[list(base)]
+    base = base if a["dx"] * b["dy"] > a["dy"] * b["dx"] else base[::-1]
+    question = asked(d)
+    question.scan["angle_variance"] = d.scan["angle_variance"]
+    if entries_of(question.scan, base, INDEX.crossings) < 0:
+        return  # lines that cross at a small angle, far away
+    expected = twin.placements(d.scan, *base, INDEX.runs.rows, GATES)
+    whole, pieces = swept(question, base, listed=1), swept(question, base, 1, listed=1)
+    assert whole.proposed == pieces.proposed == len(expected)
+    np.testing.assert_array_equal(pieces.poses, whole.poses)
+    assert whole.calls == 1
+    assert pieces.calls > 1 or not expected
 
 
 @given(SEEDS)

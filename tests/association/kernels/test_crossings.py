@@ -1,0 +1,194 @@
+"""Runs that cross are found, and listed where a scan segment would lie on each, as the twins do it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from association.grids import crossing_runs, listed
+from association.kernels import crossings
+from association.kernels.sweeping import measure
+from association.layout import CROSSING, ENDS, FIGURE, LISTED, MET, WALL, Integers, as_records, record
+from association.tables import Crossings
+from association.tuning import AT_ONCE, CROSSING_ANGLES, MOST_LISTS
+from association.walls import ends_of_rows
+from registration.layout import Floats, Records
+
+from ..reference import crossings as twin
+from ..scenes import index_of
+from .drawn import GATES, SEEDS, drawn, oblique
+
+ABSCISSAE = st.floats(-30.0, 30.0)
+
+
+def boxed(runs: Records) -> tuple[Records, Integers]:
+    """Return the boxes around runs, by their left sides, and the order that this is."""
+    ends = ends_of_rows(runs)
+    boxes: Floats = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
+    order = np.argsort(boxes[:, 0], kind="stable").astype(np.int32)
+    return as_records(ENDS, boxes[order]), order
+
+
+def found_in(runs: Records, reach: float, most: int = 10**9) -> Records:
+    out = np.zeros(len(runs) ** 2, CROSSING)
+    return out[: crossings.find_crossings(runs, *boxed(runs), reach, most, out)[0]]
+
+
+@given(SEEDS, st.sampled_from([4.0, 8.0, 24.0]))
+@settings(max_examples=20, deadline=None)
+def test_every_pair_that_crosses_is_found_once(seed: int, reach: float) -> None:
+    runs = oblique(np.random.default_rng(seed)).runs.rows
+    found, expected = found_in(runs, reach).tolist(), twin.crossings_of(runs, reach)
+    assert len(found) == len(expected)
+    assert set(found) == expected
+    little = np.zeros(3, CROSSING)
+    assert crossings.find_crossings(runs, *boxed(runs), reach, 10**9, little)[0] == len(expected)
+    assert little.tolist() == found[:3]
+
+
+def test_looking_for_crossings_ends() -> None:
+    runs = oblique(np.random.default_rng(0)).runs.rows
+    whole, looks = crossings.find_crossings(runs, *boxed(runs), 64.0, 10**9, np.zeros(0, CROSSING))
+    some, fewer = crossings.find_crossings(runs, *boxed(runs), 64.0, 100, np.zeros(0, CROSSING))
+    assert some < whole
+    assert 100 < fewer <= 100 + len(runs) < looks
+
+
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_what_is_sampled_tells_how_many_there_are(seed: int) -> None:
+    """Of every run exactly; of each second one about; no more than a number of looks allows."""
+    runs, reaches = oblique(np.random.default_rng(seed)).runs.rows, np.array([24.0, 8.0, 4.0])
+    exact = crossings.sample_crossings(runs, *boxed(runs), reaches, 1, 10**9)
+    np.testing.assert_allclose(exact[:, :2], [twin.counts_of(runs, reach) for reach in reaches])
+    assert (np.diff(exact[:, 2]) <= 0.0).all()
+    half = crossings.sample_crossings(runs, *boxed(runs), reaches, 2, 10**9)
+    np.testing.assert_allclose(half, exact, rtol=0.8)
+    few = crossings.sample_crossings(runs, *boxed(runs), reaches, 1, 10)
+    assert (few[:, 2] <= 10.0 * len(runs)).all()
+
+
+@given(SEEDS, st.sampled_from([5.0, 16.0]))
+@settings(max_examples=20, deadline=None)
+def test_a_crossing_is_listed_in_all_cells_that_its_runs_reach_into(seed: int, reach: float) -> None:
+    runs = oblique(np.random.default_rng(seed)).runs.rows
+    found = listed(runs, found_in(runs, reach), reach)
+    columns, grids = int(found.shape["columns"][0]), found.bins.tolist()
+    got: dict[int, set[tuple[int, int, int]]] = {k: set() for k in range(len(found.rows))}
+    for cell, (begin, end) in enumerate(zip(found.starts[:-1], found.starts[1:], strict=True)):
+        grid, place = divmod(cell, columns**2)
+        for k in found.items[begin:end].tolist():
+            got[k].add((grids.index(grid), *divmod(place, columns)))
+    for k, (p, q) in enumerate(found.rows.tolist()):
+        cells = twin.cells_of(twin.extents(runs[p], runs[q]), reach)
+        assert got[k] == {(twin.angle_bin(runs[p], runs[q]), *cell) for cell in cells}
+    assert sum(map(len, got.values())) == len(found.items) == len(found.codes)
+
+
+@given(*[ABSCISSAE] * 8)
+@settings(max_examples=300, deadline=None)
+def test_what_reaches_far_enough_fits_by_its_code(
+    a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float
+) -> None:
+    """And of what does not by more than a step of the code nothing does, as far as the lists go."""
+    reach = 16.0
+    runs, asked = (min(a, b), max(a, b), min(c, d), max(c, d)), (min(e, f), max(e, f), min(g, h), max(g, h))
+    wanted = crossings.TOP_BITS | crossings.code_of(*asked, reach)
+    fits = (wanted - crossings.code_of(*runs, reach)) & crossings.TOP_BITS == crossings.TOP_BITS
+    short = [runs[0] - asked[0], asked[1] - runs[1], runs[2] - asked[2], asked[3] - runs[3]]
+    if max(short) <= 0.0:
+        assert fits
+    step = 2.0 * reach / crossings.STEPS
+    inside = [max(-reach, min(reach, value)) for value in (*runs, *asked)]
+    lacking = [inside[0] - inside[4], inside[5] - inside[1], inside[2] - inside[6], inside[7] - inside[3]]
+    if max(lacking) > 1.01 * step:
+        assert not fits
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_what_is_beyond_the_lists_is_not_listed(seed: int) -> None:
+    """Also at an angle at which there is nothing within them."""
+    d = drawn(seed)
+    nothing, lists = listed(np.zeros(0, WALL), np.zeros(0, CROSSING), 4.0), np.zeros(MOST_LISTS, LISTED)
+    seen = {True: 0, False: 0}
+    for i, a in enumerate(d.scan):
+        for b in d.scan[i + 1 :]:
+            first, second = (a, b) if a["dx"] * b["dy"] > a["dy"] * b["dx"] else (b, a)
+            figure = record(FIGURE)
+            measure(first, second, GATES[0], figure[0])
+            if abs(math.sin(figure["turn"][0])) < 0.3:
+                continue
+            count, entries = crossings.look_up(figure[0], nothing, lists)
+            middles = twin.extents_of_segments(first, second)
+            near = max(abs(middle) - 0.5 * one["length"] for middle, one in zip(middles, (first, second), strict=True))
+            assert count == 0
+            assert entries in (0, -1)
+            if near > 4.0:
+                assert entries == -1
+                seen[False] += 1
+            seen[True] += entries == 0
+    assert seen[False] > 0 or len(d.scan) < 8
+
+
+def test_where_too_many_cross_none_is_listed() -> None:
+    """A thousand runs through one place, in all directions; and bases are swept then."""
+    angles = np.linspace(0.0, 2.0 * math.pi, 1000, endpoint=False)
+    middles, half = (
+        np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 2)),
+        np.stack([np.cos(angles), np.sin(angles)], 1),
+    )
+    index = index_of(np.hstack([middles - 2.0 * half, middles + 2.0 * half]))
+    assert len(index.sweep.runs) > 900
+    assert index.crossings.shape["reach"][0] < 0.0
+    assert len(index.crossings.rows) == len(index.crossings.items) == 0
+    figure, lists = record(FIGURE), np.zeros(MOST_LISTS, LISTED)
+    scan = drawn(0).scan
+    measure(scan[0], scan[1], GATES[0], figure[0])
+    assert crossings.look_up(figure[0], index.crossings, lists) == (0, -1)
+
+
+@pytest.mark.parametrize(("count", "reach"), [(1, 64.0), (20, 64.0), (200, 16.0)])
+def test_the_more_there_are_the_less_far_they_are_listed(count: int, reach: float) -> None:
+    """Rows of rooms: as far as memory allows, the same for the same runs."""
+    room = np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]])
+    rooms = [room + np.tile([5.0 * k, y], 2) for k in range(count) for y in (0.0, 4.0)]
+    index = index_of(np.vstack(rooms))
+    again: Crossings = crossing_runs(index.sweep.runs)
+    assert index.crossings.shape["reach"][0] == reach
+    for one, other in zip(index.crossings, again, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_crossings_are_met_in_pieces_as_at_once(seed: int) -> None:
+    """However little room there is, as long as some entries fit."""
+    d = drawn(seed)
+    runs = oblique(d.rng).runs.rows
+    found, lists = listed(runs, found_in(runs, 64.0), 64.0), np.zeros(MOST_LISTS, LISTED)
+    a, b = d.scan[:2]
+    if abs(a["dx"] * b["dy"] - a["dy"] * b["dx"]) < 0.3:
+        return
+    first, second = (a, b) if a["dx"] * b["dy"] > a["dy"] * b["dx"] else (b, a)
+    figure = record(FIGURE)
+    measure(first, second, GATES[0], figure[0])
+    figure["half_a"] = figure["half_b"] = -1.0  # so that much fits
+    count, entries = crossings.look_up(figure[0], found, lists)
+    met: dict[int, list[tuple[int, int]]] = {}
+    for room in (AT_ONCE, crossings.LEAST_AT_ONCE):
+        at, met[room] = 0, []
+        while at < entries:
+            some = np.zeros(room, MET)
+            at, n = crossings.on_crossings(figure[0], found, runs, lists, count, at, some)
+            met[room] += some[["run", "entry"]][:n].tolist()
+    assert met[AT_ONCE] == met[crossings.LEAST_AT_ONCE]
+    assert len(met[AT_ONCE]) == len({run for run, _ in met[AT_ONCE]})  # on whichever lists it is, once
+
+
+def test_bins_of_angles_have_a_right_angle_in_the_middle_of_one() -> None:
+    assert CROSSING_ANGLES % 2 == 1
