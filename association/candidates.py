@@ -15,7 +15,7 @@ from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance, begin_and_adv
 from .kernels.planning import begin
 from .kernels.sliding import search_slides, sliding_segments
 from .kernels.stopping import missed_share
-from .layout import FIGURE, FOUND, PROGRESS, RULES, Integers, record
+from .layout import FOUND, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
 from .result import SearchReport
 from .sharing import Sharing
@@ -182,7 +182,7 @@ def _go_through_bases(
     tables, deadline, work = context.index.tables, context.deadline, context.workspace
     planning = _planning(context, effort)
     if deadline.passed:
-        plan: Plan | None = begin(question, planning, progress)
+        plan: Plan | None = begin(question, tables, planning, progress)
         stopped = BUDGET
     else:
         stopped, plan = begin_and_advance(question, tables, planning, found, progress, work, effort.allowed, chunk)
@@ -209,7 +209,7 @@ def _planning(context: SearchContext, effort: Effort) -> Planning:
         # Those with the greatest sums of the logarithm of their merit and a Gumbel variate are draws without
         # replacement with a probability by merit.
         noise, fade = np.random.default_rng(context.options.seed).gumbel(size=max(1, count * (count - 1) // 2)), 0.0
-    return Planning(index.runs, index.area, *orders, fade, index.crossings, np.zeros(1, FIGURE), noise)
+    return Planning(index.runs, index.area, *orders, fade, noise)
 
 
 def _segments_of_bases(count: int) -> int:

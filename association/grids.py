@@ -62,32 +62,33 @@ def swept_runs(runs: Walls) -> Sweep:
 
 def crossing_runs(runs: Records) -> Crossings:
     """List the pairs of runs (m,) that cross, up to as far from there as their number allows, or none."""
-    m, ends = len(runs), ends_of_rows(runs)
+    ends, counted = ends_of_rows(runs), max(len(runs), FEW_RUNS)
+    most = [min(a_run * counted, at_most) for a_run, at_most in zip(CROSSINGS_A_RUN, MOST_CROSSINGS, strict=True)]
     boxes = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
     order = np.argsort(boxes[:, 0], kind="stable").astype(np.int32)
-    boxed, most = (
-        as_records(ENDS, boxes[order]),
-        np.minimum(np.array(CROSSINGS_A_RUN) * max(m, FEW_RUNS), MOST_CROSSINGS),
-    )
-    reaches, every = np.array(CROSSING_REACHES), max(1, m // CROSSING_SAMPLE)
-    counts = sample_crossings(runs, boxed, order, reaches, every, CROSSING_SAMPLE_LOOKS)
+    by_side = as_records(ENDS, boxes[order])
+    # No farther than from one end of the map to the other: the fewer lists there are the sooner one is found.
+    across = float(np.hypot(*np.ptp(ends.reshape(-1, 2), axis=0)))
+    reaches = np.array([reach for reach in CROSSING_REACHES if reach <= across] or CROSSING_REACHES[-1:])
+    every = max(1, len(runs) // CROSSING_SAMPLE)
+    counts = sample_crossings(runs, by_side, order, reaches, every, CROSSING_SAMPLE_LOOKS)
     allowed = (counts <= most).all(axis=1)
     for reach, count in zip(reaches[allowed].tolist(), counts[allowed, 0].tolist(), strict=True):
-        rows = np.empty(int(1.2 * count) + FEW_RUNS, CROSSING)
-        found, looks = find_crossings(runs, boxed, order, reach, 2 * int(most[2]), rows)
-        if found > 2 * most[0] or looks > 2 * most[2]:
+        found = np.empty(int(1.2 * count) + FEW_RUNS, CROSSING)
+        number, looks = find_crossings(runs, by_side, order, reach, 2 * most[2], found)
+        if number > 2 * most[0] or looks > 2 * most[2]:
             continue  # the sample was not like the rest
-        if found > len(rows):
-            rows = np.empty(found, CROSSING)
-            find_crossings(runs, boxed, order, reach, 2 * int(most[2]), rows)
-        return listed(runs, rows[:found].copy(), reach)
+        if number > len(found):
+            found = np.empty(number, CROSSING)
+            find_crossings(runs, by_side, order, reach, 2 * most[2], found)
+        return listed(runs, found[:number], reach)
     return listed(runs, np.zeros(0, CROSSING), -1.0)
 
 
-def listed(runs: Records, rows: Records, reach: float) -> Crossings:
+def listed(runs: Records, found: Records, reach: float) -> Crossings:
     """List crossings (k,) of `CROSSING`, all those of the runs that there are up to `reach` metres."""
     shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / CROSSING_CELL)))
-    return Crossings(shape, rows, *list_crossings(runs, rows, shape))
+    return Crossings(shape, *list_crossings(runs, found, shape))
 
 
 def directions_near(walls: Walls, runs: Walls) -> Raster:

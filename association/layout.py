@@ -107,8 +107,9 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # What a pose is judged by.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
-# Two runs whose lines cross, the second one to the left of the first.
-CROSSING = _fields((np.int32, "first second"))
+# Two runs whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
+# `kernels.crossings.code_of`. On a list there are dozens for each run, so that four bytes have to do.
+CROSSING = _fields((np.int32, "first second"), (np.uint32, "code"))
 
 # Where crossings are listed: up to how far from the point where the lines cross, and how many cells there are that way.
 CROSSING_SHAPE = _fields((_F, "reach"), (_I, "columns"))
@@ -117,15 +118,14 @@ CROSSING_SHAPE = _fields((_F, "reach"), (_I, "columns"))
 # for in it, from the midpoint of each segment, m; what its codes may be at most.
 LISTED = _fields((_I, "begin end column row"), (_F, "from_first from_second"), (_I, "code"))
 
-# Two scan segments that fix a pose; the first slides, or has the second one to its left where crossings are listed:
-# how many these are, or -1. Merit: the logarithm of what it can tell (the lesser gain) over what it costs; until it is
-# weighed, over what it costs at least.
+# Two scan segments that fix a pose; the first has the second one to its left, or slides where the base is swept. Once
+# it is weighed: how many crossings are listed of it, -1 where it is swept. Merit: the logarithm of what it can tell
+# (the lesser gain) over what it costs; until it is weighed, over what any base costs.
 BASE = _fields((_I, "sliding crossing listed weighed"), (_F, "merit"))
 
 # What a scan segment adds to the cost of its bases: in how many direction bins it can slide; its angle; what its length
-# says of the hypotheses on a wall that crosses; what it costs to slide it everywhere; the logarithm of the least that a
-# base costs in which it slides.
-LINE_COST = _fields((_I, "bins"), (_F, "angle short sweep least"))
+# says of the hypotheses on a wall that crosses; what it costs to slide it everywhere.
+LINE_COST = _fields((_I, "bins"), (_F, "angle short sweep"))
 
 # What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, also
 # along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
@@ -146,8 +146,8 @@ LAID = _fields(
 # on the way, and in the grid; the slides between which b is in it.
 SWEPT = _fields((_I, "laid step here"), (_F, "at until"))
 
-# A run of the direction of b on the list of such a cell: which run; which of the cells swept; the entry of its list; in
-# the first of an array, which of all of them b lies on.
+# A run of the direction of b on the list of such a cell, or a crossing on a list: which run, or entry of all lists;
+# which of the cells swept; the entry of its list; in the first of an array, which of all of them b lies on.
 MET = _fields((_I, "run cell entry hit"))
 
 # A pose to be tried: the pose; from the sensor to where it is held, in the scan frame, rotated, and the variance of its

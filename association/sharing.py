@@ -125,7 +125,7 @@ class Sharing:
         """Take the next base: that which was begun, or else the best that is left."""
         state, plan = self._progress.copy(), self._plan
         if self._progress["current"][0] < 0 or self._pending:
-            state["current"] = next_base(plan)
+            state["current"] = next_base(self._question, plan)
             state["anchor"] = state["step"] = state["entry"] = 0
             if state["current"][0] < 0:
                 return None

@@ -101,19 +101,16 @@ class Crossings(NamedTuple):
     Attributes
     ----------
     shape : (1,) of `CROSSING_SHAPE`
-    rows : (k,) of `CROSSING`
     bins : (angles,) which of the grids is that of each bin of angles between two runs, -1 where there is none
-    starts, items : cell ``c = (grid * columns + column) * columns + row`` lists ``items[starts[c]:starts[c + 1]]``, the
-        crossings whose first run is `column` cells and whose second one is `row` cells from where they cross, somewhere
-    codes : (entries,) of 32 bits, where the runs of each item begin and end: see `kernels.crossings.code_of`
+    starts, entries : cell ``c = (grid * columns + column) * columns + row`` lists
+        ``entries[starts[c]:starts[c + 1]]``, of `CROSSING`: those whose first run is somewhere `column` cells, and
+        whose second one `row` cells, from where they cross
     """
 
     shape: Records
-    rows: Records
     bins: Integers
     starts: Integers
-    items: Integers
-    codes: Integers
+    entries: Records
 
 
 class Pieces(NamedTuple):
@@ -277,12 +274,31 @@ class Samples(NamedTuple):
     undecided: Integers
 
 
+class Listing(NamedTuple):
+    """Where the crossings are listed on which a base may lie.
+
+    Attributes
+    ----------
+    crossings : Crossings
+        Of the map.
+    figure : (1,) of `FIGURE`
+        To write to.
+    none : (0,) of `LISTED`
+        For crossings are only counted.
+    """
+
+    crossings: Crossings
+    figure: Records
+    none: Records
+
+
 class Costs(NamedTuple):
     """What the bases of n scan segments cost.
 
     Attributes
     ----------
-    lines : (n,) of `LINE_COST`; this and what follows is empty where the crossings of all bases are listed
+    listing : Listing
+    lines : (n,) of `LINE_COST`
     slides : (n, bins) how far each could slide on the runs of each direction bin, metres
     smooth : (n, 2 bins) the same with the neighbouring bins, twice around
     taken : (n, bins) the bins where it can, as many as there are
@@ -290,6 +306,7 @@ class Costs(NamedTuple):
         Hypotheses for a metre's slide of one on one of the other, 1/m^2.
     """
 
+    listing: Listing
     lines: Records
     slides: Floats
     smooth: Floats
@@ -310,10 +327,6 @@ class Planning(NamedTuple):
     ranks : (n, s) as in `Samples`
     fade : float
         As in `Plan`.
-    crossings : Crossings
-        Of the map.
-    figure : (1,) of `FIGURE`
-        To write to.
     noise : (k,) what is added to the merits of bases that are drawn at random; empty where they are not
     """
 
@@ -322,8 +335,6 @@ class Planning(NamedTuple):
     orders: Integers
     ranks: Integers
     fade: float
-    crossings: Crossings
-    figure: Records
     noise: Floats
 
 

@@ -129,6 +129,7 @@ MOST_LISTS = 256  # lists for one base; it is swept where there are more
 
 TELLING = 0.25  # m, tables; how far a base may lay the other segments off, root mean square
 UNTELLING = 0.1  # tables; what a base is worth less that lays them farther off
+TIMES_BETTER = 2.0  # tables; what a base has to be worth at most, in times what another is, to be weighed
 REUSE = 0.3  # tables; what a base is worth less for each earlier use of one of its segments
 # What a base, a wall that it may slide on, a metre of slide, a hypothesis cost; nanoseconds, measured.
 COST_BASE = 2000.0

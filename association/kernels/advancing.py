@@ -56,7 +56,7 @@ def advance(
     spent = 0
     while True:
         if state.current < 0:
-            state.current = next_base(plan)
+            state.current = next_base(question, plan)
             if state.current < 0:
                 return EXHAUSTED
         base = plan.bases[state.current]
@@ -85,7 +85,7 @@ def begin_and_advance(
 
     Most searches end so: a plan is twenty arrays, which take long to hand to Python and back.
     """
-    plan = begin(question, planning, progress)
+    plan = begin(question, tables, planning, progress)
     if len(plan.bases) == 0:
         progress[0].missed = 0.0
         return EXHAUSTED, None

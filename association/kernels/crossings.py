@@ -12,9 +12,9 @@ import numpy as np
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import Integers
+from ..layout import CROSSING, Integers
 from ..tables import Crossings
-from ..tuning import CROSSING_ANGLES, CROSSING_CELL, CROSSING_MARGIN, MIN_CROSSING
+from ..tuning import CROSSING_ANGLES, CROSSING_CELL, CROSSING_MARGIN, MIN_CROSSING, MOST_LISTS
 from .matching import GATE_MARGIN
 
 PER_HALF_TURN = CROSSING_ANGLES / math.pi
@@ -66,20 +66,20 @@ def cells_of(a: Record, b: Record, reach: float, columns: int) -> tuple[int, int
 
 
 @inlined
-def step_of(abscissa: float, per_metre: float) -> float:
+def step_of(abscissa: float, per_metre: float) -> int:
     """Return a place on a line in the steps of a code; what is beyond the lists is where they end."""
-    return min(float(STEPS), max(0.0, abscissa * per_metre + 0.5 * STEPS))
+    return int(min(float(STEPS), max(0.0, abscissa * per_metre + 0.5 * STEPS)))
 
 
 @inlined
 def code_of(first_begin: float, first_end: float, second_begin: float, second_end: float, reach: float) -> int:
-    """Return where two runs begin and end as a number of four bytes, each from 0 to 127 and rounded outwards.
+    """Return where two runs begin and end as a number of four bytes, each from 0 to 127.
 
     Each is the less the farther a run reaches, so that those that reach far enough have no byte that is more.
     """
     per_metre = STEPS / (2.0 * reach)
-    low = math.floor(step_of(first_begin, per_metre)) | math.floor(step_of(second_begin, per_metre)) << 16
-    high = math.ceil(step_of(first_end, per_metre)) | math.ceil(step_of(second_end, per_metre)) << 16
+    low = step_of(first_begin, per_metre) | step_of(second_begin, per_metre) << 16
+    high = step_of(first_end, per_metre) | step_of(second_end, per_metre) << 16
     return low | (STEPS | STEPS << 16) - high << 8
 
 
@@ -157,14 +157,17 @@ def find_crossings(
 
 
 @kernel
-def list_crossings(runs: Records, rows: Records, shape: Records) -> tuple[Integers, Integers, Integers, Integers]:
-    """List crossings in the cells that their runs reach into; return bins, starts, items, codes as of `Crossings`."""
+def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integers, Integers, Records]:
+    """List crossings (k,) in the cells that their runs reach into; return bins, starts, entries as of `Crossings`."""
     reach = shape[0].reach
     columns = shape[0].columns
     bins = np.full(CROSSING_ANGLES, -1, dtype=np.int32)
-    of_angle = np.empty(len(rows), dtype=np.uint8)
-    for k in range(len(rows)):
-        _, _, sine, cosine = crossing_of(runs[rows[k].first], runs[rows[k].second])
+    of_angle = np.empty(len(found), dtype=np.uint8)
+    for k in range(len(found)):
+        a = runs[found[k].first]
+        b = runs[found[k].second]
+        on_a, on_b, sine, cosine = crossing_of(a, b)
+        found[k].code = code_of(a.begin - on_a, a.end - on_a, b.begin - on_b, b.end - on_b, reach)
         of_angle[k] = min(CROSSING_ANGLES - 1, int(math.atan2(sine, cosine) * PER_HALF_TURN))
         bins[of_angle[k]] = 0
     grids = 0
@@ -173,8 +176,7 @@ def list_crossings(runs: Records, rows: Records, shape: Records) -> tuple[Intege
             bins[b] = grids
             grids += 1
     starts = np.zeros(grids * columns * columns + 1, dtype=np.int32)
-    items = np.zeros(0, dtype=np.int32)
-    codes = np.zeros(0, dtype=np.uint32)
+    entries = np.empty(0, dtype=CROSSING)
     for counting in (True, False):
         if not counting:
             total = 0
@@ -182,26 +184,20 @@ def list_crossings(runs: Records, rows: Records, shape: Records) -> tuple[Intege
                 here = starts[c]
                 starts[c] = total
                 total += here
-            items = np.empty(total, dtype=np.int32)
-            codes = np.empty(total, dtype=np.uint32)
-        for k in range(len(rows)):
-            a = runs[rows[k].first]
-            b = runs[rows[k].second]
-            on_a, on_b, _, _ = crossing_of(a, b)
-            code = code_of(a.begin - on_a, a.end - on_a, b.begin - on_b, b.end - on_b, reach)
-            left, right, bottom, top = cells_of(a, b, reach, columns)
+            entries = np.empty(total, dtype=CROSSING)
+        for k in range(len(found)):
+            left, right, bottom, top = cells_of(runs[found[k].first], runs[found[k].second], reach, columns)
             for column in range(left, right + 1):
-                row_of_cells = (bins[of_angle[k]] * columns + column) * columns
+                cells = (bins[of_angle[k]] * columns + column) * columns
                 for row in range(bottom, top + 1):
                     if not counting:
-                        items[starts[row_of_cells + row]] = k
-                        codes[starts[row_of_cells + row]] = code
-                    starts[row_of_cells + row] += 1
+                        entries[starts[cells + row]] = found[k]
+                    starts[cells + row] += 1
     # The second pass moved every start to the next one's place.
     for c in range(len(starts) - 1, 0, -1):
         starts[c] = starts[c - 1]
     starts[0] = 0
-    return bins, starts, items, codes
+    return bins, starts, entries
 
 
 @inlined
@@ -223,7 +219,7 @@ def look_up(figure: Record, crossings: Crossings, lists: Records) -> tuple[int, 
     """Write the lists that hold the crossings on which a base may lie, to `lists` (k,) of `LISTED`.
 
     Its first segment has the second one to its left. Returns how many lists and how many entries there are; 0 and -1
-    where not all crossings that matter are listed, or there is no room.
+    where not all crossings that matter are listed. Where there is no room for lists the entries are counted.
     """
     reach = crossings.shape[0].reach
     columns = crossings.shape[0].columns
@@ -235,6 +231,7 @@ def look_up(figure: Record, crossings: Crossings, lists: Records) -> tuple[int, 
     beyond_a = max(0.0, -figure.half_a) + CROSSING_MARGIN
     beyond_b = max(0.0, -figure.half_b) + CROSSING_MARGIN
     n = 0
+    most = 0
     entries = 0
     last = min(CROSSING_ANGLES - 1, int((turn + spread) * PER_HALF_TURN))
     for k in range(int(max(0.0, turn - spread) * PER_HALF_TURN), last + 1):
@@ -258,23 +255,28 @@ def look_up(figure: Record, crossings: Crossings, lists: Records) -> tuple[int, 
         right = cell_of(a2 + from_first, reach, columns)
         bottom = cell_of(b1 + from_second, reach, columns)
         top = cell_of(b2 + from_second, reach, columns)
-        code = code_of(a2 - figure.half_a, a1 + figure.half_a, b2 - figure.half_b, b1 + figure.half_b, reach)
+        most += (right - left + 1) * (top - bottom + 1)
+        if most > MOST_LISTS:
+            return 0, -1
+        code = 0
         for column in range(left, right + 1):
-            for row in range(bottom, top + 1):
-                here = (bins[k] * columns + column) * columns + row
-                if starts[here] == starts[here + 1]:
+            here = (bins[k] * columns + column) * columns
+            entries += starts[here + top + 1] - starts[here + bottom]
+            for row in range(bottom, top + 1 if len(lists) > 0 else bottom):
+                if starts[here + row] == starts[here + row + 1]:
                     continue
-                if n == len(lists):
-                    return 0, -1
+                if code == 0:
+                    code = TOP_BITS | code_of(
+                        a2 - figure.half_a, a1 + figure.half_a, b2 - figure.half_b, b1 + figure.half_b, reach
+                    )
                 listed = lists[n]
-                listed.begin = starts[here]
-                listed.end = starts[here + 1]
+                listed.begin = starts[here + row]
+                listed.end = starts[here + row + 1]
                 listed.column = column
                 listed.row = row
                 listed.from_first = from_first
                 listed.from_second = from_second
-                listed.code = TOP_BITS | code
-                entries += listed.end - listed.begin
+                listed.code = code
                 n += 1
     return n, entries
 
@@ -288,9 +290,7 @@ def on_crossings(
     From the entry `first` of all of them on. Returns at which entry it left off because `met` was full, or how many
     there are, and how many crossings these are. Loosely, for the final angle is not known.
     """
-    rows = crossings.rows
-    items = crossings.items
-    codes = crossings.codes
+    entries = crossings.entries
     reach = crossings.shape[0].reach
     columns = crossings.shape[0].columns
     half_a = figure.half_a - CROSSING_MARGIN
@@ -316,11 +316,11 @@ def on_crossings(
             fitting = 0
             for k in range(begin, begin + some):
                 near[fitting] = k
-                fitting += 1 if (code - codes[k]) & TOP_BITS == TOP_BITS else 0
+                fitting += 1 if (code - entries[k].code) & TOP_BITS == TOP_BITS else 0
             for f in range(fitting):
                 k = near[f]
-                wa = runs[rows[items[k]].first]
-                wb = runs[rows[items[k]].second]
+                wa = runs[entries[k].first]
+                wb = runs[entries[k].second]
                 on_a, on_b, sine, cosine = crossing_of(wa, wb)
                 a = figure.beside * cosine / sine - figure.ahead
                 b = figure.beside / sine
@@ -334,7 +334,7 @@ def on_crossings(
                 y = min(max(b + one.from_second, b_begin), b_end)
                 fits &= cell_of(x, reach, columns) == one.column
                 fits &= cell_of(y, reach, columns) == one.row
-                met[n].run = items[k]
+                met[n].run = k
                 met[n].entry = at + k - begin + 1
                 n += 1 if fits else 0
             begin += some

@@ -7,8 +7,8 @@ import numpy as np
 from registration.compiling import borrowed, inlined, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import BASE, LINE_COST, LISTED
-from ..tables import Costs, Crossings, Plan, Planning, Question, Samples, Walls
+from ..layout import BASE, FIGURE, LINE_COST, LISTED
+from ..tables import Costs, Listing, MapTables, Plan, Planning, Question, Samples, Walls
 from ..tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
@@ -19,11 +19,11 @@ from ..tuning import (
     GAIN_POWER,
     HYPOTHESIS_SCALE,
     MIN_CROSSING_BASE,
-    MOST_LISTS,
     SHORT_LENGTH,
     SHORT_POWER,
     SINE_POWER,
     TELLING,
+    TIMES_BETTER,
     UNTELLING,
 )
 from .crossings import look_up
@@ -96,7 +96,7 @@ def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool
 
 
 @kernel
-def costs_of(scan: Records, count: int, runs: Walls, area: float) -> Costs:
+def costs_of(scan: Records, count: int, runs: Walls, area: float, listing: Listing) -> Costs:
     """Return what bases of the first `count` scan segments cost, as far as that is of one segment each.
 
     `area` is that of the map, m^2.
@@ -122,17 +122,19 @@ def costs_of(scan: Records, count: int, runs: Walls, area: float) -> Costs:
         line.angle = scan[i].angle
         line.short = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
         line.sweep = COST_ANCHOR * fitting[i] + COST_SLIDE * total
-        line.least = math.log(COST_BASE + line.sweep)
-    return Costs(lines, slides, smooth, taken, HYPOTHESIS_SCALE / area)
+    return Costs(listing, lines, slides, smooth, taken, HYPOTHESIS_SCALE / area)
 
 
 @kernel
 def pair_up(scan: Records, count: int) -> Records:
     """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`, the second left of the first.
 
-    Beyond the first `BASE_SEGMENTS` only those that tell enough. What they are worth is still to be told.
+    Beyond the first `BASE_SEGMENTS` only those that tell enough. None is weighed.
     """
     middle = middle_of(scan)
+    tells = np.empty(count)
+    for i in range(count):
+        tells[i] = GAIN_POWER * math.log(scan[i].gain) - math.log(COST_BASE)
     bases = np.empty(count * (count - 1) // 2, dtype=BASE)
     k = 0
     for i in range(count):
@@ -144,57 +146,35 @@ def pair_up(scan: Records, count: int) -> Records:
             base = bases[k]
             base.sliding = i if sine > 0.0 else j
             base.crossing = j if sine > 0.0 else i
-            base.merit = 0.0 if telling else math.log(UNTELLING)
+            base.merit = min(tells[i], tells[j]) + (0.0 if telling else math.log(UNTELLING))
+            base.weighed = 0
             k += 1
     return bases[:k]
 
 
 @kernel
-def count_listed(scan: Records, bases: Records, gates: Record, crossings: Crossings, figures: Records) -> None:
-    """Write how many crossings are listed of each base, the second segment of which is left of the first.
-
-    `figures` (1,) of `FIGURE` is written to.
-    """
-    crossings = borrowed(crossings)
-    figure = figures[0]
-    lists = np.empty(MOST_LISTS, dtype=LISTED)
-    for k in range(len(bases)):
-        base = bases[k]
-        measure(scan[base.sliding], scan[base.crossing], gates, figure)
-        _, base.listed = look_up(figure, crossings, lists)
-
-
-@kernel
-def value(scan: Records, bases: Records, costs: Costs) -> None:
-    """Add to the merits of bases what they can tell, and take off what they cost at least.
-
-    Those whose crossings are listed are weighed then; of the others the one that slides is chosen.
-    """
-    lines = costs.lines
-    tells = np.empty(len(scan))
-    for i in range(len(scan)):
-        tells[i] = math.log(scan[i].gain)
-    for k in range(len(bases)):
-        base = bases[k]
+def weigh(base: Record, scan: Records, gates: Record, costs: Costs) -> None:
+    """Take what it costs to go through a base off its merit, once, and tell how: by lists or by a sweep."""
+    listing = borrowed(costs).listing
+    figure = listing.figure[0]
+    measure(scan[base.sliding], scan[base.crossing], gates, figure)
+    _, base.listed = look_up(figure, listing.crossings, listing.none)
+    if base.listed >= 0:
+        cost = COST_BASE + COST_ENTRY * base.listed
+    else:
         i = min(base.sliding, base.crossing)
         j = max(base.sliding, base.crossing)
-        base.merit += GAIN_POWER * min(tells[i], tells[j])
-        base.weighed = 1 if base.listed >= 0 else 0
-        if base.listed >= 0:
-            base.merit -= math.log(COST_BASE + COST_ENTRY * base.listed)
-        else:
-            base.merit -= min(lines[i].least, lines[j].least)
-            slides = lines[i].sweep <= lines[j].sweep
-            base.sliding = i if slides else j
-            base.crossing = j if slides else i
+        slides = costs.lines[i].sweep <= costs.lines[j].sweep
+        base.sliding = i if slides else j
+        base.crossing = j if slides else i
+        cost = swept_cost(i, j, costs)
+    base.merit -= math.log(cost / COST_BASE)
+    base.weighed = 1
 
 
 @kernel
-def weigh(base: Record, costs: Costs) -> None:
-    """Take what the hypotheses of a base that is swept will cost off its merit, once."""
-    base.weighed = 1
-    i = min(base.sliding, base.crossing)
-    j = max(base.sliding, base.crossing)
+def swept_cost(i: int, j: int, costs: Costs) -> float:
+    """Return what it costs to sweep a base of the scan segments i and j > i."""
     one = costs.lines[i]
     other = costs.lines[j]
     slides = costs.slides[i]
@@ -208,36 +188,37 @@ def weigh(base: Record, costs: Costs) -> None:
         b = taken[t]
         expected += slides[b] * smooth[b + shift]
     expected *= costs.scale * abs(math.sin(turn)) ** SINE_POWER * max(one.short, other.short)
-    cost = COST_BASE + min(one.sweep, other.sweep) + COST_HYPOTHESIS * expected
-    base.merit -= math.log(cost) - min(one.least, other.least)
+    return COST_BASE + min(one.sweep, other.sweep) + COST_HYPOTHESIS * expected
 
 
 @kernel
-def weigh_all(bases: Records, costs: Costs, noise: Floats) -> None:
+def weigh_all(question: Question, bases: Records, costs: Costs, noise: Floats) -> None:
     """Weigh bases that are to be drawn by their merits, to which noise is added, (k,) or more."""
     for k in range(len(bases)):
-        if bases[k].weighed == 0:
-            weigh(bases[k], costs)
+        weigh(bases[k], question.scan, question.terms[0].gates, costs)
         bases[k].merit += noise[k]
 
 
 @kernel
-def next_base(plan: Plan) -> int:
+def next_base(question: Question, plan: Plan) -> int:
     """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
 
-    What a base is worth before it is weighed it is worth at most, so that few of them need be. Ties go to the pair that
-    comes first, that of the longest segments.
+    What a base is worth before it is weighed it is worth at most, so that few of them need be: one is left unweighed
+    that is not worth `TIMES_BETTER` what another is. Ties go to the pair that comes first, of the longest segments.
     """
+    question = borrowed(question)
+    plan = borrowed(plan)
     bases = plan.bases
     uses = plan.uses
     best = -1
     best_merit = -math.inf
+    slack = math.log(TIMES_BETTER)
     for k in range(len(bases)):
         base = bases[k]
         used = plan.fade * (uses[base.sliding] + uses[base.crossing])
-        if base.merit + used > best_merit:
+        if base.merit + used > best_merit + (0.0 if base.weighed else slack):
             if base.weighed == 0:
-                weigh(base, plan.costs)
+                weigh(base, question.scan, question.terms[0].gates, plan.costs)
             if base.merit + used > best_merit:
                 best_merit = base.merit + used
                 best = k
@@ -249,7 +230,7 @@ def next_base(plan: Plan) -> int:
 
 
 @kernel
-def begin(question: Question, planning: Planning, progress: Records) -> Plan:
+def begin(question: Question, tables: MapTables, planning: Planning, progress: Records) -> Plan:
     """Plan a search, and put `progress` (1,) at its beginning, at the best value that is known."""
     scan = question.scan
     count, n = planning.orders.shape
@@ -277,16 +258,11 @@ def begin(question: Question, planning: Planning, progress: Records) -> Plan:
     samples = Samples(
         planning.orders, planning.ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided
     )
+    listing = Listing(tables.crossings, np.empty(1, dtype=FIGURE), np.empty(0, dtype=LISTED))
+    costs = costs_of(scan, n, planning.runs, planning.area, listing)
     bases = pair_up(scan, n)
-    count_listed(scan, bases, question.terms[0].gates, planning.crossings, planning.figure)
-    swept = 0
-    for k in range(len(bases)):
-        if bases[k].listed < 0:
-            swept = n
-    costs = costs_of(scan, swept, planning.runs, planning.area)
-    value(scan, bases, costs)
     if random:
-        weigh_all(bases, costs, planning.noise)
+        weigh_all(question, bases, costs, planning.noise)
     return Plan(
         bases,
         costs,

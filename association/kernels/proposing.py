@@ -205,7 +205,7 @@ def search_listed(
     """
     figure = work.scratch[0].figure
     runs = tables.sweep.runs
-    crossings = tables.crossings.rows
+    crossings = tables.crossings.entries
     gates = question.terms[0].gates
     prior = question.terms[0].prior
     a = question.scan[base.sliding]

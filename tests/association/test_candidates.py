@@ -13,6 +13,7 @@ import pytest
 
 from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, SearchReport
 from association.candidates import Candidates, find_candidates
+from association.kernels.planning import pair_up
 from association.tuning import (
     BASE_SEGMENTS,
     KEPT_SHARE,
@@ -171,7 +172,7 @@ BASE = ["sliding", "crossing", "merit"]
 
 def bases_in(index: MapIndex, scan: Scan) -> list[planning.Base]:
     rows = context_of(index, scan).lines.rows
-    bases: list[planning.Base] = bases_of(rows, len(rows), index.runs, index.area)[BASE].tolist()
+    bases: list[planning.Base] = bases_of(rows, len(rows), index.runs, index.area, index.crossings)[BASE].tolist()
     return bases
 
 
@@ -226,8 +227,9 @@ def test_a_scan_of_many_segments_needs_no_more_bases(clutter: int) -> None:
 
 def missed(index: MapIndex, scan: Scan, bases: int, fewest: int) -> float:
     """Count the sets of `fewest` segments that hold none of the first bases; return their share."""
-    plan = bases_in(index, scan)
-    tried = [set(plan[k][:2]) for k in planning.order_of(plan, math.log(REUSE))[:bases]]
+    plan, rows = bases_in(index, scan), context_of(index, scan).lines.rows
+    order = planning.order_of(plan, math.log(REUSE), pair_up(rows, len(rows))["merit"].tolist())
+    tried = [set(plan[k][:2]) for k in order[:bases]]
     sets = list(itertools.combinations(range(len(scan.measured)), fewest))
     return sum(not any(base <= set(one) for base in tried) for one in sets) / len(sets)
 

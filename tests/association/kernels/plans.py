@@ -11,11 +11,11 @@ from association.kernels import planning
 from association.kernels.crossings import look_up
 from association.kernels.sweeping import measure
 from association.layout import CROSSING, FIGURE, LISTED, RULES, record
-from association.tables import Costs, Crossings, Plan, Samples, Walls
+from association.tables import Costs, Crossings, Listing, Plan, Samples, Walls
 from association.tuning import MOST_LISTS, REUSE
 from registration.layout import Records
 
-from .drawn import GATES, INDEX
+from .drawn import ASKED, GATES, INDEX
 
 NOT_LISTED = listed(INDEX.sweep.runs, np.zeros(0, CROSSING), -1.0)  # so that every base is swept
 
@@ -32,11 +32,10 @@ def sampled(n: int, count: int, rng: np.random.Generator) -> Samples:
 def plan_of(
     scan: Records, n: int, runs: Walls, area: float, *, crossings: Crossings = NOT_LISTED, by_chance: bool = False
 ) -> Plan:
-    """Return the plan of a search with bases of the first n segments; none that is swept is weighed yet."""
-    costs = planning.costs_of(scan, n, runs, area)
+    """Return the plan of a search with bases of the first n segments, none of them weighed yet."""
     return Plan(
-        bases=valued(scan, costs, crossings),
-        costs=costs,
+        bases=planning.pair_up(scan, n),
+        costs=costs_of(scan, n, runs, area, crossings),
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
@@ -47,19 +46,15 @@ def plan_of(
     )
 
 
+def costs_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Costs:
+    """Return what the bases of the first `count` segments of a scan cost."""
+    return planning.costs_of(scan, count, runs, area, Listing(crossings, record(FIGURE), np.zeros(0, LISTED)))
+
+
 def bases_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Records:
     """Return the bases of the first `count` segments of a scan, all of them weighed."""
-    costs = planning.costs_of(scan, count, runs, area)
-    bases = valued(scan, costs, crossings)
-    planning.weigh_all(bases, costs, np.zeros(len(bases)))
-    return bases
-
-
-def valued(scan: Records, costs: Costs, crossings: Crossings = NOT_LISTED) -> Records:
-    """Return the bases of the segments of which the costs are, with what they are worth at most."""
-    bases = planning.pair_up(scan, len(costs.lines))
-    planning.count_listed(scan, bases, GATES[0], crossings, record(FIGURE))
-    planning.value(scan, bases, costs)
+    bases, question = planning.pair_up(scan, count), ASKED._replace(scan=scan)
+    planning.weigh_all(question, bases, costs_of(scan, count, runs, area, crossings), np.zeros(len(bases)))
     return bases
 
 
@@ -67,4 +62,6 @@ def entries_of(scan: Records, base: tuple[int, int], crossings: Crossings) -> in
     """Return how many crossings are on the lists of a base, or -1."""
     figure, lists = record(FIGURE), np.zeros(MOST_LISTS, LISTED)
     measure(scan[base[0]], scan[base[1]], GATES[0], figure[0])
-    return int(look_up(figure[0], crossings, lists)[1])
+    count, entries = look_up(figure[0], crossings, lists)
+    assert entries < 0 or entries == sum(lists["end"][:count] - lists["begin"][:count])
+    return int(entries)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from association.kernels import advancing, stopping
 from association.kernels.planning import begin
 from association.kernels.proposing import search_base
-from association.layout import FIGURE, FOUND, PROGRESS, record
+from association.layout import FOUND, PROGRESS, record
 from association.tables import Plan, Planning, Question
 from association.tuning import REUSE
 from registration.layout import Records
@@ -66,9 +66,10 @@ def expected_end(d: Drawn, effort: Effort) -> End:
     gains, beyond = plan.best_gains.tolist(), float(d.scan["gain"][BASES:].sum())
     residual, tried, bound, missed = d.scan["gain"].copy(), [], float(d.scan["gain"].sum()), 1.0
     weighed = bases_of(question.scan, len(plan.uses), INDEX.runs, INDEX.area)
-    order = twin.order_of(weighed[["sliding", "crossing", "merit"]].tolist(), plan.fade)
+    at_most = plan.bases["merit"].tolist()
+    order = twin.order_of(weighed[["sliding", "crossing", "merit"]].tolist(), plan.fade, at_most)
     for count, k in enumerate(order, 1):
-        base = plan.bases[k]
+        base = weighed[k]
         search_base(question, TABLES, base, found, NOTHING, state[0], work, 10**9)
         best = float(state["best_value"][0])
         state["least_freedom"] = twin.least_freedom_sorted(d.scan, 0.65 * best)
@@ -138,23 +139,20 @@ def test_a_search_in_one_call(seed: int) -> None:
         question, work = asked(d, effort), workspace_of(d.scan)
         n = seed % 2 if seed % 5 == 0 else min(len(d.scan), BASES)
         samples, noise = sampled(n, 64, d.rng), d.rng.gumbel(size=BASES**2 if effort.by_chance else 0)
-        orders, crossings = (
-            (samples.orders, samples.ranks, math.log(REUSE)),
-            INDEX.crossings if seed % 3 else NOT_LISTED,
-        )
-        by = Planning(INDEX.runs, INDEX.area, *orders, crossings, record(FIGURE), noise)
+        by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
+        tables = TABLES._replace(crossings=INDEX.crossings if seed % 3 else NOT_LISTED)
         apart, found = record(PROGRESS), np.zeros(64, FOUND)
-        plan = begin(question, by, apart)
+        plan = begin(question, tables, by, apart)
         expected = advancing.EXHAUSTED
         if len(plan.bases):
-            expected = advancing.advance(question, TABLES, plan, found, apart, work, effort.allowed, 10**9)
+            expected = advancing.advance(question, tables, plan, found, apart, work, effort.allowed, 10**9)
             if expected == advancing.EXHAUSTED and not effort.by_chance:
                 apart["missed"] = stopping.missed_share(question, plan, apart)
         else:
             apart["missed"] = 0.0
         for budget in (10**9, 100):
             together, same = record(PROGRESS), np.zeros(64, FOUND)
-            why, left = advancing.begin_and_advance(question, TABLES, by, same, together, work, effort.allowed, budget)
+            why, left = advancing.begin_and_advance(question, tables, by, same, together, work, effort.allowed, budget)
             assert (left is None) == (why != advancing.BUDGET)
             assert budget == 100 or left is None
             while left is not None and why == advancing.BUDGET:

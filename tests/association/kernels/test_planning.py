@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from association.grids import listed
 from association.kernels import planning, sliding
-from association.layout import FIGURE, PROGRESS, record
+from association.layout import CROSSING, PROGRESS, record
 from association.tables import Crossings, Planning
 from association.tuning import BASE_SEGMENTS, COST_BASE, COST_ENTRY, GAIN_POWER, PARALLEL_SINE, REUSE, UNTELLING
 from registration.layout import Records
@@ -19,8 +19,8 @@ from registration.layout import Records
 from ..reference import crossings as twin_of_crossings
 from ..reference import planning as twin
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, SEEDS, Drawn, drawn, oblique
-from .plans import NOT_LISTED, RULE, bases_of, entries_of, plan_of, sampled, valued
+from .drawn import ASKED, INDEX, SEEDS, TABLES, Drawn, drawn, oblique
+from .plans import NOT_LISTED, RULE, bases_of, entries_of, plan_of, sampled
 
 
 def uncertain(d: Drawn) -> Records:
@@ -80,8 +80,9 @@ def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
     np.testing.assert_allclose(bases["merit"], [base[2] for base in expected], rtol=1e-9)
     for fade in (math.log(REUSE), 0.0):
         plan = plan_of(scan, count, runs, area)._replace(fade=fade)
-        taken = [planning.next_base(plan) for _ in range(len(expected) + 1)]
-        assert taken == [*twin.order_of(expected, fade), -1]
+        at_most = plan.bases["merit"].tolist()
+        taken = [planning.next_base(ASKED._replace(scan=scan), plan) for _ in range(len(expected) + 1)]
+        assert taken == [*twin.order_of(expected, fade, at_most), -1]
         assert plan.uses.sum() == 2 * len(expected)
 
 
@@ -90,12 +91,10 @@ def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
 def test_what_a_base_is_worth_before_it_is_weighed_it_is_worth_at_most(seed: int) -> None:
     d = drawn(seed)
     scan, runs, area = uncertain(d), oblique(d.rng).runs, 10.0 ** d.rng.uniform(1.0, 4.0)
-    costs = planning.costs_of(scan, len(scan), runs, area)
-    bases, weighed = valued(scan, costs), bases_of(scan, len(scan), runs, area)
+    bases, weighed = planning.pair_up(scan, len(scan)), bases_of(scan, len(scan), runs, area)
     assert not bases["weighed"].any()
     assert weighed["weighed"].all()
-    assert (bases["merit"] >= weighed["merit"]).all()
-    assert (bases["merit"] > weighed["merit"]).any()
+    assert (bases["merit"] > weighed["merit"]).all()
 
 
 @given(SEEDS)
@@ -104,17 +103,15 @@ def test_a_base_of_which_the_crossings_are_listed_costs_what_there_are(seed: int
     """Its second segment is to the left of the first one then; beyond the lists it is swept as any other."""
     d = drawn(seed)
     scan, near = uncertain(d), listed_up_to(4.0)
-    costs = planning.costs_of(scan, len(scan), INDEX.runs, INDEX.area)
-    swept = {frozenset(base[:2]): base for base in valued(scan, costs)[["sliding", "crossing", "merit"]].tolist()}
-    bases = valued(scan, costs, near)
-    assert len(bases) == len(swept)
-    for base in bases:
+    swept = bases_of(scan, len(scan), INDEX.runs, INDEX.area)
+    bases = bases_of(scan, len(scan), INDEX.runs, INDEX.area, near)
+    assert (swept["listed"] == -1).all()
+    for base, other in zip(bases, swept, strict=True):
         a, b = base["sliding"], base["crossing"]
         if base["listed"] < 0:
-            assert not base["weighed"]
-            assert base[["sliding", "crossing", "merit"]].item() == swept[frozenset((a, b))]
+            assert base.item() == other.item()
             continue
-        assert base["weighed"]
+        assert {a, b} == {other["sliding"], other["crossing"]}
         assert scan["dx"][a] * scan["dy"][b] > scan["dy"][a] * scan["dx"][b]
         assert base["listed"] == entries_of(scan, (a, b), near)
         worth = min(scan["gain"][[a, b]]) ** GAIN_POWER * (1.0 if twin.is_telling(scan, a, b) else UNTELLING)
@@ -124,15 +121,16 @@ def test_a_base_of_which_the_crossings_are_listed_costs_what_there_are(seed: int
 
 
 def listed_up_to(reach: float) -> Crossings:
-    found, runs = INDEX.crossings.rows, INDEX.sweep.runs
-    return listed(runs, found[[twin_of_crossings.reach_to(*runs[list(one)]) <= reach for one in found.tolist()]], reach)
+    runs = INDEX.sweep.runs
+    found = np.array([(*pair, 0) for pair in sorted(twin_of_crossings.crossings_of(runs, reach))], CROSSING)
+    return listed(runs, found, reach)
 
 
 def test_few_bases_are_weighed() -> None:
     d = drawn(3)
-    plan = plan_of(d.scan, len(d.scan), INDEX.runs, INDEX.area)
+    plan = plan_of(d.scan, len(d.scan), INDEX.runs, INDEX.area, crossings=INDEX.crossings)
     for _ in range(4):
-        planning.next_base(plan)
+        planning.next_base(ASKED._replace(scan=d.scan), plan)
     assert 4 <= plan.bases["weighed"].sum() < 0.5 * len(plan.bases)
 
 
@@ -145,9 +143,8 @@ def test_begin(seed: int) -> None:
     samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0)
     noise = d.rng.gumbel(size=n * n if seed % 2 == 0 else 0)
     crossings = INDEX.crossings if seed % 3 else NOT_LISTED
-    orders = samples.orders, samples.ranks, math.log(REUSE)
-    by = Planning(INDEX.runs, INDEX.area, *orders, crossings, record(FIGURE), noise)
-    plan = planning.begin(question, by, progress)
+    by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
+    plan = planning.begin(question, TABLES._replace(crossings=crossings), by, progress)
     assert progress[0]["current"] == -1
     assert progress[0]["bound"] == pytest.approx(d.scan["gain"].sum())
     assert progress[0]["missed"] == 1.0
@@ -155,11 +152,9 @@ def test_begin(seed: int) -> None:
     anew = plan_of(question.scan, n, INDEX.runs, INDEX.area, crossings=crossings)
     weighed = bases_of(question.scan, n, INDEX.runs, INDEX.area, crossings)
     weighed["merit"] += noise[: len(weighed)] if len(noise) else 0.0
-    np.testing.assert_array_equal(plan.bases, weighed if plan.random else anew.bases)
-    if (plan.bases["listed"] < 0).any():
-        np.testing.assert_array_equal(plan.costs.lines, anew.costs.lines)
-    else:
-        assert len(plan.costs.lines) == 0
+    given = ["sliding", "crossing", "merit", "weighed", *(["listed"] if plan.random else [])]
+    np.testing.assert_array_equal(plan.bases[given], (weighed if plan.random else anew.bases)[given])
+    np.testing.assert_array_equal(plan.costs.lines, anew.costs.lines)
     np.testing.assert_array_equal(plan.uses, np.zeros(n))
     np.testing.assert_array_equal(plan.residual, d.scan["gain"])
     np.testing.assert_array_equal(plan.best_gains, sorted(d.scan["gain"][:n], reverse=True))

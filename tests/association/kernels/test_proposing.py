@@ -226,6 +226,46 @@ def test_a_base_of_which_the_crossings_are_listed_is_gone_through_whole(seed: in
     assert pieces.calls > 1 or not expected
 
 
+@pytest.mark.parametrize(("length", "apart", "end"), [(1.0, 31.8, 32.3), (0.3, 31.8, 31.97), (0.3, 3.8, 3.97)])
+@pytest.mark.parametrize("first", [0, 1])
+def test_wherever_a_base_lies_its_crossings_are_looked_up(length: float, apart: float, end: float, first: int) -> None:
+    """A segment across another, far or near, up to beyond the end of its run; and where a cell of the lists ends."""
+    along = np.array([[0.0, 0.0, 9.0, 0.0], [2.0, 0.0, 5.0, 0.0]])
+    wall, long = (
+        along if first == 0 else along[:, [2, 3, 0, 1]]
+    )  # the other way round it is to the left of the other one
+    index, proposed = index_of([wall, [0.0, min(1.0, end - 10.0), 0.0, end], [60.0, 60.0, 61.0, 60.0]]), []
+    for middle in apart + 0.003 * np.arange(110):
+        scan = scan_of([long, [0.0, middle - 0.5 * length, 0.0, middle + 0.5 * length]])
+        question = context_of(index, scan).question(ALL)
+        assert question.scan["length"][0] == 3.0
+        found, progress, work = np.zeros(20, FOUND), record(PROGRESS), workspace_of(question.scan, index)
+        chosen = record(BASE, sliding=first, crossing=1 - first, listed=1)
+        proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 10**9)
+        proposed.append(int(progress["hypotheses"][0]))
+        assert proposed[-1] == len(twin.placements(question.scan, first, 1 - first, index.runs.rows, GATES))
+    assert set(proposed) == {0, 1}
+
+
+def test_only_what_crosses_at_about_the_angle_of_a_base_is_proposed_within_the_window() -> None:
+    """Of a fan of runs, half a degree apart, those up to four degrees off; of these, what a prior lets through."""
+    angles = np.radians(90.0 + 0.5 * np.arange(-30, 31))
+    middles = np.stack([0.8 * np.arange(61), np.full(61, 3.0)], axis=1)
+    half = 2.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    index = index_of(np.vstack([[[-9.0, 0.0, 60.0, 0.0]], np.hstack([middles - half, middles + half])]))
+    scan = scan_of([[-3.0, 0.0, 3.0, 0.0], [0.0, 1.0, 0.0, 5.0]])
+    ways = twin.placements(context_of(index, scan).lines.rows, 0, 1, index.runs.rows, GATES)
+    window = HardPrior(ways[len(ways) // 2].pose, 1.0, 0.5)
+    inside = [way for way in ways if twin.may_be_refined_into(window, way.pose)]
+    assert 0 < len(inside) < len(ways) < 30
+    moved_window = HardPrior(moved(window.pose, [0.0, *index.origin]), 1.0, 0.5)
+    for prior, expected in ((None, ways), (moved_window, inside)):
+        question, found, progress = context_of(index, scan, prior).question(ALL), np.zeros(99, FOUND), record(PROGRESS)
+        chosen, work = record(BASE, sliding=0, crossing=1, listed=1), workspace_of(question.scan, index)
+        proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 10**9)
+        assert progress["hypotheses"][0] == len(expected)
+
+
 @given(SEEDS)
 @settings(max_examples=6, deadline=None)
 def test_what_a_base_proposes_is_refined_and_kept(seed: int) -> None:

@@ -21,6 +21,7 @@ from association.tuning import (
     SHORT_POWER,
     SINE_POWER,
     TELLING,
+    TIMES_BETTER,
     UNTELLING,
 )
 from registration.layout import Floats, Record, Records
@@ -77,12 +78,20 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> list[Base
     return bases
 
 
-def order_of(bases: list[Base], fade: float) -> list[int]:
-    """Return the bases in the order in which they are taken: each use of a segment adds `fade` to its others' merit."""
-    left, uses, order = list(range(len(bases))), dict.fromkeys(range(1000), 0), []
+def order_of(bases: list[Base], fade: float, at_most: list[float]) -> list[int]:
+    """Return the bases in the order in which they are taken: each use of a segment adds `fade` to its others' merit.
+
+    What a base is worth it is not asked before it may be worth `TIMES_BETTER` what another is.
+    """
+    left, uses, order, asked = list(range(len(bases))), dict.fromkeys(range(1000), 0), [], set()
     while left:
-        worth = {k: bases[k][2] + fade * (uses[bases[k][0]] + uses[bases[k][1]]) for k in left}
-        best = max(worth, key=worth.__getitem__)
+        best, most = left[0], -math.inf
+        for k in left:
+            used = fade * (uses[bases[k][0]] + uses[bases[k][1]])
+            if k not in asked and at_most[k] + used > most + math.log(TIMES_BETTER):
+                asked.add(k)
+            if k in asked and bases[k][2] + used > most:
+                best, most = k, bases[k][2] + used
         left.remove(best)
         order.append(best)
         for segment in bases[best][:2]:
