@@ -230,10 +230,8 @@ def test_a_base_of_which_the_crossings_are_listed_is_gone_through_whole(seed: in
 @pytest.mark.parametrize("first", [0, 1])
 def test_wherever_a_base_lies_its_crossings_are_looked_up(length: float, apart: float, end: float, first: int) -> None:
     """A segment across another, far or near, up to beyond the end of its run; and where a cell of the lists ends."""
-    along = np.array([[0.0, 0.0, 9.0, 0.0], [2.0, 0.0, 5.0, 0.0]])
-    wall, long = (
-        along if first == 0 else along[:, [2, 3, 0, 1]]
-    )  # the other way round it is to the left of the other one
+    along = np.array([[-9.0, 0.0, 9.0, 0.0], [-1.5, 0.0, 1.5, 0.0]])
+    wall, long = along[:, [0, 1, 2, 3] if first == 0 else [2, 3, 0, 1]]  # what is short is to its left, or it to that's
     index, proposed = index_of([wall, [0.0, min(1.0, end - 10.0), 0.0, end], [60.0, 60.0, 61.0, 60.0]]), []
     for middle in apart + 0.003 * np.arange(110):
         scan = scan_of([long, [0.0, middle - 0.5 * length, 0.0, middle + 0.5 * length]])
