@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import kernel
+from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
 from ..layout import HARD_PRIOR, LAID, LISTED, MET, SWEPT
@@ -239,7 +239,7 @@ def search_listed(
     return spent
 
 
-@kernel
+@inlined
 def search_base(
     question: Question,
     tables: MapTables,
