@@ -17,9 +17,10 @@ from .kernels.sliding import search_slides, sliding_segments
 from .kernels.stopping import missed_share
 from .layout import FOUND, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
+from .planning_tables import Plan, Planning
 from .result import SearchReport
 from .sharing import Sharing
-from .tables import Plan, Planning, Question
+from .tables import Question
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,

@@ -20,7 +20,8 @@ from .context import SearchContext
 from .kernels.advancing import BUDGET, EXHAUSTED, merge, search_ahead
 from .kernels.planning import next_base
 from .layout import TRIED
-from .tables import Plan, Question, Workspace
+from .planning_tables import Plan
+from .tables import Question, Workspace
 
 ROOM = 1024  # poses that are noted at a time
 MOST_AHEAD = 4  # bases at once: what is ahead when the search ends was for nothing, and each thread has a workspace

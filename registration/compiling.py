@@ -7,7 +7,7 @@ compiled it. When any of these changes the name does, so old code is never looke
 the same time write the same.
 
 A kernel lives in the folder ``kernels`` of its package and reaches what stands there, the package's ``layout.py``,
-``tables.py`` and ``tuning.py``, and the same files of `registration`; a test holds the packages to that.
+``*tables.py`` and ``tuning.py``, and the same files of `registration`; a test holds the packages to that.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ Value = TypeVar("Value")
 logger = logging.getLogger("linefix")
 
 SHARED = "registration"  # the package whose kernels those of every other may call
-SOURCES = ("layout.py", "tables.py", "tuning.py", "_*kernels.py", "kernels/**/*.py")
+SOURCES = ("layout.py", "*tables.py", "tuning.py", "_*kernels.py", "kernels/**/*.py")
 VERSIONS = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
 DIRECTORY = "LINEFIX_KERNELS"  # names where compiled kernels are kept
 KEPT_STAMPS = 8  # of a package in one place: of other versions and processors, and of checkouts in use

@@ -8,7 +8,8 @@ from registration.compiling import borrowed, kernel
 from registration.layout import Record, Records
 
 from ..layout import FOUND, TRIED
-from ..tables import MapTables, Plan, Planning, Question, Workspace
+from ..planning_tables import Plan, Planning
+from ..tables import MapTables, Question, Workspace
 from .planning import begin, is_telling, middle_of, next_base
 from .proposing import search_base
 from .stopping import (

@@ -8,7 +8,8 @@ from registration.compiling import borrowed, inlined, kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import BASE, FIGURE, LINE_COST, LISTED
-from ..tables import Costs, Listing, MapTables, Plan, Planning, Question, Samples, Walls
+from ..planning_tables import Costs, Plan, Planning, Samples
+from ..tables import Crossings, MapTables, Question, Walls
 from ..tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
@@ -26,7 +27,7 @@ from ..tuning import (
     TIMES_BETTER,
     UNTELLING,
 )
-from .crossings import look_up
+from .looking_up import look_up
 from .ordering import ascending
 from .sweeping import least_length, measure
 
@@ -96,10 +97,10 @@ def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool
 
 
 @kernel
-def costs_of(scan: Records, count: int, runs: Walls, area: float, listing: Listing) -> Costs:
+def costs_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings) -> Costs:
     """Return what bases of the first `count` scan segments cost, as far as that is of one segment each.
 
-    `area` is that of the map, m^2.
+    `area` is that of the map, m^2; its crossings say what bases cost that are looked up.
     """
     slides, fitting = slack_tables(scan, count, runs)
     bins = slides.shape[1]
@@ -122,7 +123,9 @@ def costs_of(scan: Records, count: int, runs: Walls, area: float, listing: Listi
         line.angle = scan[i].angle
         line.short = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
         line.sweep = COST_ANCHOR * fitting[i] + COST_SLIDE * total
-    return Costs(listing, lines, slides, smooth, taken, HYPOTHESIS_SCALE / area)
+    figure = np.empty(1, dtype=FIGURE)
+    no_lists = np.empty(0, dtype=LISTED)
+    return Costs(crossings, figure, no_lists, lines, slides, smooth, taken, HYPOTHESIS_SCALE / area)
 
 
 @kernel
@@ -155,10 +158,10 @@ def pair_up(scan: Records, count: int) -> Records:
 @kernel
 def weigh(base: Record, scan: Records, gates: Record, costs: Costs) -> None:
     """Take what it costs to go through a base off its merit, once, and tell how: by lists or by a sweep."""
-    listing = borrowed(costs).listing
-    figure = listing.figure[0]
+    costs = borrowed(costs)
+    figure = costs.figure[0]
     measure(scan[base.sliding], scan[base.crossing], gates, figure)
-    _, base.listed = look_up(figure, listing.crossings, listing.none)
+    _, base.listed = look_up(figure, costs.crossings, costs.no_lists)
     if base.listed >= 0:
         cost = COST_BASE + COST_ENTRY * base.listed
     else:
@@ -258,8 +261,7 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     samples = Samples(
         planning.orders, planning.ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided
     )
-    listing = Listing(tables.crossings, np.empty(1, dtype=FIGURE), np.empty(0, dtype=LISTED))
-    costs = costs_of(scan, n, planning.runs, planning.area, listing)
+    costs = costs_of(scan, n, planning.runs, planning.area, tables.crossings)
     bases = pair_up(scan, n)
     if random:
         weigh_all(question, bases, costs, planning.noise)

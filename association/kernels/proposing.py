@@ -10,7 +10,7 @@ from registration.layout import Record, Records
 from ..layout import HARD_PRIOR, LAID, LISTED, MET, SWEPT
 from ..tables import MapTables, Question, Workspace
 from ..tuning import AT_ONCE, MOST_LISTS, TESTS_ANCHOR, TESTS_BASE
-from .crossings import look_up, on_crossings
+from .looking_up import look_up, on_crossings
 from .matching import gates_about, wrap
 from .sweeping import anchors, end_slack, lay, measure, meet, sweep, where_crossed
 from .trying import is_about, try_poses

@@ -4,7 +4,8 @@ from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
 from ..layout import Integers
-from ..tables import Plan, Question, Samples
+from ..planning_tables import Plan, Samples
+from ..tables import Question
 
 
 @kernel

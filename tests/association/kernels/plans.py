@@ -8,10 +8,11 @@ import numpy as np
 
 from association.grids import listed
 from association.kernels import planning
-from association.kernels.crossings import look_up
+from association.kernels.looking_up import look_up
 from association.kernels.sweeping import measure
 from association.layout import CROSSING, FIGURE, LISTED, RULES, record
-from association.tables import Costs, Crossings, Listing, Plan, Samples, Walls
+from association.planning_tables import Costs, Plan, Samples
+from association.tables import Crossings, Walls
 from association.tuning import MOST_LISTS, REUSE
 from registration.layout import Records
 
@@ -48,7 +49,7 @@ def plan_of(
 
 def costs_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Costs:
     """Return what the bases of the first `count` segments of a scan cost."""
-    return planning.costs_of(scan, count, runs, area, Listing(crossings, record(FIGURE), np.zeros(0, LISTED)))
+    return planning.costs_of(scan, count, runs, area, crossings)
 
 
 def bases_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Records:

@@ -13,7 +13,8 @@ from association.kernels import advancing, stopping
 from association.kernels.planning import begin
 from association.kernels.proposing import search_base
 from association.layout import FOUND, PROGRESS, record
-from association.tables import Plan, Planning, Question
+from association.planning_tables import Plan, Planning
+from association.tables import Question
 from association.tuning import REUSE
 from registration.layout import Records
 

@@ -11,18 +11,15 @@ from hypothesis import strategies as st
 
 from association.grids import crossing_runs, listed
 from association.kernels import crossings
-from association.kernels.sweeping import measure
-from association.layout import CROSSING, ENDS, FIGURE, LISTED, MET, WALL, Integers, as_records, record
+from association.layout import CROSSING, ENDS, Integers, as_records
 from association.tables import Crossings
-from association.tuning import AT_ONCE, CROSSING_ANGLES, MOST_LISTS
 from association.walls import ends_of_rows
 from registration.layout import Floats, Records
 
 from ..reference import crossings as twin
 from ..scenes import index_of
-from .drawn import GATES, SEEDS, drawn, oblique
-
-ABSCISSAE = st.floats(-30.0, 30.0)
+from .drawn import SEEDS, drawn, oblique
+from .plans import entries_of
 
 
 def boxed(runs: Records) -> tuple[Records, Integers]:
@@ -91,52 +88,6 @@ def test_a_crossing_is_listed_in_all_cells_that_its_runs_reach_into(seed: int, r
     assert sum(map(len, got.values())) == len(found.entries)
 
 
-@given(*[ABSCISSAE] * 8)
-@settings(max_examples=300, deadline=None)
-def test_what_reaches_far_enough_fits_by_its_code(
-    a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float
-) -> None:
-    """And of what does not by more than a step of the code nothing does, as far as the lists go."""
-    reach = 16.0
-    runs, asked = (min(a, b), max(a, b), min(c, d), max(c, d)), (min(e, f), max(e, f), min(g, h), max(g, h))
-    wanted = crossings.TOP_BITS | crossings.code_of(*asked, reach)
-    fits = (wanted - crossings.code_of(*runs, reach)) & crossings.TOP_BITS == crossings.TOP_BITS
-    short = [runs[0] - asked[0], asked[1] - runs[1], runs[2] - asked[2], asked[3] - runs[3]]
-    if max(short) <= 0.0:
-        assert fits
-    step = 2.0 * reach / crossings.STEPS
-    inside = [max(-reach, min(reach, value)) for value in (*runs, *asked)]
-    lacking = [inside[0] - inside[4], inside[5] - inside[1], inside[2] - inside[6], inside[7] - inside[3]]
-    if max(lacking) > 1.01 * step:
-        assert not fits
-
-
-@given(SEEDS)
-@settings(max_examples=30, deadline=None)
-def test_what_is_beyond_the_lists_is_not_listed(seed: int) -> None:
-    """Also at an angle at which there is nothing within them."""
-    d = drawn(seed)
-    nothing, lists = listed(np.zeros(0, WALL), np.zeros(0, CROSSING), 4.0), np.zeros(MOST_LISTS, LISTED)
-    seen = {True: 0, False: 0}
-    for i, a in enumerate(d.scan):
-        for b in d.scan[i + 1 :]:
-            first, second = (a, b) if a["dx"] * b["dy"] > a["dy"] * b["dx"] else (b, a)
-            figure = record(FIGURE)
-            measure(first, second, GATES[0], figure[0])
-            if abs(math.sin(figure["turn"][0])) < 0.3:
-                continue
-            count, entries = crossings.look_up(figure[0], nothing, lists)
-            middles = twin.extents_of_segments(first, second)
-            near = max(abs(middle) - 0.5 * one["length"] for middle, one in zip(middles, (first, second), strict=True))
-            assert count == 0
-            assert entries in (0, -1)
-            if near > 4.0:
-                assert entries == -1
-                seen[False] += 1
-            seen[True] += entries == 0
-    assert seen[False] > 0 or len(d.scan) < 8
-
-
 def test_where_too_many_cross_none_is_listed() -> None:
     """A thousand runs through one place, in all directions; and bases are swept then."""
     angles = np.linspace(0.0, 2.0 * math.pi, 1000, endpoint=False)
@@ -148,10 +99,7 @@ def test_where_too_many_cross_none_is_listed() -> None:
     assert len(index.sweep.runs) > 900
     assert index.crossings.shape["reach"][0] < 0.0
     assert len(index.crossings.entries) == 0
-    figure, lists = record(FIGURE), np.zeros(MOST_LISTS, LISTED)
-    scan = drawn(0).scan
-    measure(scan[0], scan[1], GATES[0], figure[0])
-    assert crossings.look_up(figure[0], index.crossings, lists) == (0, -1)
+    assert entries_of(drawn(0).scan, (0, 1), index.crossings) == -1
 
 
 @pytest.mark.parametrize(("count", "reach"), [(1, 8.0), (20, 64.0), (200, 16.0)])
@@ -164,33 +112,3 @@ def test_the_more_there_are_the_less_far_they_are_listed(count: int, reach: floa
     assert index.crossings.shape["reach"][0] == reach
     for one, other in zip(index.crossings, again, strict=True):
         np.testing.assert_array_equal(one, other)
-
-
-@given(SEEDS)
-@settings(max_examples=20, deadline=None)
-def test_crossings_are_met_in_pieces_as_at_once(seed: int) -> None:
-    """However little room there is, as long as some entries fit."""
-    d = drawn(seed)
-    runs = oblique(d.rng).runs.rows
-    found, lists = listed(runs, found_in(runs, 64.0), 64.0), np.zeros(MOST_LISTS, LISTED)
-    a, b = d.scan[:2]
-    if abs(a["dx"] * b["dy"] - a["dy"] * b["dx"]) < 0.3:
-        return
-    first, second = (a, b) if a["dx"] * b["dy"] > a["dy"] * b["dx"] else (b, a)
-    figure = record(FIGURE)
-    measure(first, second, GATES[0], figure[0])
-    figure["half_a"] = figure["half_b"] = -1.0  # so that much fits
-    count, entries = crossings.look_up(figure[0], found, lists)
-    met: dict[int, list[tuple[int, int]]] = {}
-    for room in (AT_ONCE, crossings.LEAST_AT_ONCE):
-        at, met[room] = 0, []
-        while at < entries:
-            some = np.zeros(room, MET)
-            at, n = crossings.on_crossings(figure[0], found, runs, lists, count, at, some)
-            met[room] += some[["run", "entry"]][:n].tolist()
-    assert met[AT_ONCE] == met[crossings.LEAST_AT_ONCE]
-    assert len(met[AT_ONCE]) == len({run for run, _ in met[AT_ONCE]})  # on whichever lists it is, once
-
-
-def test_bins_of_angles_have_a_right_angle_in_the_middle_of_one() -> None:
-    assert CROSSING_ANGLES % 2 == 1

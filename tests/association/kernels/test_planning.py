@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from association.grids import listed
 from association.kernels import planning, sliding
 from association.layout import CROSSING, PROGRESS, record
-from association.tables import Crossings, Planning
+from association.planning_tables import Planning
+from association.tables import Crossings
 from association.tuning import BASE_SEGMENTS, COST_BASE, COST_ENTRY, GAIN_POWER, PARALLEL_SINE, REUSE, UNTELLING
 from registration.layout import Records
 
