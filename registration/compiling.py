@@ -47,6 +47,8 @@ try:
     from numba.core.registry import cpu_target
     from numba.core.serialize import dumps
 
+    from .callees import CalleeCompiler, put_together, set_environments
+
     _pickle: Callable[[Any], bytes] = dumps
     _take_apart: Callable[[Any], tuple[Any, ...]] = CompileResult._reduce
     _put_together: Callable[..., Any] = CompileResult._rebuild
@@ -63,6 +65,9 @@ SHARED = "registration"  # the package whose kernels those of every other may ca
 SOURCES = ("layout.py", "*tables.py", "tuning.py", "_*kernels.py", "kernels/**/*.py")
 VERSIONS = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
 DIRECTORY = "LINEFIX_KERNELS"  # names where compiled kernels are kept
+# The ways in that Numba makes of no use.
+FROM_PYTHON: dict[str, Any] = {"no_cfunc_wrapper": True}
+FROM_KERNELS: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 KEPT_STAMPS = 8  # of a package in one place: of other versions and processors, and of checkouts in use
 
 
@@ -83,13 +88,16 @@ def kernel(function: Function) -> Function:
     """
     if function.__closure__:
         raise TypeError(f"kernel {function.__qualname__}: expected no variables of an enclosing function")
-    compiled = njit(nogil=True)(function)
+    compiled = njit(nogil=True, **FROM_PYTHON)(function)
     if not isinstance(compiled, Dispatcher):  # NUMBA_DISABLE_JIT is set
         return interpreted(function)
     if not hasattr(compiled, "_cache"):
         raise ImportError(UNKNOWN_NUMBA)
-    compiled._cache = KernelCache(function)
-    compiled.get_call_template = partial(_call_template, compiled.get_call_template)  # type: ignore[method-assign]
+    called: Any = njit(nogil=True, pipeline_class=CalleeCompiler, **FROM_KERNELS)(function)
+    compiled._cache, called._cache = KernelCache(function), CalleeCache(function)
+    # Kernels that call it are handed the other one.
+    compiled.get_call_template = partial(_call_template, called.get_call_template)  # type: ignore[method-assign]
+    compiled.get_overload = called.get_overload  # type: ignore[method-assign]
     return cast(Function, compiled)
 
 
@@ -177,7 +185,8 @@ def stamp(package: str) -> str:
         for path in sources(name):
             text = path.read_bytes()
             digest.update(f"{name}/{path.relative_to(_home(name)).as_posix()} {len(text)}\n".encode() + text)
-    digest.update(Path(__file__).read_bytes())
+    for name in ("callees.py", "compiling.py"):
+        digest.update((_home(SHARED) / name).read_bytes())
     return digest.hexdigest()[:20]
 
 
@@ -193,10 +202,12 @@ class KernelCache(_Cache):
     Whatever goes wrong with a file costs no more than compiling anew.
     """
 
+    kind = "kernel"
+
     def __init__(self, function: Callable[..., Any]) -> None:
         module, line = function.__module__, function.__code__.co_firstlineno
         self._directory = cache_directory(_package_of(module))
-        self._name = f"{module}.{function.__qualname__}-{line}"
+        self._name = f"{module}.{function.__qualname__}-{line}-{self.kind}"
 
     @property
     def cache_path(self) -> str:
@@ -209,7 +220,7 @@ class KernelCache(_Cache):
         path = self._path(sig)
         try:
             kept_sig, parts = pickle.loads(path.read_bytes())
-            return _put_together(target_context, *parts) if kept_sig == sig else None
+            return self._put_together(target_context, *parts) if kept_sig == sig else None
         except FileNotFoundError:
             return None
         except Exception as error:  # a file that was cut off can fail in any way
@@ -217,7 +228,8 @@ class KernelCache(_Cache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a variant; where that is not possible it works from memory."""
+        """Keep a variant that was just compiled; where that is not possible it works from memory."""
+        self._finish(data)
         if data.library.has_dynamic_globals:  # addresses, which another process has elsewhere
             return
         path = self._path(sig)
@@ -243,6 +255,24 @@ class KernelCache(_Cache):
 
     def _path(self, sig: Any) -> Path:
         return self._directory / f"{self._name}-{hashlib.sha256(str(sig).encode()).hexdigest()[:16]}.nbc"
+
+    def _put_together(self, target_context: Any, *parts: Any) -> Any:
+        return _put_together(target_context, *parts)
+
+    def _finish(self, data: Any) -> None:
+        set_environments(data)
+
+
+class CalleeCache(KernelCache):
+    """The same for what other kernels call."""
+
+    kind = "callee"
+
+    def _put_together(self, target_context: Any, *parts: Any) -> Any:
+        return put_together(target_context, *parts)
+
+    def _finish(self, data: Any) -> None:
+        pass
 
 
 def _package_of(module: str) -> str:

@@ -204,6 +204,23 @@ def test_a_broken_file_is_compiled_anew(compiled: SmallPackage) -> None:
     assert (mended.answer, mended.loaded, mended.log) == (22.0, True, "")
 
 
+def test_what_kernels_call_is_kept_for_them_alone(compiled: SmallPackage) -> None:
+    """As bitcode: nobody else runs it, and a caller that is compiled anew takes it in as it is."""
+    (called,) = compiled.kept().glob("small.kernels.inner.*-callee-*")
+    (caller,) = compiled.kept().glob("small.kernels.outer.*-kernel-*")
+    kept = called.read_bytes()
+    assert b"BC\xc0\xde" in kept  # how bitcode begins
+    assert b"\x7fELF" not in kept
+    caller.unlink()
+    again = compiled.run()
+    assert (again.answer, again.loaded, again.log) == (22.0, False, "")
+    assert called.read_bytes() == kept
+    assert caller.exists()
+    directly = compiled.run("\nfrom small.kernels.inner import inner\nassert inner(2.0) == 21.0")
+    assert directly.loaded
+    assert len(list(compiled.kept().iterdir())) == 3
+
+
 def test_old_source_is_forgotten_in_the_end(small: SmallPackage) -> None:
     place = small.home / "kernels" / "__pycache__"
     stamps = [place / f"small-{k:020x}" for k in range(compiling.KEPT_STAMPS + 3)]
@@ -221,8 +238,9 @@ def test_a_constant_is_no_variant_of_its_own(small: SmallPackage) -> None:
     small.edit("kernels/outer.py", "    return 2.0 * inner(x)", counting)
     small.edit("layout.py", "10.0", "10")
     small.edit("kernels/inner.py", "+ 1.0", "+ 1")
-    variants = "\nfrom small.kernels.inner import inner\nassert len(inner.signatures) == 2, inner.signatures"
-    assert small.run(variants).answer == 11 + 10 * (10 * (10 * 0 - 8) - 8) - 8
+    ran = small.run()
+    assert ran.answer == 11 + 10 * (10 * (10 * 0 - 8) - 8) - 8
+    assert len(list(ran.directory.glob("small.kernels.inner.*"))) == 2
 
 
 def test_a_kernel_elsewhere_is_refused() -> None:
