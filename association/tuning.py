@@ -114,16 +114,23 @@ KEPT_SLIDES = 64  # tables
 
 # Pairs of runs that cross are listed up to as far from there as one of these, as three numbers allow: pairs, their
 # entries in all lists, and pairs of runs that are near enough to be looked at.
-CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m
-CROSSING_CELL = 2.0  # m
-CROSSING_ANGLES = 45  # bins of half a turn; the middle one is about a right angle
+CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m; each has about half the entries of the last
+CROSSING_CELL = 2.0  # m, tables
+# Bins of half a turn; an odd number, so that the middle one is about a right angle. Measured: with 23 it takes up to a
+# tenth longer, with 91 as long.
+CROSSING_ANGLES = 45
+# Tables: half of the first two take a fifth longer; twice as many gain a seventh at 20,000 segments, for half
+# as much memory again. The third is some 10 us of indexing a run.
 CROSSINGS_A_RUN = (40, 250, 4_000)
-MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)  # memory: 16 and 36 MB; and a second of indexing
-FEW_RUNS = 500  # at least so many runs count
-CROSSING_SAMPLE = 128  # runs by which these numbers are estimated,
-CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most
+# Memory, of 12 bytes each: 54 MB of entries, and 24 MB of pairs while indexing, with room for a fifth more; and 1 to
+# 1.5 s of indexing. They are compared with estimates: twice as many pairs and looks are let pass.
+MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
+FEW_RUNS = 500  # at least so many runs count; tables: in a room all pairs are listed
+CROSSING_SAMPLE = 128  # runs by which these numbers are estimated; measured: to a fifth, by 32 to a third;
+CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most: some 30 ms
 CROSSING_MARGIN = 1e-3  # m, rounding
-MOST_LISTS = 256  # lists for one base; it is swept where there are more
+# Lists for one base; it is swept where there are more. Measured: at most one base in a thousand.
+MOST_LISTS = 256
 
 # --- Planning: the order of bases, and when enough have been gone through ---------------------------------------------
 
@@ -131,7 +138,8 @@ TELLING = 0.25  # m, tables; how far a base may lay the other segments off, root
 UNTELLING = 0.1  # tables; what a base is worth less that lays them farther off
 TIMES_BETTER = 2.0  # tables; what a base has to be worth at most, in times what another is, to be weighed
 REUSE = 0.3  # tables; what a base is worth less for each earlier use of one of its segments
-# What a base, a wall that it may slide on, a metre of slide, a hypothesis cost; nanoseconds, measured.
+# What a base, an entry of its lists with what comes of it, a wall that it may slide on, a metre of slide, a hypothesis
+# cost; nanoseconds, measured.
 COST_BASE = 2000.0
 COST_ENTRY = 50.0
 COST_ANCHOR = 60.0
