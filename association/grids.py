@@ -11,11 +11,12 @@ from registration.layout import Records
 
 from .kernels.crossings import find_crossings, list_crossings, sample_crossings
 from .kernels.walls import direction_raster, grid_cells
-from .layout import CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
+from .layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
 from .tables import Crossings, Grid, Raster, Sweep, Walls
 from .tuning import (
     CELL,
     CELL_GROWTH,
+    CROSSING_BAND,
     CROSSING_CELL,
     CROSSING_REACHES,
     CROSSING_SAMPLE,
@@ -26,6 +27,7 @@ from .tuning import (
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
+    MOST_BANDS,
     MOST_CROSSINGS,
     NARROW_REACH,
     NEIGHBOURHOOD,
@@ -64,25 +66,42 @@ def crossing_runs(runs: Records) -> Crossings:
     """List the pairs of runs (m,) that cross, up to as far from there as their number allows, or none."""
     ends, counted = ends_of_rows(runs), max(len(runs), FEW_RUNS)
     most = [min(a_run * counted, at_most) for a_run, at_most in zip(CROSSINGS_A_RUN, MOST_CROSSINGS, strict=True)]
-    boxes = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
-    order = np.argsort(boxes[:, 0], kind="stable").astype(np.int32)
-    by_side = as_records(ENDS, boxes[order])
+    boxed = boxes_in_bands(ends)
     # No farther than from one end of the map to the other: the fewer lists there are the sooner one is found.
     across = float(np.hypot(*np.ptp(ends.reshape(-1, 2), axis=0)))
     reaches = np.array([reach for reach in CROSSING_REACHES if reach <= across] or CROSSING_REACHES[-1:])
     every = max(1, len(runs) // CROSSING_SAMPLE)
-    counts = sample_crossings(runs, by_side, order, reaches, every, CROSSING_SAMPLE_LOOKS)
+    counts = sample_crossings(runs, *boxed, reaches, every, CROSSING_SAMPLE_LOOKS)
     allowed = (counts <= most).all(axis=1)
     for reach, count in zip(reaches[allowed].tolist(), counts[allowed, 0].tolist(), strict=True):
         found = np.empty(int(1.2 * count) + FEW_RUNS, CROSSING)
-        number, looks = find_crossings(runs, by_side, order, reach, 2 * most[2], found)
+        number, looks = find_crossings(runs, *boxed, reach, 2 * most[2], found)
         if number > 2 * most[0] or looks > 2 * most[2]:
             continue  # the sample was not like the rest
         if number > len(found):
             found = np.empty(number, CROSSING)
-            find_crossings(runs, by_side, order, reach, 2 * most[2], found)
+            find_crossings(runs, *boxed, reach, 2 * most[2], found)
         return listed(runs, found[:number], reach)
     return listed(runs, np.zeros(0, CROSSING), -1.0)
+
+
+def boxes_in_bands(ends: Floats, height: float = CROSSING_BAND) -> tuple[Records, NDArray[np.int32], Records]:
+    """Return the boxes around runs (m, 4), by bands of y and there by their left sides, their order, and the bands.
+
+    (m,) of `ENDS`, (m,) and (b,) of `BAND`, each some `height` metres or more.
+    """
+    boxes = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
+    bottom, extent = boxes[:, 1].min(initial=np.inf), np.ptp(boxes[:, 1]) if len(boxes) else 0.0
+    band_of = np.floor((boxes[:, 1] - bottom) / max(height, extent / MOST_BANDS))
+    order = np.lexsort((boxes[:, 0], band_of))
+    boxes, band_of = boxes[order], band_of[order]
+    begins = np.flatnonzero(np.diff(band_of, prepend=-1.0))
+    bands = np.zeros(len(begins), BAND)
+    if len(begins):
+        bands["begin"], bands["end"] = begins, np.append(begins[1:], len(boxes))
+        bands["low"] = np.minimum.reduceat(boxes[:, 1], begins)
+        bands["high"] = np.maximum.reduceat(boxes[:, 3], begins)
+    return as_records(ENDS, boxes), order.astype(np.int32), bands
 
 
 def listed(runs: Records, found: Records, reach: float) -> Crossings:

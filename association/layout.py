@@ -111,6 +111,9 @@ TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 # `kernels.crossings.code_of`. On a list there are dozens for each run, so that four bytes have to do.
 CROSSING = _fields((np.int32, "first second"), (np.uint32, "code"))
 
+# Some of the boxes around runs that are near one another in y: where they begin and end, and between which y they are.
+BAND = _fields((_I, "begin end"), (_F, "low high"))
+
 # Where crossings are listed: up to how far from the point where the lines cross, and how many cells there are that way.
 CROSSING_SHAPE = _fields((_F, "reach"), (_I, "columns"))
 

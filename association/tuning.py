@@ -116,6 +116,8 @@ KEPT_SLIDES = 64  # tables
 # entries in all lists, and pairs of runs that are near enough to be looked at.
 CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m; each has about half the entries of the last
 CROSSING_CELL = 2.0  # m, tables
+CROSSING_BAND = 16.0  # m; runs are gone through band by band to find those that cross,
+MOST_BANDS = 200  # of which there are so many at most, about
 # Bins of half a turn; an odd number, so that the middle one is about a right angle. Measured: with 23 it takes up to a
 # tenth longer, with 91 as long.
 CROSSING_ANGLES = 45

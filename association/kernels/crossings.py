@@ -76,12 +76,35 @@ def code_of(first_begin: float, first_end: float, second_begin: float, second_en
     return low | (STEPS | STEPS << 16) - high << 8
 
 
+@inlined
+def away_from(band: Record, box: Record) -> float:
+    """Return how far at least the boxes of a band are from a box, in y; below 0 where they may lie beside it."""
+    return max(band.low - box.y2, box.y1 - band.high)
+
+
+@inlined
+def first_from(boxes: Records, begin: int, end: int, at: int) -> int:
+    """Return from where on the boxes of a band, in ascending order of x1, come after another: no pair comes twice."""
+    low = begin
+    high = end
+    x = boxes[at].x1
+    while low < high:
+        middle = (low + high) // 2
+        if boxes[middle].x1 < x or (boxes[middle].x1 == x and middle <= at):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 @kernel
-def sample_crossings(runs: Records, boxes: Records, order: Integers, reaches: Floats, every: int, most: int) -> Floats:
+def sample_crossings(
+    runs: Records, boxes: Records, order: Integers, bands: Records, reaches: Floats, every: int, most: int
+) -> Floats:
     """Estimate how many crossings are listed up to each of some reaches, by those of every so many-th run.
 
-    `reaches` (k,) in descending order; `boxes` and `order` as of `find_crossings`. Stops after `most` looks at a pair
-    of runs. Returns for each reach (k, 3) crossings, their entries in all lists, and looks.
+    `reaches` (k,) in descending order; the others as of `find_crossings`. Stops after `most` looks at a pair of runs.
+    Returns for each reach (k, 3) crossings, their entries in all lists, and looks.
     """
     counts = np.zeros((len(reaches), 3))
     sampled = 0
@@ -89,23 +112,28 @@ def sample_crossings(runs: Records, boxes: Records, order: Integers, reaches: Fl
     at = 0
     while at < len(runs) and looks < most:
         one = runs[order[at]]
-        k = at + 1
-        while k < len(runs) and boxes[k].x1 <= boxes[at].x2 + 2.0 * reaches[0] and looks < most:
-            looks += 1
-            gap = boxes[k].x1 - boxes[at].x2
-            above = max(boxes[k].y1 - boxes[at].y2, boxes[at].y1 - boxes[k].y2)
-            other = runs[order[k]]
-            least = reach_to(one, other) if above <= 2.0 * reaches[0] else math.inf
-            for j in range(len(reaches)):
-                reach = reaches[j]
-                if gap > 2.0 * reach:
-                    break
-                counts[j, 2] += 1.0
-                if least <= reach:
-                    left, right, bottom, top = cells_of(one, other, reach, math.ceil(2.0 * reach * PER_CELL))
-                    counts[j, 0] += 1.0
-                    counts[j, 1] += (right - left + 1) * (top - bottom + 1)
-            k += 1
+        for g in range(len(bands)):
+            band = bands[g]
+            away = away_from(band, boxes[at])
+            if away > 2.0 * reaches[0]:
+                continue
+            k = first_from(boxes, band.begin, band.end, at)
+            while k < band.end and boxes[k].x1 <= boxes[at].x2 + 2.0 * reaches[0] and looks < most:
+                looks += 1
+                gap = boxes[k].x1 - boxes[at].x2
+                above = max(boxes[k].y1 - boxes[at].y2, boxes[at].y1 - boxes[k].y2)
+                other = runs[order[k]]
+                least = reach_to(one, other) if above <= 2.0 * reaches[0] else math.inf
+                for j in range(len(reaches)):
+                    reach = reaches[j]
+                    if gap > 2.0 * reach:
+                        break
+                    counts[j, 2] += 1.0 if away <= 2.0 * reach else 0.0
+                    if least <= reach:
+                        left, right, bottom, top = cells_of(one, other, reach, math.ceil(2.0 * reach * PER_CELL))
+                        counts[j, 0] += 1.0
+                        counts[j, 1] += (right - left + 1) * (top - bottom + 1)
+                k += 1
         sampled += 1
         at += every
     return counts * (len(runs) / max(1, sampled))
@@ -113,13 +141,13 @@ def sample_crossings(runs: Records, boxes: Records, order: Integers, reaches: Fl
 
 @kernel
 def find_crossings(
-    runs: Records, boxes: Records, order: Integers, reach: float, most: int, out: Records
+    runs: Records, boxes: Records, order: Integers, bands: Records, reach: float, most: int, out: Records
 ) -> tuple[int, int]:
     """Find the pairs of runs that cross within `reach` of both, and write as many to `out` (k,) as there is room for.
 
-    `boxes` (m,) of `ENDS`: corners of the box around each run, in ascending order of x1, which `order` (m,) gives.
-    Pairs come in the order of their runs, so that those are together that are near one another. Stops after `most`
-    looks at a pair. Returns how many there are, and looks.
+    `boxes` (m,) of `ENDS`: corners of the box around each run, those of each of `bands` (b,) of `BAND` in ascending
+    order of x1, which `order` (m,) gives. Pairs come in the order of their runs, so that those are together that are
+    near one another. Stops after `most` looks at a pair. Returns how many there are, and looks.
     """
     m = len(runs)
     place = np.empty(m, dtype=np.int32)
@@ -132,18 +160,23 @@ def find_crossings(
         right = boxes[at].x2 + 2.0 * reach
         low = boxes[at].y1 - 2.0 * reach
         high = boxes[at].y2 + 2.0 * reach
-        k = at + 1
-        while k < m and boxes[k].x1 <= right:
-            if boxes[k].y1 <= high and boxes[k].y2 >= low:
-                q = order[k]
-                if reach_to(runs[p], runs[q]) <= reach:
-                    if found < len(out):
-                        turned = runs[p].dx * runs[q].dy - runs[p].dy * runs[q].dx < 0.0
-                        out[found].first = q if turned else p
-                        out[found].second = p if turned else q
-                    found += 1
-            k += 1
-        looks += k - at
+        for g in range(len(bands)):
+            band = bands[g]
+            if away_from(band, boxes[at]) > 2.0 * reach:
+                continue
+            begin = first_from(boxes, band.begin, band.end, at)
+            k = begin
+            while k < band.end and boxes[k].x1 <= right:
+                if boxes[k].y1 <= high and boxes[k].y2 >= low:
+                    q = order[k]
+                    if reach_to(runs[p], runs[q]) <= reach:
+                        if found < len(out):
+                            turned = runs[p].dx * runs[q].dy - runs[p].dy * runs[q].dx < 0.0
+                            out[found].first = q if turned else p
+                            out[found].second = p if turned else q
+                        found += 1
+                k += 1
+            looks += k - begin
         if looks > most:
             break
     return found, looks

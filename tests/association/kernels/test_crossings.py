@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from association.grids import crossing_runs, listed
+from association.grids import boxes_in_bands, crossing_runs, listed
 from association.kernels import crossings
-from association.layout import CROSSING, ENDS, Integers, as_records
+from association.layout import CROSSING, Integers
 from association.tables import Crossings
 from association.walls import ends_of_rows
-from registration.layout import Floats, Records
+from registration.layout import Records
 
 from ..reference import crossings as twin
 from ..scenes import index_of
@@ -22,12 +22,9 @@ from .drawn import SEEDS, drawn, oblique
 from .plans import entries_of
 
 
-def boxed(runs: Records) -> tuple[Records, Integers]:
-    """Return the boxes around runs, by their left sides, and the order that this is."""
-    ends = ends_of_rows(runs)
-    boxes: Floats = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
-    order = np.argsort(boxes[:, 0], kind="stable").astype(np.int32)
-    return as_records(ENDS, boxes[order]), order
+def boxed(runs: Records, height: float = 1.0) -> tuple[Records, Integers, Records]:
+    """Return the boxes around runs, in bands of which there are some, and the order that this is."""
+    return boxes_in_bands(ends_of_rows(runs), height)
 
 
 def found_in(runs: Records, reach: float, most: int = 10**9) -> Records:
@@ -53,6 +50,22 @@ def test_looking_for_crossings_ends() -> None:
     some, fewer = crossings.find_crossings(runs, *boxed(runs), 64.0, 100, np.zeros(0, CROSSING))
     assert some < whole
     assert 100 < fewer <= 100 + len(runs) < looks
+
+
+def test_runs_are_found_from_one_band_to_another() -> None:
+    """However high the bands are: a long run reaches from its own into many."""
+    runs = oblique(np.random.default_rng(1)).runs.rows
+    found = [set(map(tuple, pairs_in(runs, 4.0, height))) for height in (0.3, 3.0, 1e9)]
+    assert found[0] == found[1] == found[2] == twin.crossings_of(runs, 4.0)
+    assert len(boxed(runs, 0.3)[2]) > 10
+    assert len(boxed(runs, 1e9)[2]) == 1
+    assert len(boxed(runs[:0])[2]) == 0
+
+
+def pairs_in(runs: Records, reach: float, height: float) -> list[list[int]]:
+    out = np.zeros(len(runs) ** 2, CROSSING)
+    count, _ = crossings.find_crossings(runs, *boxed(runs, height), reach, 10**9, out)
+    return out[["first", "second"]][:count].tolist()
 
 
 @given(SEEDS)
