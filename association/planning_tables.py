@@ -42,9 +42,13 @@ class Costs(NamedTuple):
         To write to.
     no_lists : (0,) of `LISTED`
         For crossings are only counted.
+    runs : Walls
+        Of the map.
+    known : (1,) whether what follows, of bases that are swept, was written: in a small map none is
     lines : (n,) of `LINE_COST`
     slides : (n, bins) how far each could slide on the runs of each direction bin, metres
-    smooth : (n, 2 bins) the same with the neighbouring bins, twice around
+    smooth : (n, 2 bins) the same with the neighbouring bins, twice around: a bin that is turned needs no division to be
+        found
     taken : (n, bins) the bins where it can, as many as there are
     scale : float
         Hypotheses for a metre's slide of one on one of the other, 1/m^2.
@@ -53,6 +57,8 @@ class Costs(NamedTuple):
     crossings: Crossings
     figure: Records
     no_lists: Records
+    runs: Walls
+    known: Integers
     lines: Records
     slides: Floats
     smooth: Floats

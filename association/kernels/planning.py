@@ -97,17 +97,37 @@ def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool
 
 
 @kernel
-def costs_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings) -> Costs:
-    """Return what bases of the first `count` scan segments cost, as far as that is of one segment each.
+def costs_of(count: int, runs: Walls, area: float, crossings: Crossings) -> Costs:
+    """Return what bases of the first `count` scan segments cost: nothing of what is swept is known yet.
 
     `area` is that of the map, m^2; its crossings say what bases cost that are looked up.
     """
-    slides, fitting = slack_tables(scan, count, runs)
-    bins = slides.shape[1]
-    # Twice around, so that a bin that is turned needs no division to be found.
-    smooth = np.empty((count, 2 * bins))
-    taken = np.empty((count, bins), dtype=np.int64)
-    lines = np.empty(count, dtype=LINE_COST)
+    bins = len(runs.bin_starts) - 1
+    return Costs(
+        crossings,
+        np.empty(1, dtype=FIGURE),
+        np.empty(0, dtype=LISTED),
+        runs,
+        np.zeros(1, dtype=np.uint8),
+        np.empty(count, dtype=LINE_COST),
+        np.empty((count, bins)),
+        np.empty((count, 2 * bins)),
+        np.empty((count, bins), dtype=np.int64),
+        HYPOTHESIS_SCALE / area,
+    )
+
+
+@kernel
+def know_sweeps(scan: Records, costs: Costs) -> None:
+    """Write what it costs to sweep bases, as far as that is of one segment each, once the first of them is."""
+    costs = borrowed(costs)
+    costs.known[0] = 1
+    lines = costs.lines
+    smooth = costs.smooth
+    taken = costs.taken
+    count, bins = costs.slides.shape
+    slides, fitting = slack_tables(scan, count, costs.runs)
+    costs.slides[:] = slides
     for i in range(count):
         line = lines[i]
         total = 0.0
@@ -123,9 +143,6 @@ def costs_of(scan: Records, count: int, runs: Walls, area: float, crossings: Cro
         line.angle = scan[i].angle
         line.short = (scan[i].length + SHORT_LENGTH) ** SHORT_POWER
         line.sweep = COST_ANCHOR * fitting[i] + COST_SLIDE * total
-    figure = np.empty(1, dtype=FIGURE)
-    no_lists = np.empty(0, dtype=LISTED)
-    return Costs(crossings, figure, no_lists, lines, slides, smooth, taken, HYPOTHESIS_SCALE / area)
 
 
 @kernel
@@ -165,6 +182,8 @@ def weigh(base: Record, scan: Records, gates: Record, costs: Costs) -> None:
     if base.listed >= 0:
         cost = COST_BASE + COST_ENTRY * base.listed
     else:
+        if costs.known[0] == 0:
+            know_sweeps(scan, costs)
         i = min(base.sliding, base.crossing)
         j = max(base.sliding, base.crossing)
         slides = costs.lines[i].sweep <= costs.lines[j].sweep
@@ -261,7 +280,7 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     samples = Samples(
         planning.orders, planning.ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided
     )
-    costs = costs_of(scan, n, planning.runs, planning.area, tables.crossings)
+    costs = costs_of(n, planning.runs, planning.area, tables.crossings)
     bases = pair_up(scan, n)
     if random:
         weigh_all(question, bases, costs, planning.noise)

@@ -36,7 +36,7 @@ def plan_of(
     """Return the plan of a search with bases of the first n segments, none of them weighed yet."""
     return Plan(
         bases=planning.pair_up(scan, n),
-        costs=costs_of(scan, n, runs, area, crossings),
+        costs=costs_of(n, runs, area, crossings),
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
@@ -47,15 +47,15 @@ def plan_of(
     )
 
 
-def costs_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Costs:
+def costs_of(count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Costs:
     """Return what the bases of the first `count` segments of a scan cost."""
-    return planning.costs_of(scan, count, runs, area, crossings)
+    return planning.costs_of(count, runs, area, crossings)
 
 
 def bases_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Records:
     """Return the bases of the first `count` segments of a scan, all of them weighed."""
     bases, question = planning.pair_up(scan, count), ASKED._replace(scan=scan)
-    planning.weigh_all(question, bases, costs_of(scan, count, runs, area, crossings), np.zeros(len(bases)))
+    planning.weigh_all(question, bases, costs_of(count, runs, area, crossings), np.zeros(len(bases)))
     return bases
 
 

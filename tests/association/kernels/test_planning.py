@@ -155,7 +155,12 @@ def test_begin(seed: int) -> None:
     weighed["merit"] += noise[: len(weighed)] if len(noise) else 0.0
     given = ["sliding", "crossing", "merit", "weighed", *(["listed"] if plan.random else [])]
     np.testing.assert_array_equal(plan.bases[given], (weighed if plan.random else anew.bases)[given])
-    np.testing.assert_array_equal(plan.costs.lines, anew.costs.lines)
+    swept = plan.random and bool((plan.bases["listed"] < 0).any())
+    assert plan.costs.known[0] == swept
+    for costs in (plan.costs, anew.costs):
+        planning.know_sweeps(question.scan, costs)
+    for name in ("lines", "slides", "smooth", "scale"):
+        np.testing.assert_equal(getattr(plan.costs, name), getattr(anew.costs, name))
     np.testing.assert_array_equal(plan.uses, np.zeros(n))
     np.testing.assert_array_equal(plan.residual, d.scan["gain"])
     np.testing.assert_array_equal(plan.best_gains, sorted(d.scan["gain"][:n], reverse=True))
