@@ -11,11 +11,11 @@ import numpy as np
 from registration.layout import Records
 
 from .context import SearchContext
-from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance, begin_and_advance
+from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance
 from .kernels.planning import begin
-from .kernels.sliding import search_slides, sliding_segments
+from .kernels.searching import finish, put_in_order, search
 from .kernels.stopping import missed_share
-from .layout import FOUND, PROGRESS, RULES, Integers, record
+from .layout import FOUND, HOW, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
@@ -36,7 +36,6 @@ from .tuning import (
     SAMPLE_SEED,
     SAMPLES,
     SLIDE_DISTINCT_SHARE,
-    SLIDE_SEGMENTS,
     SLIDE_SPACING,
     SLIDE_SPACING_FOR_BEAMS,
     TELLING_SEGMENTS,
@@ -132,20 +131,32 @@ def find_candidates(context: SearchContext, effort: Effort | None = None) -> Can
 
 def _search(context: SearchContext, effort: Effort) -> Candidates:
     """Search the map, or the window of a hard prior."""
-    scan, index, kept = context.lines.rows, context.index, effort.kept
-    found, progress = np.zeros(kept + KEPT_SLIDES, FOUND), np.zeros(1, PROGRESS)
+    deadline, tables, work = context.deadline, context.index.tables, context.workspace
+    how, rules = _limits(context, effort)
+    found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), np.zeros(1, PROGRESS)
     progress["best_value"] = effort.known
-    # A test of a pose takes longer the more walls lie where it is.
-    chunk = int(CHUNK / max(1.0, index.crowd / USUAL_CROWD))
-    question = context.question(_rules(effort, DISTINCT_DISTANCE))
-    stopped = _go_through_bases(context, effort, question, found[:kept], progress, chunk)
-    places = [*range(int(progress["count"][0]))]
-    # Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more.
-    slid = _slide(context, effort, found[kept:], progress, chunk)
-    places += range(kept, kept + int(progress["count"][0]))
-    if context.deadline.cancelled:
+    question, planning = context.question(rules), _planning(context, effort)
+    stopped, plan = BUDGET, None
+    if deadline.passed:
+        plan = begin(question, tables, planning, progress)
+    else:
+        stopped, plan = search(question, tables, planning, found, progress, work, how)
+    if plan is not None:
+        stopped = _go_on(context, question, plan, found[: effort.kept], progress, how)
+    while not (progress["done"][0] or deadline.passed):
+        finish(question, tables, found, progress, work, how)
+    if deadline.cancelled:
         raise CancelledError
-    exhaustive = stopped == EXHAUSTED and len(scan) <= BASE_SEGMENTS
+    slid = bool(progress["done"][0])
+    if not slid:
+        put_in_order(found, progress, how)
+    return _found(context, effort, found, progress, stopped, slid=slid)
+
+
+def _found(
+    context: SearchContext, effort: Effort, found: Records, progress: Records, stopped: int, *, slid: bool
+) -> Candidates:
+    exhaustive = stopped == EXHAUSTED and len(context.lines.rows) <= BASE_SEGMENTS
     state = dict(zip(PROGRESS.names or (), progress[0].item(), strict=True))  # a look at one field takes as long as all
     report = SearchReport(
         complete=stopped != BUDGET and slid,
@@ -158,49 +169,48 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    poses = found[np.array(places, dtype=np.intp)]
-    if len(places) > 1:
-        poses = poses[np.argsort(-poses["value"], kind="stable")]
-    return Candidates(poses, report)
+    return Candidates(found[: state["count"]], report)
 
 
-@lru_cache
-def _rules(effort: Effort, distinct_distance: float) -> Records:
-    return record(
-        RULES,
-        kept_share=effort.kept_share,
-        distinct_distance=distinct_distance,
-        distinct_angle=DISTINCT_ANGLE,
-        rival_share=effort.rival_share,
-        enough=effort.enough,
-    )
-
-
-def _go_through_bases(
-    context: SearchContext, effort: Effort, question: Question, found: Records, progress: Records, chunk: int
+def _go_on(
+    context: SearchContext, question: Question, plan: Plan, found: Records, progress: Records, how: Records
 ) -> int:
-    """Fill `found` and `progress`; return why it ended, `BUDGET` where the deadline did."""
+    """Go on with a plan, and fill `found` and `progress`; return why it ended, `BUDGET` where the deadline did."""
     tables, deadline, work = context.index.tables, context.deadline, context.workspace
-    planning = _planning(context, effort)
-    if deadline.passed:
-        plan: Plan | None = begin(question, tables, planning, progress)
-        stopped = BUDGET
-    else:
-        stopped, plan = begin_and_advance(question, tables, planning, found, progress, work, effort.allowed, chunk)
-    if plan is None:
-        return stopped
+    allowed, chunk = float(how["allowed"][0]), int(how["budget"][0])
     if len(plan.bases) == 0:
-        progress["missed"] = 0.0  # walls of which no two cross are slid
+        progress["missed"] = 0.0
         return EXHAUSTED
+    stopped = BUDGET
     while stopped == BUDGET:
         if deadline.helped:
-            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(effort.allowed)
+            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(allowed)
         if stopped != BUDGET or deadline.passed:
             break
-        stopped = advance(question, tables, plan, found, progress, work, effort.allowed, chunk)
+        stopped = advance(question, tables, plan, found, progress, work, allowed, chunk)
     if stopped in (BUDGET, EXHAUSTED) and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
     return stopped
+
+
+def _limits(context: SearchContext, effort: Effort) -> tuple[Records, Records]:
+    """Return how far the search goes, (1,) of `HOW`, and which poses of bases and slides are kept, (2,) of `RULES`."""
+    spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
+    if context.window is not None:
+        spacing = min(spacing, context.window.radius)
+    share = effort.kept_share if context.with_beams else effort.rival_share
+    # A test of a pose takes longer the more walls lie where it is.
+    return _records(effort, spacing, share, int(CHUNK / max(1.0, context.index.crowd / USUAL_CROWD)))
+
+
+@lru_cache
+def _records(effort: Effort, spacing: float, share: float, budget: int) -> tuple[Records, Records]:
+    how = record(HOW, allowed=effort.allowed, spacing=spacing, share=share, kept=effort.kept, budget=budget)
+    rules = np.zeros(2, RULES)
+    rules["kept_share"], rules["rival_share"], rules["enough"] = effort.kept_share, effort.rival_share, effort.enough
+    rules["distinct_angle"] = DISTINCT_ANGLE
+    rules["distinct_distance"] = DISTINCT_DISTANCE, SLIDE_DISTINCT_SHARE * spacing
+    return how, rules
 
 
 def _planning(context: SearchContext, effort: Effort) -> Planning:
@@ -223,22 +233,3 @@ def _orders(n: int, samples: int) -> tuple[Integers, Integers]:
     """Draw orders of n segments (samples, n), all as likely; return the places of each segment, too, (n, samples)."""
     orders = np.random.default_rng(SAMPLE_SEED).random((samples, n)).argsort(axis=1)
     return orders.astype(np.uint8), np.ascontiguousarray(orders.argsort(axis=1).T, dtype=np.uint8)
-
-
-def _slide(context: SearchContext, effort: Effort, found: Records, progress: Records, chunk: int) -> bool:
-    """Lay the longest of parallel segments on every run, and fill `found`; return whether that was completed."""
-    spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
-    if context.window is not None:
-        spacing = min(spacing, context.window.radius)
-    question = context.question(_rules(effort, SLIDE_DISTINCT_SHARE * spacing))
-    tables, share = context.index.tables, effort.kept_share if context.with_beams else effort.rival_share
-    progress["count"] = 0
-    slid, scan, floor = True, context.lines.rows, share * float(progress["best_value"][0])
-    for sliding in sliding_segments(scan, min(len(scan), BASE_SEGMENTS), floor, SLIDE_SEGMENTS).tolist():
-        progress["anchor"] = progress["step"] = 0
-        slid = False
-        while not slid and not context.deadline.passed:
-            slid = search_slides(question, tables, sliding, found, progress, context.workspace, spacing, chunk)
-        if not slid:
-            break
-    return slid

@@ -169,12 +169,21 @@ POSED = np.dtype(
 # through, poses proposed, poses scored to the end; where to go on: at which base or -1, the anchor, the step along it,
 # and the entry of the list there; how many poses were tried ahead of their turn; bound on the gain of a pose that
 # contains no base so far; chance of having missed a better consensus set; the freedom that any set takes at least whose
-# score would be kept.
+# score would be kept. Once bases have been left: how many poses are of these; how many segments have been laid along
+# walls, -1 before, and what they have to come to together; whether nothing is left to do.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
     (_I, "count bases hypotheses verified current anchor step entry tried"),
     (_F, "bound missed least_freedom"),
+    (_I, "of_bases sliding"),
+    (_F, "floor"),
+    (_I, "done"),
 )
+
+# How far a search goes: the greatest chance of having missed a better consensus set, -1 for all bases; metres between
+# slides, and what is laid so has to come to, as a share of the best value; how many poses of bases are kept; tests of
+# walls between two looks at the clock.
+HOW = _fields((_F, "allowed spacing share"), (_I, "kept budget"))
 
 # A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
 # m^2; if walls were off by centimetres, the position's deviation along its weakest direction, m, and that unit

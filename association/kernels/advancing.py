@@ -8,9 +8,9 @@ from registration.compiling import borrowed, kernel
 from registration.layout import Record, Records
 
 from ..layout import FOUND, TRIED
-from ..planning_tables import Plan, Planning
+from ..planning_tables import Plan
 from ..tables import MapTables, Question, Workspace
-from .planning import begin, is_telling, middle_of, next_base
+from .planning import is_telling, middle_of, next_base
 from .proposing import search_base
 from .stopping import (
     cover,
@@ -19,7 +19,6 @@ from .stopping import (
     gain_beyond,
     least_freedom,
     missed_sets,
-    missed_share,
     needed_of,
     strike,
 )
@@ -69,33 +68,6 @@ def advance(
             return why
         if spent > budget:
             return BUDGET
-
-
-@kernel
-def begin_and_advance(
-    question: Question,
-    tables: MapTables,
-    planning: Planning,
-    found: Records,
-    progress: Records,
-    work: Workspace,
-    allowed: float,
-    budget: int,
-) -> tuple[int, Plan | None]:
-    """Plan a search and do as `advance`; return the plan where the budget ended it, and None where nothing is left.
-
-    Most searches end so: a plan is twenty arrays, which take long to hand to Python and back.
-    """
-    plan = begin(question, tables, planning, progress)
-    if len(plan.bases) == 0:
-        progress[0].missed = 0.0
-        return EXHAUSTED, None
-    why = advance(question, tables, plan, found, progress, work, allowed, budget)
-    if why == BUDGET:
-        return why, plan
-    if why == EXHAUSTED and not plan.random:
-        progress[0].missed = missed_share(question, plan, progress)
-    return why, None
 
 
 @kernel

@@ -259,6 +259,8 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     random = len(planning.noise) > 0
     state = progress[0]
     state.current = -1
+    state.sliding = -1
+    state.done = 0
     state.bound = 0.0
     state.missed = 1.0
     residual = np.empty(len(scan))

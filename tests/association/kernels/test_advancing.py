@@ -10,18 +10,16 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels import advancing, stopping
-from association.kernels.planning import begin
 from association.kernels.proposing import search_base
 from association.layout import FOUND, PROGRESS, record
-from association.planning_tables import Plan, Planning
+from association.planning_tables import Plan
 from association.tables import Question
-from association.tuning import REUSE
 from registration.layout import Records
 
 from ..reference import planning as twin
 from ..scenes import context_of, scan_of
 from .drawn import INDEX, NOTHING, SEEDS, TABLES, Drawn, drawn, workspace_of
-from .plans import NOT_LISTED, RULE, bases_of, plan_of, sampled
+from .plans import RULE, bases_of, plan_of
 
 BASES = 8  # segments that bases are made of
 
@@ -129,40 +127,6 @@ def test_advance(seed: int) -> None:
     d = drawn(seed, radius=8.0, clutter=seed % 4)
     for allowed in (-1.0, 0.0, 0.02, 0.3):
         assert_ends_alike(d, Effort(allowed))
-
-
-@given(SEEDS)
-@settings(max_examples=12, deadline=None)
-def test_a_search_in_one_call(seed: int) -> None:
-    """It does as planning and advancing do, the plan being handed out where the budget ends it; no bases are an end."""
-    d = drawn(seed, radius=8.0, clutter=seed % 4)
-    for effort in (Effort(-1.0), Effort(0.0), Effort(0.3), Effort(-1.0, by_chance=True), Effort(0.3, by_chance=True)):
-        question, work = asked(d, effort), workspace_of(d.scan)
-        n = seed % 2 if seed % 5 == 0 else min(len(d.scan), BASES)
-        samples, noise = sampled(n, 64, d.rng), d.rng.gumbel(size=BASES**2 if effort.by_chance else 0)
-        by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
-        tables = TABLES._replace(crossings=INDEX.crossings if seed % 3 else NOT_LISTED)
-        apart, found = record(PROGRESS), np.zeros(64, FOUND)
-        plan = begin(question, tables, by, apart)
-        expected = advancing.EXHAUSTED
-        if len(plan.bases):
-            expected = advancing.advance(question, tables, plan, found, apart, work, effort.allowed, 10**9)
-            if expected == advancing.EXHAUSTED and not effort.by_chance:
-                apart["missed"] = stopping.missed_share(question, plan, apart)
-        else:
-            apart["missed"] = 0.0
-        for budget in (10**9, 100):
-            together, same = record(PROGRESS), np.zeros(64, FOUND)
-            why, left = advancing.begin_and_advance(question, tables, by, same, together, work, effort.allowed, budget)
-            assert (left is None) == (why != advancing.BUDGET)
-            assert budget == 100 or left is None
-            while left is not None and why == advancing.BUDGET:
-                why = advancing.advance(question, TABLES, left, same, together, work, effort.allowed, budget)
-            if left is not None and why == advancing.EXHAUSTED and not effort.by_chance:
-                together["missed"] = stopping.missed_share(question, left, together)
-            assert why == expected
-            np.testing.assert_array_equal(together, apart)
-            np.testing.assert_array_equal(same, found)
 
 
 @given(SEEDS)

@@ -1,0 +1,99 @@
+"""Compiled search from its plan to what it found, in one call where the budget lets it."""
+
+import numpy as np
+
+from registration.compiling import borrowed, kernel
+from registration.layout import Records
+
+from ..planning_tables import Plan, Planning
+from ..tables import MapTables, Question, Workspace
+from ..tuning import BASE_SEGMENTS, SLIDE_SEGMENTS
+from .advancing import BUDGET, EXHAUSTED, advance
+from .ordering import ascending
+from .planning import begin
+from .sliding import search_slides, sliding_segments
+from .stopping import missed_share
+
+
+@kernel
+def search(
+    question: Question,
+    tables: MapTables,
+    planning: Planning,
+    found: Records,
+    progress: Records,
+    work: Workspace,
+    how: Records,
+) -> tuple[int, Plan | None]:
+    """Plan a search, go through its bases as `advance` does, and then `finish` it; `how` (1,) of `HOW`.
+
+    ``rules`` of the question (2,) are those of bases and of slides. Returns why the bases were left, and the plan where
+    the budget ended them, None where nothing is left of it: a plan is thirty arrays, which take long to hand to Python
+    and back.
+    """
+    plan = begin(question, tables, planning, progress)
+    why = EXHAUSTED
+    if len(plan.bases) == 0:
+        progress[0].missed = 0.0  # walls of which no two cross are slid
+    else:
+        of_bases = found[: how[0].kept]
+        why = advance(question, tables, plan, of_bases, progress, work, how[0].allowed, how[0].budget)
+        if why == BUDGET:
+            return why, plan
+        if why == EXHAUSTED and not plan.random:
+            progress[0].missed = missed_share(question, plan, progress)
+    finish(question, tables, found, progress, work, how)
+    return why, None
+
+
+@kernel
+def finish(
+    question: Question, tables: MapTables, found: Records, progress: Records, work: Workspace, how: Records
+) -> None:
+    """Lay the longest of parallel segments on every run, once the bases are left, and put what was found in order.
+
+    Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more. Goes on
+    where `progress` stands, and stops when ``budget`` tests are used up for one of the segments: it is not ``done``
+    then.
+    """
+    found = borrowed(found)
+    state = progress[0]
+    limits = how[0]
+    if state.sliding < 0:
+        state.sliding = 0
+        state.floor = limits.share * state.best_value
+        state.of_bases = state.count
+        state.count = 0
+        state.anchor = 0
+        state.step = 0
+    scan = question.scan
+    slides = Question(scan, question.terms, question.rules[1:])
+    segments = sliding_segments(scan, min(len(scan), BASE_SEGMENTS), state.floor, SLIDE_SEGMENTS)
+    while state.sliding < len(segments):
+        a = segments[state.sliding]
+        if not search_slides(slides, tables, a, found[limits.kept :], progress, work, limits.spacing, limits.budget):
+            return
+        state.sliding += 1
+        state.anchor = 0
+        state.step = 0
+    put_in_order(found, progress, how)
+
+
+@kernel
+def put_in_order(found: Records, progress: Records, how: Records) -> None:
+    """Put the poses of bases and of slides together, the best first, ties as they were found; ``count`` of them."""
+    state = progress[0]
+    if state.sliding < 0:
+        state.of_bases = state.count
+        state.count = 0
+    n = state.of_bases + state.count
+    losses = np.empty(n)
+    together = found[:n].copy()
+    for k in range(n):
+        together[k] = found[k if k < state.of_bases else how[0].kept + k - state.of_bases]
+        losses[k] = -together[k].value
+    order = ascending(losses)
+    for k in range(n):
+        found[k] = together[order[k]]
+    state.count = n
+    state.done = 1
