@@ -154,13 +154,12 @@ SWEPT = _fields((_I, "laid step here"), (_F, "at until"))
 MET = _fields((_I, "run cell entry hit"))
 
 # A pose to be tried: the pose; from the sensor to where it is held, in the scan frame, rotated, and the variance of its
-# turning about that; what the prior says of
-# it, and what its score has to come to; the rotation and the sensor in cells of the raster, the heading in sectors;
-# what its lines can add at most; where the search goes on behind it; whether it may score that.
+# turning about that; what the prior says of it, and what its score has to come to; where the search goes on behind it;
+# whether it may score that.
 POSED = np.dtype(
     [
         *POSE.descr,
-        *_fields((_F, "lever_x lever_y angle_variance bonus floor cosine sine left bottom turned total")).descr,
+        *_fields((_F, "lever_x lever_y angle_variance bonus floor")).descr,
         *_fields((_I, "anchor step entry possible")).descr,
     ]
 )

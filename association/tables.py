@@ -260,10 +260,11 @@ class Workspace(NamedTuple):
     ----------
     matches : (n,) of `MATCH`
     spreads : (n,) angle gates in sectors
-    shifts : (n,) where in the raster's cells the bits for the offset gate begin
+    shifts : (n,) where in the raster's cells the bits for the offset gate begin; below 0 where none is looked up
+    later : (n,) what the scan lines after each can add, of those that are looked up, nats
     possible : (n,) what each scan line can add at a pose, nats, -1 where it can lie on no wall
     posed : (k,) of `POSED`, poses to be tried
-    possible_of : (k, n) what each scan line can add at each of them
+    near : (n, k) whether each scan line may lie on a wall at each of them
     held : (n,) which wall of each scan line is in the sums, or -1
     shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
@@ -272,9 +273,10 @@ class Workspace(NamedTuple):
     matches: Records
     spreads: Floats
     shifts: Integers
+    later: Floats
     possible: Floats
     posed: Records
-    possible_of: Floats
+    near: Integers
     held: Integers
     shares: Records
     scratch: Records
@@ -284,7 +286,7 @@ class Workspace(NamedTuple):
         """Return one for a scan of `count` lines and a map of that many walls."""
         held = np.full(count, -1, np.int64)
         spreads, possible, shares = np.zeros(count), np.zeros(count), np.zeros(walls, WALL_SHARE)
-        shifts = np.zeros(count, np.int64)
-        posed, possible_of = np.empty(AT_ONCE, POSED), np.empty((AT_ONCE, count))
+        shifts, later = np.zeros(count, np.int64), np.zeros(count)
+        posed, near = np.empty(AT_ONCE, POSED), np.empty((count, AT_ONCE), np.uint8)
         matches, scratch = np.zeros(count, MATCH), np.zeros(1, SCRATCH)
-        return cls(matches, spreads, shifts, possible, posed, possible_of, held, shares, scratch)
+        return cls(matches, spreads, shifts, later, possible, posed, near, held, shares, scratch)

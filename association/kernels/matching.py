@@ -155,17 +155,19 @@ def allow_all(scan: Records, possible: Floats) -> None:
 
 
 @kernel
-def gates_about(
-    scan: Records, theta_var: float, x: float, y: float, slip: float, gates: Record, spreads: Floats, shifts: Integers
-) -> None:
-    """Write what gates scan segments have at a pose that turns about ``(x, y)``, of the scan frame, with that variance.
+def gates_about(scan: Records, figure: Record, gates: Record, spreads: Floats, shifts: Integers, later: Floats) -> None:
+    """Write what gates scan segments have at a pose that turns about the pin of `figure`, with the variance there.
 
     For the angle in sectors, a little wider than `match_scan` has it: see `GATE_MARGIN`; for the offset which bits of
     the raster are to be looked at, those of what is near where the gate is narrow. The covariance of the pose may be
-    that of one that is turned by up to `slip` radians.
+    that of one that is turned by up to the ``slip``. What the segments after each of them can add goes to `later`.
     """
-    away = GATE_MARGIN * slip * math.hypot(x, y)
+    theta_var = figure.angle_variance
+    x = figure.pin_x
+    y = figure.pin_y
+    away = GATE_MARGIN * figure.slip * math.hypot(x, y)
     for i in range(len(scan)):
+        later[i] = scan[i].later_gain
         deviation = math.sqrt(scan[i].angle_variance + theta_var)
         gate = GATE_MARGIN * min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * deviation))
         spreads[i] = gate * PER_RADIAN
@@ -177,55 +179,85 @@ def gates_about(
 
 @kernel
 def may_score(
-    scan: Records, posed: Records, count: int, spreads: Floats, shifts: Integers, raster: Raster, possible: Floats
+    scan: Records,
+    posed: Records,
+    count: int,
+    spreads: Floats,
+    shifts: Integers,
+    later: Floats,
+    raster: Raster,
+    near: Integers,
 ) -> None:
     """Tell of poses whether the scan may score there: no segment counts where no wall of its direction is near.
 
-    Of the first `count` of `posed`, (k,) of `POSED`, against the ``floor`` of each. Writes to `possible` (k, n) what
-    each segment can add, nats, -1 where it can lie on no wall, as far as it takes to tell.
+    Of the first `count` of `posed`, (k,) of `POSED`, against the ``floor`` of each. Writes to `near` (n, k) which
+    segments may lie on a wall, as far as it takes to tell.
 
     Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or
-    is between two; and a tenth of the price of `match_scan`. `spreads` and `shifts` as of `gates_about`.
+    is between two; and a tenth of the price of `match_scan`. `spreads`, `shifts` and `later` as of `gates_about`; a
+    segment whose shift is below 0 is not looked up, and counts for nothing here.
 
-    Line by line, for all poses that are left: so it does not wait for one place of the raster before the next.
+    Line by line, for all poses that are left: so it does not wait for one place of the raster before the next. What it
+    goes by is in columns, which stay in the cache where the records would not.
     """
     shape = raster.shape[0]
     bits = raster.bits
     columns = shape.columns
     rows = shape.rows
     per_cell = 1.0 / shape.cell
+    cosines = np.empty(count)
+    sines = np.empty(count)
+    lefts = np.empty(count)
+    bottoms = np.empty(count)
+    turned = np.empty(count)
+    lacking = np.empty(count)
     open_ones = np.empty(count, np.int32)
+    theta = math.nan
+    cosine = 0.0
+    sine = 0.0
     for p in range(count):
         one = posed[p]
-        one.cosine = math.cos(one.theta) * per_cell
-        one.sine = math.sin(one.theta) * per_cell
-        one.left = (one.x - shape.x0) * per_cell
-        one.bottom = (one.y - shape.y0) * per_cell
-        one.turned = (one.theta + math.pi) * PER_RADIAN + 0.5
-        one.total = 0.0
+        if one.theta != theta:  # slides along one wall have one heading
+            theta = one.theta
+            cosine = math.cos(theta) * per_cell
+            sine = math.sin(theta) * per_cell
+        cosines[p] = cosine
+        sines[p] = sine
+        lefts[p] = (one.x - shape.x0) * per_cell
+        bottoms[p] = (one.y - shape.y0) * per_cell
+        turned[p] = (theta + math.pi) * PER_RADIAN + 0.5
+        lacking[p] = one.floor
         one.possible = 0
         open_ones[p] = p
     left = count
     for i in range(len(scan)):
+        near_it = near[i]
+        if shifts[i] < 0:
+            for k in range(left):
+                near_it[open_ones[k]] = True
+            continue
         x = scan[i].x
         y = scan[i].y
         gain = scan[i].gain
-        later = scan[i].later_gain
         angle = scan[i].angle * PER_RADIAN
+        spread = spreads[i]
+        shift = shifts[i]
+        after = later[i]
         kept = 0
         for k in range(left):
             p = open_ones[k]
-            one = posed[p]
-            fx = one.cosine * x - one.sine * y + one.left
-            fy = one.sine * x + one.cosine * y + one.bottom
-            near = False
-            if fx >= 0.0 and fy >= 0.0 and fx < columns and fy < rows:
-                here = bits[int(fy) * columns + int(fx)] >> shifts[i]
-                near = (here & sectors_about(one.turned + angle, spreads[i])) != 0
-            possible[p, i] = gain if near else -1.0
-            one.total += gain if near else 0.0
+            fx = cosines[p] * x - sines[p] * y + lefts[p]
+            fy = sines[p] * x + cosines[p] * y + bottoms[p]
+            # Without a branch, which would wait for the raster.
+            inside = (fx >= 0.0) & (fy >= 0.0) & (fx < columns) & (fy < rows)
+            cell = int(fy) * columns + int(fx) if inside else 0
+            here = bits[cell] >> shift
+            fits = inside & ((here & sectors_about(turned[p] + angle, spread)) != 0)
+            near_it[p] = fits
+            lack = lacking[p] - (gain if fits else 0.0)
+            lacking[p] = lack
             open_ones[kept] = p
-            kept += 1 if one.total + later >= one.floor else 0
+            kept += 1 if after >= lack else 0
         left = kept
     for k in range(left):
         posed[open_ones[k]].possible = 1

@@ -144,9 +144,7 @@ def sweep_base(
     a = question.scan[base.sliding]
     b = question.scan[base.crossing]
     measure(a, b, gates, figure)
-    gates_about(
-        question.scan, figure.angle_variance, figure.pin_x, figure.pin_y, figure.slip, gates, work.spreads, work.shifts
-    )
+    gates_about(question.scan, figure, gates, work.spreads, work.shifts, work.later)
     anchor_list = np.empty(len(runs), dtype=np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
     laid = np.empty(AT_ONCE, dtype=LAID)
@@ -223,10 +221,7 @@ def search_listed(
         if poses > 0:
             if not gated:
                 gated = True
-                gates_about(
-                    question.scan, figure.angle_variance, figure.pin_x, figure.pin_y, figure.slip, gates,
-                    work.spreads, work.shifts,
-                )  # fmt: skip
+                gates_about(question.scan, figure, gates, work.spreads, work.shifts, work.later)
             cost, stopped = try_poses(question, tables, poses, found, tried, progress, work, budget - spent)
             spent += cost
             if stopped:

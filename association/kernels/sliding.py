@@ -5,12 +5,13 @@ import math
 import numpy as np
 
 from registration.compiling import borrowed, kernel
-from registration.layout import Records
+from registration.layout import Floats, Records
 
 from ..layout import HARD_PRIOR, TRIED, Integers
 from ..tables import MapTables, Question, Workspace
-from ..tuning import PARALLEL_SINE, WINDOW_TURN
+from ..tuning import BASE_SEGMENTS, MIN_CROSSING_BASE, PARALLEL_SINE, WINDOW_TURN
 from .matching import gates_about, wrap
+from .planning import is_telling, middle_of
 from .sweeping import anchors, end_slack
 from .trying import try_poses
 
@@ -41,6 +42,25 @@ def sliding_segments(scan: Records, count: int, floor: float, most: int) -> Inte
 
 
 @kernel
+def leave_out_bases(scan: Records, sliding: int, shifts: Integers, later: Floats) -> None:
+    """Mark the segments for `may_score` that make a base with another one, as not to be looked up.
+
+    A pose to which one of them counts is one of that base.
+    """
+    middle = middle_of(scan)
+    a = scan[sliding]
+    after = 0.0
+    for i in range(len(scan) - 1, -1, -1):
+        later[i] = after
+        b = scan[i]
+        crossing = abs(a.dx * b.dy - a.dy * b.dx) >= MIN_CROSSING_BASE
+        if crossing and i < BASE_SEGMENTS and is_telling(a, b, middle):
+            shifts[i] = -1
+        else:
+            after += b.gain
+
+
+@kernel
 def search_slides(
     question: Question,
     tables: MapTables,
@@ -53,8 +73,9 @@ def search_slides(
 ) -> bool:
     """Lay scan segment `sliding` on every run that is long enough, at slides `spacing` metres apart; keep the best.
 
-    For scans without a base: what is found is a family of poses, fixed across the walls and free along them. Goes on
-    from the anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
+    For scans without a base: what is found is a family of poses, fixed across the walls and free along them. What makes
+    a base with the segment has been looked for so, and what does not has to be enough by itself. Goes on from the
+    anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
     """
     question = borrowed(question)
     tables = borrowed(tables)
@@ -67,7 +88,13 @@ def search_slides(
     a = question.scan[sliding]
     variance = a.angle_variance
     nothing = np.empty(0, dtype=TRIED)
-    gates_about(question.scan, variance, a.x, a.y, 0.0, question.terms[0].gates, work.spreads, work.shifts)
+    figure = work.scratch[0].figure
+    figure.angle_variance = variance
+    figure.pin_x = a.x
+    figure.pin_y = a.y
+    figure.slip = 0.0
+    gates_about(question.scan, figure, question.terms[0].gates, work.spreads, work.shifts, work.later)
+    leave_out_bases(question.scan, sliding, work.shifts, work.later)
     anchor_list = np.empty(len(runs), dtype=np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
     left = budget

@@ -40,12 +40,11 @@ def try_poses(
         if prior.kind == HARD_PRIOR and not is_about(prior, one):
             one.floor = math.inf
     if terms.gates.least_overlap >= WHOLE_OVERLAP:
-        may_score(scan, posed, count, work.spreads, work.shifts, tables.raster, work.possible_of)
+        may_score(scan, posed, count, work.spreads, work.shifts, work.later, tables.raster, work.near)
     else:
         for k in range(count):
             posed[k].possible = posed[k].floor < math.inf
-            for i in range(len(scan)):
-                work.possible_of[k, i] = scan[i].gain
+            work.near[:, k] = 1
     pose = work.scratch[0].estimate
     spent = 0
     for k in range(count):
@@ -83,12 +82,13 @@ def _match_and_refine(
     terms = question.terms[0]
     rules = question.rules[0]
     one = work.posed[k]
-    possible = work.possible_of[k]
+    possible = work.possible
     pose = work.scratch[0].estimate
     # Of the poses tried before it one may have been better than what was known when it was looked at.
     floor = floor_of(rules, progress, one.bonus) + progress.least_freedom
     most = 0.0
     for i in range(len(scan)):
+        possible[i] = scan[i].gain if work.near[i, k] else -1.0
         most += max(0.0, possible[i])
     if most < floor:
         return TESTS_REJECTED if terms.gates.least_overlap >= WHOLE_OVERLAP else TESTS_HYPOTHESIS

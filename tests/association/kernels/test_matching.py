@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from association import AssociationOptions
 from association.kernels import matching
-from association.layout import MATCH, POSED
+from association.layout import FIGURE, MATCH, POSED, record
 from association.scan_lines import gates
 from association.tables import Raster
 from registration import RigidTransform
@@ -87,12 +87,14 @@ def test_long_segments_on_walls_with_doorways(seed: int) -> None:
 @settings(max_examples=20, deadline=None)
 def test_gates_about(seed: int, theta_var: float, gates: Records) -> None:
     d = drawn(seed)
-    spreads, shifts = np.zeros(len(d.scan)), np.zeros(len(d.scan), np.int64)
+    spreads, shifts, later = np.zeros(len(d.scan)), np.zeros(len(d.scan), np.int64), np.zeros(len(d.scan))
     pin, slip = d.rng.uniform(-5.0, 5.0, 2), float(d.rng.uniform(0.0, 0.3))
-    matching.gates_about(d.scan, theta_var, pin[0], pin[1], slip, gates[0], spreads, shifts)
+    figure = record(FIGURE, angle_variance=theta_var, pin_x=pin[0], pin_y=pin[1], slip=slip)
+    matching.gates_about(d.scan, figure[0], gates[0], spreads, shifts, later)
     expected, begins = twin.gates_about(d.scan, theta_var, pin, slip, gates)
     np.testing.assert_allclose(spreads, expected, rtol=1e-12)
     assert shifts.tolist() == begins.tolist()
+    assert later.tolist() == d.scan["later_gain"].tolist()
 
 
 def may_score(
@@ -104,11 +106,12 @@ def may_score(
     raster: Raster,
 ) -> tuple[list[bool], Floats]:
     """Return of each pose whether the scan may come to its floor there, and what each line can add."""
-    posed, possible = np.zeros(len(poses) + 1, POSED), np.zeros((len(poses) + 1, len(scan)))
+    posed, near = np.zeros(len(poses) + 1, POSED), np.zeros((len(scan), len(poses) + 1), np.uint8)
+    later = np.array([scan["gain"][i + 1 :][shifts[i + 1 :] >= 0].sum() for i in range(len(scan))])
     for one, at, floor in zip(posed, poses, floors, strict=False):
         one["x"], one["y"], one["theta"], one["floor"] = at.x, at.y, at.theta, floor
-    matching.may_score(scan, posed, len(poses), spreads, shifts, raster, possible)
-    return [bool(told) for told in posed["possible"][:-1]], possible[:-1]
+    matching.may_score(scan, posed, len(poses), spreads, shifts, later, raster, near)
+    return [bool(told) for told in posed["possible"][:-1]], np.where(near.T[:-1], scan["gain"], -1.0)
 
 
 @given(SEEDS)
@@ -144,6 +147,21 @@ def test_may_score(seed: int) -> None:
     told_so, gains = may_score(d.scan, [*places, far], [*floors, 1e-9], spreads, shifts, TABLES.raster)
     assert told_so == [True, False, True, False]
     assert gains[3, 0] < 0.0
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_what_is_not_looked_up_counts_for_nothing_and_may_be_matched(seed: int) -> None:
+    d = drawn(seed)
+    spreads, shifts = twin.gates_about(d.scan, 1e-4, np.zeros(2), 0.0, GATES)
+    skipped = d.rng.random(len(d.scan)) < 0.4
+    shifts[skipped] = -1
+    at = d.near(0.3, 3.0, 3.0)
+    bound = twin.reachable(d.scan[~skipped], at, spreads[~skipped], shifts[~skipped], TABLES.raster)
+    told, gains = may_score(d.scan, [at, at], [bound - 1e-6, bound + 1e-6], spreads, shifts, TABLES.raster)
+    assert told == [True, False]
+    np.testing.assert_array_equal(gains[0][skipped], d.scan["gain"][skipped])
+    assert np.maximum(gains[0][~skipped], 0.0).sum() == pytest.approx(bound)
 
 
 def test_a_pose_over_a_doorway_may_score() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from association.grids import listed
 from association.kernels import planning, sliding
-from association.layout import CROSSING, PROGRESS, record
+from association.layout import CROSSING, FOUND, PROGRESS, record
 from association.planning_tables import Planning
 from association.tables import Crossings
 from association.tuning import BASE_SEGMENTS, COST_BASE, COST_ENTRY, GAIN_POWER, PARALLEL_SINE, REUSE, UNTELLING
@@ -19,7 +19,7 @@ from registration.layout import Records
 
 from ..reference import crossings as twin_of_crossings
 from ..reference import planning as twin
-from ..scenes import context_of, scan_of
+from ..scenes import context_of, index_of, scan_of
 from .drawn import ASKED, INDEX, SEEDS, TABLES, Drawn, drawn, oblique
 from .plans import NOT_LISTED, RULE, bases_of, entries_of, plan_of, sampled
 
@@ -183,3 +183,39 @@ def test_sliding_segments(seed: int) -> None:
         if d.scan["gain"][alike].sum() > floor and alike[chosen].sum() < 2:
             chosen.append(i)
     assert sliding.sliding_segments(d.scan, few, floor, most).tolist() == chosen[:most]
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_what_makes_a_base_with_a_segment_is_left_out_where_that_slides(seed: int) -> None:
+    """As far as such bases are planned: nothing that is nearly parallel, beyond the longest, or tells little."""
+    scan = np.concatenate([uncertain(drawn(seed + k)) for k in range(6)])[: BASE_SEGMENTS + 8]
+    sliding_one, shifts, later = int(seed % BASE_SEGMENTS), np.zeros(len(scan), np.int64), np.zeros(len(scan))
+    sliding.leave_out_bases(scan, sliding_one, shifts, later)
+    bases = planning.pair_up(scan, len(scan))
+    pairs = {frozenset(pair) for pair in bases[["sliding", "crossing"]].tolist()}
+    told = {frozenset((sliding_one, j)) for j in range(len(scan)) if twin.is_telling(scan, sliding_one, j)}
+    left_out = [frozenset((sliding_one, j)) in pairs & told and j < BASE_SEGMENTS for j in range(len(scan))]
+    assert (shifts < 0).tolist() == left_out
+    counted = np.where(shifts < 0, 0.0, scan["gain"])
+    np.testing.assert_allclose(later, [counted[j + 1 :].sum() for j in range(len(scan))])
+
+
+def test_a_slide_needs_enough_without_what_makes_a_base_with_it() -> None:
+    """Two sides of a room and the wall across: what is parallel has to come to enough alone."""
+    index = index_of([[0.0, 0.0, 6.0, 0.0], [6.0, 4.0, 0.0, 4.0], [6.0, 0.0, 6.0, 4.0]])
+    endpoints = [[-3.0, -2.0, 3.0, -2.0], [3.0, 2.0, -3.0, 2.0], [3.0, -2.0, 3.0, 2.0]]
+    context = context_of(index, scan_of(endpoints))
+    scan, kept = context.lines.rows, []
+    longest = int(np.argmax(scan["length"]))
+    for more in (-0.5, 0.5):
+        parallel = scan["gain"][np.abs(scan["dx"] * scan["dy"][longest] - scan["dy"] * scan["dx"][longest]) < 0.1].sum()
+        rules = RULE.copy()
+        rules["kept_share"] = 1.0
+        found, progress = np.zeros(9, FOUND), record(PROGRESS, best_value=parallel + more)
+        question = context.question(rules)
+        done = sliding.search_slides(question, index.tables, longest, found, progress, context.workspace, 2.0, 10**9)
+        assert done
+        kept.append(int(progress["verified"][0]))
+    assert kept[0] > 0
+    assert kept[1] == 0

@@ -316,6 +316,7 @@ def test_try_poses(seed: int) -> None:
     question.rules["kept_share"] = 0.65
     if whole := d.rng.random() < 0.7:
         work.spreads[:], _ = gates_about(d.scan, variance, np.zeros(2), 0.0, GATES)
+        work.later[:] = d.scan["later_gain"]
     else:
         question.terms["gates"]["least_overlap"] = 0.4  # a midpoint may then be off the map: the raster knows nothing
     gates = question.terms["gates"]
