@@ -11,6 +11,7 @@ import numpy as np
 
 from .context import SearchContext
 from .explain import Answer
+from .kernels.odds import left_unmatched, most_by_one_wall
 from .null import Null
 from .ranking import Ranked
 from .tuning import (
@@ -103,6 +104,11 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
+OF_NULL = ("null", "null_gap", "null_better")
+NULL_PLACES = [Features._fields.index(name) for name in OF_NULL]
+DEVIATION_PLACE = Features._fields.index("deviation")
+
+
 def features_of(context: SearchContext, answer: Answer, weighed: Sequence[Weighed]) -> Features:
     """Return the features of an answer beside its rivals, with the least null there is."""
     best, hinges = answer.best, answer.settled.hinges
@@ -110,6 +116,7 @@ def features_of(context: SearchContext, answer: Answer, weighed: Sequence[Weighe
     crowd = math.log(_evidence(weighed, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
     count = best.count
     longest, unmatched = _unmatched(context, best)
+    moves, hinge_deviation = most_by_one_wall(hinges)
     misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
     return Features(
         constant=1.0,
@@ -127,8 +134,8 @@ def features_of(context: SearchContext, answer: Answer, weighed: Sequence[Weighe
         passed=best.passed,
         root_farther=math.sqrt(answer.beams.farther),
         root_nearer=math.sqrt(answer.beams.nearer),
-        hinge_moves=min(float(hinges["moves"].max(initial=0.0)), MOST_DEVIATION),
-        hinge_deviation=min(float(hinges["deviation"].max(initial=0.0)), MOST_DEVIATION),
+        hinge_moves=min(moves, MOST_DEVIATION),
+        hinge_deviation=min(hinge_deviation, MOST_DEVIATION),
         chance=max(LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
         null=NULL_SHARE,
         null_gap=_root_gap((1.0 - NULL_SHARE) * best.score),
@@ -150,8 +157,8 @@ def _unmatched(context: SearchContext, best: Ranked) -> tuple[float, float]:
     """
     views = context.scan.views
     if views is None or not views.uncertain:
-        lengths = context.lines.rows["length"][~best.matched]
-        return min(float(lengths.max(initial=0.0)), LONGEST_UNMATCHED), float(lengths.sum())
+        most, together = left_unmatched(context.lines.rows, best.matches)
+        return min(most, LONGEST_UNMATCHED), together
     seen = context.lines.sightings
     seen = seen[~best.matched[seen["row"]]]
     longest, sums = np.zeros((2, len(views)))
@@ -162,12 +169,17 @@ def _unmatched(context: SearchContext, best: Ranked) -> tuple[float, float]:
 
 def with_null(features: Features, best: Ranked, null: Null) -> Features:
     """Return the features with what the mirrored scan comes to."""
+    return features._replace(**dict(zip(OF_NULL, of_null(best, null), strict=True)))
+
+
+def of_null(best: Ranked, null: Null) -> tuple[float, float, float]:
+    """Return what the mirrored scan comes to beside the best explanation: the features that `OF_NULL` names."""
     share = min(MOST_NULL, null.score / best.score) if best.score > 0.0 else MOST_NULL
     symmetric = min(1.0, max(0.0, (null.symmetry - UNLIKE_SYMMETRY) / (SYMMETRIC - UNLIKE_SYMMETRY)))
     excess = max(0.0, share - NULL_SHARE) * (1.0 - symmetric)
     gap = (1.0 - NULL_SHARE - excess) * best.score
     better = max(0.0, share - 1.0)
-    return features._replace(null=NULL_SHARE + excess, null_gap=_root_gap(gap), null_better=better)
+    return NULL_SHARE + excess, _root_gap(gap), better
 
 
 def _root_gap(gap: float) -> float:

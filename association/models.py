@@ -76,9 +76,9 @@ class Model:
     curves: Mapping[str, Curve]
     pairs: tuple[Pair, ...] = ()
 
-    def logit(self, features: Features) -> float:
-        """Return the logarithm of the odds."""
-        return float(log_odds(self._odds, np.array(features)))
+    def logit(self, features: Features | Floats) -> float:
+        """Return the logarithm of the odds; several models are sooner asked with an array (n,) of the features."""
+        return float(log_odds(self._odds, np.asarray(features)))
 
     @cached_property
     def _odds(self) -> Odds:

@@ -6,12 +6,15 @@ import math
 from bisect import bisect_left
 from dataclasses import dataclass
 
+import numpy as np
+
 from registration import RigidTransform
+from registration.layout import Floats
 
 from .context import SearchContext
 from .explain import Answer, Explanations
 from .families import is_thin, place_on_family
-from .features import Features, features_of, twin_share, weigh, with_null
+from .features import DEVIATION_PLACE, NULL_PLACES, Features, features_of, of_null, twin_share, weigh, with_null
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
 from .null import Null, null_of
@@ -159,9 +162,12 @@ class _Chances:
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
         weighed = weigh(answer.best, rivals)
         features, share = features_of(context, answer, weighed), twin_share(weighed)
-        right, careful = usual.logit(features), cautious.logit(features)
+        numbers = np.array(features)
+        right, careful = usual.logit(numbers), cautious.logit(numbers)
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
-        explained = _logistic(cautious.logit(features._replace(deviation=USUAL.deviation)))
+        fixed = numbers.copy()
+        fixed[DEVIATION_PLACE] = USUAL.deviation
+        explained = _logistic(cautious.logit(fixed))
         likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
         decidable = not answer.settled.degenerate and not is_thin(context, answer)
         if likely and decidable and _logistic(careful) * share >= _bar(context):
@@ -170,7 +176,7 @@ class _Chances:
             # Only what would be usable has to stand up to the mirrored scan, which costs another search. Where it is
             # usable nothing else is told of the null; where it is not, the reasons go by what it comes to.
             certain = certain and _logistic(right) * share >= USABLE_PROBABILITY
-            allowed = _allowed_null(cautious, features, answer.best, _bar(context) / share) if certain else 0.0
+            allowed = _allowed_null(cautious, numbers, answer.best, _bar(context) / share) if certain else 0.0
             features = with_null(features, answer.best, null_of(context, answer.best, allowed))
             careful = cautious.logit(features)
         return cls(_logistic(right) * share, _logistic(careful) * share, explained, share, features, cautious)
@@ -185,14 +191,17 @@ def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
 
 
-def _allowed_null(cautious: Model, features: Features, best: Ranked, bar: float) -> float:
+def _allowed_null(cautious: Model, features: Floats, best: Ranked, bar: float) -> float:
     """Return what share of the answer's score the mirrored scan may reach, and the cautious chance is `bar` at least.
 
     Of `NULL_SHARES`, or 0; wherever the map is not symmetric about the place. The more it reaches the less the chance.
+    `features` (n,) are those of the answer.
     """
+    beside = features.copy()
 
     def matters(share: float) -> bool:
-        return _logistic(cautious.logit(with_null(features, best, Null(share * best.score, 0.0)))) < bar + ROUNDING
+        beside[NULL_PLACES] = of_null(best, Null(share * best.score, 0.0))
+        return _logistic(cautious.logit(beside)) < bar + ROUNDING
 
     if not matters(NULL_SHARES[-1]):
         return NULL_SHARES[-1]
