@@ -69,10 +69,11 @@ def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
             return Null(0.0, 0.0)
     effort = Effort(NULL_KEPT, NULL_SHARE, NULL_SHARE, max(allowed, NULL_ALLOWED), known, enough, NULL_SAMPLES)
     found = rank_candidates(other, find_candidates(other, effort))
-    return Null(found[0].score, _symmetry(context, best, found[0])) if found else Null(0.0, 0.0)
+    return Null(found[0].score, symmetry_of(context, best, found[0])) if found else Null(0.0, 0.0)
 
 
-def _symmetry(context: SearchContext, best: Ranked, null: Ranked) -> float:
+def symmetry_of(context: SearchContext, best: Ranked, null: Ranked) -> float:
+    """Return how much of what the map shows from an answer it shows mirrored from there, at the null's pose, 0 to 1."""
     seen, places = context.lines.sightings, context.sights.places
     at = places[seen["sensor"]]
     reach = float(np.max(np.hypot(seen["x"] - at["x"], seen["y"] - at["y"]) + 0.5 * seen["length"]))

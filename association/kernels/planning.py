@@ -127,12 +127,12 @@ def know_sweeps(scan: Records, costs: Costs) -> None:
     taken = costs.taken
     count, bins = costs.slides.shape
     slides, fitting = slack_tables(scan, count, costs.runs)
-    costs.slides[:] = slides
     for i in range(count):
         line = lines[i]
         total = 0.0
         line.bins = 0
         for b in range(bins):
+            costs.slides[i, b] = slides[i, b]
             after = b + 1 if b + 1 < bins else 0
             smooth[i, b] = slides[i, b - 1] + slides[i, b] + slides[i, after]
             smooth[i, b + bins] = smooth[i, b]

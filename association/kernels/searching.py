@@ -5,6 +5,7 @@ import numpy as np
 from registration.compiling import borrowed, kernel
 from registration.layout import Records
 
+from ..layout import FOUND
 from ..planning_tables import Plan, Planning
 from ..tables import MapTables, Question, Workspace
 from ..tuning import BASE_SEGMENTS, SLIDE_SEGMENTS
@@ -88,7 +89,7 @@ def put_in_order(found: Records, progress: Records, how: Records) -> None:
         state.count = 0
     n = state.of_bases + state.count
     losses = np.empty(n)
-    together = found[:n].copy()
+    together = np.empty(n, dtype=FOUND)
     for k in range(n):
         together[k] = found[k if k < state.of_bases else how[0].kept + k - state.of_bases]
         losses[k] = -together[k].value

@@ -44,7 +44,8 @@ def try_poses(
     else:
         for k in range(count):
             posed[k].possible = posed[k].floor < math.inf
-            work.near[:, k] = 1
+            for i in range(len(scan)):
+                work.near[i, k] = 1
     pose = work.scratch[0].estimate
     spent = 0
     for k in range(count):

@@ -20,7 +20,10 @@ from association import (
 from association.checking import check_map, try_sample
 from association.context import SearchContext
 from association.explain import explain_at
+from association.null import symmetry_of
 from association.scan_lines import ScanLines
+from association.sight import missing_segments
+from association.similarity import fit_similarity
 from registration import Beams, MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
 
@@ -98,10 +101,15 @@ def warm_up_scans() -> None:
 
 
 def warm_up_explaining() -> None:
-    """Work out the answer to scans that nobody searches for: their pose is given."""
+    """Work out the answer to scans that nobody searches for, at a given pose, and what is asked of it afterwards."""
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
     for scan, prior, how in _asked():
-        explain_at(SearchContext.of(index, scan, prior, how, Deadline()), RigidTransform(0, 0, 0))
+        context = SearchContext.of(index, scan, prior, how, Deadline())
+        answer = explain_at(context, RigidTransform(0, 0, 0)).answer
+        assert answer is not None
+        missing_segments(context, answer.best)
+        symmetry_of(context, answer.best, answer.best)
+        fit_similarity(context, answer.best)
 
 
 def warm_up_searching() -> None:
