@@ -69,7 +69,8 @@ def finish(
         state.step = 0
     scan = question.scan
     slides = Question(scan, question.terms, question.rules[1:])
-    segments = sliding_segments(scan, min(len(scan), BASE_SEGMENTS), state.floor, SLIDE_SEGMENTS)
+    most = SLIDE_SEGMENTS
+    segments = sliding_segments(scan, min(len(scan), BASE_SEGMENTS), state.floor, most)
     while state.sliding < len(segments):
         a = segments[state.sliding]
         if not search_slides(slides, tables, a, found[limits.kept :], progress, work, limits.spacing, limits.budget):
