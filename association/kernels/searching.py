@@ -3,6 +3,7 @@
 import numpy as np
 
 from registration.compiling import borrowed, kernel
+from registration.kernels import keep_alive
 from registration.layout import Records
 
 from ..layout import FOUND
@@ -97,5 +98,6 @@ def put_in_order(found: Records, progress: Records, how: Records) -> None:
     order = ascending(losses)
     for k in range(n):
         found[k] = together[order[k]]
+    keep_alive(together)
     state.count = n
     state.done = 1
