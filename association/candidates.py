@@ -11,11 +11,11 @@ import numpy as np
 from registration.layout import Records
 
 from .context import SearchContext
-from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN, advance
+from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.planning import begin
-from .kernels.searching import finish, put_in_order, search
+from .kernels.searching import go_on, put_in_order, search
 from .kernels.stopping import missed_share
-from .layout import FOUND, HOW, PROGRESS, RULES, Integers, record
+from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
 from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
@@ -43,6 +43,7 @@ from .tuning import (
 )
 
 NO_NOISE = np.zeros(0)
+NONE_TRIED = np.zeros(0, TRIED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +102,16 @@ def allowed_by(options: AssociationOptions) -> float:
     return -1.0 if options.exhaustive else 1.0 - options.confidence
 
 
-def find_candidates(context: SearchContext, effort: Effort | None = None) -> Candidates:
+def find_candidates(context: SearchContext, effort: Effort | None = None, *, chunk: int | None = None) -> Candidates:
     """Go through bases until nothing better can have been missed, the bases are used up or the deadline passes.
+
+    Parameters
+    ----------
+    context : SearchContext
+    effort : Effort or None
+        By default what the context wants.
+    chunk : int or None
+        Tests of walls between two looks at the clock; by default some milliseconds of them.
 
     Raises
     ------
@@ -110,10 +119,11 @@ def find_candidates(context: SearchContext, effort: Effort | None = None) -> Can
         When the deadline was cancelled.
     """
     effort = effort or Effort.of(context)
+    chunk = chunk or CHUNK
     if context.window is None:
-        return _search(context, effort)
+        return _search(context, effort, chunk)
     # A window is searched by itself; the whole map shows whether a clearly better pose lies outside.
-    within, everywhere = _search(context, effort), _search(context.anywhere(), effort)
+    within, everywhere = _search(context, effort, chunk), _search(context.anywhere(), effort, chunk)
     one, other = within.report, everywhere.report
     report = SearchReport(
         complete=one.complete and other.complete,
@@ -129,10 +139,10 @@ def find_candidates(context: SearchContext, effort: Effort | None = None) -> Can
     return Candidates(np.concatenate([within.poses, everywhere.poses]), report)
 
 
-def _search(context: SearchContext, effort: Effort) -> Candidates:
+def _search(context: SearchContext, effort: Effort, chunk: int) -> Candidates:
     """Search the map, or the window of a hard prior."""
     deadline, tables, work = context.deadline, context.index.tables, context.workspace
-    how, rules = _limits(context, effort)
+    how, rules = _limits(context, effort, chunk)
     found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), np.zeros(1, PROGRESS)
     progress["best_value"] = effort.known
     question, planning = context.question(rules), _planning(context, effort)
@@ -142,9 +152,10 @@ def _search(context: SearchContext, effort: Effort) -> Candidates:
     else:
         stopped, plan = search(question, tables, planning, found, progress, work, how)
     if plan is not None:
-        stopped = _go_on(context, question, plan, found[: effort.kept], progress, how)
-    while not (progress["done"][0] or deadline.passed):
-        finish(question, tables, found, progress, work, how)
+        if not progress["left"][0]:
+            stopped = _leave_bases(context, question, plan, found, progress, how)
+        while not (progress["done"][0] or deadline.passed):
+            go_on(question, tables, plan, found, NONE_TRIED, progress, work, how)
     if deadline.cancelled:
         raise CancelledError
     slid = bool(progress["done"][0])
@@ -172,35 +183,35 @@ def _found(
     return Candidates(found[: state["count"]], report)
 
 
-def _go_on(
+def _leave_bases(
     context: SearchContext, question: Question, plan: Plan, found: Records, progress: Records, how: Records
 ) -> int:
-    """Go on with a plan, and fill `found` and `progress`; return why it ended, `BUDGET` where the deadline did."""
+    """Go on with the bases of a plan until they are left; return why, `BUDGET` where the deadline ended them."""
     tables, deadline, work = context.index.tables, context.deadline, context.workspace
-    allowed, chunk = float(how["allowed"][0]), int(how["budget"][0])
     if len(plan.bases) == 0:
-        progress["missed"] = 0.0
+        progress["missed"], progress["left"] = 0.0, 1
         return EXHAUSTED
     stopped = BUDGET
     while stopped == BUDGET:
         if deadline.helped:
-            stopped = Sharing(context, question, plan, found, progress, chunk).go_on(allowed)
+            stopped = Sharing(context, question, plan, found, progress, how).go_on()
         if stopped != BUDGET or deadline.passed:
             break
-        stopped = advance(question, tables, plan, found, progress, work, allowed, chunk)
+        stopped = go_on(question, tables, plan, found, NONE_TRIED, progress, work, how)
     if stopped in (BUDGET, EXHAUSTED) and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
+    progress["left"] = 1
     return stopped
 
 
-def _limits(context: SearchContext, effort: Effort) -> tuple[Records, Records]:
+def _limits(context: SearchContext, effort: Effort, chunk: int) -> tuple[Records, Records]:
     """Return how far the search goes, (1,) of `HOW`, and which poses of bases and slides are kept, (2,) of `RULES`."""
     spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
     if context.window is not None:
         spacing = min(spacing, context.window.radius)
     share = effort.kept_share if context.with_beams else effort.rival_share
     # A test of a pose takes longer the more walls lie where it is.
-    return _records(effort, spacing, share, int(CHUNK / max(1.0, context.index.crowd / USUAL_CROWD)))
+    return _records(effort, spacing, share, int(chunk / max(1.0, context.index.crowd / USUAL_CROWD)))
 
 
 @lru_cache

@@ -169,14 +169,14 @@ POSED = np.dtype(
 # and the entry of the list there; how many poses were tried ahead of their turn; bound on the gain of a pose that
 # contains no base so far; chance of having missed a better consensus set; the freedom that any set takes at least whose
 # score would be kept. Once bases have been left: how many poses are of these; how many segments have been laid along
-# walls, -1 before, and what they have to come to together; whether nothing is left to do.
+# walls, -1 before, and what they have to come to together; whether bases have been left, and nothing is left to do.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
     (_I, "count bases hypotheses verified current anchor step entry tried"),
     (_F, "bound missed least_freedom"),
     (_I, "of_bases sliding"),
     (_F, "floor"),
-    (_I, "done"),
+    (_I, "left done"),
 )
 
 # How far a search goes: the greatest chance of having missed a better consensus set, -1 for all bases; metres between

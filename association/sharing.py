@@ -17,8 +17,9 @@ import numpy as np
 from registration.layout import Records
 
 from .context import SearchContext
-from .kernels.advancing import BUDGET, EXHAUSTED, merge, search_ahead
+from .kernels.advancing import BUDGET, EXHAUSTED, merge
 from .kernels.planning import next_base
+from .kernels.searching import go_on
 from .layout import TRIED
 from .planning_tables import Plan
 from .tables import Question, Workspace
@@ -71,34 +72,33 @@ class Sharing:
     plan : Plan
     found, progress : Records
         The best poses so far, and how far the search is.
-    chunk : int
-        Tests after which a thread looks at the deadline.
+    how : (1,) of `HOW`
     """
 
     def __init__(
-        self, context: SearchContext, question: Question, plan: Plan, found: Records, progress: Records, chunk: int
+        self, context: SearchContext, question: Question, plan: Plan, found: Records, progress: Records, how: Records
     ) -> None:
         self._context, self._question, self._plan = context, question, plan
-        self._found, self._progress, self._chunk = found, progress, chunk
+        self._found, self._progress, self._how = found, progress, how
         assert context.deadline.helpers is not None
         self._helpers = context.deadline.helpers
         self._pending: deque[_Ahead] = deque()
         self._spare: list[Workspace] = []
         self._ended = False
 
-    def go_on(self, allowed: float) -> int:
+    def go_on(self) -> int:
         """Go through bases as `advance` does, as long as there are helpers; return as it does."""
         try:
-            return self._go_on(allowed)
+            return self._go_on()
         finally:
             self._ended = True  # helpers leave off soon
 
-    def _go_on(self, allowed: float) -> int:
+    def _go_on(self) -> int:
         helpers, deadline = self._helpers, self._context.deadline
         own: _Ahead | None = None
         while True:
             while self._pending and self._pending[0].finished:
-                why = self._merge(self._pending.popleft(), allowed)
+                why = self._merge(self._pending.popleft())
                 if why != BUDGET:
                     return why
             if deadline.passed or (not self._pending and not helpers.free):
@@ -149,11 +149,11 @@ class Sharing:
             state[name] = max(state[name][0], self._progress[name][0])
         state["tried"] = 0
         tables = self._context.index.tables
-        finished = search_ahead(self._question, tables, self._plan, room, state, work, self._chunk)
+        why = go_on(self._question, tables, self._plan, self._found, room, state, work, self._how)
         ahead.tried.append(room[: int(state["tried"][0])].copy())
-        ahead.finished = finished
+        ahead.finished = why != BUDGET
 
-    def _merge(self, ahead: _Ahead, allowed: float) -> int:
-        tried = np.concatenate(ahead.tried)
-        found, progress, work = self._found, self._progress, self._context.workspace
+    def _merge(self, ahead: _Ahead) -> int:
+        tried, allowed = np.concatenate(ahead.tried), float(self._how["allowed"][0])
+        found, progress, work = self._found[: self._how["kept"][0]], self._progress, self._context.workspace
         return merge(self._question, self._plan, tried, ahead.state, found, progress, work, allowed)

@@ -7,7 +7,7 @@ import numpy as np
 from registration.compiling import borrowed, kernel
 from registration.layout import Record, Records
 
-from ..layout import FOUND, TRIED
+from ..layout import TRIED
 from ..planning_tables import Plan
 from ..tables import MapTables, Question, Workspace
 from .planning import is_telling, middle_of, next_base
@@ -101,26 +101,6 @@ def after_base(question: Question, plan: Plan, state: Record, allowed: float) ->
         if state.missed <= allowed:
             return CONFIDENT
     return BUDGET
-
-
-@kernel
-def search_ahead(
-    question: Question, tables: MapTables, plan: Plan, tried: Records, ahead: Records, work: Workspace, budget: int
-) -> bool:
-    """Go through the current base of `ahead` (1,) of `PROGRESS`, before its turn; tell whether it is done.
-
-    What others find meanwhile is not known, so that what may have to be kept is only noted in `tried` (k,), for
-    `merge`. Goes on where `ahead` stands; stops when `budget` tests or the room in `tried` are used up.
-    """
-    question = borrowed(question)
-    tables = borrowed(tables)
-    plan = borrowed(plan)
-    tried = borrowed(tried)
-    work = borrowed(work)
-    state = ahead[0]
-    nothing = np.empty(0, dtype=FOUND)
-    search_base(question, tables, plan.bases[state.current], nothing, tried, state, work, budget)
-    return state.anchor == 0 and state.step == 0 and state.entry == 0
 
 
 @kernel

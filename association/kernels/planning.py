@@ -260,6 +260,7 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     state = progress[0]
     state.current = -1
     state.sliding = -1
+    state.left = 0
     state.done = 0
     state.bound = 0.0
     state.missed = 1.0

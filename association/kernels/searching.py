@@ -13,6 +13,7 @@ from ..tuning import BASE_SEGMENTS, SLIDE_SEGMENTS
 from .advancing import BUDGET, EXHAUSTED, advance
 from .ordering import ascending
 from .planning import begin
+from .proposing import search_base
 from .sliding import search_slides, sliding_segments
 from .stopping import missed_share
 
@@ -30,8 +31,8 @@ def search(
     """Plan a search, go through its bases as `advance` does, and then `finish` it; `how` (1,) of `HOW`.
 
     ``rules`` of the question (2,) are those of bases and of slides. Returns why the bases were left, and the plan where
-    the budget ended them, None where nothing is left of it: a plan is thirty arrays, which take long to hand to Python
-    and back.
+    the budget ended them or the slides, to `go_on` with; else None: a plan is thirty arrays, which take long to hand to
+    Python and back.
     """
     plan = begin(question, tables, planning, progress)
     why = EXHAUSTED
@@ -44,8 +45,41 @@ def search(
             return why, plan
         if why == EXHAUSTED and not plan.random:
             progress[0].missed = missed_share(question, plan, progress)
+    progress[0].left = 1
     finish(question, tables, found, progress, work, how)
+    if progress[0].done == 0:
+        return why, plan
     return why, None
+
+
+@kernel
+def go_on(
+    question: Question,
+    tables: MapTables,
+    plan: Plan,
+    found: Records,
+    tried: Records,
+    progress: Records,
+    work: Workspace,
+    how: Records,
+) -> int:
+    """Go on with a search where `progress` stands, with its bases or, once these are ``left``, to `finish` it.
+
+    Returns as `advance` does. Where there is room in `tried` (k,) of `TRIED` only the current base is gone through,
+    before its turn: what others find meanwhile is not known, so that what may have to be kept is only noted there, for
+    `merge`. It is `BUDGET` until that base is done, or the room used up. All in one kernel, for each that goes through
+    bases takes seconds to compile.
+    """
+    state = progress[0]
+    budget = how[0].budget
+    if len(tried) > 0:
+        base = plan.bases[state.current]
+        search_base(borrowed(question), borrowed(tables), base, found[:0], tried, state, borrowed(work), budget)
+        return BUDGET if state.anchor > 0 or state.step > 0 or state.entry > 0 else EXHAUSTED
+    if state.left == 0:
+        return advance(question, tables, plan, found[: how[0].kept], progress, work, how[0].allowed, budget)
+    finish(question, tables, found, progress, work, how)
+    return BUDGET if state.done == 0 else EXHAUSTED
 
 
 @kernel

@@ -17,6 +17,7 @@ from association import (
     assemble,
     associate,
 )
+from association.candidates import find_candidates
 from association.checking import check_map, try_sample
 from association.context import SearchContext
 from association.explain import explain_at
@@ -26,6 +27,8 @@ from association.sight import missing_segments
 from association.similarity import fit_similarity
 from registration import Beams, MeasuredSegments, RegistrationOptions, RigidTransform, Segments, register
 from vectorization import LaserScan, vectorize
+
+from ..admission.helpers import HelperThreads
 
 # A room with a niche, seen from inside: free space on the left of every wall.
 ROOM = np.array(
@@ -61,6 +64,7 @@ def warm_up() -> None:
     warm_up_registering()
     warm_up_vectorizing()
     warm_up_searching()
+    warm_up_searching_long()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
     check_map(index)
@@ -123,6 +127,17 @@ def warm_up_searching() -> None:
     # Nothing is said of this map, which is not to scale.
     too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
     associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
+
+
+def warm_up_searching_long() -> None:
+    """Search as where it takes long: in steps, alone and with a helper, and beyond the deadline."""
+    index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
+    helpers, every = HelperThreads(1, lambda: 1), AssociationOptions(exhaustive=True)
+    for at, who in ((None, None), (None, helpers), (0.0, None)):
+        deadline = Deadline(at)
+        deadline.helpers = who
+        find_candidates(SearchContext.of(index, scan, None, every, deadline), chunk=1)
+    helpers.close()
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:

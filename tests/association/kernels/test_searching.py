@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 from association.kernels import advancing, stopping
 from association.kernels.planning import begin
-from association.kernels.searching import finish, put_in_order, search
+from association.kernels.searching import go_on, put_in_order, search
 from association.kernels.sliding import search_slides, sliding_segments
 from association.layout import FOUND, HOW, PROGRESS, record
 from association.planning_tables import Planning
@@ -18,7 +18,7 @@ from association.tuning import BASE_SEGMENTS, REUSE, SLIDE_SEGMENTS
 from registration.layout import Records
 
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, SEEDS, TABLES, Drawn, drawn, workspace_of
+from .drawn import INDEX, NOTHING, SEEDS, TABLES, Drawn, drawn, workspace_of
 from .plans import NOT_LISTED, RULE, sampled
 
 BASES, KEPT, SLIDES = 8, 20, 16  # segments that bases are made of; poses of bases and of slides that are kept
@@ -70,14 +70,19 @@ def test_a_search_in_one_call(seed: int) -> None:
             how = record(HOW, allowed=allowed, spacing=SPACING, share=SHARE, kept=KEPT, budget=budget)
             progress, found = record(PROGRESS), np.zeros(KEPT + SLIDES, FOUND)
             why, left = search(question, tables, by, found, progress, work, how)
-            assert (left is None) == (why != advancing.BUDGET)
-            assert budget == 100 or (left is None and progress["done"][0])
-            while left is not None and why == advancing.BUDGET:
-                why = advancing.advance(question, tables, left, found[:KEPT], progress, work, allowed, budget)
-            if left is not None and why == advancing.EXHAUSTED and not by_chance:
-                progress["missed"] = stopping.missed_share(question, left, progress)
-            while not progress["done"][0]:
-                finish(question, tables, found, progress, work, how)
+            assert (left is None) == bool(progress["done"][0])
+            assert budget == 100 or left is None
+            assert bool(progress["left"][0]) == (why != advancing.BUDGET)
+            if left is not None:
+                steps = 0
+                while not progress["left"][0]:
+                    why = go_on(question, tables, left, found, NOTHING, progress, work, how)
+                    progress["left"] = why != advancing.BUDGET
+                    steps += 1
+                if steps and why == advancing.EXHAUSTED and not by_chance:
+                    progress["missed"] = stopping.missed_share(question, left, progress)
+                while not progress["done"][0]:
+                    go_on(question, tables, left, found, NOTHING, progress, work, how)
             assert why == ended
             np.testing.assert_array_equal(found[: int(progress["count"][0])], expected)
             same = ["best_value", "least_kept", "bases", "hypotheses", "verified", "bound", "missed", "least_freedom"]
