@@ -65,13 +65,19 @@ def warm_up() -> None:
     warm_up_vectorizing()
     warm_up_searching()
     warm_up_searching_long()
+    warm_up_analyzing()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
-    check_map(index)
     one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
     for scan in (_with_beams(), one_wall):
         try_sample(index, scan, Deadline(), oriented=True)
-    robot = Robot(beams=360)
+
+
+def warm_up_analyzing() -> None:
+    """Check a map, and look from its places, once."""
+    room = Segments.from_array(ROOM)
+    index, robot = MapIndex.build(room, 0.0), Robot(beams=360)
+    check_map(index)
     analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
     for number in range(len(analysis.standing.poses)):
         analysis.look(number)
@@ -176,3 +182,4 @@ if __name__ == "__main__":
     warm_up_scans()
     warm_up_vectorizing()
     warm_up_explaining()
+    warm_up_analyzing()
