@@ -2,12 +2,9 @@
 
 import math
 
-import numpy as np
-
 from registration.compiling import borrowed, kernel
 from registration.layout import Record, Records
 
-from ..layout import TRIED
 from ..planning_tables import Plan
 from ..tables import MapTables, Question, Workspace
 from .planning import is_telling, middle_of, next_base
@@ -34,25 +31,30 @@ def advance(
     tables: MapTables,
     plan: Plan,
     found: Records,
+    tried: Records,
     progress: Records,
     work: Workspace,
-    allowed: float,
-    budget: int,
+    how: Records,
 ) -> int:
-    """Go through bases, the best first, until nothing better can have been missed or `budget` tests are used up.
+    """Go through bases, the best first, until nothing better can have been missed or the budget of tests is used up.
 
-    `allowed` is the greatest chance of having missed a better consensus set, -1 to go through all bases; `progress`
-    (1,) keeps that chance up to date, or says that it is greater than that: see `missed_share`. Returns one of
-    `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+    `how` (1,) of `HOW`; `progress` (1,) keeps the chance of having missed something up to date, or says that it is
+    greater than is allowed: see `missed_share`. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
+
+    Where there is room in `tried` (k,) of `TRIED` only the current base is gone through, before its turn: what others
+    find meanwhile is not known, so that what may have to be kept is only noted there, for `merge`. It is `BUDGET` until
+    that base is done, or the room used up.
     """
     question = borrowed(question)
     tables = borrowed(tables)
     plan = borrowed(plan)
     found = borrowed(found)
+    tried = borrowed(tried)
     progress = borrowed(progress)
     work = borrowed(work)
     state = progress[0]
-    nothing = np.empty(0, dtype=TRIED)
+    allowed = how[0].allowed
+    budget = how[0].budget
     spent = 0
     while True:
         if state.current < 0:
@@ -60,9 +62,11 @@ def advance(
             if state.current < 0:
                 return EXHAUSTED
         base = plan.bases[state.current]
-        spent += search_base(question, tables, base, found, nothing, state, work, budget - spent)
+        spent += search_base(question, tables, base, found, tried, state, work, budget - spent)
         if state.anchor > 0 or state.step > 0 or state.entry > 0:
             return BUDGET
+        if len(tried) > 0:
+            return EXHAUSTED
         why = after_base(question, plan, state, allowed)
         if why != BUDGET:
             return why

@@ -6,14 +6,13 @@ from registration.compiling import borrowed, kernel
 from registration.kernels import keep_alive
 from registration.layout import Records
 
-from ..layout import FOUND
+from ..layout import FOUND, TRIED
 from ..planning_tables import Plan, Planning
 from ..tables import MapTables, Question, Workspace
 from ..tuning import BASE_SEGMENTS, SLIDE_SEGMENTS
 from .advancing import BUDGET, EXHAUSTED, advance
 from .ordering import ascending
 from .planning import begin
-from .proposing import search_base
 from .sliding import search_slides, sliding_segments
 from .stopping import missed_share
 
@@ -40,7 +39,7 @@ def search(
         progress[0].missed = 0.0  # walls of which no two cross are slid
     else:
         of_bases = found[: how[0].kept]
-        why = advance(question, tables, plan, of_bases, progress, work, how[0].allowed, how[0].budget)
+        why = advance(question, tables, plan, of_bases, np.empty(0, dtype=TRIED), progress, work, how)
         if why == BUDGET:
             return why, plan
         if why == EXHAUSTED and not plan.random:
@@ -65,21 +64,12 @@ def go_on(
 ) -> int:
     """Go on with a search where `progress` stands, with its bases or, once these are ``left``, to `finish` it.
 
-    Returns as `advance` does. Where there is room in `tried` (k,) of `TRIED` only the current base is gone through,
-    before its turn: what others find meanwhile is not known, so that what may have to be kept is only noted there, for
-    `merge`. It is `BUDGET` until that base is done, or the room used up. All in one kernel, for each that goes through
-    bases takes seconds to compile.
+    Returns as `advance` does. Both in one kernel, for each that goes through bases takes seconds to compile.
     """
-    state = progress[0]
-    budget = how[0].budget
-    if len(tried) > 0:
-        base = plan.bases[state.current]
-        search_base(borrowed(question), borrowed(tables), base, found[:0], tried, state, borrowed(work), budget)
-        return BUDGET if state.anchor > 0 or state.step > 0 or state.entry > 0 else EXHAUSTED
-    if state.left == 0:
-        return advance(question, tables, plan, found[: how[0].kept], progress, work, how[0].allowed, budget)
+    if progress[0].left == 0:
+        return advance(question, tables, plan, found[: how[0].kept], tried, progress, work, how)
     finish(question, tables, found, progress, work, how)
-    return BUDGET if state.done == 0 else EXHAUSTED
+    return BUDGET if progress[0].done == 0 else EXHAUSTED
 
 
 @kernel

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from association.kernels import advancing, stopping
 from association.kernels.proposing import search_base
-from association.layout import FOUND, PROGRESS, record
+from association.layout import FOUND, HOW, PROGRESS, record
 from association.planning_tables import Plan
 from association.tables import Question
 from registration.layout import Records
@@ -97,10 +97,14 @@ def expected_end(d: Drawn, effort: Effort) -> End:
 def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
     """Advance until it ends; return how, what was found, and the number of calls."""
     question, found, progress = asked(d, effort), np.zeros(64, FOUND), start_of(d.scan)
-    plan, work = planned(question, effort), workspace_of(d.scan)
+    plan, work, how = (
+        planned(question, effort),
+        workspace_of(d.scan),
+        record(HOW, allowed=effort.allowed, budget=budget),
+    )
     why, calls = advancing.BUDGET, 0
     while why == advancing.BUDGET:
-        why = advancing.advance(question, TABLES, plan, found, progress, work, effort.allowed, budget)
+        why = advancing.advance(question, TABLES, plan, found, NOTHING, progress, work, how)
         calls += 1
     state = progress[0]
     missed = float(state["missed"]) if effort.by_chance else stopping.missed_share(question, plan, progress)

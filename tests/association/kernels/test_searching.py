@@ -39,7 +39,8 @@ def apart(
     progress, found, slid = record(PROGRESS), np.zeros(KEPT, FOUND), np.zeros(SLIDES, FOUND)
     plan, why = begin(question, tables, by, progress), advancing.EXHAUSTED
     if len(plan.bases):
-        why = advancing.advance(question, tables, plan, found, progress, work, allowed, 10**9)
+        how = record(HOW, allowed=allowed, budget=10**9)
+        why = advancing.advance(question, tables, plan, found, NOTHING, progress, work, how)
     if not len(plan.bases):
         progress["missed"] = 0.0
     elif why == advancing.EXHAUSTED and not plan.random:
