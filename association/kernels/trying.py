@@ -91,7 +91,8 @@ def _match_and_refine(
     for i in range(len(scan)):
         possible[i] = scan[i].gain if work.near[i, k] else -1.0
         # As `may_score` counts, wherever a search was interrupted between the two.
-        most += scan[i].gain if work.near[i, k] and work.shifts[i] >= 0 else 0.0
+        if work.shifts[i] >= 0:
+            most += max(0.0, possible[i])
     if most < floor:
         return TESTS_REJECTED if terms.gates.least_overlap >= WHOLE_OVERLAP else TESTS_HYPOTHESIS
     matched = match_scan(scan, pose, place, terms.gates, possible, floor, work.matches)
