@@ -11,6 +11,7 @@ from .errors import InvalidArgumentError
 from .kernels import pairs as kernels
 from .layout import LEAST_POINTS, Floats, Records, X, Y
 from .segments import MeasuredSegments, Segments
+from .tables import Drawn, Points
 
 Indices = NDArray[np.intp]
 Point = Floats | tuple[float, float]
@@ -50,9 +51,9 @@ class Correspondences:
         chosen = _checked_pairs(pairs, len(scan), len(map_segments))
         m, s = map_segments, scan.segments
         rows = kernels.empty_pairs(len(chosen))
-        kernels.fill_in_map(rows, chosen, m.directions, m.midpoints, m.lengths)
-        kernels.fill_in_scan(rows, chosen, s.directions, s.midpoints, s.lengths)
-        kernels.fill_in_points(rows, chosen, scan.centroids, scan.spreads, scan.sigma, scan.points)
+        on_map, of_scan = Drawn(m.directions, m.midpoints, m.lengths), Drawn(s.directions, s.midpoints, s.lengths)
+        points = Points(scan.centroids, scan.spreads, scan.sigma, scan.points)
+        kernels.fill_in(rows, chosen, on_map, of_scan, points)
         if not scan.counted and scan.points.min(initial=np.inf) < LEAST_POINTS:
             together = np.bincount(chosen[:, 1], scan.points[chosen[:, 0]])[chosen[:, 1]]
             rows["scan"]["variance"] *= np.minimum(1.0, together / LEAST_POINTS)
@@ -125,21 +126,9 @@ class Correspondences:
         """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
         return kernels.relative_angles(self.rows, theta)
 
-    def runs_against(self, theta: float) -> NDArray[np.bool_]:
-        """Tell which scan segments, turned by `theta`, run against their map segments."""
-        return np.abs(self.angles(theta)) > 0.5 * np.pi
-
     def take(self, rows: NDArray[np.bool_] | Indices | slice) -> Correspondences:
         """Return some of the pairs."""
         return Correspondences(self.rows[rows])
-
-    def turned(self, rows: NDArray[np.bool_]) -> Correspondences:
-        """Return the pairs with the scan segments of `rows` running the other way."""
-        which = np.zeros(len(self), dtype=np.bool_)
-        which[rows] = True
-        turned = kernels.empty_pairs(len(self))
-        kernels.turn_round(self.rows, which, turned)
-        return Correspondences(turned)
 
     def about(self, map_origin: Point, scan_origin: Point) -> Correspondences:
         """Return the pairs in frames that have been moved to two new origins, each (2,) metres in its old frame."""
@@ -176,14 +165,14 @@ def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices
         index = int(np.argmax(broken)) if np.any(broken) else None
         raise InvalidArgumentError(f"expected integers, got {rows.dtype}", argument="correspondences", index=index)
     chosen = np.ascontiguousarray(rows, dtype=np.intp)
-    for column, count, what in ((kernels.SCAN, scan_count, "scan"), (kernels.MAP, map_count, "map")):
-        index = kernels.first_outside(chosen, column, count)
-        if index >= 0:
-            raise InvalidArgumentError(
-                f"expected a {what} index from 0 to {count - 1}, got {rows[index, column]}"
-                if count
-                else f"the {what} has no segments",
-                argument="correspondences",
-                index=index,
-            )
+    row, column = kernels.first_outside(chosen, scan_count, map_count)
+    if row >= 0:
+        count, what = (scan_count, "scan") if column == kernels.SCAN else (map_count, "map")
+        raise InvalidArgumentError(
+            f"expected a {what} index from 0 to {count - 1}, got {chosen[row, column]}"
+            if count
+            else f"the {what} has no segments",
+            argument="correspondences",
+            index=row,
+        )
     return chosen

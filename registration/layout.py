@@ -103,3 +103,37 @@ POSE = np.dtype(
         ("x", "f8"), ("y", "f8"),  # m
     ]
 )  # fmt: skip
+
+# How pairs are fitted, with 1 for yes: by the paper's estimator, else by the joint one; whether the transform is given
+# instead; whether directions mean anything; by Wahba's rotation, else by Mitsuta's; whether the weights used are what
+# is taken for 1 / variance; whether a covariance is wanted, and the ambiguity somewhere else. Up to what chi-square of
+# their angles lines are parallel. The transform that is given, and where else the ambiguity is asked, map_from_scan.
+FITTING = np.dtype(
+    [
+        *((name, "i8") for name in ("one_step", "given", "oriented", "wahba", "informed", "covariance", "elsewhere")),
+        ("parallel", "f8"),
+        ("at", POSE),
+        ("other", POSE),
+    ]
+)
+
+# What an estimator answers: the transform, map_from_scan, and its translation between the middles of both sets; its
+# covariance, where it is wanted and there is one; what is free, see `kernels.observability`, along which unit vector,
+# that points right or straight up, and how far, m; whether only one way to turn the segments round fits, and whether
+# any scan segment runs against its map segment; how many pairs count, their chi-square, and the root mean squares of
+# their offsets (m) and angles (rad); the paper's costs of translation and rotation there, at T = 0 and where else they
+# are asked; its determinant and reliability.
+FITTED = np.dtype(
+    [
+        ("pose", POSE),
+        ("between", [("x", "f8"), ("y", "f8")]),
+        ("covariance", SYMMETRIC3),
+        ("free", "i8"), ("free_x", "f8"), ("free_y", "f8"), ("slack", "f8"),
+        ("unique", "i8"), ("against", "i8"), ("count", "i8"),
+        ("chi2", "f8"), ("rms_offset", "f8"), ("rms_angle", "f8"),
+        ("translation", "f8"), ("rotation", "f8"),
+        ("translation_before", "f8"), ("rotation_before", "f8"),
+        ("translation_elsewhere", "f8"), ("rotation_elsewhere", "f8"),
+        ("determinant", "f8"), ("reliability", "f8"),
+    ]
+)  # fmt: skip

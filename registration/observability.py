@@ -54,7 +54,12 @@ def are_parallel(pairs: Correspondences, inverse_variances: Floats) -> bool:
         Of the offsets; those of 0 do not count.
     """
     unlike, count = angle_chi_square(pairs.rows, inverse_variances)
-    return count < 2 or bool(unlike <= chi_square_quantile(count - 1, THREE_SIGMA_TAIL))
+    return bool(unlike <= most_parallel(count))
+
+
+def most_parallel(count: int) -> float:
+    """Return the chi-square of their angles up to which so many lines are parallel; inf for fewer than two."""
+    return chi_square_quantile(count - 1, THREE_SIGMA_TAIL) if count > 1 else math.inf
 
 
 def find_freedom(used: JointSums, noise: JointSums | None, theta: float, *, parallel: bool) -> Freedom:

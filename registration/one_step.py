@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,14 +98,12 @@ class OneStepSums:
     @property
     def determinant(self) -> float:
         """Eq. (8)'s D, 0 for parallel lines (the paper calls it discriminant, and the lines collinear)."""
-        _, x2, y2, xy = of_arrays.direction_moments(self.compensated)
-        return max(0.0, x2 * y2 - xy**2)
+        return of_arrays.direction_measures(self.compensated)[0]
 
     @property
     def reliability(self) -> float:
         """Eq. (28) from 0 to 1; ``2 sqrt(D) / S_w``. Knows the directions of the map lines and nothing of noise."""
-        total = of_arrays.direction_moments(self.compensated)[0]
-        return min(1.0, 2.0 * math.sqrt(self.determinant) / total) if total > 0.0 else 0.0
+        return of_arrays.direction_measures(self.compensated)[1]
 
     def solve(self, rotation: Rotation) -> tuple[RigidTransform, bool]:
         """Return the paper's transform, map_from_scan, and whether the lines fix it.

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import numpy as np
 from numpy.typing import ArrayLike
 
-from .chi_square import chi_square_quantile
 from .correspondences import Correspondences
-from .diagnostics import Residuals, covariance_of, diagnose, no_answer
-from .estimate import Problem, fit_at, fit_joint, fit_one_step
-from .options import RegistrationOptions
+from .diagnostics import no_answer, result_of
+from .kernels.fitting import fit
+from .layout import FITTED, FITTING, Records
+from .observability import most_parallel
+from .options import Estimator, RegistrationOptions, Rotation
 from .result import RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .transform import RigidTransform
-from .weights import weigh
+from .weights import PairWeights, weigh
 
-TAIL = 0.001  # chance that chi2 of right pairs is larger; an answer beyond it is not usable
 DEFAULT_OPTIONS = RegistrationOptions()
+NOT_KNOWN = np.zeros(0)
 
 
 def register(
@@ -59,25 +63,35 @@ def register(
     if not len(given):
         return no_answer(options)
 
-    problem = Problem.of(given, weights, oriented=options.oriented)
-    if at is not None:
-        fit = fit_at(problem, at)
-    else:
-        fit = (fit_joint if options.estimator == "joint" else fit_one_step)(problem, options)
-    degenerate = fit.freedom.degenerate or not problem.unique
+    noise = NOT_KNOWN if weights.noise is None else weights.noise
+    fitted = np.zeros(1, FITTED)
+    how = _how(weights, options, at)
+    offsets, angles = fit(given.rows, weights.used, weights.information, noise, how, fitted)
+    return result_of(fitted, offsets, angles, weights, options)
 
-    residuals = Residuals.of(problem, fit)
-    diagnostics = diagnose(problem, fit, residuals, options)
-    reversed_pair = options.oriented and residuals.against
-    has_covariance = not degenerate and options.estimator == "joint"
-    return RegistrationResult(
-        degenerate=degenerate,
-        usable=not degenerate and diagnostics.chi2 <= chi_square_quantile(diagnostics.dof, TAIL) and not reversed_pair,
-        pose=problem.map_from_local.compose(fit.local_from_scan),
-        covariance=covariance_of(problem, fit) if has_covariance else None,
-        unobservable=fit.freedom.direction,
-        offsets=residuals.offsets,
-        angles=residuals.angles,
-        weights=weights.used,
-        diagnostics=diagnostics,
-    )
+
+def _how(weights: PairWeights, options: RegistrationOptions, at: RigidTransform | None) -> Records:
+    """Return what the fit goes by, (1,) of `FITTING`."""
+    # None but a caller's own weights are 0.
+    count = len(weights.used) if options.weights is None else int(np.count_nonzero(weights.used))
+    informed = weights.information is weights.used
+    usual = _usual(options.estimator, options.rotation, count, oriented=options.oriented, informed=informed)
+    how = np.frombuffer(bytearray(usual), FITTING)
+    for place, pose in (("at", at), ("other", options.evaluate_at)):
+        if pose is not None:
+            how[place] = pose.theta, pose.x, pose.y
+    if at is not None:
+        how["given"] = 1
+    if options.evaluate_at is not None:
+        how["elsewhere"] = 1
+    return how
+
+
+@lru_cache
+def _usual(estimator: Estimator, rotation: Rotation, count: int, *, oriented: bool, informed: bool) -> bytes:
+    """Return a `FITTING` without a pose, for so many pairs that count, as bytes: numpy takes long to make one."""
+    how = np.zeros(1, FITTING)
+    how["one_step"], how["covariance"] = estimator == "one_step", estimator == "joint"
+    how["wahba"], how["oriented"], how["informed"] = rotation == "wahba", oriented, informed
+    how["parallel"] = most_parallel(count)
+    return how.tobytes()

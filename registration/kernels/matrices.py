@@ -95,6 +95,32 @@ def invert3_scaled(m: Record, out: Record) -> None:
 
 
 @kernel
+def sandwich(c: Record, m: Record, out: Record) -> None:
+    """Write the upper triangle of ``C M C`` to `out`, which may be `c`."""
+    # Rows of C M.
+    xx = c.xx * m.xx + c.xy * m.xy + c.xt * m.xt
+    xy = c.xx * m.xy + c.xy * m.yy + c.xt * m.yt
+    xt = c.xx * m.xt + c.xy * m.yt + c.xt * m.tt
+    yx = c.xy * m.xx + c.yy * m.xy + c.yt * m.xt
+    yy = c.xy * m.xy + c.yy * m.yy + c.yt * m.yt
+    yt = c.xy * m.xt + c.yy * m.yt + c.yt * m.tt
+    tx = c.xt * m.xx + c.yt * m.xy + c.tt * m.xt
+    ty = c.xt * m.xy + c.yt * m.yy + c.tt * m.yt
+    tt = c.xt * m.xt + c.yt * m.yt + c.tt * m.tt
+    of_xx = xx * c.xx + xy * c.xy + xt * c.xt
+    of_xy = xx * c.xy + xy * c.yy + xt * c.yt
+    of_xt = xx * c.xt + xy * c.yt + xt * c.tt
+    of_yy = yx * c.xy + yy * c.yy + yt * c.yt
+    of_yt = yx * c.xt + yy * c.yt + yt * c.tt
+    out.tt = tx * c.xt + ty * c.yt + tt * c.tt
+    out.xx = of_xx
+    out.xy = of_xy
+    out.xt = of_xt
+    out.yy = of_yy
+    out.yt = of_yt
+
+
+@kernel
 def carried(covariance: Record, x: float, y: float, out: Record) -> None:
     """Write the covariance of (x, y, theta) of a frame whose origin is ``-(x, y)``, both turned, in the moved one.
 

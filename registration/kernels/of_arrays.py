@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..compiling import kernel
-from ..layout import INFORMATION, SYMMETRIC3, Floats, Records
+from ..layout import INFORMATION, Floats, Records
 from .joint import joint_cost, joint_information, joint_solve
-from .matrices import carried, invert3_scaled
-from .one_step import one_step_solve
+from .matrices import invert3_scaled
+from .one_step import determinant_and_reliability, one_step_solve
 
 
 @kernel
@@ -51,20 +49,6 @@ def information(sums: Records, theta: float) -> Floats:
 
 
 @kernel
-def upper_triangle(matrix: Floats) -> Records:
-    """Return the upper triangle of a (3, 3) matrix, an array of one SYMMETRIC3."""
-    out = np.empty(1, SYMMETRIC3)
-    m = out[0]
-    m.xx = matrix[0, 0]
-    m.xy = matrix[0, 1]
-    m.xt = matrix[0, 2]
-    m.yy = matrix[1, 1]
-    m.yt = matrix[1, 2]
-    m.tt = matrix[2, 2]
-    return out
-
-
-@kernel
 def covariance(sums: Records, theta: float) -> Floats:
     """Return the inverse of the information of (x, y, theta), (3, 3); see `invert3_scaled`."""
     out = np.empty(1, INFORMATION)
@@ -74,19 +58,9 @@ def covariance(sums: Records, theta: float) -> Floats:
 
 
 @kernel
-def carried_matrix(covariance: Floats, theta: float, x: float, y: float) -> Floats:
-    """Do as `carried` with a (3, 3) matrix, by a lever that is turned by `theta` as the frame is."""
-    m = upper_triangle(covariance)
-    c = math.cos(theta)
-    s = math.sin(theta)
-    carried(m[0], c * x - s * y, s * x + c * y, m[0])
-    return full_matrix(m)
-
-
-@kernel
-def direction_moments(sums: Records) -> tuple[float, float, float, float]:
-    """Return the paper's ``S_w``, ``S_x2``, ``S_y2`` and ``S_xy``."""
-    return sums[0].w, sums[0].x2, sums[0].y2, sums[0].xy
+def direction_measures(sums: Records) -> tuple[float, float]:
+    """Do as `determinant_and_reliability`."""
+    return determinant_and_reliability(sums[0])
 
 
 @kernel

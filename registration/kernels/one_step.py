@@ -100,6 +100,14 @@ def one_step_solve(values: Record, use_wahba: bool) -> tuple[float, float, float
 
 
 @kernel
+def determinant_and_reliability(values: Record) -> tuple[float, float]:
+    """Return Eq. (8)'s D, not below 0, and Eq. (28) from 0 to 1, ``2 sqrt(D) / S_w``."""
+    v = values
+    determinant = max(0.0, v.x2 * v.y2 - v.xy * v.xy)
+    return determinant, min(1.0, 2.0 * math.sqrt(determinant) / v.w) if v.w > 0.0 else 0.0
+
+
+@kernel
 def wahba_angle(pairs: Records, weights: Floats) -> float:
     """Return Wahba's rotation of pairs, Eq. (15), radians; those of weight 0 do not count."""
     sums = one_step_sums(pairs, 0.0, 0.0, 0.0, weights)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..compiling import kernel
 from ..layout import PAIR, Floats, Record, Records, X, Y
+from ..tables import Drawn, Points
 
 MIN_SIGMA = 1e-12  # m; a smaller one that is not 0 counts as this, so that its square is not lost
 
@@ -17,12 +18,14 @@ SCAN, MAP = 0, 1  # columns of the (n, 2) indices that name pairs
 
 
 @kernel
-def first_outside(indices: NDArray[np.intp], column: int, count: int) -> int:
-    """Return the first row of `indices` that does not have a number from 0 to ``count - 1`` in `column`, or -1."""
-    for i in range(len(indices)):
-        if indices[i, column] < 0 or indices[i, column] >= count:
-            return i
-    return -1
+def first_outside(indices: NDArray[np.intp], scan_count: int, map_count: int) -> tuple[int, int]:
+    """Return row and column of the first of `indices` (n, 2) that names no segment, column by column; or row -1."""
+    for column in range(2):
+        count = scan_count if column == SCAN else map_count
+        for i in range(len(indices)):
+            if indices[i, column] < 0 or indices[i, column] >= count:
+                return i, column
+    return -1, 0
 
 
 @kernel
@@ -36,49 +39,29 @@ def empty_pairs(count: int) -> Records:
 
 
 @kernel
-def fill_in_map(
-    pairs: Records, indices: NDArray[np.intp], directions: Floats, midpoints: Floats, lengths: Floats
-) -> None:
-    """Write the segments (k,) of the map that `indices` name to the pairs."""
+def fill_in(pairs: Records, indices: NDArray[np.intp], on_map: Drawn, scan: Drawn, points: Points) -> None:
+    """Write the segments of map and scan that `indices` (n, 2) name to the pairs, and the points behind these."""
     for i in range(len(pairs)):
         j = indices[i, MAP]
         line = pairs[i].map
-        line.dx = directions[j, X]
-        line.dy = directions[j, Y]
-        line.x = midpoints[j, X]
-        line.y = midpoints[j, Y]
+        line.dx = on_map.directions[j, X]
+        line.dy = on_map.directions[j, Y]
+        line.x = on_map.midpoints[j, X]
+        line.y = on_map.midpoints[j, Y]
         line.offset = offset_of(line)
-        line.length = lengths[j]
-
-
-@kernel
-def fill_in_scan(
-    pairs: Records, indices: NDArray[np.intp], directions: Floats, midpoints: Floats, lengths: Floats
-) -> None:
-    """Write the segments (k,) of the scan that `indices` name to the pairs."""
-    for i in range(len(pairs)):
+        line.length = on_map.lengths[j]
         j = indices[i, SCAN]
         seen = pairs[i].scan
-        seen.dx = directions[j, X]
-        seen.dy = directions[j, Y]
-        seen.x = midpoints[j, X]
-        seen.y = midpoints[j, Y]
-        seen.length = lengths[j]
-
-
-@kernel
-def fill_in_points(
-    pairs: Records, indices: NDArray[np.intp], centroids: Floats, spreads: Floats, sigmas: Floats, counts: Floats
-) -> None:
-    """Write what is known of the points behind the segments (k,) of the scan that `indices` name to the pairs."""
-    for i in range(len(pairs)):
-        j = indices[i, SCAN]
-        seen = pairs[i].scan
-        seen.centroid_x = centroids[j, X]
-        seen.centroid_y = centroids[j, Y]
-        seen.spread = spreads[j]
-        sigma = max(sigmas[j], MIN_SIGMA) if sigmas[j] > 0.0 else 0.0
-        seen.variance = sigma * sigma / counts[j]
+        seen.dx = scan.directions[j, X]
+        seen.dy = scan.directions[j, Y]
+        seen.x = scan.midpoints[j, X]
+        seen.y = scan.midpoints[j, Y]
+        seen.length = scan.lengths[j]
+        seen.centroid_x = points.centroids[j, X]
+        seen.centroid_y = points.centroids[j, Y]
+        seen.spread = points.spreads[j]
+        sigma = max(points.sigmas[j], MIN_SIGMA) if points.sigmas[j] > 0.0 else 0.0
+        seen.variance = sigma * sigma / points.counts[j]
 
 
 @kernel
@@ -152,16 +135,6 @@ def move_origins(pairs: Records, map_x: float, map_y: float, scan_x: float, scan
         seen.y -= scan_y
         seen.centroid_x -= scan_x
         seen.centroid_y -= scan_y
-
-
-@kernel
-def turn_round(pairs: Records, which: NDArray[np.bool_], turned: Records) -> None:
-    """Write the pairs to `turned`, with the scan segments of `which` (n,) running the other way."""
-    for i in range(len(pairs)):
-        turned[i] = pairs[i]
-        if which[i]:
-            turned[i].scan.dx *= -1.0
-            turned[i].scan.dy *= -1.0
 
 
 @kernel

@@ -39,8 +39,10 @@ def test_gather(seed: int) -> None:
 
 def test_first_outside() -> None:
     pairs = np.array([[0, 3], [4, 0], [1, -1], [5, 2]])
-    assert [pairing.first_outside(pairs, pairing.SCAN, count) for count in (6, 5, 4, 0)] == [-1, 3, 1, 0]
-    assert [pairing.first_outside(pairs, pairing.MAP, count) for count in (4, 3)] == [2, 0]
+    in_scan, on_map = [(-1, 0), (3, 0), (1, 0), (0, 0)], [(2, 1), (0, 1)]
+    assert [pairing.first_outside(pairs[:2], count, 4) for count in (5, 4)] == [(-1, 0), (1, 0)]
+    assert [pairing.first_outside(pairs, count, 4) for count in (6, 5, 4, 0)] == [(2, 1), *in_scan[1:]]
+    assert [pairing.first_outside(pairs, 6, count) for count in (4, 3)] == on_map
 
 
 @given(SEEDS)
@@ -174,3 +176,14 @@ def test_inverses_and_carried(seed: int) -> None:
     expected = lever @ matrix @ lever.T
     matrices.carried(symmetric(matrix)[0], x, y, out[0])
     np.testing.assert_allclose(of_arrays.full_matrix(out), expected, rtol=1e-12, atol=1e-12 * expected.max())
+
+
+@given(SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_sandwich(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    outer, inner = definite(rng, 3), definite(rng, 3)
+    expected = outer @ inner @ outer
+    out = symmetric(outer)
+    matrices.sandwich(out[0], symmetric(inner)[0], out[0])
+    np.testing.assert_allclose(of_arrays.full_matrix(out), expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
