@@ -15,7 +15,7 @@ from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.planning import begin
 from .kernels.searching import go_on, put_in_order, search
 from .kernels.stopping import missed_share
-from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
+from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers
 from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
@@ -44,6 +44,9 @@ from .tuning import (
 
 NO_NOISE = np.zeros(0)
 NONE_TRIED = np.zeros(0, TRIED)
+COUNT, BASES, HYPOTHESES, VERIFIED, MISSED = map(
+    (PROGRESS.names or ()).index, ("count", "bases", "hypotheses", "verified", "missed")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +147,8 @@ def _search(context: SearchContext, effort: Effort, chunk: int) -> Candidates:
     deadline, tables, work = context.deadline, context.index.tables, context.workspace
     how, rules = _limits(context, effort, chunk)
     found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), np.zeros(1, PROGRESS)
-    progress["best_value"] = effort.known
+    if effort.known > 0.0:
+        progress["best_value"] = effort.known
     question, planning = context.question(rules), _planning(context, effort)
     stopped, plan = BUDGET, None
     if deadline.passed:
@@ -158,7 +162,7 @@ def _search(context: SearchContext, effort: Effort, chunk: int) -> Candidates:
             go_on(question, tables, plan, found, NONE_TRIED, progress, work, how)
     if deadline.cancelled:
         raise CancelledError
-    slid = bool(progress["done"][0])
+    slid = plan is None or bool(progress["done"][0])
     if not slid:
         put_in_order(found, progress, how)
     return _found(context, effort, found, progress, stopped, slid=slid)
@@ -168,19 +172,19 @@ def _found(
     context: SearchContext, effort: Effort, found: Records, progress: Records, stopped: int, *, slid: bool
 ) -> Candidates:
     exhaustive = stopped == EXHAUSTED and len(context.lines.rows) <= BASE_SEGMENTS
-    state = dict(zip(PROGRESS.names or (), progress[0].item(), strict=True))  # a look at one field takes as long as all
+    state = progress[0].item()  # a look at one field takes as long as all
     report = SearchReport(
         complete=stopped != BUDGET and slid,
         exhaustive=exhaustive,
-        confidence=1.0 if exhaustive or stopped == PROVEN else 1.0 - state["missed"],
-        bases=state["bases"],
-        hypotheses=state["hypotheses"],
-        verified=state["verified"],
+        confidence=1.0 if exhaustive or stopped == PROVEN else 1.0 - state[MISSED],
+        bases=state[BASES],
+        hypotheses=state[HYPOTHESES],
+        verified=state[VERIFIED],
         seed=context.options.seed,
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    return Candidates(found[: state["count"]], report)
+    return Candidates(found[: state[COUNT]], report)
 
 
 def _leave_bases(
@@ -211,17 +215,11 @@ def _limits(context: SearchContext, effort: Effort, chunk: int) -> tuple[Records
         spacing = min(spacing, context.window.radius)
     share = effort.kept_share if context.with_beams else effort.rival_share
     # A test of a pose takes longer the more walls lie where it is.
-    return _records(effort, spacing, share, int(chunk / max(1.0, context.index.crowd / USUAL_CROWD)))
-
-
-@lru_cache
-def _records(effort: Effort, spacing: float, share: float, budget: int) -> tuple[Records, Records]:
-    how = record(HOW, allowed=effort.allowed, spacing=spacing, share=share, kept=effort.kept, budget=budget)
-    rules = np.zeros(2, RULES)
-    rules["kept_share"], rules["rival_share"], rules["enough"] = effort.kept_share, effort.rival_share, effort.enough
-    rules["distinct_angle"] = DISTINCT_ANGLE
-    rules["distinct_distance"] = DISTINCT_DISTANCE, SLIDE_DISTINCT_SHARE * spacing
-    return how, rules
+    budget = int(chunk / max(1.0, context.index.crowd / USUAL_CROWD))
+    how = np.array([(effort.allowed, spacing, share, effort.kept, budget)], HOW)
+    of_bases = effort.kept_share, DISTINCT_DISTANCE, DISTINCT_ANGLE, effort.rival_share, effort.enough
+    of_slides = effort.kept_share, SLIDE_DISTINCT_SHARE * spacing, *of_bases[2:]
+    return how, np.array([of_bases, of_slides], RULES)
 
 
 def _planning(context: SearchContext, effort: Effort) -> Planning:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from registration import Segments
-from registration.layout import Floats
+from registration.layout import Records
 
+from .kernels.extents import extent_along
+from .layout import POINT, as_records
 from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 
 _ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # in which extents are looked for
+_DIRECTIONS = as_records(POINT, DIRECTIONS)
 
 
 def diagonal(segments: Segments) -> float:
@@ -21,12 +24,9 @@ def diagonal(segments: Segments) -> float:
     return float(np.hypot(max(high[0::2]) - min(low[0::2]), max(high[1::2]) - min(low[1::2])))
 
 
-def extent(segments: Segments) -> float:
-    """Return how wide segments lie apart in the direction in which that is most, metres; 0 without any."""
-    if not len(segments):
-        return 0.0
-    along = _along(segments)
-    return float((along.max(axis=1) - along.min(axis=1)).max())
+def extent(ends: Records) -> float:
+    """Return how wide segments, (n,) of `ENDS`, lie apart in the direction in which that is most, metres; 0 of none."""
+    return extent_along(ends, _DIRECTIONS)
 
 
 def inner_extent(segments: Segments) -> float:
@@ -36,16 +36,10 @@ def inner_extent(segments: Segments) -> float:
     """
     if not len(segments):
         return 0.0
-    along = _along(segments)
+    along = DIRECTIONS @ segments.endpoints.reshape(-1, 2).T
     order = np.argsort(along, axis=1)
     shares = np.cumsum(np.repeat(segments.lengths, 2)[order], axis=1) / (2.0 * segments.lengths.sum())
     low = np.argmax(shares >= OUTERMOST_SHARE, axis=1)
     high = np.argmax(shares >= 1.0 - OUTERMOST_SHARE, axis=1)
     rows = np.arange(EXTENT_ANGLES)
     return float((along[rows, order[rows, high]] - along[rows, order[rows, low]]).max())
-
-
-def _along(segments: Segments) -> Floats:
-    """Return where the ends of n segments lie along each of the directions, (directions, 2 n) metres."""
-    found: Floats = DIRECTIONS @ segments.endpoints.reshape(-1, 2).T
-    return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from .context import SearchContext
 from .explain import Answer
-from .kernels.odds import left_unmatched, most_by_one_wall
+from .kernels.odds import left_unmatched, most_by_one_wall, null_features, root_gap
 from .null import Null
 from .ranking import Ranked
 from .tuning import (
@@ -21,19 +21,15 @@ from .tuning import (
     LEAST_MISFIT,
     LONGEST_UNMATCHED,
     MANY,
-    MAX_GAP,
     MAX_LEAD,
     MOST_DEVIATION,
     MOST_MISFIT,
-    MOST_NULL,
     MOST_UNMATCHED,
     NEARLY_ALL,
     NULL_SHARE,
     RIVAL_SHARE,
-    SYMMETRIC,
     TWIN_TEMPERATURE,
     UNCOUNTED_SHARE,
-    UNLIKE_SYMMETRY,
     USUAL_WALLS,
 )
 
@@ -104,8 +100,7 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
-OF_NULL = ("null", "null_gap", "null_better")
-NULL_PLACES = [Features._fields.index(name) for name in OF_NULL]
+NULL_PLACE = Features._fields.index("null")  # where these three begin
 DEVIATION_PLACE = Features._fields.index("deviation")
 
 
@@ -138,7 +133,7 @@ def features_of(context: SearchContext, answer: Answer, weighed: Sequence[Weighe
         hinge_deviation=min(hinge_deviation, MOST_DEVIATION),
         chance=max(LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
         null=NULL_SHARE,
-        null_gap=_root_gap((1.0 - NULL_SHARE) * best.score),
+        null_gap=root_gap((1.0 - NULL_SHARE) * best.score),
         null_better=0.0,
         root_score=math.sqrt(max(0.0, best.by_segments)),
         blocked=math.sqrt(best.blocked),
@@ -169,21 +164,8 @@ def _unmatched(context: SearchContext, best: Ranked) -> tuple[float, float]:
 
 def with_null(features: Features, best: Ranked, null: Null) -> Features:
     """Return the features with what the mirrored scan comes to."""
-    return features._replace(**dict(zip(OF_NULL, of_null(best, null), strict=True)))
-
-
-def of_null(best: Ranked, null: Null) -> tuple[float, float, float]:
-    """Return what the mirrored scan comes to beside the best explanation: the features that `OF_NULL` names."""
-    share = min(MOST_NULL, null.score / best.score) if best.score > 0.0 else MOST_NULL
-    symmetric = min(1.0, max(0.0, (null.symmetry - UNLIKE_SYMMETRY) / (SYMMETRIC - UNLIKE_SYMMETRY)))
-    excess = max(0.0, share - NULL_SHARE) * (1.0 - symmetric)
-    gap = (1.0 - NULL_SHARE - excess) * best.score
-    better = max(0.0, share - 1.0)
-    return NULL_SHARE + excess, _root_gap(gap), better
-
-
-def _root_gap(gap: float) -> float:
-    return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
+    null_share, gap, better = null_features(best.score, null.score, null.symmetry)
+    return features._replace(null=null_share, null_gap=gap, null_better=better)
 
 
 class Weighed(NamedTuple):

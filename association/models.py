@@ -78,11 +78,11 @@ class Model:
 
     def logit(self, features: Features | Floats) -> float:
         """Return the logarithm of the odds; several models are sooner asked with an array (n,) of the features."""
-        return float(log_odds(self._odds, np.asarray(features)))
+        return float(log_odds(self.odds, np.asarray(features)))
 
     @cached_property
-    def _odds(self) -> Odds:
-        """The same for the kernel."""
+    def odds(self) -> Odds:
+        """The same for the kernels."""
         place = Features._fields.index
         curves, bends = np.zeros(len(self.curves), CURVE), [bend for c in self.curves.values() for bend in c.bends]
         end = 0

@@ -16,7 +16,7 @@ from .candidates import Candidates
 from .context import SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
-from .kernels.ranking import distinct, rank
+from .kernels.ranking import begin_at, distinct, rank
 from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Integers, as_records
 from .options import CancelledError, Estimator
 from .tables import Rays
@@ -38,6 +38,7 @@ from .tuning import (
 )
 
 Floats = NDArray[np.float64]
+NOTHING = np.zeros(0)
 
 
 @dataclass(slots=True)
@@ -146,16 +147,18 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     """Refine and order the candidates: within the prior's window first, then by value; ties by the search's order."""
     if not len(candidates.poses):
         return []
-    scored = _score(context, candidates.poses)
+    estimates = np.zeros(len(candidates.poses), ESTIMATE)
+    begin_at(candidates.poses, estimates)
+    scored = _score(context, estimates)
     if context.with_beams:
         scored = _weigh_beams(context, scored)
-    scores = scored.merits["score"]
-    values = scores if context.prior is None else scores + _prior_values(context, scored.estimates)
+    beside = NOTHING if context.prior is None else _prior_values(context, scored.estimates)
     most = max(LEAST_DISTINCT, context.options.max_alternatives + 1)
-    order = _distinct(scored, np.where(scores > 0.0, values, -np.inf), most)
+    order = _distinct(scored, beside, most)
     windowed = context.window is not None
     explanations = []
-    for place, merit, value in zip(order.tolist(), scored.merits[order].tolist(), values[order].tolist(), strict=True):
+    for place, merit in zip(order.tolist(), scored.merits[order].tolist(), strict=True):
+        value = merit[0] + (float(beside[place]) if len(beside) else 0.0)
         within = value >= INSIDE / 2
         inside = within or not windowed
         explanations.append(_explanation(scored, place, merit, merit[0] if within else value, inside=inside))
@@ -203,16 +206,15 @@ def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: f
     )
 
 
-def _distinct(scored: _Scored, values: Floats, most: int) -> Integers:
-    """Return the places of the best `most` by value, ties by place, without those that a better one stands for."""
-    scores = np.ascontiguousarray(scored.merits["score"])
+def _distinct(scored: _Scored, beside: Floats, most: int) -> Integers:
+    """Return the places of the best `most`, those of the greatest value first: score, and what is `beside` it (k,)."""
     return distinct(
-        scored.estimates, scores, values, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
+        scored.estimates, scored.merits, beside, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
     )
 
 
 def _score(context: SearchContext, poses: Records) -> _Scored:
-    """Refine the poses on their consensus sets and score those, with lines of sight unless there are beams.
+    """Refine poses (k,) of `ESTIMATE` in place and score their sets, with lines of sight unless there are beams.
 
     The first are scored also when the deadline has passed, so that there is an answer, without lines of sight where
     those take long; what it leaves unscored is worth nothing.
@@ -223,9 +225,7 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
         When the deadline was cancelled.
     """
     k, place = len(poses), context.index.tables.place
-    scored = _Scored(np.zeros(k, ESTIMATE), np.zeros(k, MERIT), np.zeros((k, len(context.lines.rows)), MATCH))
-    for name in ("theta", "x", "y"):
-        scored.estimates[name] = poses[name]
+    scored = _Scored(poses, np.zeros(k, MERIT), np.zeros((k, len(context.lines.rows)), MATCH))
     # Between some poses the clock is looked at: of the best first there are usually few enough for one go.
     step = max(1, int(RANKED_AT_ONCE / (max(1, len(context.lines.rows)) * max(1.0, context.index.crowd))))
     for begin in range(0, k, step):

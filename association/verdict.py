@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +13,11 @@ from registration.layout import Floats
 from .context import SearchContext
 from .explain import Answer, Explanations
 from .families import is_thin, place_on_family
-from .features import DEVIATION_PLACE, NULL_PLACES, Features, features_of, of_null, twin_share, weigh, with_null
+from .features import DEVIATION_PLACE, NULL_PLACE, Features, features_of, twin_share, weigh, with_null
+from .kernels.odds import allowed_null, three_log_odds
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
-from .null import Null, null_of
+from .null import null_of
 from .ranking import Ranked
 from .reasons import Standing, reasons_of
 from .result import Reason, Status
@@ -29,7 +29,6 @@ from .tuning import (
     LEAST_IN_STEP,
     MIRRORED_BETTER,
     NO_MATCH_PROBABILITY,
-    NULL_SHARES,
     USABLE_CAUTIOUS,
     USABLE_CAUTIOUS_DRIVE,
     USABLE_CAUTIOUS_WITH_BEAMS,
@@ -163,11 +162,8 @@ class _Chances:
         weighed = weigh(answer.best, rivals)
         features, share = features_of(context, answer, weighed), twin_share(weighed)
         numbers = np.array(features)
-        right, careful = usual.logit(numbers), cautious.logit(numbers)
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
-        fixed = numbers.copy()
-        fixed[DEVIATION_PLACE] = USUAL.deviation
-        explained = _logistic(cautious.logit(fixed))
+        right, careful, fixed = three_log_odds(usual.odds, cautious.odds, numbers, DEVIATION_PLACE, USUAL.deviation)
         likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
         decidable = not answer.settled.degenerate and not is_thin(context, answer)
         if likely and decidable and _logistic(careful) * share >= _bar(context):
@@ -179,7 +175,7 @@ class _Chances:
             allowed = _allowed_null(cautious, numbers, answer.best, _bar(context) / share) if certain else 0.0
             features = with_null(features, answer.best, null_of(context, answer.best, allowed))
             careful = cautious.logit(features)
-        return cls(_logistic(right) * share, _logistic(careful) * share, explained, share, features, cautious)
+        return cls(_logistic(right) * share, _logistic(careful) * share, _logistic(fixed), share, features, cautious)
 
     @property
     def mirrored(self) -> bool:
@@ -194,19 +190,12 @@ def _logistic(logit: float) -> float:
 def _allowed_null(cautious: Model, features: Floats, best: Ranked, bar: float) -> float:
     """Return what share of the answer's score the mirrored scan may reach, and the cautious chance is `bar` at least.
 
-    Of `NULL_SHARES`, or 0; wherever the map is not symmetric about the place. The more it reaches the less the chance.
     `features` (n,) are those of the answer.
     """
-    beside = features.copy()
-
-    def matters(share: float) -> bool:
-        beside[NULL_PLACES] = of_null(best, Null(share * best.score, 0.0))
-        return _logistic(cautious.logit(beside)) < bar + ROUNDING
-
-    if not matters(NULL_SHARES[-1]):
-        return NULL_SHARES[-1]
-    few = bisect_left(NULL_SHARES, True, key=matters)
-    return NULL_SHARES[few - 1] if few else 0.0
+    if bar >= 1.0:
+        return 0.0
+    least = math.log((bar + ROUNDING) / (1.0 - bar - ROUNDING))
+    return allowed_null(cautious.odds, features.copy(), NULL_PLACE, best.score, least)
 
 
 def _out_of_step(answer: Answer) -> bool:

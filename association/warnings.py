@@ -11,6 +11,8 @@ from registration import Beams
 from .causes import Cause, Mistake
 from .context import SearchContext
 from .extents import extent, inner_extent
+from .kernels.extents import facing_away
+from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport
 from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
@@ -104,7 +106,7 @@ def _exceeding(context: SearchContext) -> str | None:
     """Tell where the scan, but for its outermost pieces, would not fit into the box around the map."""
     segments, room = context.scan.measured.segments, context.index.diagonal
     # With its outermost pieces it is no less wide, which is sooner told.
-    if extent(segments) <= EXCEEDING * room:
+    if extent(context.ends) <= EXCEEDING * room:
         return None
     reach = inner_extent(segments)
     if reach <= EXCEEDING * room:
@@ -119,14 +121,13 @@ def _facing_away(context: SearchContext) -> str | None:
     """Tell where segments have another left, where free space is, than where the sensor stood."""
     if context.scan.viewpoint is None or not context.options.oriented:
         return None
-    segments, views = context.scan.measured.segments, context.scan.views
+    views = context.scan.views
     # What has no viewpoint, nan, shows its back to none.
-    seen_from = np.asarray(context.scan.viewpoint) if views is None else views.viewpoints[views.of_segment]
-    sights = segments.normals * (seen_from - segments.midpoints)
-    away = np.count_nonzero(sights[:, 0] + sights[:, 1] < -FACING)
+    seen_from = context.sights.places if views is None else as_records(POINT, views.viewpoints[views.of_segment])
+    away = facing_away(context.ends, seen_from, FACING)
     if not away:
         return None
     return (
-        f"{away} of {len(segments)} segments show their back to the viewpoint, from where nobody can see them: are "
+        f"{away} of {len(context.ends)} segments show their back to the viewpoint, from where nobody can see them: are "
         "begin and end exchanged, or is this not the sensor's frame?"
     )

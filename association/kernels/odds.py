@@ -1,9 +1,12 @@
 """Compiled models of the verdict, and some of what they go by: see `association.models` and `association.features`."""
 
+import math
+
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
 from ..tables import Odds
+from ..tuning import MAX_GAP, MOST_NULL, NULL_SHARE, NULL_SHARES, SYMMETRIC, UNLIKE_SYMMETRY
 
 
 @inlined
@@ -34,6 +37,52 @@ def log_odds(odds: Odds, features: Floats) -> float:
         other = share_between(features[pair.second], pair.second_start, pair.second_full)
         by_pairs += pair.nats * (min(one, other) if pair.least else max(one, other))
     return by_curves + by_pairs
+
+
+@kernel
+def three_log_odds(
+    usual: Odds, cautious: Odds, features: Floats, place: int, value: float
+) -> tuple[float, float, float]:
+    """Return the logarithms of the odds by both models, and by the second one with another value at one place."""
+    right = log_odds(usual, features)
+    careful = log_odds(cautious, features)
+    own = features[place]
+    features[place] = value
+    other = log_odds(cautious, features)
+    features[place] = own
+    return right, careful, other
+
+
+@kernel
+def null_features(score: float, null: float, symmetry: float) -> tuple[float, float, float]:
+    """Return the features ``null``, ``null_gap`` and ``null_better``, of what an answer and the mirrored scan score."""
+    share = min(MOST_NULL, null / score) if score > 0.0 else MOST_NULL
+    symmetric = min(1.0, max(0.0, (symmetry - UNLIKE_SYMMETRY) / (SYMMETRIC - UNLIKE_SYMMETRY)))
+    excess = max(0.0, share - NULL_SHARE) * (1.0 - symmetric)
+    gap = (1.0 - NULL_SHARE - excess) * score
+    return NULL_SHARE + excess, root_gap(gap), max(0.0, share - 1.0)
+
+
+@kernel
+def root_gap(gap: float) -> float:
+    """Return the root of a gap, nats, with its sign, up to that of `MAX_GAP`."""
+    return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
+
+
+@kernel
+def allowed_null(cautious: Odds, features: Floats, first: int, score: float, least: float) -> float:
+    """Return which of `NULL_SHARES` of the score the mirrored scan may reach, and the log odds are `least` still; or 0.
+
+    Wherever the map is not symmetric about the place. The more it reaches the less the odds. `features` (n,) are those
+    of the answer; of these ``null`` and the two after it, at `first`, are changed.
+    """
+    allowed = 0.0
+    for share in NULL_SHARES:
+        features[first], features[first + 1], features[first + 2] = null_features(score, share * score, 0.0)
+        if log_odds(cautious, features) < least:
+            break
+        allowed = share
+    return allowed
 
 
 @kernel

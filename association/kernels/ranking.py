@@ -84,10 +84,19 @@ def rank(
 
 
 @kernel
+def begin_at(found: Records, estimates: Records) -> None:
+    """Write the poses that a search found, (k,) of `FOUND`, to `estimates` (k,)."""
+    for k in range(len(found)):
+        estimates[k].theta = found[k].theta
+        estimates[k].x = found[k].x
+        estimates[k].y = found[k].y
+
+
+@kernel
 def distinct(
     poses: Records,
-    scores: Floats,
-    values: Floats,
+    merits: Records,
+    beside: Floats,
     most: int,
     distance: float,
     angle: float,
@@ -99,15 +108,20 @@ def distinct(
     A pose stands for those that are near, within `distance` metres and `angle` radians, and for those that its own
     covariance does not tell from it, at less than `same_family` squared deviations: a family along a corridor is one
     explanation. It does not stand for one of its family with a score that is better by more than `much_better` nats: a
-    prior may put that one behind it, and is contradicted by it. `poses` (k,) of `ESTIMATE`, `scores` (k,) without the
-    prior and `values` (k,) with it, -inf of what is no explanation; ties by place. Returns the places in them.
+    prior may put that one behind it, and is contradicted by it. `poses` (k,) of `ESTIMATE`, `merits` (k,) of `MERIT`;
+    what does not score is no explanation. The value is the score and what is `beside` it (k,), or (0,) where that is
+    nothing; ties by place. Returns the places in them.
     """
-    kept = np.empty(min(most, len(values)), dtype=np.int64)
+    losses = np.empty(len(poses))
+    for k in range(len(poses)):
+        value = merits[k].score + (beside[k] if len(beside) > 0 else 0.0)
+        losses[k] = -value if merits[k].score > 0.0 else math.inf
+    kept = np.empty(min(most, len(poses)), dtype=np.int64)
     informations = np.empty(len(kept), dtype=SYMMETRIC3)
     known = np.empty(len(kept), dtype=np.bool_)
     count = 0
-    for i in ascending(-values):
-        if count == len(kept) or values[i] == -math.inf:
+    for i in ascending(losses):
+        if count == len(kept) or losses[i] == math.inf:
             break
         stands = False
         for k in range(count):
@@ -121,7 +135,7 @@ def distinct(
             f = informations[k]
             square = f.xx * x * x + f.yy * y * y + f.tt * turn * turn
             square += 2.0 * (f.xy * x * y + f.xt * x * turn + f.yt * y * turn)
-            if known[k] and square < same_family and scores[i] <= scores[kept[k]] + much_better:
+            if known[k] and square < same_family and merits[i].score <= merits[kept[k]].score + much_better:
                 stands = True
                 break
         if not stands:

@@ -11,7 +11,7 @@ from association.layout import MATCH, MERIT
 from association.tables import Place, Sights, Workspace
 from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_FAMILY
 from registration import RigidTransform
-from registration.layout import Records
+from registration.layout import Floats, Records
 
 from ..records import assert_records, covariance_of, estimate_of, pose_of, sights_of
 from ..reference import ranking as twin
@@ -71,7 +71,10 @@ def test_lines_of_sight_are_spared_where_a_pose_is_far_behind(lacking: int, char
     assert both == (alone if charged else blind)
 
 
-BY_PLACE = np.zeros(3)  # values: ties go by place
+def merits_of(scores: Floats) -> Records:
+    merits = np.zeros(len(scores), MERIT)
+    merits["score"] = scores
+    return merits
 
 
 @given(SEEDS)
@@ -83,11 +86,12 @@ def test_distinct(seed: int) -> None:
     roots = rng.normal(size=(40, 3, 3)) * rng.choice([0.02, 0.3], (40, 1, 1))
     covariances, order = roots @ roots.transpose(0, 2, 1) + 1e-4 * np.eye(3), rng.permutation(40)
     estimates = np.concatenate([estimate_of(at, c) for at, c in zip(poses, covariances, strict=True)])
-    scores, values = rng.uniform(0.0, 10.0, 40), np.full(40, -np.inf)
-    values[order[:36]] = -np.arange(36.0)  # the others are no explanations
+    scores, values = rng.uniform(0.0, 10.0, 40), np.zeros(40)
+    values[order[:36]] = -np.arange(36.0)
+    scores[order[36:]] = [0.0, -1.0, 0.0, -2.0]  # no explanations
     rules = DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, 6.0
     for most in (5, 40):
-        got = ranking.distinct(estimates, scores, values, most, *rules)
+        got = ranking.distinct(estimates, merits_of(scores), values - scores, most, *rules)
         assert got.tolist() == twin.distinct(poses, covariances, scores, order[:36], most, *rules)
 
 
@@ -96,9 +100,9 @@ def test_a_pose_of_a_family_does_not_stand_for_a_much_better_one() -> None:
     poses = np.concatenate([estimate_of(pose(x), np.diag([4.0, 1e-4, 1e-4])) for x in (0.0, 1.0, 3.0)])
     for better, places in ((5.9, [0]), (6.1, [0, 2])):
         scores = np.array([10.0, 10.0, 10.0 + better])
-        assert ranking.distinct(poses, scores, BY_PLACE, 3, 0.3, 0.1, 12.8, 6.0).tolist() == places
+        assert ranking.distinct(poses, merits_of(scores), -scores, 3, 0.3, 0.1, 12.8, 6.0).tolist() == places
 
 
 def test_a_pose_without_a_covariance_stands_for_those_near_it_alone() -> None:
     poses = np.concatenate([estimate_of(pose(x)) for x in (0.0, 0.2, 0.5)])
-    assert ranking.distinct(poses, np.zeros(3), BY_PLACE, 3, 0.3, 0.1, 12.8, 6.0).tolist() == [0, 2]
+    assert ranking.distinct(poses, merits_of(np.ones(3)), np.zeros(0), 3, 0.3, 0.1, 12.8, 6.0).tolist() == [0, 2]
