@@ -23,7 +23,7 @@ import tempfile
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache, partial, wraps
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -65,6 +65,7 @@ SHARED = "registration"  # the package whose kernels those of every other may ca
 SOURCES = ("layout.py", "*tables.py", "tuning.py", "_*kernels.py", "kernels/**/*.py")
 VERSIONS = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
 DIRECTORY = "LINEFIX_KERNELS"  # names where compiled kernels are kept
+CHECKED = "LINEFIX_CHECK_KERNELS"  # set, it has the types of what kernels are handed looked at each time
 # The ways in that Numba makes of no use.
 FROM_PYTHON: dict[str, Any] = {"no_cfunc_wrapper": True}
 FROM_KERNELS: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
@@ -99,6 +100,43 @@ def kernel(function: Function) -> Function:
     compiled.get_call_template = partial(_call_template, called.get_call_template)  # type: ignore[method-assign]
     compiled.get_overload = called.get_overload  # type: ignore[method-assign]
     return cast(Function, compiled)
+
+
+def internal(function: Function) -> Function:
+    """Call a kernel from Python without a look at its arguments' types, once it is compiled.
+
+    For those whose arguments the packages make themselves, each always of one type: to find out what it is of tables of
+    forty arrays takes ten times as long as to hand them over, a tenth of a small answer in all. Other kernels cannot
+    call it. Where `CHECKED` is set in the environment, as in the tests, the types are looked at all the same.
+
+    Parameters
+    ----------
+    function : callable
+        A kernel.
+
+    Raises
+    ------
+    TypeError
+        By the kernel, where types are looked at: it was called with arguments of other types before.
+    """
+    if not isinstance(function, Dispatcher):  # NUMBA_DISABLE_JIT is set
+        return function
+    entry: Callable[..., Any] | None = None
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        nonlocal entry
+        if entry is not None:
+            return entry(*arguments)
+        result = function(*arguments)
+        variants: list[Any] = list(function.overloads.values())
+        if len(variants) > 1:
+            raise TypeError(f"{function.py_func.__qualname__}: expected arguments of one type each, got {function.signatures}")
+        if not os.environ.get(CHECKED):
+            entry = variants[0].entry_point
+        return result
+
+    return cast(Function, call)
 
 
 def inlined(function: Function) -> Function:

@@ -163,7 +163,8 @@ class MeasuredSegments:
     def __post_init__(self) -> None:
         # For a kernel an array that may be written to is another type, and each type is compiled anew.
         for name in ("sigma", "points", "centroids", "spreads"):
-            object.__setattr__(self, name, _frozen(np.ascontiguousarray(getattr(self, name)).view()))
+            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, _frozen(array.view()))
 
     @classmethod
     def from_segments(

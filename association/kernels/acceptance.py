@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import inlined, internal, kernel
 from registration.layout import Floats, Records
 
 from ..layout import BLOCKER, Indices
@@ -37,6 +37,7 @@ def first_wall(walls: Records, w: int, bridging: bool) -> int:
     return w
 
 
+@internal
 @kernel
 def accept_matches(
     matches: Records, lines: Lines, scan_ends: Records, pose: Records, walls: Records, pieces: Pieces
@@ -131,6 +132,7 @@ def accept_matches(
     return pairs[:pair], overlaps[:pair], rivals[: rival_starts[pair]], rival_starts[: pair + 1]
 
 
+@internal
 @kernel
 def missing_pieces(
     sights: Sights, matches: Records, pose: Records, place: Place, pieces: Pieces, work: Workspace

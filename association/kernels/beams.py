@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import borrowed, inlined, kernel
+from registration.compiling import borrowed, inlined, internal, kernel
 from registration.kernels import joint_add, joint_solve
 from registration.layout import Record, Records
 
@@ -80,6 +80,7 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
     evidence.passed = passed / n
 
 
+@internal
 @kernel
 def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
     """Return the shares of the beams that read farther, and nearer, than the map shows from the first pose.
@@ -164,6 +165,7 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
     pose.y = ty
 
 
+@internal
 @kernel
 def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Workspace, out: Records) -> None:
     """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import inlined, internal, kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import HARD_PRIOR, NO_PRIOR
@@ -31,6 +31,7 @@ def prior_value(prior: Record, pose: Record) -> float:
     return max(SOFT_FLOOR, -0.5 * square)
 
 
+@internal
 @kernel
 def prior_values(prior: Records, poses: Records) -> Floats:
     """Return what the prior (1,) says of each of the poses (k,), nats."""

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 
-from registration.compiling import kernel
+from registration.compiling import internal, kernel
 from registration.layout import Floats, Records
 
 from ..tuning import LEAST_CHANCE, MOST_CHANCE
 
 
+@internal
 @kernel
 def chance_matches(
     scan: Records, lengths: Floats, beyond: Floats, agreeing: float, area: float, gates: Records
@@ -36,6 +37,7 @@ def chance_matches(
     return chances
 
 
+@internal
 @kernel
 def log_tail(scan: Records, chances: Floats, score: float, exponents: Floats) -> float:
     """Return Chernoff's bound on the log of the probability that gains drawn with `chances` come to `score`.

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 
-from registration.compiling import kernel
+from registration.compiling import internal, kernel
 from registration.kernels import keep_alive, one_step_add
 from registration.layout import ONE_STEP_SUMS, Records
 
 from ..tuning import ROUGHNESS
 
 
+@internal
 @kernel
 def paper_measures(
     scan: Records, matches: Records, walls: Records, wall_sigma: float, theta: float, x: float, y: float

@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import inlined, kernel
+from registration.compiling import inlined, internal, kernel
 from registration.layout import Floats, Records
 
 from ..tables import Odds
@@ -39,6 +39,7 @@ def log_odds(odds: Odds, features: Floats) -> float:
     return by_curves + by_pairs
 
 
+@internal
 @kernel
 def three_log_odds(
     usual: Odds, cautious: Odds, features: Floats, place: int, value: float
@@ -69,6 +70,7 @@ def root_gap(gap: float) -> float:
     return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
 
 
+@internal
 @kernel
 def allowed_null(cautious: Odds, features: Floats, first: int, score: float, least: float) -> float:
     """Return which of `NULL_SHARES` of the score the mirrored scan may reach, and the log odds are `least` still; or 0.
@@ -85,6 +87,7 @@ def allowed_null(cautious: Odds, features: Floats, first: int, score: float, lea
     return allowed
 
 
+@internal
 @kernel
 def left_unmatched(scan: Records, matches: Records) -> tuple[float, float]:
     """Return the length of the longest scan line that is not matched, and of all of them together, metres."""
@@ -97,6 +100,7 @@ def left_unmatched(scan: Records, matches: Records) -> tuple[float, float]:
     return longest, together
 
 
+@internal
 @kernel
 def most_by_one_wall(hinges: Records) -> tuple[float, float]:
     """Return by how much a pose would move at most without one wall, and its greatest deviation then, m; 0 of none."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import inlined, internal, kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, LEAST_POINTS, Floats, Record, Records
 
@@ -338,6 +338,7 @@ def seen_at_once(rows: Records) -> Records:
     return seen
 
 
+@internal
 @kernel
 def describe_view(
     measured: Measured, counted: bool, variances: Records, model: Records
@@ -348,6 +349,7 @@ def describe_view(
     return row_of, rows, seen_at_once(rows)
 
 
+@internal
 @kernel
 def mirror_lines(rows: Records) -> Records:
     """Return the rows of the scan with left and right exchanged: y becomes -y, and free space stays on the left."""

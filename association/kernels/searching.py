@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from registration.compiling import borrowed, kernel
+from registration.compiling import borrowed, internal, kernel
 from registration.kernels import keep_alive
 from registration.layout import Records
 
@@ -17,6 +17,7 @@ from .sliding import search_slides, sliding_segments
 from .stopping import missed_share
 
 
+@internal
 @kernel
 def search(
     question: Question,
@@ -51,6 +52,7 @@ def search(
     return why, None
 
 
+@internal
 @kernel
 def go_on(
     question: Question,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from registration.compiling import inlined, internal, kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
@@ -137,6 +137,7 @@ def walls_of(scan: Records, matches: Records) -> Integers:
     return of_wall[:count]
 
 
+@internal
 @kernel
 def settle(
     question: Question, walls: Records, matches: Records, start: Records, map_variance: float, settled: Records,

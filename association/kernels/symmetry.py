@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import kernel
+from registration.compiling import internal, kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import MATCH, SCAN_LINE
@@ -82,6 +82,7 @@ def mirror_walls(pose: Record, walls: Records, lows: Floats, highs: Floats) -> R
     return out
 
 
+@internal
 @kernel
 def mirrored_share(
     views: Records, pose: Records, reach: float, null: Records, gates: Records, place: Place, work: Workspace

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..compiling import kernel
+from ..compiling import internal, kernel
 from ..layout import INFORMATION, PAIR, Floats, Record, Records
 from .joint import joint_information, joint_solve, joint_sums_compensated
 from .matrices import carried, invert3_scaled, sandwich
@@ -21,6 +21,7 @@ from .pairs import angle_chi_square, middles, move_origins, residuals
 from .records import keep_alive
 
 
+@internal
 @kernel
 def fit(
     pairs: Records, used: Floats, information: Floats, noise: Floats, how: Records, fitted: Records

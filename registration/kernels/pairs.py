@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiling import kernel
+from ..compiling import internal, kernel
 from ..layout import PAIR, Floats, Record, Records, X, Y
 from ..tables import Drawn, Points
 
@@ -38,6 +38,7 @@ def empty_pairs(count: int) -> Records:
     return np.empty(count, PAIR)
 
 
+@internal
 @kernel
 def fill_in(pairs: Records, indices: NDArray[np.intp], on_map: Drawn, scan: Drawn, points: Points) -> None:
     """Write the segments of map and scan that `indices` (n, 2) name to the pairs, and the points behind these."""

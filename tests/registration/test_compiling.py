@@ -124,6 +124,37 @@ def compiled(ran_once: SmallPackage, tmp_path: Path) -> SmallPackage:
     return SmallPackage(shutil.copytree(ran_once.home, tmp_path / "small"))
 
 
+FIRST = """
+import numpy as np
+from registration.compiling import internal, kernel
+@internal
+@kernel
+def first(a):
+    return a[0]
+"""
+CALLS = """
+import numpy as np
+from small.kernels.first import first
+ones = np.ones(2)
+assert first(ones) == first(ones) == 1.0
+try:
+    assert first(np.ones(2, np.int64)) == 5e-324
+except TypeError as error:
+    assert "first: expected arguments of one type each" in str(error)
+    assert {refused}
+else:
+    assert not {refused}
+assert first.__name__ == "first"
+"""
+
+
+@pytest.mark.parametrize("checked", [True, False])
+def test_the_types_of_what_an_internal_kernel_is_handed(compiled: SmallPackage, checked: bool) -> None:
+    """They are looked at where they are checked; else an integer is read as the float that has its bits."""
+    (compiled.home / "kernels" / "first.py").write_text(FIRST)
+    compiled.run(CALLS.format(refused=checked), **{compiling.CHECKED: "1" if checked else ""})
+
+
 def test_unchanged_source_is_loaded_and_not_compiled(compiled: SmallPackage) -> None:
     again = compiled.run()
     assert (again.answer, again.loaded, again.compiled_before, again.compiled_after) == (22.0, True, True, True)

@@ -12,12 +12,20 @@ from association.kernels import acceptance
 from association.layout import ENDS, MATCH, SCAN_LINE, as_records
 from association.tables import Lines
 from association.tuning import MAX_RIVALS
+from registration.layout import Records
 
 from ..records import estimate_of, sights_of
 from ..reference import acceptance as twin
 from ..reference.matching import match_scan
 from ..scenes import context_of, index_of, local, pose, scan_of
 from .drawn import GATES, SEEDS, SMALL, drawn, in_pieces, workspace_of
+
+
+def sent(ends: np.ndarray) -> Records:
+    """Return the ends of segments as those of a scan are, which nobody may write to."""
+    records = as_records(ENDS, ends)
+    records.flags.writeable = False
+    return records
 
 
 def test_union_length() -> None:
@@ -49,7 +57,7 @@ def test_accept_matches(seed: int) -> None:
     index = in_pieces(np.random.default_rng(seed))
     d = drawn(seed, radius=12.0, clutter=3, index=index)
     matches, _ = match_scan(d.scan, d.at, SMALL, index.tables.place, GATES)
-    ends, walls = as_records(ENDS, d.endpoints), index.walls.rows
+    ends, walls = sent(d.endpoints.copy()), index.walls.rows
     lines = Lines(d.scan, d.row_of, 0.5)
     got = acceptance.accept_matches(matches, lines, ends, estimate_of(d.at), walls, index.pieces)
     expected = twin.accept_matches(matches["wall"], lines, d.endpoints, d.at, walls, index.pieces)
@@ -73,7 +81,7 @@ def accepted_on(walls: list[list[float]], *segments: list[float]) -> tuple[np.nd
     assert len(lines.rows) == 1
     matches, _ = match_scan(lines.rows, local(index, pose()), SMALL, index.tables.place, GATES)
     return acceptance.accept_matches(
-        matches, Lines(lines.rows, lines.row_of, 0.5), as_records(ENDS, np.array(segments)),
+        matches, Lines(lines.rows, lines.row_of, 0.5), sent(np.array(segments)),
         estimate_of(local(index, pose())), index.walls.rows, index.pieces,
     )  # fmt: skip
 
@@ -120,7 +128,7 @@ def test_nothing_matched_is_nothing_accepted() -> None:
     matches["wall"] = -1
     lines = Lines(np.zeros(2, SCAN_LINE), np.arange(2), 0.5)
     got = acceptance.accept_matches(
-        matches, lines, np.zeros(2, ENDS), estimate_of(pose()), index.walls.rows, index.pieces
+        matches, lines, sent(np.zeros((2, 4))), estimate_of(pose()), index.walls.rows, index.pieces
     )
     assert [len(array) for array in got] == [0, 0, 0, 1]
 

@@ -128,11 +128,11 @@ def signatures() -> dict[str, int]:
     from numba.core.dispatcher import Dispatcher
 
     kernels = {
-        id(thing): thing
+        id(kernel): kernel
         for name, module in sys.modules.items()
         if name.split(".")[0] in ("registration", "vectorization", "association", "simulation")
         for thing in vars(module).values()
-        if isinstance(thing, Dispatcher)
+        if isinstance(kernel := getattr(thing, "__wrapped__", thing), Dispatcher)
     }
     return {f"{k.__module__}.{k.__name__}": len(k.signatures) for k in kernels.values()}
 
