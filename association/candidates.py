@@ -15,7 +15,7 @@ from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.planning import begin
 from .kernels.searching import go_on, put_in_order, search
 from .kernels.stopping import missed_share
-from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers
+from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
 from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
@@ -146,9 +146,7 @@ def _search(context: SearchContext, effort: Effort, chunk: int) -> Candidates:
     """Search the map, or the window of a hard prior."""
     deadline, tables, work = context.deadline, context.index.tables, context.workspace
     how, rules = _limits(context, effort, chunk)
-    found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), np.zeros(1, PROGRESS)
-    if effort.known > 0.0:
-        progress["best_value"] = effort.known
+    found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), record(PROGRESS, best_value=effort.known)
     question, planning = context.question(rules), _planning(context, effort)
     stopped, plan = BUDGET, None
     if deadline.passed:

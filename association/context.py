@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -45,7 +45,7 @@ def _place(x: float, y: float) -> Records:
 @lru_cache
 def _terms(gates: bytes, prior: bytes, model: bytes) -> bytes:
     """Put records together, which numpy does field by field: those of most searches on a map are the same."""
-    terms = np.zeros(1, TERMS)
+    terms = record(TERMS)
     terms["gates"], terms["prior"] = np.frombuffer(gates, GATES), np.frombuffer(prior, PRIOR)
     terms["model"] = np.frombuffer(model, MODEL)
     return terms.tobytes()
@@ -155,17 +155,20 @@ class SearchContext:
 
     def anywhere(self) -> SearchContext:
         """Return the same search without its prior."""
-        return replace(self, prior=None)
+        return self._searching(self.scan, self.lines)
 
     def instead(self, scan: Scan, lines: ScanLines) -> SearchContext:
         """Return the search, without a prior, for a scan that differs from this one, on the same map.
 
         Where it has as many lines, what the kernels write to is the same: one of both may search at a time.
         """
-        other = replace(self, scan=scan, lines=lines, prior=None)
+        other = self._searching(scan, lines)
         if len(lines.rows) == len(self.lines.rows):
             other.__dict__["workspace"] = self.workspace
         return other
+
+    def _searching(self, scan: Scan, lines: ScanLines) -> SearchContext:
+        return SearchContext(self.index, scan, None, self.options, self.deadline, lines, self.gates)
 
     def in_map(self, pose: RigidTransform) -> RigidTransform:
         """Return a pose of the index frame in the map frame."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration.layout import JOINT_SUMS, POSE, SEEN, SYMMETRIC3, Floats, Records
+from registration.layout import record as record
 
 Integers: TypeAlias = NDArray[np.integer[Any]]
 Indices: TypeAlias = NDArray[np.intp]
@@ -234,14 +235,6 @@ SCRATCH = np.dtype(
         ("figure", FIGURE),
     ]
 )
-
-
-def record(dtype: np.dtype[Any], /, **values: float) -> Records:
-    """Return an array of one record; what is not named is 0."""
-    out = np.zeros(1, dtype)
-    for name, value in values.items():
-        out[name] = value
-    return out
 
 
 def as_records(dtype: np.dtype[Any], rows: Floats) -> Records:

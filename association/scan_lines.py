@@ -18,7 +18,6 @@ from .kernels.scans import (
     join_lines,
     lines_of_a_view,
     mirror_lines,
-    seen_at_once,
 )
 from .layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, as_records, record
 from .options import AssociationOptions
@@ -85,8 +84,8 @@ class ScanLines:
 
     def mirrored(self) -> ScanLines:
         """Return those of the scan with left and right exchanged, which has to be of one view."""
-        rows = mirror_lines(self.rows)
-        return replace(self, rows=rows, sightings=seen_at_once(rows))
+        rows, seen = mirror_lines(self.rows)
+        return ScanLines(self.row_of, rows, self.model, seen)
 
 
 def _given(measured: MeasuredSegments) -> Measured:

@@ -14,7 +14,7 @@ from registration.observability import MAX_DEVIATION, THREE_SIGMA_TAIL
 
 from .context import SearchContext
 from .kernels.settling import settle as settle_matches
-from .layout import HINGE, SETTLED
+from .layout import HINGE, SETTLED, record
 from .ranking import Ranked
 from .scan import Views
 from .tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY
@@ -65,7 +65,7 @@ class Settled:
 
 def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Settled:
     """Work out the pose of a consensus set; without `hinges` there are none."""
-    settled = np.zeros(1, SETTLED)
+    settled = record(SETTLED)
     without = np.zeros(len(best.matches) if hinges else 0, HINGE)
     known = context.index.sigma
     count = settle_matches(

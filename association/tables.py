@@ -12,7 +12,7 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import MATCH, POSED, SCRATCH, WALL_SHARE, Indices, Integers
+from .layout import MATCH, POSED, SCRATCH, WALL_SHARE, Indices, Integers, record
 from .tuning import AT_ONCE
 
 
@@ -284,9 +284,9 @@ class Workspace(NamedTuple):
     @classmethod
     def of(cls, count: int, walls: int) -> Workspace:
         """Return one for a scan of `count` lines and a map of that many walls."""
-        held = np.full(count, -1, np.int64)
-        spreads, possible, shares = np.zeros(count), np.zeros(count), np.zeros(walls, WALL_SHARE)
-        shifts, later = np.zeros(count, np.int64), np.zeros(count)
+        spreads, later, possible = np.zeros((3, count))
+        shifts, held = np.zeros((2, count), np.int64)
+        held.fill(-1)
         posed, near = np.empty(AT_ONCE, POSED), np.empty((count, AT_ONCE), np.uint8)
-        matches, scratch = np.zeros(count, MATCH), np.zeros(1, SCRATCH)
+        matches, shares, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SHARE), record(SCRATCH)
         return cls(matches, spreads, shifts, later, possible, posed, near, held, shares, scratch)

@@ -131,7 +131,8 @@ def internal(function: Function) -> Function:
         result = function(*arguments)
         variants: list[Any] = list(function.overloads.values())
         if len(variants) > 1:
-            raise TypeError(f"{function.py_func.__qualname__}: expected arguments of one type each, got {function.signatures}")
+            name, kinds = function.py_func.__qualname__, function.signatures
+            raise TypeError(f"kernel {name}: expected arguments of one type each, got {kinds}")
         if not os.environ.get(CHECKED):
             entry = variants[0].entry_point
         return result

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .correspondences import Correspondences
 from .diagnostics import no_answer, result_of
 from .kernels.fitting import fit
-from .layout import FITTED, FITTING, Records
+from .layout import FITTED, FITTING, Records, record
 from .observability import most_parallel
 from .options import Estimator, RegistrationOptions, Rotation
 from .result import RegistrationResult
@@ -64,7 +64,7 @@ def register(
         return no_answer(options)
 
     noise = NOT_KNOWN if weights.noise is None else weights.noise
-    fitted = np.zeros(1, FITTED)
+    fitted = record(FITTED)
     how = _how(weights, options, at)
     offsets, angles = fit(given.rows, weights.used, weights.information, noise, how, fitted)
     return result_of(fitted, offsets, angles, weights, options)
@@ -90,7 +90,7 @@ def _how(weights: PairWeights, options: RegistrationOptions, at: RigidTransform 
 @lru_cache
 def _usual(estimator: Estimator, rotation: Rotation, count: int, *, oriented: bool, informed: bool) -> bytes:
     """Return a `FITTING` without a pose, for so many pairs that count, as bytes: numpy takes long to make one."""
-    how = np.zeros(1, FITTING)
+    how = record(FITTING)
     how["one_step"], how["covariance"] = estimator == "one_step", estimator == "joint"
     how["wahba"], how["oriented"], how["informed"] = rotation == "wahba", oriented, informed
     how["parallel"] = most_parallel(count)

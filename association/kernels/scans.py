@@ -351,12 +351,15 @@ def describe_view(
 
 @internal
 @kernel
-def mirror_lines(rows: Records) -> Records:
-    """Return the rows of the scan with left and right exchanged: y becomes -y, and free space stays on the left."""
+def mirror_lines(rows: Records) -> tuple[Records, Records]:
+    """Return the rows of the scan with left and right exchanged, and what one view shows of them.
+
+    Then y is -y, and free space stays on the left.
+    """
     out = np.copy(rows)
     for i in range(len(rows)):
         out[i].dx = -rows[i].dx
         out[i].y = -rows[i].y
         out[i].centroid_y = -rows[i].centroid_y
         out[i].angle = math.atan2(out[i].dy, out[i].dx)
-    return out
+    return out, seen_at_once(out)

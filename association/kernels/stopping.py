@@ -53,10 +53,14 @@ def missed_sets(scan: Records, samples: Samples, fewest: int, needed: float, mos
         s = undecided[at]
         held = found[s] < fewest
         if not held:
-            while (gains[s] < needed or sizes[s] < fewest) and sizes[s] < n:
-                gains[s] += scan[orders[s, sizes[s]]].gain
-                sizes[s] += 1
-            held = found[s] < sizes[s] or gains[s] < needed
+            size = sizes[s]
+            gain = gains[s]
+            while (gain < needed or size < fewest) and size < n:
+                gain += scan[orders[s, size]].gain
+                size += 1
+            sizes[s] = size
+            gains[s] = gain
+            held = found[s] < size or gain < needed
         if held:
             end -= 1
             undecided[at] = undecided[end]

@@ -140,7 +140,7 @@ assert first(ones) == first(ones) == 1.0
 try:
     assert first(np.ones(2, np.int64)) == 5e-324
 except TypeError as error:
-    assert "first: expected arguments of one type each" in str(error)
+    assert "kernel first: expected arguments of one type each" in str(error)
     assert {refused}
 else:
     assert not {refused}

@@ -233,7 +233,9 @@ def test_mirror_lines(seed: int) -> None:
     other = mirrored(Scan(measured)).measured
     expected_row_of, expected, _ = scans.describe_view(given_to(other), other.counted, variances, model)
     assert row_of.tolist() == expected_row_of.tolist()
-    assert_rows(scans.mirror_lines(rows), expected, 1e-9)
+    got, got_seen = scans.mirror_lines(rows)
+    assert_rows(got, expected, 1e-9)
+    np.testing.assert_array_equal(got_seen, scans.seen_at_once(got))
 
 
 def test_a_scan_of_nothing_has_no_lines() -> None:
