@@ -21,7 +21,7 @@ import platform
 import shutil
 import tempfile
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache, partial, wraps
 from importlib.util import find_spec
@@ -128,16 +128,25 @@ def internal(function: Function) -> Function:
         nonlocal entry
         if entry is not None:
             return entry(*arguments)
-        result = function(*arguments)
-        variants: list[Any] = list(function.overloads.values())
-        if len(variants) > 1:
-            name, kinds = function.py_func.__qualname__, function.signatures
-            raise TypeError(f"kernel {name}: expected arguments of one type each, got {kinds}")
+        result, kinds = function(*arguments), set(map(_layouts, function.signatures))
+        if len(kinds) > 1:
+            raise TypeError(f"kernel {function.py_func.__qualname__}: expected arguments of one type each, got {kinds}")
         if not os.environ.get(CHECKED):
+            variants: list[Any] = list(function.overloads.values())
             entry = variants[0].entry_point
         return result
 
     return cast(Function, call)
+
+
+def _layouts(kinds: Iterable[types.Type]) -> tuple[Any, ...]:
+    """Return types but for whether arrays may be written to, which those that another process sent always may."""
+    return tuple(
+        kind.copy(readonly=False) if isinstance(kind, types.Array)
+        else _layouts(tuple(cast(Any, kind))) if isinstance(kind, types.BaseTuple)
+        else kind
+        for kind in kinds
+    )  # fmt: skip
 
 
 def inlined(function: Function) -> Function:
