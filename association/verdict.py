@@ -192,10 +192,10 @@ def _allowed_null(cautious: Model, features: Floats, best: Ranked, bar: float) -
 
     `features` (n,) are those of the answer.
     """
-    if bar >= 1.0:
+    chance = bar + ROUNDING
+    if chance >= 1.0:
         return 0.0
-    least = math.log((bar + ROUNDING) / (1.0 - bar - ROUNDING))
-    return allowed_null(cautious.odds, features.copy(), NULL_PLACE, best.score, least)
+    return allowed_null(cautious.odds, features.copy(), NULL_PLACE, best.score, math.log(chance / (1.0 - chance)))
 
 
 def _out_of_step(answer: Answer) -> bool:

@@ -174,6 +174,13 @@ def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatc
             assert asked_of(sure, monkeypatch) == []
 
 
+def test_where_the_bar_is_next_to_one_every_null_matters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where no odds are so great that rounding leaves room for a null."""
+    for lacking in (1e-8, 1e-9, 5e-10, 1e-12):
+        with judged_by(SURE, USABLE_CAUTIOUS=1.0 - lacking):
+            assert asked_of(leading(400.0), monkeypatch) == [tuning.NULL_SHARES[-1] if lacking > 2e-9 else 0.0]
+
+
 def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> None:
     """An answer with 20 nats, which the mirrored scan of ROOM has as well; it says nothing of an answer with 110."""
     with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, 0.9, -100.0]}}):
