@@ -47,11 +47,10 @@ try:
     from numba.core.registry import cpu_target
     from numba.core.serialize import dumps
 
-    from .callees import CalleeCompiler, put_together, set_environments
+    from .libraries import Bitcode, CalleeCompiler, KernelCompiler, MachineCode, put_together, set_environments
 
     _pickle: Callable[[Any], bytes] = dumps
     _take_apart: Callable[[Any], tuple[Any, ...]] = CompileResult._reduce
-    _put_together: Callable[..., Any] = CompileResult._rebuild
     PROCESSOR = cpu_target.target_context.codegen().magic_tuple()
 except (ImportError, AttributeError) as error:
     raise ImportError(UNKNOWN_NUMBA) from error
@@ -89,7 +88,7 @@ def kernel(function: Function) -> Function:
     """
     if function.__closure__:
         raise TypeError(f"kernel {function.__qualname__}: expected no variables of an enclosing function")
-    compiled = njit(nogil=True, **FROM_PYTHON)(function)
+    compiled: Any = njit(nogil=True, pipeline_class=KernelCompiler, **FROM_PYTHON)(function)
     if not isinstance(compiled, Dispatcher):  # NUMBA_DISABLE_JIT is set
         return interpreted(function)
     if not hasattr(compiled, "_cache"):
@@ -233,7 +232,7 @@ def stamp(package: str) -> str:
         for path in sources(name):
             text = path.read_bytes()
             digest.update(f"{name}/{path.relative_to(_home(name)).as_posix()} {len(text)}\n".encode() + text)
-    for name in ("callees.py", "compiling.py"):
+    for name in ("compiling.py", "libraries.py"):
         digest.update((_home(SHARED) / name).read_bytes())
     return digest.hexdigest()[:20]
 
@@ -251,6 +250,7 @@ class KernelCache(_Cache):
     """
 
     kind = "kernel"
+    library: type[Bitcode | MachineCode] = MachineCode
 
     def __init__(self, function: Callable[..., Any]) -> None:
         module, line = function.__module__, function.__code__.co_firstlineno
@@ -268,7 +268,7 @@ class KernelCache(_Cache):
         path = self._path(sig)
         try:
             kept_sig, parts = pickle.loads(path.read_bytes())
-            return self._put_together(target_context, *parts) if kept_sig == sig else None
+            return put_together(target_context, self.library, *parts) if kept_sig == sig else None
         except FileNotFoundError:
             return None
         except Exception as error:  # a file that was cut off can fail in any way
@@ -304,9 +304,6 @@ class KernelCache(_Cache):
     def _path(self, sig: Any) -> Path:
         return self._directory / f"{self._name}-{hashlib.sha256(str(sig).encode()).hexdigest()[:16]}.nbc"
 
-    def _put_together(self, target_context: Any, *parts: Any) -> Any:
-        return _put_together(target_context, *parts)
-
     def _finish(self, data: Any) -> None:
         set_environments(data)
 
@@ -315,9 +312,7 @@ class CalleeCache(KernelCache):
     """The same for what other kernels call."""
 
     kind = "callee"
-
-    def _put_together(self, target_context: Any, *parts: Any) -> Any:
-        return put_together(target_context, *parts)
+    library = Bitcode
 
     def _finish(self, data: Any) -> None:
         pass

@@ -161,16 +161,21 @@ def _overlapping(index: MapIndex, sides: Beside) -> Iterator[Finding]:
 
 def _gaping(index: MapIndex) -> Iterator[Finding]:
     """Tell where an end nearly meets another segment: at no other end, on no other line, and yet near one."""
+    ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
+    _, place, there = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    # What is as near as this to its own begin is too short to tell.
+    alone = (there[place.reshape(-1)] == 1) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
+    if not alone.any():
+        return
     from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
 
-    ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
-    # The nearest is the end itself; what is as near as this to its own begin is too short to tell.
-    nearest = np.asarray(cKDTree(ends).query(ends, k=2)[0])[:, 1]
-    free = np.flatnonzero((nearest > LEAST_GAP) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2))
+    loose = np.flatnonzero(alone)
+    nearest = np.asarray(cKDTree(ends).query(ends[loose], k=2)[0])[:, 1]  # after the end itself
+    free = nearest > LEAST_GAP
     found = set()
-    for end in free[:MOST_ENDS]:
+    for end, gap in zip(loose[free][:MOST_ENDS], nearest[free][:MOST_ENDS], strict=True):
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
-        if apart > LEAST_GAP + SAME_LINE and min(apart, nearest[end]) <= GREATEST_GAP:
+        if apart > LEAST_GAP + SAME_LINE and min(apart, gap) <= GREATEST_GAP:
             found.add(int(end) // 2)
     if found:
         yield Finding(

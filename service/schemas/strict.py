@@ -40,7 +40,7 @@ class Strict(BaseModel):
 class Answer(BaseModel):
     """What is answered: documents the JSON, is never built while answering."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)  # seldom asked for
 
 
 def _free_json(value: Any) -> Any:

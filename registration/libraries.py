@@ -1,0 +1,124 @@
+"""What is kept of a kernel: for other kernels that call it bitcode, for Python machine code, and never both.
+
+Numba makes machine code of every kernel, and two ways in from Python and C. A kernel takes in whatever it calls, so
+that nobody runs those of what is called by kernels only: a quarter of the time of a first start. And beside machine
+code it keeps bitcode, which nobody links that takes in callees: to read it was a tenth of a later start. How Numba
+keeps and links code is its own affair, so that this is written for the versions that the project names.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import binding
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+
+
+class Bitcode(JITCodeLibrary):
+    """What is compiled of a function, to be linked into what calls it."""
+
+    @classmethod
+    def read(cls, codegen: Any, kept: tuple[str, str, bytes]) -> Bitcode:
+        """Return what `serialize_using_object_code` made something of."""
+        name, _, bitcode = kept
+        library = cls(codegen, name)
+        library._final_module = binding.parse_bitcode(bitcode)
+        library._finalize_final_module()
+        return library
+
+    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
+        """Return what is kept: there is no object code."""
+        return self.name, "bitcode", self._get_module_for_linking().as_bitcode()
+
+    def get_pointer_to_function(self, _: str) -> int:
+        """Return that nothing here can be run."""
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self) -> Bitcode:
+        """Who is asked to set the environments of what can be run."""
+        return self
+
+    def set_env(self, *_: object) -> None:
+        """Do nothing: whoever links this sets them."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave it to the callers, which do it again anyway."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+class CalleeCompiler(CompilerBase):
+    """Compiles to `Bitcode`."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes that Numba goes through."""
+        state = self.state
+        state.library = Bitcode(state.targetctx.codegen(), state.func_id.func_qualname)
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+class MachineCode(JITCodeLibrary):
+    """What is compiled of a function that Python calls; nothing is linked into anything of what was kept of it."""
+
+    @classmethod
+    def read(cls, codegen: Any, kept: tuple[str, str, tuple[bytes, set[str]]]) -> MachineCode:
+        """Return what `serialize_using_object_code` made something of, ready to run."""
+        name, _, (code, symbols) = kept
+        library = cls(codegen, name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols |= symbols
+        return library
+
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, set[str]]]:
+        """Return what is kept: the code, and the names of what is in it."""
+        module = self._get_module_for_linking()
+        symbols = {part.name for part in (*module.functions, *module.global_variables) if not part.is_declaration}
+        return self.name, "object", (self._get_compiled_object(), symbols)
+
+
+class KernelCompiler(CompilerBase):
+    """Compiles to `MachineCode`."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes that Numba goes through."""
+        state = self.state
+        state.library = MachineCode(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+class _Reader:
+    """Stands in for a target context where Numba puts together what was kept of a kernel."""
+
+    def __init__(self, context: Any, library: type[Bitcode | MachineCode]) -> None:
+        self.typing_context, self.get_executable, self._codegen = (
+            context.typing_context,
+            context.get_executable,
+            context.codegen(),
+        )
+        self._library = library
+
+    def codegen(self) -> _Reader:
+        return self
+
+    def unserialize_library(self, kept: Any) -> Bitcode | MachineCode:
+        return self._library.read(self._codegen, kept)
+
+
+def put_together(context: Any, library: type[Bitcode | MachineCode], *parts: Any) -> Any:
+    """Return what was taken apart of a kernel with such a library, as Numba's `CompileResult._rebuild`."""
+    return CompileResult._rebuild(_Reader(context, library), *parts)._replace(target_context=context)
+
+
+def set_environments(compiled: Any) -> None:
+    """Set the environments of the callees that a kernel took in, which have none of their own."""
+    for environment in compiled._find_referenced_environments():
+        compiled.library.codegen.set_env(environment.env_name, environment)
