@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .context import SearchContext
 from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.planning import begin
 from .kernels.searching import go_on, put_in_order, search
-from .kernels.stopping import missed_share
+from .kernels.stopping import missed_share, restrict
 from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
 from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
@@ -237,6 +237,17 @@ def _segments_of_bases(count: int) -> int:
 
 @lru_cache(maxsize=2 * (BASE_SEGMENTS + 1 + len(TELLING_SEGMENTS)))
 def _orders(n: int, samples: int) -> tuple[Integers, Integers]:
-    """Draw orders of n segments (samples, n), all as likely; return the places of each segment, too, (n, samples)."""
-    orders = np.random.default_rng(SAMPLE_SEED).random((samples, n)).argsort(axis=1)
-    return orders.astype(np.uint8), np.ascontiguousarray(orders.argsort(axis=1).T, dtype=np.uint8)
+    """Return orders of n segments (samples, n), all as likely, and the places of each segment in them, (n, samples).
+
+    Those of few segments are what is left of orders of more: to draw them anew takes ten times as long, for each number
+    of segments that a scan has for the first time.
+    """
+    drawn = _drawn(max(n, BASE_SEGMENTS), samples)
+    orders, ranks = np.empty((samples, n), np.uint8), np.empty((n, samples), np.uint8)
+    restrict(drawn, orders, ranks)
+    return orders, ranks
+
+
+@cache
+def _drawn(n: int, samples: int) -> Integers:
+    return np.random.default_rng(SAMPLE_SEED).random((samples, n)).argsort(axis=1).astype(np.uint8)

@@ -121,9 +121,9 @@ MOST_BANDS = 200  # of which there are so many at most, about
 # Bins of half a turn; an odd number, so that the middle one is about a right angle. Measured: with 23 it takes up to a
 # tenth longer, with 91 as long.
 CROSSING_ANGLES = 45
-# Tables: half of the first two take a fifth longer; twice as many gain a seventh at 20,000 segments, for half
-# as much memory again. The third is some 10 us of indexing a run.
-CROSSINGS_A_RUN = (40, 250, 4_000)
+# Tables: half of the first two take a seventh longer at 20,000 segments; twice as many take a twelfth less, for 2.3
+# times the memory. The third is some 10 us of indexing a run.
+CROSSINGS_A_RUN = (80, 500, 4_000)
 # Memory, of 12 bytes each: 54 MB of entries, and 24 MB of pairs while indexing, with room for a fifth more; and 1 to
 # 1.5 s of indexing. They are compared with estimates: twice as many pairs and looks are let pass.
 MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)

@@ -22,6 +22,30 @@ def cover(residual: Floats, a: int, b: int) -> float:
 
 
 @kernel
+def restrict(drawn: Integers, orders: Integers, ranks: Integers) -> None:
+    """Leave of orders of more segments those of the first n; of all orders as likely they are all as likely.
+
+    Parameters
+    ----------
+    drawn : (s, m)
+        Orders of m segments, at least n.
+    orders : (s, n)
+        Written: the segments below n in the same order.
+    ranks : (n, s)
+        Written: the places of each segment in them.
+    """
+    n = orders.shape[1]
+    for s in range(len(orders)):
+        place = k = 0
+        while place < n:  # without a branch that is as often wrong as right: what does not stay is written over
+            orders[s, place] = drawn[s, k]
+            place += drawn[s, k] < n
+            k += 1
+        for place in range(n):
+            ranks[orders[s, place], s] = place
+
+
+@kernel
 def strike(samples: Samples, a: int, b: int) -> None:
     """Note in the sampled consensus sets that a base was gone through."""
     found = samples.found

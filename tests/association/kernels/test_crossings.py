@@ -115,7 +115,7 @@ def test_where_too_many_cross_none_is_listed() -> None:
     assert entries_of(drawn(0).scan, (0, 1), index.crossings) == -1
 
 
-@pytest.mark.parametrize(("count", "reach"), [(1, 8.0), (20, 64.0), (200, 16.0)])
+@pytest.mark.parametrize(("count", "reach"), [(1, 8.0), (20, 64.0), (200, 32.0)])
 def test_the_more_there_are_the_less_far_they_are_listed(count: int, reach: float) -> None:
     """Rows of rooms: from one end to the other, or as far as memory allows; the same for the same runs."""
     room = np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]])

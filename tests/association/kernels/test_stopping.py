@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -33,6 +35,17 @@ def test_bound_is_never_below_what_can_have_been_missed() -> None:
         assert bound >= missed - 1e-9
         assert bound >= residual.sum() - 1e-9
     assert bound < 0.7 * gains.sum()
+
+
+@pytest.mark.parametrize("n", [1, 4, 6])
+def test_orders_of_fewer(n: int) -> None:
+    """Of all orders of six those of the first n come as often as one another, with the places of each."""
+    drawn = np.array(list(itertools.permutations(range(6))), np.uint8)
+    orders, ranks = np.full((len(drawn), n), 99, np.uint8), np.full((n, len(drawn)), 99, np.uint8)
+    stopping.restrict(drawn, orders, ranks)
+    assert orders.tolist() == [[k for k in row if k < n] for row in drawn.tolist()]
+    assert np.array_equal(ranks, orders.argsort(axis=1).T)
+    assert set(Counter(map(tuple, orders.tolist())).values()) == {len(drawn) // math.factorial(n)}
 
 
 @given(SEEDS)
