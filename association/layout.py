@@ -154,13 +154,13 @@ SWEPT = _fields((_I, "laid step here"), (_F, "at until"))
 # which of the cells swept; the entry of its list; in the first of an array, which of all of them b lies on.
 MET = _fields((_I, "run cell entry hit"))
 
-# A pose to be tried: the pose; from the sensor to where it is held, in the scan frame, rotated, and the variance of its
-# turning about that; what the prior says of it, and what its score has to come to; where the search goes on behind it;
-# whether it may score that.
+# A pose to be tried: the pose; cosine and sine of its heading; from the sensor to where it is held, in the scan frame,
+# rotated, and the variance of its turning about that; what the prior says of it, and what its score has to come to;
+# where the search goes on behind it; whether it may score that.
 POSED = np.dtype(
     [
         *POSE.descr,
-        *_fields((_F, "lever_x lever_y angle_variance bonus floor")).descr,
+        *_fields((_F, "cosine sine lever_x lever_y angle_variance bonus floor")).descr,
         *_fields((_I, "anchor step entry possible")).descr,
     ]
 )

@@ -212,20 +212,13 @@ def may_score(
     turned = np.empty(count)
     lacking = np.empty(count)
     open_ones = np.empty(count, np.int32)
-    theta = math.nan
-    cosine = 0.0
-    sine = 0.0
     for p in range(count):
         one = posed[p]
-        if one.theta != theta:  # slides along one wall have one heading
-            theta = one.theta
-            cosine = math.cos(theta) * per_cell
-            sine = math.sin(theta) * per_cell
-        cosines[p] = cosine
-        sines[p] = sine
+        cosines[p] = one.cosine * per_cell
+        sines[p] = one.sine * per_cell
         lefts[p] = (one.x - shape.x0) * per_cell
         bottoms[p] = (one.y - shape.y0) * per_cell
-        turned[p] = (theta + math.pi) * PER_RADIAN + 0.5
+        turned[p] = (one.theta + math.pi) * PER_RADIAN + 0.5
         lacking[p] = one.floor
         one.possible = 0
         open_ones[p] = p

@@ -123,6 +123,8 @@ def search_slides(
             slide = low + (j + 0.5) / steps * (high - low)
             one = posed[n]
             one.theta = theta
+            one.cosine = c
+            one.sine = s
             one.x = wall.dx * slide - wall.dy * wall.offset - gx
             one.y = wall.dy * slide + wall.dx * wall.offset - gy
             one.lever_x = gx

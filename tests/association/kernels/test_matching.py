@@ -110,6 +110,7 @@ def may_score(
     later = np.array([scan["gain"][i + 1 :][shifts[i + 1 :] >= 0].sum() for i in range(len(scan))])
     for one, at, floor in zip(posed, poses, floors, strict=False):
         one["x"], one["y"], one["theta"], one["floor"] = at.x, at.y, at.theta, floor
+        one["cosine"], one["sine"] = math.cos(at.theta), math.sin(at.theta)
     matching.may_score(scan, posed, len(poses), spreads, shifts, later, raster, near)
     return [bool(told) for told in posed["possible"][:-1]], np.where(near.T[:-1], scan["gain"], -1.0)
 

@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from association import HardPrior
 from association.kernels import proposing, sweeping, trying
 from association.kernels.sliding import search_slides
-from association.layout import BASE, ESTIMATE, FOUND, PROGRESS, RULES, record
+from association.layout import BASE, FOUND, POSED, PROGRESS, RULES, record
 from association.tables import Question
 from association.tuning import AT_ONCE, ROUNDS, TESTS_HYPOTHESIS, TESTS_REFINED, TESTS_REJECTED
 from registration import RigidTransform
@@ -61,9 +61,18 @@ def test_base_pose(seed: int) -> None:
         if abs(wa["dx"] * wb["dy"] - wa["dy"] * wb["dx"]) < 0.1:
             continue
         at, inside = twin.base_pose(a, b, wa, wb)
-        out = np.zeros(1, ESTIMATE)
+        out = np.zeros(1, POSED)
         assert bool(proposing.base_pose(a, b, wa, wb, out[0])) is inside
         assert same_pose(pose_of(out[0]), at, 1e-9, 1e-9)
+        assert (out["cosine"][0], out["sine"][0]) == pytest.approx((math.cos(at.theta), math.sin(at.theta)), abs=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, -1e-9, 0.07, -0.2999, 0.3001, -1.0, 3.0])
+def test_what_is_turned_a_little(angle: float) -> None:
+    """By their series where that is exact, and as by the library beyond."""
+    for heading in np.linspace(-4.0, 4.0, 9).tolist():
+        turned = proposing.turn_a_little(math.cos(heading), math.sin(heading), angle)
+        assert turned == pytest.approx((math.cos(heading + angle), math.sin(heading + angle)), abs=3e-15)
 
 
 @pytest.mark.parametrize(("slide", "inside"), [(-0.01, False), (0.01, True), (2.99, True), (3.01, False)])
@@ -79,7 +88,7 @@ def test_a_base_may_stick_out_of_its_walls_a_little(slide: float, inside: bool, 
         one["x"] = along * wall["dx"] - wall["offset"] * wall["dy"]
         one["y"] = along * wall["dy"] + wall["offset"] * wall["dx"]
     pair = (b[0], a[0], wb, wa) if second else (a[0], b[0], wa, wb)
-    assert bool(proposing.base_pose(*pair, np.zeros(1, ESTIMATE)[0])) is inside
+    assert bool(proposing.base_pose(*pair, np.zeros(1, POSED)[0])) is inside
 
 
 @dataclass(frozen=True)
@@ -326,6 +335,7 @@ def test_try_poses(seed: int) -> None:
     progress["least_freedom"] = d.rng.choice([0.0, 10.0])
     for k, (one, at) in enumerate(zip(work.posed, places, strict=False)):
         one["x"], one["y"], one["theta"] = at.x, at.y, at.theta
+        one["cosine"], one["sine"] = math.cos(at.theta), math.sin(at.theta)
         one["lever_x"], one["lever_y"] = RigidTransform(0.0, 0.0, at.theta).apply(pin)
         one["angle_variance"] = variance
         one["anchor"], one["step"], one["entry"] = 100 + k, 10 + k, k
