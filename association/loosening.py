@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from .context import SearchContext
 from .explain import Answer
-from .ranking import Ranked, score_again
+from .ranking import Ranked, scores_again
 from .scan_lines import ScanLines
 from .tuning import LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_RIVALS, LOOSE_WALLS, MODEL_OFFSET, TWIN_TEMPERATURE
 
@@ -32,11 +32,12 @@ def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ra
     wall_sigma = max(LOOSE_WALLS, LOOSE_FACTOR * answer.settled.wall_sigma)
     more = math.sqrt(wall_sigma**2 - MODEL_OFFSET**2)
     loose = context.instead(context.scan, ScanLines.of(context.scan, more, context.options))
-    best, *others = score_again(loose, (answer.best, *rivals[:LOOSE_RIVALS]))
-    return 1.0 / (1.0 + sum(math.exp(min(0.0, _gap(best, one)) / TWIN_TEMPERATURE) for one in others))
+    explanations = (answer.best, *rivals[:LOOSE_RIVALS])
+    best, *others = map(_worth, explanations, scores_again(loose, explanations))
+    return 1.0 / (1.0 + sum(math.exp(min(0.0, other - best) / TWIN_TEMPERATURE) for other in others))
 
 
-def _gap(best: Ranked, other: Ranked) -> float:
-    """Return how much more the other is worth, nats, with what beams say of centimetres the less."""
-    by_beams = (other.score - other.by_segments) - (best.score - best.by_segments)
-    return other.value - best.value - (1.0 - LOOSE_BEAMS) * by_beams
+def _worth(one: Ranked, by_segments: float) -> float:
+    """Return what it is worth if its segments score so much, nats, with what beams say of centimetres the less."""
+    by_beams = one.score - one.by_segments
+    return by_segments + by_beams + one.value - one.score - (1.0 - LOOSE_BEAMS) * by_beams

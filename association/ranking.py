@@ -17,7 +17,7 @@ from .context import SearchContext
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
 from .kernels.ranking import begin_at, distinct, rank
-from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Integers, as_records
+from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Integers
 from .options import CancelledError, Estimator
 from .tables import Rays
 from .tuning import (
@@ -165,23 +165,17 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     return explanations
 
 
-def score_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[Ranked]:
-    """Match and score explanations anew, refined from where they are; in their order, with what beams and prior say.
+def scores_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[float]:
+    """Match explanations anew, refined from where they are; return what their segments score then, in their order.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    poses = as_records(ESTIMATE, np.stack([one.estimate.view(np.float64) for one in explanations]))
-    scored = _score(context, poses)
-    merits = scored.merits
-    merits["read"], merits["passed"] = [one.read for one in explanations], [one.passed for one in explanations]
-    merits["score"] += [one.score - one.by_segments for one in explanations]
-    return [
-        _explanation(scored, place, merit, merit[0] + one.value - one.score, inside=one.inside)
-        for place, (one, merit) in enumerate(zip(explanations, merits.tolist(), strict=True))
-    ]
+    poses = np.frombuffer(bytearray().join(one.estimate.tobytes() for one in explanations), ESTIMATE)
+    scores: list[float] = _score(context, poses).merits["score"].tolist()
+    return scores
 
 
 def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, inside: bool) -> Ranked:

@@ -198,18 +198,19 @@ class MeasuredSegments:
             When a number is out of range or an array has another length than `segments`.
         """
         n = len(segments)
-        counted = points is not None
-        centroids, spreads = moments if moments is not None else (segments.midpoints, segments.lengths**2 / 12.0)
-        ranges: list[tuple[str, Any, tuple[int, ...], float, float]] = [
-            ("sigma", np.full(n, sigma, dtype=np.float64) if np.ndim(sigma) == 0 else sigma, (n,), 0.0, MAX_SIGMA),
-            ("points", points if counted else segments.lengths / DEFAULT_POINT_SPACING,
-             (n,), 1.0 if counted else 0.0, MAX_POINTS),
-            ("centroids", centroids, (n, 2), -MAX_COORDINATE, MAX_COORDINATE),
-            ("spreads", spreads, (n,), 0.0, MAX_LENGTH**2),
-        ]  # fmt: skip
-        arrays = [_checked(values, shape, low, high, f"{argument}.{name}") for name, values, shape, low, high in ranges]
-        sigmas, counts, means, moments_along = arrays
-        return cls(segments, sigmas, counts, means, moments_along, counted)
+        given = np.full(n, sigma, dtype=np.float64) if np.ndim(sigma) == 0 else sigma
+        sigmas = _checked(given, (n,), 0.0, MAX_SIGMA, f"{argument}.sigma")
+        # What is derived of segments was checked with them.
+        if points is None:
+            counts = _frozen(segments.lengths / DEFAULT_POINT_SPACING)
+        else:
+            counts = _checked(points, (n,), 1.0, MAX_POINTS, f"{argument}.points")
+        if moments is None:
+            means, along = segments.midpoints, _frozen(segments.lengths**2 / 12.0)
+        else:
+            means = _checked(moments[0], (n, 2), -MAX_COORDINATE, MAX_COORDINATE, f"{argument}.centroids")
+            along = _checked(moments[1], (n,), 0.0, MAX_LENGTH**2, f"{argument}.spreads")
+        return cls(segments, sigmas, counts, means, along, points is not None)
 
     def __len__(self) -> int:
         return len(self.segments)
