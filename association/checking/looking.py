@@ -35,6 +35,12 @@ class Looker:
         reach, wall = first_hit(ray, place.walls, place.grid.starts, place.grid.items, place.grid.shape[0])
         return float(reach), int(wall)
 
+    def is_within(self, x: float, y: float) -> bool:
+        """Tell whether a place lies in the box around the walls, as far as cells list them."""
+        shape = self.index.tables.place.grid.shape[0]
+        right, top = shape["columns"] * shape["cell"], shape["rows"] * shape["cell"]
+        return bool(0.0 <= x - shape["x0"] <= right and 0.0 <= y - shape["y0"] <= top)
+
     def is_front(self, wall: int, angle: float) -> bool:
         """Tell whether a ray along an angle meets a wall on its left, where free space is."""
         row = self.index.walls.rows[wall]

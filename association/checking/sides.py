@@ -45,6 +45,7 @@ class Sides:
     lengths : (k,) metres
     left, right : (k, 2) how many rays met a front, and how many a back, on either side
     room : (k, 2) how far away what is nearest is on the left, and on the right, metres; inf where nothing is
+    lost : (k,) whether a ray on the left was left within the map: nobody knows what it would have met
     """
 
     walls: np.ndarray[tuple[int], np.dtype[np.intp]]
@@ -52,6 +53,7 @@ class Sides:
     left: Floats
     right: Floats
     room: Floats
+    lost: Flags
 
     @property
     def meaningless(self) -> bool:
@@ -70,7 +72,7 @@ class Sides:
     @property
     def reversed(self) -> bool:
         """Whether all of the map is the wrong way round: free space is outside of it, or no wider than a wall."""
-        outside = (self.left.sum(axis=1) == 0.0) & (self.right.sum(axis=1) > 0.0)
+        outside = (self.left.sum(axis=1) == 0.0) & (self.right.sum(axis=1) > 0.0) & ~self.lost
         within = (self.room[:, 0] < DOUBLE) & (self.room[:, 1] > 2.0 * DOUBLE)
         return self.share((self.against_left & self.against_right) | outside | within) >= MOST
 
@@ -101,17 +103,22 @@ def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Si
     longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]
     chosen = longest[(lengths[longest] >= SHORTEST_LOOKED_FROM) & ~both_ways[longest]]
     left, right, room = np.zeros((len(chosen), 2)), np.zeros((len(chosen), 2)), np.full((len(chosen), 2), np.inf)
+    lost = np.zeros(len(chosen), bool)
     looker, done = Looker(index), 0
     for k, wall in enumerate(chosen):
         if deadline.passed:
             break
-        _look(looker, int(wall), both_ways, (left[k], right[k]), room[k])
+        lost[k] = _look(looker, int(wall), both_ways, (left[k], right[k]), room[k])
         done = k + 1
-    return Sides(chosen[:done], lengths[chosen[:done]], left[:done], right[:done], room[:done])
+    return Sides(chosen[:done], lengths[chosen[:done]], left[:done], right[:done], room[:done], lost[:done])
 
 
-def _look(looker: Looker, wall: int, both_ways: Flags, counts: tuple[Floats, Floats], room: Floats) -> None:
-    """Count fronts and backs that rays from a wall meet on its left and on its right, and note how near they are."""
+def _look(looker: Looker, wall: int, both_ways: Flags, counts: tuple[Floats, Floats], room: Floats) -> bool:
+    """Count fronts and backs that rays from a wall meet on its left and on its right, and note how near they are.
+
+    Returns whether a ray on the left met nothing as far as it was followed, and was still within the map.
+    """
+    lost = False
     row = looker.index.walls.rows[wall]
     normal = float(row["angle"]) + 0.5 * math.pi
     nx, ny = -float(row["dy"]), float(row["dx"])
@@ -127,6 +134,9 @@ def _look(looker: Looker, wall: int, both_ways: Flags, counts: tuple[Floats, Flo
                 if met >= 0 and reach > TOO_NEAR and not both_ways[met]:
                     counts[side][0 if looker.is_front(met, angle) else 1] += 1.0
                     room[side] = min(room[side], reach)
+                elif met < 0 and sign > 0.0:
+                    lost = lost or looker.is_within(px + reach * math.cos(angle), py + reach * math.sin(angle))
+    return lost
 
 
 def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:
