@@ -74,6 +74,7 @@ def warm_up() -> None:
     warm_up_vectorizing()
     warm_up_searching()
     warm_up_searching_long()
+    warm_up_searching_late()
     warm_up_analyzing()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
@@ -148,14 +149,27 @@ def warm_up_searching() -> None:
 
 
 def warm_up_searching_long() -> None:
-    """Search as where it takes long: in steps, alone and with a helper, and beyond the deadline."""
-    index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
-    helpers, every = HelperThreads(1, lambda: 1), AssociationOptions(exhaustive=True)
-    for at, who in ((None, None), (None, helpers), (0.0, None)):
-        deadline = Deadline(at)
+    """Search as where it takes long: in steps, alone and with a helper."""
+    helpers = HelperThreads(1, lambda: 1)
+    for who in (None, helpers):
+        deadline = Deadline()
         deadline.helpers = who
-        find_candidates(SearchContext.of(index, scan, None, every, deadline), chunk=1)
+        _search_in_steps(deadline)
     helpers.close()
+
+
+def warm_up_searching_late() -> None:
+    """Search as beyond the deadline."""
+    _search_in_steps(Deadline(0.0))
+
+
+def _search_in_steps(deadline: Deadline) -> None:
+    index, scan, every = (
+        MapIndex.build(Segments.from_array(ROOM), 0.0),
+        _asked()[0][0],
+        AssociationOptions(exhaustive=True),
+    )
+    find_candidates(SearchContext.of(index, scan, None, every, deadline), chunk=1)
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
@@ -194,4 +208,5 @@ if __name__ == "__main__":
     warm_up_scans()
     warm_up_vectorizing()
     warm_up_explaining()
+    warm_up_searching_late()
     warm_up_analyzing()
