@@ -47,7 +47,7 @@ try:
     from numba.core.registry import cpu_target
     from numba.core.serialize import dumps
 
-    from .libraries import Bitcode, CalleeCompiler, KernelCompiler, MachineCode, put_together, set_environments
+    from .code_libraries import Bitcode, CalleeCompiler, KernelCompiler, MachineCode, put_together, set_environments
 
     _pickle: Callable[[Any], bytes] = dumps
     _take_apart: Callable[[Any], tuple[Any, ...]] = CompileResult._reduce
@@ -232,7 +232,7 @@ def stamp(package: str) -> str:
         for path in sources(name):
             text = path.read_bytes()
             digest.update(f"{name}/{path.relative_to(_home(name)).as_posix()} {len(text)}\n".encode() + text)
-    for name in ("compiling.py", "libraries.py"):
+    for name in ("code_libraries.py", "compiling.py"):
         digest.update((_home(SHARED) / name).read_bytes())
     return digest.hexdigest()[:20]
 

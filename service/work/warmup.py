@@ -164,12 +164,8 @@ def warm_up_searching_late() -> None:
 
 
 def _search_in_steps(deadline: Deadline) -> None:
-    index, scan, every = (
-        MapIndex.build(Segments.from_array(ROOM), 0.0),
-        _asked()[0][0],
-        AssociationOptions(exhaustive=True),
-    )
-    find_candidates(SearchContext.of(index, scan, None, every, deadline), chunk=1)
+    index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
+    find_candidates(SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), deadline), chunk=1)
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:

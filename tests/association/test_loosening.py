@@ -66,3 +66,12 @@ def test_of_what_beams_say_a_share_counts() -> None:
     by_beams = loose_twin_share(context, replace(answer, best=read), rivals)
     odds = by_beams / (1.0 - by_beams) / (plain / (1.0 - plain))
     assert odds == pytest.approx(math.exp(LOOSE_BEAMS * 0.1 * BEAMS_READ / TWIN_TEMPERATURE), rel=1e-6)
+
+
+def test_what_a_prior_says_counts_whole() -> None:
+    context, answer, rivals = explained(0)
+    plain = loose_twin_share(context, answer, rivals)
+    liked = replace(answer.best, value=answer.best.value + 1.0)
+    by_prior = loose_twin_share(context, replace(answer, best=liked), rivals)
+    odds = by_prior / (1.0 - by_prior) / (plain / (1.0 - plain))
+    assert odds == pytest.approx(math.exp(1.0 / TWIN_TEMPERATURE), rel=1e-6)
