@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import RegistrationOptions, RegistrationResult, RigidTransform, register
+from registration.values import value
 
 from .context import SearchContext
 from .kernels.acceptance import accept_matches
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Accepted:
     """A consensus set in the map's own segments.
 
@@ -89,10 +89,12 @@ def _how(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
     return RegistrationOptions(estimator=estimator, rotation=rotation)
 
 
-def correspondences(index: MapIndex, accepted: Accepted, registered: RegistrationResult) -> tuple[Correspondence, ...]:
-    """Report the consensus set by scan index."""
+def correspondences(
+    index: MapIndex, accepted: Accepted, overlaps: Floats, registered: RegistrationResult
+) -> tuple[Correspondence, ...]:
+    """Report the consensus set by scan index, with the overlaps that are told of it, (n,)."""
     rivals, starts = (accepted.rivals % index.directed).tolist(), accepted.rival_starts.tolist()
-    columns = (accepted.overlaps, registered.offsets, registered.angles, registered.weights)
+    columns = (overlaps, registered.offsets, registered.angles, registered.weights)
     alternatives = (tuple(rivals[begin:end]) for begin, end in pairwise(starts))
     values = (column.tolist() for column in columns)
     return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, alternatives))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
 
 from registration.layout import Records
+from registration.values import value
 
 from .context import SearchContext
 from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
@@ -49,7 +49,7 @@ COUNT, BASES, HYPOTHESES, VERIFIED, MISSED = map(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Candidates:
     """What the search found.
 
@@ -63,7 +63,7 @@ class Candidates:
     report: SearchReport
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Effort:
     """How much is looked for.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from registration import RigidTransform
 from registration.layout import Records
+from registration.values import value
 
 from .alignment import aligned
 from .layout import (
@@ -51,7 +51,7 @@ def _terms(gates: bytes, prior: bytes, model: bytes) -> bytes:
     return terms.tobytes()
 
 
-@dataclass(frozen=True)
+@value(frozen=True)
 class SearchContext:
     """A search's map, scan, prior and options, and what the kernels are handed of them.
 
@@ -118,7 +118,7 @@ class SearchContext:
         places = as_records(POINT, np.where(sighted[:, None], views.viewpoints, 0.0))
         return Sights(places, np.searchsorted(seen["sensor"], np.arange(len(views) + 1)), seen)
 
-    @cached_property
+    @property
     def lines_of_sight(self) -> Sights:
         """The same where it scores poses: segments have no lines of sight where single beams tell more."""
         return self.nothing_seen if self.with_beams else self.sights
@@ -150,8 +150,12 @@ class SearchContext:
     @cached_property
     def question_of_a_pose(self) -> Question:
         """The same for kernels that keep no poses."""
+        return Question(self.lines.rows, self._terms, NOTHING_KEPT)
+
+    @cached_property
+    def _terms(self) -> Records:
         terms = _terms(self.gates.tobytes(), self.prior_record.tobytes(), self.lines.model.tobytes())
-        return Question(self.lines.rows, np.frombuffer(bytearray(terms), TERMS), NOTHING_KEPT)
+        return np.frombuffer(bytearray(terms), TERMS)
 
     def anywhere(self) -> SearchContext:
         """Return the same search without its prior."""
@@ -163,6 +167,8 @@ class SearchContext:
         Where it has as many lines, what the kernels write to is the same: one of both may search at a time.
         """
         other = self._searching(scan, lines)
+        if lines.model is self.lines.model and self.prior is None:
+            other.__dict__["_terms"] = self._terms
         if len(lines.rows) == len(self.lines.rows):
             other.__dict__["workspace"] = self.workspace
         return other

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from registration import RegistrationResult, RigidTransform
+from registration.values import value
 
 from .acceptance import Accepted, accept, register_accepted
 from .candidates import Candidates, Effort, find_candidates
@@ -20,7 +21,7 @@ from .views import corrected
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Answer:
     """The best explanation, worked out.
 
@@ -50,7 +51,7 @@ class Answer:
     significance: float
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Explanations:
     """What a search found.
 
@@ -111,7 +112,7 @@ def _explain_by(context: SearchContext, candidates: Candidates) -> Explanations:
 
 def _answer(context: SearchContext, best: Ranked) -> Answer | None:
     accepted = accept(context, best)
-    settled = settle(context, best)
+    (settled,) = settle(context, [best], hinges=True)
     if settled.views is not None:
         # What is told of it holds where the views are found to have been.
         context = replace(context, scan=corrected(context.scan, settled.views.found, settled.views.spread))

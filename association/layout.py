@@ -190,6 +190,9 @@ HOW = _fields((_F, "allowed spacing share"), (_I, "kept budget"))
 # direction; how far the directions of the walls are from parallel, as a chi-square of their angles.
 SETTLED = np.dtype([("pose", ESTIMATE), *_fields((_F, "wall_variance weakest dx dy unlike")).descr])
 
+# A pose among walls of which each is off by itself, with that standard deviation, m.
+POSE_AMONG_WALLS = _fields((_F, "theta x y wall_sigma"))
+
 # What a pose would be without one wall: the wall; by how much it would move, m; the position's deviation along its
 # weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed.
 HINGE = np.dtype([("wall", _I), *_fields((_F, "moves deviation dx dy")).descr])

@@ -31,7 +31,8 @@ def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ra
         return 1.0
     wall_sigma = max(LOOSE_WALLS, LOOSE_FACTOR * answer.settled.wall_sigma)
     more = math.sqrt(wall_sigma**2 - MODEL_OFFSET**2)
-    loose = context.instead(context.scan, ScanLines.of(context.scan, more, context.options))
+    lines = ScanLines.of(context.scan, more, context.options, context.lines.given)
+    loose = context.instead(context.scan, lines)
     explanations = (answer.best, *rivals[:LOOSE_RIVALS])
     best, *others = map(_worth, explanations, scores_again(loose, explanations))
     return 1.0 / (1.0 + sum(math.exp(min(0.0, other - best) / TWIN_TEMPERATURE) for other in others))

@@ -7,9 +7,10 @@ of these, and (almost) never was there to be seen: where it scores as high as th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+
+from registration.values import value
 
 from .candidates import Effort, allowed_by, find_candidates
 from .context import SearchContext
@@ -29,7 +30,7 @@ from .tuning import (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Null:
     """What the mirrored scan comes to.
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import RigidTransform
 from registration.layout import Records
+from registration.values import value
 
 from .candidates import Candidates
 from .context import SearchContext
@@ -41,11 +41,9 @@ Floats = NDArray[np.float64]
 NOTHING = np.zeros(0)
 
 
-@dataclass(slots=True)
+@value(frozen=True, slots=True)
 class Ranked:
     """One explanation of the scan.
-
-    Nobody changes one; a frozen dataclass takes eight times as long to make, and a search makes dozens.
 
     Attributes
     ----------
@@ -129,7 +127,7 @@ class Ranked:
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class _Scored:
     """Candidates (k,) of `ESTIMATE`, what they are worth (k,) of `MERIT`, their matches (k, n) of `MATCH`."""
 
@@ -173,9 +171,19 @@ def scores_again(context: SearchContext, explanations: Sequence[Ranked]) -> list
     CancelledError
         When the deadline was cancelled.
     """
-    poses = np.frombuffer(bytearray().join(one.estimate.tobytes() for one in explanations), ESTIMATE)
-    scores: list[float] = _score(context, poses).merits["score"].tolist()
+    scores: list[float] = _score(context, poses_of(explanations)).merits["score"].tolist()
     return scores
+
+
+def poses_of(explanations: Sequence[Ranked]) -> Records:
+    """Return the poses of explanations for the kernels, (k,) of `ESTIMATE`."""
+    return np.frombuffer(bytearray().join(one.estimate.tobytes() for one in explanations), ESTIMATE)
+
+
+def matches_of(explanations: Sequence[Ranked]) -> Records:
+    """Return the matches of explanations for the kernels, (k, n) of `MATCH`."""
+    together = bytearray().join(one.matches.tobytes() for one in explanations)
+    return np.frombuffer(together, MATCH).reshape(len(explanations), -1)
 
 
 def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, inside: bool) -> Ranked:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from registration.values import value
 
 from .features import Features
 from .models import USUAL, Model
@@ -11,7 +12,7 @@ from .result import Reason, Status
 from .tuning import NO_TWIN, TELLING_REASON
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Standing:
     """What the verdict is, beside its probabilities.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from .causes import Cause
 from .context import SearchContext
 from .explain import Answer, Explanations
 from .kernels.measures import paper_measures
-from .ranking import Ranked
+from .layout import POSE_AMONG_WALLS
+from .ranking import Ranked, matches_of
 from .result import (
     Alternative,
     AssociationDiagnostics,
@@ -23,7 +25,7 @@ from .result import (
     Hinge,
     Status,
 )
-from .settling import settle
+from .settling import Settled, settle
 from .sight import missing_segments
 from .to_scale import Factor
 from .tuning import HINGES
@@ -66,10 +68,10 @@ def report(
 
 def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
     """Return the consensus set, with the overlaps at the pose that is answered."""
-    accepted = answer.accepted
+    accepted, overlaps = answer.accepted, answer.accepted.overlaps
     if verdict.pose is not None:
-        accepted = replace(accepted, overlaps=overlaps_at(context, answer.best, accepted, verdict.pose))
-    return correspondences(context.index, accepted, answer.registered)
+        overlaps = overlaps_at(context, answer.best, accepted, verdict.pose)
+    return correspondences(context.index, accepted, overlaps, answer.registered)
 
 
 def _no_match(
@@ -123,19 +125,19 @@ def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
 
 
 def _alternatives(context: SearchContext, others: tuple[Ranked, ...], *, usable: bool) -> tuple[Alternative, ...]:
-    if usable and "alternatives" not in context.options.parts:
+    shown = others[: context.options.max_alternatives]
+    if not shown or (usable and "alternatives" not in context.options.parts):
         return ()
-    return tuple(_alternative(context, other) for other in others[: context.options.max_alternatives])
+    settled = settle(context, shown)
+    poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)
+    measures = paper_measures(context.lines.rows, matches_of(shown), context.index.walls.rows, poses)
+    return tuple(map(partial(_alternative, context), shown, settled, measures.tolist()))
 
 
-def _alternative(context: SearchContext, other: Ranked) -> Alternative:
-    settled = settle(context, other, hinges=False)
-    pose = settled.pose
-    translation, mitsuta, wahba, reliability = paper_measures(
-        context.lines.rows, other.matches, context.index.walls.rows, settled.wall_sigma, pose.theta, pose.x, pose.y
-    )
+def _alternative(context: SearchContext, other: Ranked, settled: Settled, measures: list[float]) -> Alternative:
+    translation, mitsuta, wahba, reliability = measures
     return Alternative(
-        pose=context.in_map(pose),
+        pose=context.in_map(settled.pose),
         covariance=None if settled.degenerate else settled.covariance,
         score=other.score_by(context.options.estimator),
         ambiguity=Ambiguity(translation, wahba if context.options.rotation == "wahba" else mitsuta),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import Ambiguity, RegistrationDiagnostics, RigidTransform
+from registration.values import value
 
 Floats = NDArray[np.float64]
 
@@ -22,11 +23,9 @@ class Status(StrEnum):
     OK = "ok"
 
 
-@dataclass(slots=True)
+@value(frozen=True, slots=True)
 class Correspondence:
     """A scan segment found on a map segment.
-
-    Nobody changes one; a frozen dataclass takes several times as long to make, and an answer has dozens.
 
     Attributes
     ----------

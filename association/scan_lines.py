@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from registration import MeasuredSegments
 from registration.layout import Records
+from registration.values import value
 
 from .kernels.scans import (
     describe_labelled,
@@ -43,7 +44,7 @@ from .tuning import (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class ScanLines:
     """A scan as the kernels are handed it.
 
@@ -54,15 +55,20 @@ class ScanLines:
     model : (1,) of `MODEL`
     sightings : (k,) of `SIGHTING`
         What each view shows of them, view by view; of one view the rows themselves.
+    given : Measured or None
+        What they were made from, of a scan of one view.
     """
 
     row_of: NDArray[np.intp]
     rows: Records
     model: Records
     sightings: Records
+    given: Measured | None = None
 
     @classmethod
-    def of(cls, scan: Scan, map_sigma: float | None, options: AssociationOptions) -> ScanLines:
+    def of(
+        cls, scan: Scan, map_sigma: float | None, options: AssociationOptions, given: Measured | None = None
+    ) -> ScanLines:
         """Join the segments that continue or repeat one another, and order them by what they tell; ties by index.
 
         Parameters
@@ -72,12 +78,15 @@ class ScanLines:
             Standard deviation of the map's lines, metres; None where it is not known.
         options : AssociationOptions
             A tolerance wider than the sigmas' own gate says that the map is that far off.
+        given : Measured or None
+            Of other lines of the same scan, where there are any.
         """
         measured = scan.measured
         variances, model = _variances(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
-            row_of, rows, seen = describe_view(_given(measured), measured.counted, variances, model)
-            return cls(row_of, rows, model, seen)
+            given = given or _given(measured)
+            row_of, rows, seen = describe_view(given, measured.counted, variances, model)
+            return cls(row_of, rows, model, seen, given)
         part_of, parts, views = parts_of(measured, scan.views)
         line_row, rows = describe_labelled(*_joined_views(parts, scan.views), variances, model)
         return cls(line_row[part_of], rows, model, _sightings(parts, views, line_row))

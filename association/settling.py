@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain, repeat
+from typing import Any
 
 import numpy as np
 
@@ -11,17 +14,20 @@ from registration import RigidTransform
 from registration.chi_square import chi_square_quantile
 from registration.layout import Floats, Records
 from registration.observability import MAX_DEVIATION, THREE_SIGMA_TAIL
+from registration.values import value
 
 from .context import SearchContext
 from .kernels.settling import settle as settle_matches
-from .layout import HINGE, SETTLED, record
-from .ranking import Ranked
+from .layout import HINGE, SETTLED
+from .ranking import Ranked, matches_of, poses_of
 from .scan import Views
 from .tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY
 from .view_settling import SeenOnWalls, ViewsSettled
 
+NO_HINGES = np.zeros(0, HINGE)
 
-@dataclass(frozen=True, slots=True)
+
+@value(frozen=True, slots=True)
 class Settled:
     """A pose that reckons with walls that are off, as far as their residuals show it.
 
@@ -63,32 +69,38 @@ class Settled:
         return self.parallel or self.weakest > MAX_DEVIATION
 
 
-def settle(context: SearchContext, best: Ranked, *, hinges: bool = True) -> Settled:
-    """Work out the pose of a consensus set; without `hinges` there are none."""
-    settled = record(SETTLED)
-    without = np.zeros(len(best.matches) if hinges else 0, HINGE)
+def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bool = False) -> list[Settled]:
+    """Work out the poses of consensus sets, of one at least; with `hinges` of the first, where the others have none."""
+    found = np.zeros(len(explanations), SETTLED)
+    without = np.zeros(len(explanations[0].matches) if hinges else 0, HINGE)
     known = context.index.sigma
     count = settle_matches(
-        context.question_of_a_pose, context.index.walls.rows, best.matches, best.estimate,
-        -1.0 if known is None else known**2, settled, without, context.workspace,
+        context.question_of_a_pose, context.index.walls.rows, matches_of(explanations), poses_of(explanations),
+        -1.0 if known is None else known**2, found, without, context.workspace,
     )  # fmt: skip
-    (theta, x, y, xx, xy, xt, yy, yt, tt), variance, weakest, dx, dy, unlike = settled[0].item()
-    covariance = np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3)
+    settled = list(map(_settled, explanations, found.tolist(), chain([without[:count]], repeat(NO_HINGES))))
+    views = context.scan.views
+    if views is None or not views.uncertain:
+        return settled
+    return [_with_views(context, one, views, alone) for one, alone in zip(explanations, settled, strict=True)]
+
+
+def _settled(one: Ranked, numbers: Any, hinges: Records) -> Settled:
+    """Return what a record of `SETTLED` says of an explanation."""
+    (theta, x, y, xx, xy, xt, yy, yt, tt), variance, weakest, dx, dy, unlike = numbers
     sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
-    parallel = best.count < 2 or unlike <= chi_square_quantile(best.count - 1, THREE_SIGMA_TAIL)
+    parallel = one.count < 2 or unlike <= chi_square_quantile(one.count - 1, THREE_SIGMA_TAIL)
     spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
-    alone = Settled(
+    return Settled(
         pose=RigidTransform(x, y, theta),
-        covariance=covariance,
+        covariance=np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3),
         wall_sigma=math.sqrt(variance),
         weakest=weakest,
         direction=(sign * dx, sign * dy),
         free=parallel or spread > ONE_OF_MANY**2,
         parallel=parallel,
-        hinges=without[:count],
+        hinges=hinges,
     )
-    views = context.scan.views
-    return alone if views is None or not views.uncertain else _with_views(context, best, views, alone)
 
 
 def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settled) -> Settled:

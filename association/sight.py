@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from registration.layout import Records
+from registration.values import value
 
 from .context import SearchContext
 from .kernels.acceptance import missing_pieces
@@ -18,7 +19,7 @@ from .settling import Settled
 from .tuning import COMPARED_BEAMS, NEUTRAL
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class BeamShares:
     """How far the beams do not read what the map shows.
 
@@ -38,6 +39,9 @@ class BeamShares:
     farther: float = 0.0
     nearer: float = 0.0
     in_step: float = 1.0
+
+
+NO_BEAMS = BeamShares()
 
 
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
@@ -65,7 +69,7 @@ def agreement(context: SearchContext, best: Ranked) -> float:
 def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
     """Return how many beams do not read what the map shows from the settled pose."""
     if not context.with_beams:
-        return BeamShares()
+        return NO_BEAMS
     pose, place = settled.pose, context.index.tables.place
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
     farther, nearer = beam_shares(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)

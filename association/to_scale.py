@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from registration import wrap_angle
+from registration.values import value
 
 from .acceptance import register_accepted
 from .candidates import Candidates, find_candidates
@@ -54,7 +55,7 @@ class Factor:
     deviation: float
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Explained:
     """What a search found, and what it searched.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from registration import RigidTransform
 from registration.layout import Floats
+from registration.values import value
 
 from .context import SearchContext
 from .explain import Answer, Explanations
@@ -38,7 +38,7 @@ from .tuning import (
 ROUNDING = 1e-9  # of a chance
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Verdict:
     """What the evidence comes to.
 
@@ -125,7 +125,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     )
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class _Chances:
     """Chances of an answer, 0 to 1.
 

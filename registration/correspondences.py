@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidArgumentError
 from .kernels import pairs as kernels
-from .layout import LEAST_POINTS, Floats, Records, X, Y
+from .layout import LEAST_POINTS, PAIR, Floats, Records, X, Y
 from .segments import MeasuredSegments, Segments
 from .tables import Drawn, Points
+from .values import value
 
 Indices = NDArray[np.intp]
 Point = Floats | tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@value(frozen=True, slots=True, eq=False)
 class Correspondences:
     """n pairs, a row each.
 
@@ -48,13 +47,21 @@ class Correspondences:
             When `pairs` is not such an array or an index is out of range; argument ``correspondences`` with the index
             of the first row at fault.
         """
-        chosen = _checked_pairs(pairs, len(scan), len(map_segments))
-        m, s = map_segments, scan.segments
-        rows = kernels.empty_pairs(len(chosen))
+        chosen, m, s = _as_pairs(pairs), map_segments, scan.segments
+        rows = np.empty(len(chosen), PAIR)
         on_map, of_scan = Drawn(m.directions, m.midpoints, m.lengths), Drawn(s.directions, s.midpoints, s.lengths)
         points = Points(scan.centroids, scan.spreads, scan.sigma, scan.points)
-        kernels.fill_in(rows, chosen, on_map, of_scan, points)
-        if not scan.counted and scan.points.min(initial=np.inf) < LEAST_POINTS:
+        row, column, fewest = kernels.fill_in(rows, chosen, on_map, of_scan, points)
+        if row >= 0:
+            count, what = (len(s), "scan") if column == kernels.SCAN else (len(m), "map")
+            raise InvalidArgumentError(
+                f"expected a {what} index from 0 to {count - 1}, got {chosen[row, column]}"
+                if count
+                else f"the {what} has no segments",
+                argument="correspondences",
+                index=row,
+            )
+        if not scan.counted and fewest < LEAST_POINTS:
             together = np.bincount(chosen[:, 1], scan.points[chosen[:, 0]])[chosen[:, 1]]
             rows["scan"]["variance"] *= np.minimum(1.0, together / LEAST_POINTS)
         return cls(rows)
@@ -133,7 +140,7 @@ class Correspondences:
     def about(self, map_origin: Point, scan_origin: Point) -> Correspondences:
         """Return the pairs in frames that have been moved to two new origins, each (2,) metres in its old frame."""
         (map_x, map_y), (scan_x, scan_y) = map_origin, scan_origin
-        moved = kernels.empty_pairs(len(self))
+        moved = np.empty(len(self), PAIR)
         kernels.move_origins(self.rows, float(map_x), float(map_y), float(scan_x), float(scan_y), moved)
         return Correspondences(moved)
 
@@ -151,7 +158,7 @@ def _dots(a: Floats, b: Floats) -> Floats:
     return products
 
 
-def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices:
+def _as_pairs(pairs: ArrayLike) -> Indices:
     try:
         rows = np.asarray(pairs)
     except (ValueError, OverflowError) as error:
@@ -164,15 +171,4 @@ def _checked_pairs(pairs: ArrayLike, scan_count: int, map_count: int) -> Indices
         broken = rows.dtype.kind == "f" and (rows != np.floor(rows)).any(axis=1)
         index = int(np.argmax(broken)) if np.any(broken) else None
         raise InvalidArgumentError(f"expected integers, got {rows.dtype}", argument="correspondences", index=index)
-    chosen = np.ascontiguousarray(rows, dtype=np.intp)
-    row, column = kernels.first_outside(chosen, scan_count, map_count)
-    if row >= 0:
-        count, what = (scan_count, "scan") if column == kernels.SCAN else (map_count, "map")
-        raise InvalidArgumentError(
-            f"expected a {what} index from 0 to {count - 1}, got {chosen[row, column]}"
-            if count
-            else f"the {what} has no segments",
-            argument="correspondences",
-            index=row,
-        )
-    return chosen
+    return np.ascontiguousarray(rows, dtype=np.intp)

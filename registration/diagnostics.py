@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -39,15 +40,16 @@ def result_of(
     fitted: Records, offsets: Floats, angles: Floats, weights: PairWeights, options: RegistrationOptions
 ) -> RegistrationResult:
     """Return what a fit answers, (1,) of `FITTED`, which leaves `offsets` and `angles`, (n,) each."""
+    numbers: Any = fitted.item()
     (
         (theta, x, y), _, (xx, xy, xt, yy, yt, tt), free, free_x, free_y, _, unique, against, count,
         chi2, rms_offset, rms_angle, *costs, determinant, reliability,
-    ) = fitted[0].item()  # fmt: skip
+    ) = numbers  # fmt: skip
 
     def ambiguity(translation: float, rotation: float) -> Ambiguity:
         return Ambiguity(options.k_translation * translation, options.k_rotation * rotation)
 
-    at_pose, before, elsewhere = ambiguity(*costs[:2]), ambiguity(*costs[2:4]), ambiguity(*costs[4:])
+    at_pose, before = ambiguity(*costs[:2]), ambiguity(*costs[2:4])
     degenerate, dof = free != FIXED or not unique, 2 * count - (2 if free == PARALLEL else 3)
     fits = chi2 <= chi_square_quantile(dof, TAIL) and not (options.oriented and against)
     has_covariance = not degenerate and options.estimator == "joint"
@@ -63,7 +65,7 @@ def result_of(
         diagnostics=RegistrationDiagnostics(
             ambiguity=at_pose,
             ambiguity_before=before,
-            ambiguity_at=None if options.evaluate_at is None else elsewhere,
+            ambiguity_at=None if options.evaluate_at is None else ambiguity(*costs[4:]),
             similarity=1.0 / at_pose.total if at_pose.total > sys.float_info.min else None,
             reliability=reliability,
             determinant=determinant,

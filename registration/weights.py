@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +13,12 @@ from .kernels.pairs import MIN_SIGMA, inverse_variances
 from .layout import Floats
 from .limits import MAX_SIGMA
 from .options import RegistrationOptions
+from .values import value
 
 MIN_WEIGHT, MAX_WEIGHT = 1e-100, 1e100  # squares and products with 1e9 m squared stay finite
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@value(frozen=True, slots=True, eq=False)
 class PairWeights:
     """Weights of n pairs; a pair that does not count has 0 in each.
 

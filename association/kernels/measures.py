@@ -6,21 +6,35 @@ import numpy as np
 
 from registration.compiling import internal, kernel
 from registration.kernels import keep_alive, one_step_add
-from registration.layout import ONE_STEP_SUMS, Records
+from registration.layout import ONE_STEP_SUMS, Floats, Record, Records
 
 from ..tuning import ROUGHNESS
 
 
 @internal
 @kernel
-def paper_measures(
-    scan: Records, matches: Records, walls: Records, wall_sigma: float, theta: float, x: float, y: float
-) -> tuple[float, float, float, float]:
-    """Return what the one-step sums cost at a pose, and what they say of its reliability.
+def paper_measures(scan: Records, matches: Records, walls: Records, poses: Records) -> Floats:
+    """Return what the one-step sums of consensus sets cost at poses, and what they say of the reliability, (k, 4).
 
     The translation's cost, ``sum w r^2``, the rotation's by Mitsuta, ``sum w a^2``, and by Wahba,
-    ``2 sum w (1 - cos a)``, and Eq. (28). Walls are off by `wall_sigma`, metres, one by one.
+    ``2 sum w (1 - cos a)``, and Eq. (28). `matches` (k, n); `poses` (k,) of `POSE_AMONG_WALLS`.
     """
+    measures = np.empty((len(poses), 4))
+    for k in range(len(poses)):
+        sums = set_sums(scan, matches[k], walls, poses[k])
+        value = sums[0]
+        determinant = max(0.0, value.x2 * value.y2 - value.xy * value.xy)
+        measures[k, 0] = max(0.0, value.gap2)
+        measures[k, 1] = max(0.0, value.angle2)
+        measures[k, 2] = max(0.0, 2.0 * value.versine)
+        measures[k, 3] = min(1.0, 2.0 * math.sqrt(determinant) / value.w) if value.w > 0.0 else 0.0
+        keep_alive(sums)
+    return measures
+
+
+@kernel
+def set_sums(scan: Records, matches: Records, walls: Records, pose: Record) -> Records:
+    """Return the one-step sums of a consensus set about a pose, walls being off one by one."""
     sums = np.zeros(2, ONE_STEP_SUMS)
     for i in range(len(scan)):
         if matches[i].wall < 0:
@@ -29,12 +43,8 @@ def paper_measures(
         middle = 0.5 * (wall.begin + wall.end)
         on_x = wall.dx * middle - wall.dy * wall.offset
         on_y = wall.dy * middle + wall.dx * wall.offset
-        gap = wall.dx * (on_y - y) - wall.dy * (on_x - x) - (scan[i].dx * scan[i].y - scan[i].dy * scan[i].x)
-        variance = 1.0 / scan[i].weight - ROUGHNESS * ROUGHNESS + wall_sigma * wall_sigma
-        one_step_add(sums, wall, scan[i], gap, theta, 1.0 / variance, 1.0)
-    value = sums[0]
-    costs = (max(0.0, value.gap2), max(0.0, value.angle2), max(0.0, 2.0 * value.versine))
-    determinant = max(0.0, value.x2 * value.y2 - value.xy * value.xy)
-    reliability = min(1.0, 2.0 * math.sqrt(determinant) / value.w) if value.w > 0.0 else 0.0
-    keep_alive(sums)
-    return costs[0], costs[1], costs[2], reliability
+        gap = wall.dx * (on_y - pose.y) - wall.dy * (on_x - pose.x)
+        gap -= scan[i].dx * scan[i].y - scan[i].dy * scan[i].x
+        variance = 1.0 / scan[i].weight - ROUGHNESS * ROUGHNESS + pose.wall_sigma * pose.wall_sigma
+        one_step_add(sums, wall, scan[i], gap, pose.theta, 1.0 / variance, 1.0)
+    return sums

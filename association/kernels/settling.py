@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, internal, kernel
+from registration.compiling import borrowed, inlined, internal, kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
@@ -140,24 +140,41 @@ def walls_of(scan: Records, matches: Records) -> Integers:
 @internal
 @kernel
 def settle(
-    question: Question, walls: Records, matches: Records, start: Records, map_variance: float, settled: Records,
+    question: Question, walls: Records, matches: Records, starts: Records, map_variance: float, settled: Records,
     hinges: Records, work: Workspace,
 ) -> int:  # fmt: skip
-    """Work out the pose of a consensus set from `start` (1,), with the error of the walls as their residuals show it.
+    """Work out the poses of consensus sets from `starts` (k,), with the error of the walls as their residuals show it.
 
-    `map_variance` is known of it, m^2; negative where nothing is. Writes `settled` (1,) and, for each wall that holds a
-    match, `hinges`, unless that has no room for any; returns how many walls that are.
+    `matches` (k, n). `map_variance` is known of the walls, m^2; negative where nothing is. Writes `settled` (k,) and,
+    for each wall that holds a match of the first set, `hinges`, unless that has no room for any; returns how many walls
+    that are.
     """
-    scan = question.scan
-    out = settled[0]
+    matches = borrowed(matches)
+    count = 0
+    for k in range(len(starts)):
+        of_wall = find_pose(question.scan, walls, matches[k], starts[k], map_variance, settled[k], work)
+        if k == 0:
+            count = len(of_wall)
+            if len(hinges) > 0:
+                leave_each_out(question, walls, matches[0], of_wall, settled, hinges, work)
+    return count
+
+
+@kernel
+def find_pose(
+    scan: Records, walls: Records, matches: Records, start: Record, map_variance: float, out: Record, work: Workspace
+) -> Integers:
+    """Write to `out`, a record of `SETTLED`, what a consensus set comes to; its sums hold all matches then.
+
+    Returns the walls that hold a match.
+    """
     pose = out.pose
     information = work.scratch[0].information
     value = work.scratch[0].value
     sums = work.scratch[0].sums
     of_wall = walls_of(scan, matches)
-    count = len(of_wall)
     add_all(scan, matches, walls, USUAL_WALL_ERROR**2, work)
-    copy_estimate(start[0], pose)
+    copy_estimate(start, pose)
     out.wall_variance = max(map_variance, LEAST_KNOWN_VARIANCE) if map_variance >= 0.0 else USUAL_WALL_ERROR**2
     for _ in range(1 if map_variance >= 0.0 else SETTLING_ROUNDS):
         add_all(scan, matches, walls, out.wall_variance, work)
@@ -170,13 +187,11 @@ def settle(
     copy_estimate(pose, other[0])
     solve(sums, other[0], information, value)
     out.weakest, out.dx, out.dy = weakest(other[0])
+    keep_alive(other)
     out.unlike = unlike(scan, matches, walls, out.wall_variance)
     add_all(scan, matches, walls, out.wall_variance, work)
     solve(sums, pose, information, value)
-    if len(hinges) > 0:
-        leave_each_out(question, walls, matches, of_wall, settled, hinges, work)
-    keep_alive(other)
-    return count
+    return of_wall
 
 
 @kernel

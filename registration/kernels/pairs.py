@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiling import internal, kernel
-from ..layout import PAIR, Floats, Record, Records, X, Y
+from ..layout import Floats, Record, Records, X, Y
 from ..tables import Drawn, Points
 
 MIN_SIGMA = 1e-12  # m; a smaller one that is not 0 counts as this, so that its square is not lost
@@ -28,20 +28,22 @@ def first_outside(indices: NDArray[np.intp], scan_count: int, map_count: int) ->
     return -1, 0
 
 
-@kernel
-def empty_pairs(count: int) -> Records:
-    """Return pairs to be filled in.
-
-    Python gets all its arrays of pairs from here. Others that kernels return have an equal type, but not the same, and
-    handing them over takes two microseconds more.
-    """
-    return np.empty(count, PAIR)
-
-
 @internal
 @kernel
-def fill_in(pairs: Records, indices: NDArray[np.intp], on_map: Drawn, scan: Drawn, points: Points) -> None:
-    """Write the segments of map and scan that `indices` (n, 2) name to the pairs, and the points behind these."""
+def fill_in(
+    pairs: Records, indices: NDArray[np.intp], on_map: Drawn, scan: Drawn, points: Points
+) -> tuple[int, int, float]:
+    """Write the segments of map and scan that `indices` (n, 2) name to the pairs, and the points behind these.
+
+    Returns what `first_outside` does, where nothing is written unless that is no row, and how many points are behind
+    the scan segment that has fewest of them, named or not.
+    """
+    row, column = first_outside(indices, len(scan.lengths), len(on_map.lengths))
+    fewest = math.inf
+    for k in range(len(points.counts)):
+        fewest = min(fewest, points.counts[k])
+    if row >= 0:
+        return row, column, fewest
     for i in range(len(pairs)):
         j = indices[i, MAP]
         line = pairs[i].map
@@ -63,6 +65,7 @@ def fill_in(pairs: Records, indices: NDArray[np.intp], on_map: Drawn, scan: Draw
         seen.spread = points.spreads[j]
         sigma = max(points.sigmas[j], MIN_SIGMA) if points.sigmas[j] > 0.0 else 0.0
         seen.variance = sigma * sigma / points.counts[j]
+    return row, column, fewest
 
 
 @kernel
@@ -71,6 +74,7 @@ def offset_of(line: Record) -> float:
     return -line.dy * line.x + line.dx * line.y
 
 
+@internal
 @kernel
 def inverse_variances(pairs: Records, map_variance: float) -> tuple[Floats, bool]:
     """Return 1 / variance of each pair's offset (n,), and whether all pairs have a variance."""

@@ -7,6 +7,7 @@ import pytest
 
 from association import Deadline, HardPrior, Prior, SoftPrior, mirrored
 from association.layout import GATES, HARD_PRIOR, NO_PRIOR, RULES, SOFT_PRIOR, record
+from association.scan_lines import ScanLines
 from association.tuning import GATE_SIGMAS, GREATEST_ANGLE_GATE, LEAST_ANGLE_GATE, LEAST_OFFSET_GATE, REACH
 from registration import RigidTransform
 
@@ -95,6 +96,18 @@ def test_another_scan_instead_is_searched_without_the_prior_and_with_room_for_it
         assert (other.scan, other.prior, other.options) == (scan, None, context.options)
         assert len(other.workspace.held) == len(scan.measured)
         assert (other.workspace is context.workspace) is same
+
+
+@pytest.mark.parametrize("prior", [None, HARD])
+def test_another_scan_is_asked_after_by_its_own_lines_and_without_the_prior(prior: Prior | None) -> None:
+    context = context_of(ROOM_INDEX, SCAN, prior)
+    loose = ScanLines.of(SCAN, 0.05, context.options)
+    for lines in (context.lines.mirrored(), loose):
+        asked = context.instead(SCAN, lines).question_of_a_pose
+        assert asked.scan is lines.rows
+        assert asked.terms["model"] == lines.model
+        assert asked.terms["prior"]["kind"] == NO_PRIOR
+    assert loose.model != context.lines.model
 
 
 def test_poses_of_the_index_frame_in_the_map_frame() -> None:

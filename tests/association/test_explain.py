@@ -57,8 +57,10 @@ def test_what_is_worked_out_of_the_answer() -> None:
     assert worth > answer.best.score + 3.0
     assert answer.significance == significance(context, worth) < significance(context, answer.best.score)
     assert answer.agreement == agreement(context, answer.best) < 1.0
-    settled = settle(context, answer.best)
+    settled, again = settle(context, [answer.best, answer.best], hinges=True)
     assert (settled.pose, settled.weakest) == (answer.settled.pose, answer.settled.weakest)
+    assert (again.pose, len(again.hinges)) == (settled.pose, 0)
+    assert len(settled.hinges) == len(answer.settled.hinges) > 4
     found = answer.registered.pose
     assert found is not None
     assert same_pose(found, context.in_map(settled.pose), 1e-12, 1e-12)

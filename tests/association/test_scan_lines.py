@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from association import MapIndex, Scan, View, assemble
-from association.scan_lines import parts_of
+from association.scan_lines import ScanLines, parts_of
 from association.tuning import (
     COMMON_ERROR,
     FREE_ANGLE,
@@ -79,6 +79,16 @@ def test_with_raw_ranges_neighbouring_points_have_an_error_in_common() -> None:
     more = with_ranges["angle_variance"] - without["angle_variance"]
     np.testing.assert_allclose(more, COMMON_ERROR**2 / without["spread"])
     np.testing.assert_allclose(with_ranges["offset_variance"], without["offset_variance"])
+
+
+def test_lines_on_a_map_that_is_farther_off_are_those_of_the_scan_as_if_made_anew() -> None:
+    context = context_of(ROOM_INDEX, SCAN)
+    given = context.lines.given
+    assert given is not None
+    again, anew = (ScanLines.of(SCAN, 0.05, context.options, parts) for parts in (given, None))
+    assert again.given is given
+    np.testing.assert_array_equal(again.rows, anew.rows)
+    assert (again.rows["offset_variance"] > context.lines.rows["offset_variance"]).all()
 
 
 def test_what_is_not_known_of_a_views_place_moves_its_lines_together() -> None:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 
 from association.kernels.measures import paper_measures
+from association.layout import POSE_AMONG_WALLS, Integers
 from association.tuning import ROUGHNESS
-from registration import Correspondences, MeasuredSegments, OneStepSums, RigidTransform, Segments
+from registration import Correspondences, MeasuredSegments, OneStepSums, Segments
 from registration.layout import Floats, Records
 
 from ..reference.consensus import matches_on
@@ -36,14 +37,21 @@ def sums_of(one: Set, wall_sigma: float) -> OneStepSums:
     return OneStepSums.of_set(pairs, 1.0 / variances, one.start)
 
 
+def measures_at(one: Set, held: Integers, wall_sigma: float) -> list[float]:
+    """Return what they are with these walls held, the second of two sets of which the first is another."""
+    at = one.start
+    poses = np.array([(0.0, 0.0, 0.0, 0.01), (at.theta, at.x, at.y, wall_sigma)], POSE_AMONG_WALLS)
+    matches = np.stack([matches_on(one.held[::-1]), matches_on(held)])
+    found: list[float] = paper_measures(one.scan, matches, one.walls, poses)[1].tolist()
+    return found
+
+
 @given(SEEDS)
 @settings(max_examples=40, deadline=None)
 def test_they_are_those_of_the_one_step_sums(seed: int) -> None:
     one, wall_sigma = some(seed), 0.02 * (seed % 3)
     at = one.start
-    translation, mitsuta, wahba, reliability = paper_measures(
-        one.scan, matches_on(one.held), one.walls, wall_sigma, at.theta, at.x, at.y
-    )
+    translation, mitsuta, wahba, reliability = measures_at(one, one.held, wall_sigma)
     sums = sums_of(one, wall_sigma)
     assert (translation, mitsuta) == pytest.approx(sums.costs(at, "mitsuta"), rel=1e-6)
     assert (translation, wahba) == pytest.approx(sums.costs(at, "wahba"), rel=1e-6)
@@ -52,9 +60,4 @@ def test_they_are_those_of_the_one_step_sums(seed: int) -> None:
 
 def test_of_no_pair_there_is_nothing_to_tell() -> None:
     one = some(1)
-    nothing = matches_on(np.full_like(one.held, -1))
-    assert paper_measures(one.scan, nothing, one.walls, 0.0, *pose_numbers(one.start)) == (0.0, 0.0, 0.0, 0.0)
-
-
-def pose_numbers(at: RigidTransform) -> tuple[float, float, float]:
-    return at.theta, at.x, at.y
+    assert measures_at(one, np.full_like(one.held, -1), 0.0) == [0.0, 0.0, 0.0, 0.0]

@@ -37,7 +37,7 @@ class Set:
         """Return `SETTLED` and the hinges."""
         out, hinges = np.zeros(1, SETTLED), np.zeros(len(self.scan), HINGE)
         question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
-        start, matches = estimate_of(self.start), matches_on(self.held)
+        start, matches = estimate_of(self.start), matches_on(self.held)[None]
         count = settle(question, self.walls, matches, start, map_variance, out, hinges, work)
         assert start == estimate_of(self.start)
         return out[0], hinges[:count]
@@ -112,6 +112,23 @@ def test_what_the_pose_would_be_without_a_wall(seed: int) -> None:
             assert got["deviation"] > 0.9
         if hinge.moves > 1.1 * hinge.deviation:
             assert [got["dx"], got["dy"]] == pytest.approx(hinge.direction.tolist(), abs=1e-4)
+
+
+def test_several_sets_are_each_settled_as_if_alone() -> None:
+    """Hinges are those of the first."""
+    one = some(7)
+    helds = np.stack([one.held[::-1], one.held])
+    out, hinges = np.zeros(2, SETTLED), np.zeros(len(one.scan), HINGE)
+    starts = np.concatenate([estimate_of(one.start)] * 2)
+    question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
+    matches = np.stack([matches_on(held) for held in helds])
+    count = settle(question, one.walls, matches, starts, -1.0, out, hinges, work)
+    for k, held in enumerate(helds):
+        alone, without = Set(one.scan, one.walls, held, one.start).settled()
+        assert out[k] == alone
+        if k == 0:
+            np.testing.assert_array_equal(hinges[:count], without)
+    assert out[0] != out[1]
 
 
 def crossing_walls(*angles: float) -> Records:
