@@ -121,17 +121,21 @@ def internal(function: Function) -> Function:
     if not isinstance(function, Dispatcher):  # NUMBA_DISABLE_JIT is set
         return function
     entry: Callable[..., Any] | None = None
+    variants: list[Any] = []
 
     @wraps(function)
     def call(*arguments: Any) -> Any:
-        nonlocal entry
+        nonlocal entry, variants
         if entry is not None:
             return entry(*arguments)
-        result, kinds = function(*arguments), set(map(_layouts, function.signatures))
-        if len(kinds) > 1:
-            raise TypeError(f"kernel {function.py_func.__qualname__}: expected arguments of one type each, got {kinds}")
+        result = function(*arguments)
+        if len(function.overloads) > len(variants):
+            kinds = set(map(_layouts, function.signatures))
+            if len(kinds) > 1:
+                name = function.py_func.__qualname__
+                raise TypeError(f"kernel {name}: expected arguments of one type each, got {kinds}")
+            variants = list(function.overloads.values())
         if not os.environ.get(CHECKED):
-            variants: list[Any] = list(function.overloads.values())
             entry = variants[0].entry_point
         return result
 

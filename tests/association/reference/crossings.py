@@ -17,7 +17,7 @@ Rectangle = tuple[float, float, float, float]  # begin and end of a run, begin a
 
 def extents(a: Record, b: Record) -> Rectangle:
     """Return where two runs begin and end, counted along each from where their lines cross."""
-    point = np.linalg.solve(np.stack([normal(a), normal(b)]), [a["offset"], b["offset"]])
+    point = np.linalg.solve(np.array((normal(a), normal(b))), [a["offset"], b["offset"]])
     on_a, on_b = direction(a) @ point, direction(b) @ point
     return a["begin"] - on_a, a["end"] - on_a, b["begin"] - on_b, b["end"] - on_b
 
@@ -59,6 +59,6 @@ def counts_of(runs: Records, reach: float) -> Floats:
 
 def extents_of_segments(a: Record, b: Record) -> tuple[float, float]:
     """Return where the midpoints of two scan segments lie, counted along each from where their lines cross."""
-    turned = np.stack([direction(a), -direction(b)], axis=1)
+    turned = np.array((direction(a), -direction(b))).T
     on_a, on_b = np.linalg.solve(turned, [b["x"] - a["x"], b["y"] - a["y"]])
     return -float(on_a), -float(on_b)

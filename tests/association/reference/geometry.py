@@ -26,7 +26,7 @@ def rotation(theta: float) -> Floats:
 
 def point(record: Record, x: str = "x", y: str = "y") -> Floats:
     """Return two fields of a record as a vector; of an array (n,) as (n, 2)."""
-    return np.stack([record[x], record[y]], axis=-1)
+    return np.array((record[x], record[y])).T
 
 
 def direction(record: Record) -> Floats:
