@@ -129,11 +129,11 @@ def missed_share(orders: np.ndarray, gains: np.ndarray, bases: list[Record], nee
 
     They are the first two and more of each order that come to what is needed, where all of it does.
     """
-    missed = 0
+    missed, pairs = 0, [{int(base["sliding"]), int(base["crossing"])} for base in bases]
     for order in orders.tolist():
         sums = np.cumsum(gains[order])
         if sums[-1] < needed:
             continue
         some = set(order[: max(2, int(np.argmax(sums >= needed)) + 1)])
-        missed += not any({base["sliding"], base["crossing"]} <= some for base in bases)
+        missed += not any(pair <= some for pair in pairs)
     return missed / len(orders)

@@ -19,17 +19,20 @@ from registration.observability import MAX_DEVIATION
 Numbers = dict[str, float]
 Document = Mapping[str, list[float]]  # for each feature its slope, then value and change of slope of each bend; pairs
 
+LOG_RATIOS = np.linspace(-60.0, 60.0, 2_401)  # of variances; ten times as many change less than 1e-11
+INVERSES = np.exp(-LOG_RATIOS)
+
 
 def worth(one: Ranked) -> float:
     """Return the value of an explanation with its residuals' likelihood averaged over how far the walls may be off.
 
     Their variance over the supposed one, e to the t, is a scaled inverse chi-square of so many degrees of freedom.
     """
-    n, k = sum(wall >= 0 for wall in one.matches["wall"]), tuning.USUAL_WALLS
-    t = np.linspace(-60.0, 60.0, 2_401)  # ten times as many change less than 1e-11
-    density = 0.5 * k * (math.log(0.5 * k) - t - np.exp(-t)) - math.lgamma(0.5 * k)
-    logs = density - 0.5 * n * t - 0.5 * one.cost * np.exp(-t)
-    return one.value + 0.5 * one.cost + float(logs.max() + np.log(np.exp(logs - logs.max()).sum() * (t[1] - t[0])))
+    n, k = int((one.matches["wall"] >= 0).sum()), tuning.USUAL_WALLS
+    density = 0.5 * k * (math.log(0.5 * k) - LOG_RATIOS - INVERSES) - math.lgamma(0.5 * k)
+    logs = density - 0.5 * n * LOG_RATIOS - 0.5 * one.cost * INVERSES
+    step = LOG_RATIOS[1] - LOG_RATIOS[0]
+    return one.value + 0.5 * one.cost + float(logs.max() + np.log(np.exp(logs - logs.max()).sum() * step))
 
 
 def evidence(answer: Answer, rivals: list[Ranked], temperature: float) -> float:
