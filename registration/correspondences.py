@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,13 +12,12 @@ from .kernels import pairs as kernels
 from .layout import LEAST_POINTS, PAIR, Floats, Records, X, Y
 from .segments import MeasuredSegments, Segments
 from .tables import Drawn, Points
-from .values import value
 
 Indices = NDArray[np.intp]
 Point = Floats | tuple[float, float]
 
 
-@value(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Correspondences:
     """n pairs, a row each.
 

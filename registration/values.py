@@ -1,4 +1,7 @@
-"""Values that are made by the dozen for each answer."""
+"""Values that are made for each answer and handed from one part of the packages to another.
+
+What callers get is frozen at run time, too, but for the dozens of correspondences.
+"""
 
 from __future__ import annotations
 

@@ -137,13 +137,14 @@ import numpy as np
 from small.kernels.first import first
 ones = np.ones(2)
 assert first(ones) == first(ones) == 1.0
-try:
-    assert first(np.ones(2, np.int64)) == 5e-324
-except TypeError as error:
-    assert "kernel first: expected arguments of one type each" in str(error)
-    assert {refused}
-else:
-    assert not {refused}
+for _ in range(2):
+    try:
+        assert first(np.ones(2, np.int64)) == 5e-324
+    except TypeError as error:
+        assert "kernel first: expected arguments of one type each" in str(error)
+        assert {refused}
+    else:
+        assert not {refused}
 assert first.__name__ == "first"
 """
 

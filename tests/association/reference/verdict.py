@@ -26,7 +26,8 @@ INVERSES = np.exp(-LOG_RATIOS)
 def worth(one: Ranked) -> float:
     """Return the value of an explanation with its residuals' likelihood averaged over how far the walls may be off.
 
-    Their variance over the supposed one, e to the t, is a scaled inverse chi-square of so many degrees of freedom.
+    Their variance over the supposed one is a scaled inverse chi-square of so many degrees of freedom; the sum goes over
+    its logarithm.
     """
     n, k = int((one.matches["wall"] >= 0).sum()), tuning.USUAL_WALLS
     density = 0.5 * k * (math.log(0.5 * k) - LOG_RATIOS - INVERSES) - math.lgamma(0.5 * k)
