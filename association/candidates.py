@@ -7,13 +7,15 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from registration.compiling import internal
 from registration.layout import Records
 from registration.values import value
 
 from .context import SearchContext
+from .kernels import searching
 from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.planning import begin
-from .kernels.searching import go_on, put_in_order, search
+from .kernels.searching import go_on, put_in_order
 from .kernels.stopping import missed_share, restrict
 from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
 from .options import AssociationOptions, CancelledError
@@ -41,6 +43,8 @@ from .tuning import (
     TELLING_SEGMENTS,
     USUAL_CROWD,
 )
+
+_search_map = internal(searching.search)
 
 NO_NOISE = np.zeros(0)
 NONE_TRIED = np.zeros(0, TRIED)
@@ -122,7 +126,6 @@ def find_candidates(context: SearchContext, effort: Effort | None = None, *, chu
         When the deadline was cancelled.
     """
     effort = effort or Effort.of(context)
-    chunk = chunk or CHUNK
     if context.window is None:
         return _search(context, effort, chunk)
     # A window is searched by itself; the whole map shows whether a clearly better pose lies outside.
@@ -142,28 +145,66 @@ def find_candidates(context: SearchContext, effort: Effort | None = None, *, chu
     return Candidates(np.concatenate([within.poses, everywhere.poses]), report)
 
 
-def _search(context: SearchContext, effort: Effort, chunk: int) -> Candidates:
-    """Search the map, or the window of a hard prior."""
-    deadline, tables, work = context.deadline, context.index.tables, context.workspace
-    how, rules = _limits(context, effort, chunk)
-    found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), record(PROGRESS, best_value=effort.known)
-    question, planning = context.question(rules), _planning(context, effort)
-    stopped, plan = BUDGET, None
-    if deadline.passed:
-        plan = begin(question, tables, planning, progress)
-    else:
-        stopped, plan = search(question, tables, planning, found, progress, work, how)
-    if plan is not None:
-        if not progress["left"][0]:
-            stopped = _leave_bases(context, question, plan, found, progress, how)
-        while not (progress["done"][0] or deadline.passed):
-            go_on(question, tables, plan, found, NONE_TRIED, progress, work, how)
-    if deadline.cancelled:
-        raise CancelledError
-    slid = plan is None or bool(progress["done"][0])
-    if not slid:
-        put_in_order(found, progress, how)
-    return _found(context, effort, found, progress, stopped, slid=slid)
+@value(frozen=True, slots=True)
+class Begun:
+    """A search as the kernels are handed it.
+
+    Attributes
+    ----------
+    effort : Effort
+    question : Question
+    planning : Planning
+    found : (k,) of `FOUND`, to write to
+    progress : (1,) of `PROGRESS`
+    how : (1,) of `HOW`
+    """
+
+    effort: Effort
+    question: Question
+    planning: Planning
+    found: Records
+    progress: Records
+    how: Records
+
+    @classmethod
+    def of(cls, context: SearchContext, effort: Effort, chunk: int | None = None) -> Begun:
+        """Prepare a search of the map, or of the window of a hard prior; `chunk` as in `find_candidates`."""
+        # A test of a pose takes longer the more walls lie where it is.
+        budget = int((chunk or CHUNK) / max(1.0, context.index.crowd / USUAL_CROWD))
+        how, rules = _limits(effort, context.window and context.window.radius, budget, with_beams=context.with_beams)
+        found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), record(PROGRESS, best_value=effort.known)
+        return cls(effort, context.question(rules), _planning(context, effort), found, progress, how)
+
+    def go_on(self, context: SearchContext, stopped: int, plan: Plan | None) -> Candidates:
+        """Go on where `search` left it.
+
+        Raises
+        ------
+        CancelledError
+            When the deadline was cancelled.
+        """
+        deadline, found, progress, how = context.deadline, self.found, self.progress, self.how
+        if plan is not None:
+            if not progress["left"][0]:
+                stopped = _leave_bases(context, self.question, plan, found, progress, how)
+            while not (progress["done"][0] or deadline.passed):
+                go_on(
+                    self.question, context.index.tables, plan, found, NONE_TRIED, progress, context.workspace, how
+                )  # fmt: skip
+        if deadline.cancelled:
+            raise CancelledError
+        slid = plan is None or bool(progress["done"][0])
+        if not slid:
+            put_in_order(found, progress, how)
+        return _found(context, self.effort, found, progress, stopped, slid=slid)
+
+
+def _search(context: SearchContext, effort: Effort, chunk: int | None) -> Candidates:
+    tables, begun = context.index.tables, Begun.of(context, effort, chunk)
+    question, planning, found, progress, how = begun.question, begun.planning, begun.found, begun.progress, begun.how
+    if context.deadline.passed:
+        return begun.go_on(context, BUDGET, begin(question, tables, planning, progress))
+    return begun.go_on(context, *_search_map(question, tables, planning, found, progress, context.workspace, how))
 
 
 def _found(
@@ -206,14 +247,16 @@ def _leave_bases(
     return stopped
 
 
-def _limits(context: SearchContext, effort: Effort, chunk: int) -> tuple[Records, Records]:
-    """Return how far the search goes, (1,) of `HOW`, and which poses of bases and slides are kept, (2,) of `RULES`."""
-    spacing = SLIDE_SPACING_FOR_BEAMS if context.with_beams else SLIDE_SPACING
-    if context.window is not None:
-        spacing = min(spacing, context.window.radius)
-    share = effort.kept_share if context.with_beams else effort.rival_share
-    # A test of a pose takes longer the more walls lie where it is.
-    budget = int(chunk / max(1.0, context.index.crowd / USUAL_CROWD))
+@lru_cache
+def _limits(effort: Effort, radius: float | None, budget: int, *, with_beams: bool) -> tuple[Records, Records]:
+    """Return how far a search goes, (1,) of `HOW`, and which poses of bases and slides are kept, (2,) of `RULES`.
+
+    `radius` is that of a hard prior's window, if there is one. Both are read-only in all but name: searches share them.
+    """
+    spacing = SLIDE_SPACING_FOR_BEAMS if with_beams else SLIDE_SPACING
+    if radius is not None:
+        spacing = min(spacing, radius)
+    share = effort.kept_share if with_beams else effort.rival_share
     how = np.array([(effort.allowed, spacing, share, effort.kept, budget)], HOW)
     of_bases = effort.kept_share, DISTINCT_DISTANCE, DISTINCT_ANGLE, effort.rival_share, effort.enough
     of_slides = effort.kept_share, SLIDE_DISTINCT_SHARE * spacing, *of_bases[2:]
@@ -221,8 +264,8 @@ def _limits(context: SearchContext, effort: Effort, chunk: int) -> tuple[Records
 
 
 def _planning(context: SearchContext, effort: Effort) -> Planning:
-    index, count = context.index, _segments_of_bases(len(context.lines.rows))
-    orders, noise, fade = _orders(count, effort.samples), NO_NOISE, math.log(REUSE)
+    index, count = context.index, segments_of_bases(len(context.lines.rows))
+    orders, noise, fade = orders_of(count, effort.samples), NO_NOISE, math.log(REUSE)
     if context.options.sampling == "random":
         # Those with the greatest sums of the logarithm of their merit and a Gumbel variate are draws without
         # replacement with a probability by merit.
@@ -230,13 +273,13 @@ def _planning(context: SearchContext, effort: Effort) -> Planning:
     return Planning(index.runs, index.area, *orders, fade, noise)
 
 
-def _segments_of_bases(count: int) -> int:
+def segments_of_bases(count: int) -> int:
     """Return among how many of a scan's segments bases are drawn."""
     return max((n for n in (min(count, BASE_SEGMENTS), *TELLING_SEGMENTS) if n <= count), default=0)
 
 
 @lru_cache(maxsize=2 * (BASE_SEGMENTS + 1 + len(TELLING_SEGMENTS)))
-def _orders(n: int, samples: int) -> tuple[Integers, Integers]:
+def orders_of(n: int, samples: int) -> tuple[Integers, Integers]:
     """Return orders of n segments (samples, n), all as likely, and the places of each segment in them, (n, samples).
 
     Those of few segments are what is left of orders of more: to draw them anew takes ten times as long, for each number

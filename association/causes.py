@@ -12,7 +12,8 @@ from registration.limits import MAX_LENGTH, MIN_LENGTH
 
 from .candidates import Effort, allowed_by
 from .context import SearchContext
-from .explain import Explanations, explain
+from .explain import explain
+from .explanations import Explanations
 from .extents import inner_extent
 from .scaling import scale_near_one
 from .scan import Scan, mirrored, scaled, turned_round

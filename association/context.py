@@ -8,6 +8,7 @@ import numpy as np
 
 from registration import RigidTransform
 from registration.layout import Records
+from registration.observability import most_parallel_up_to
 from registration.values import value
 
 from .alignment import aligned
@@ -30,7 +31,7 @@ from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
 from .scan_lines import ScanLines, gates
-from .tables import Question, Sights, Workspace
+from .tables import Question, Sights, Standing, Workspace
 from .tuning import LATE_CROWD
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
@@ -142,10 +143,16 @@ class SearchContext:
         """Return one for another thread."""
         return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
 
+    @cached_property
+    def standing(self) -> Standing:
+        """The walls, and what is known of where they stand."""
+        known = self.index.sigma
+        parallel = most_parallel_up_to(len(self.lines.rows))
+        return Standing(self.index.walls.rows, -1.0 if known is None else known**2, parallel)
+
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""
-        scan, terms, _ = self.question_of_a_pose
-        return Question(scan, terms, rules)
+        return Question(self.lines.rows, self._terms, rules)
 
     @cached_property
     def question_of_a_pose(self) -> Question:

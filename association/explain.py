@@ -4,79 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from registration import RegistrationResult, RigidTransform
-from registration.values import value
+from registration import RigidTransform
 
-from .acceptance import Accepted, accept, register_accepted
+from .acceptance import accept, register_accepted
+from .answering import answer_at_once, is_plain
 from .candidates import Candidates, Effort, find_candidates
 from .context import SearchContext
+from .explanations import Answer, Explanations
+from .kernels.chance import worth_of
 from .layout import FOUND, record
 from .ranking import Ranked, rank_candidates
 from .result import SearchReport
-from .settling import Settled, settle
-from .sight import BeamShares, agreement, compare_beams
+from .settling import settle
+from .sight import NO_BEAMS, agreement, compare_beams
 from .significance import significance
 from .views import corrected
 
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
-
-
-@value(frozen=True, slots=True)
-class Answer:
-    """The best explanation, worked out.
-
-    Attributes
-    ----------
-    best : Ranked
-    accepted : Accepted
-        Its consensus set in the map's own segments.
-    settled : Settled
-        Its pose, and what that hinges on.
-    registered : RegistrationResult
-        That pose on the map's own segments.
-    agreement : float
-        Share of directions in which the scan shows what the map does, 0 to 1.
-    beams : BeamShares
-        How many of the beams do not read what the map shows.
-    significance : float
-        Probability that chance scores as high.
-    """
-
-    best: Ranked
-    accepted: Accepted
-    settled: Settled
-    registered: RegistrationResult
-    agreement: float
-    beams: BeamShares
-    significance: float
-
-
-@value(frozen=True, slots=True)
-class Explanations:
-    """What a search found.
-
-    Attributes
-    ----------
-    ranked : tuple of Ranked
-        Distinct; those within a hard prior's window first, the best first.
-    answer : Answer or None
-        The first within the window; None where there is none.
-    search : SearchReport
-    """
-
-    ranked: tuple[Ranked, ...]
-    answer: Answer | None
-    search: SearchReport
-
-    @property
-    def rivals(self) -> tuple[Ranked, ...]:
-        """The other explanations within the window, best first."""
-        return tuple(one for one in self.others if one.inside)
-
-    @property
-    def others(self) -> tuple[Ranked, ...]:
-        """All explanations but that of the answer."""
-        return self.ranked if self.answer is None else tuple(r for r in self.ranked if r is not self.answer.best)
 
 
 def explain(context: SearchContext, effort: Effort | None = None) -> Explanations:
@@ -87,6 +31,8 @@ def explain(context: SearchContext, effort: Effort | None = None) -> Explanation
     CancelledError
         When the deadline was cancelled.
     """
+    if effort is None and is_plain(context):
+        return _explain_at_once(context)
     return _explain_by(context, find_candidates(context, effort))
 
 
@@ -102,12 +48,30 @@ def explain_at(context: SearchContext, pose: RigidTransform) -> Explanations:
     return _explain_by(context, Candidates(record(FOUND, x=pose.x - x, y=pose.y - y, theta=pose.theta), NOT_SEARCHED))
 
 
+def _explain_at_once(context: SearchContext) -> Explanations:
+    candidates, told = answer_at_once(context)
+    if told is None:
+        return _explain_by(context, candidates)
+    search = _as_far_as(context, candidates)
+    best = told.ranked[0]
+    accepted = accept(context, best)
+    registered = register_accepted(context, accepted, told.settled)
+    if registered is None:
+        return Explanations(told.ranked, None, search)
+    answer = Answer(best, accepted, told.settled, registered, told.agreement, NO_BEAMS, told.significance)
+    return Explanations(told.ranked, answer, search, told.weighing)
+
+
 def _explain_by(context: SearchContext, candidates: Candidates) -> Explanations:
-    ranked = rank_candidates(context, candidates)
-    # What the deadline left unranked may have been better.
-    search = replace(candidates.report, complete=False) if context.deadline.passed else candidates.report
+    ranked, search = rank_candidates(context, candidates), _as_far_as(context, candidates)
     best = next((one for one in ranked if one.inside), None)
-    return Explanations(tuple(ranked), None if best is None else _answer(context, best), search)
+    answer = None if best is None else _answer(context, best)
+    return Explanations(tuple(ranked), answer, search)
+
+
+def _as_far_as(context: SearchContext, candidates: Candidates) -> SearchReport:
+    """Return how the search went; what the deadline left unranked may have been better."""
+    return replace(candidates.report, complete=False) if context.deadline.passed else candidates.report
 
 
 def _answer(context: SearchContext, best: Ranked) -> Answer | None:
@@ -119,6 +83,6 @@ def _answer(context: SearchContext, best: Ranked) -> Answer | None:
     registered = register_accepted(context, accepted, settled)
     if registered is None:
         return None
-    chance = significance(context, float(best.matches["worth"].sum()))
+    chance = significance(context, worth_of(best.matches))
     beams = compare_beams(context, settled)
     return Answer(best, accepted, settled, registered, agreement(context, best), beams, chance)

@@ -1,29 +1,14 @@
-"""Poses that differ along a direction that nothing fixes: when an answer is one of many, and which of them is given."""
+"""Poses that differ along a direction that nothing fixes: which of them is given."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from registration import RigidTransform
-from registration.observability import MAX_DEVIATION
 
 from .context import SearchContext
-from .explain import Answer
+from .explanations import Answer
 from .ranking import Ranked
-from .tuning import FEW_WALLS, OFFSET_OF_FEW
-
-
-def is_thin(context: SearchContext, answer: Answer) -> bool:
-    """Tell whether so few walls fix the pose that one alone decides: any building has such a corner.
-
-    Many have three sides of a room that are about as far apart, too, but few to millimetres. Beams move a pose to
-    where those three fit, so that with them it proves less.
-    """
-    hinges = answer.settled.hinges
-    if len(hinges) > FEW_WALLS or not (hinges["deviation"] > MAX_DEVIATION).any():
-        return False
-    offsets = answer.best.matches["offset"][answer.best.matched]
-    return len(hinges) < FEW_WALLS or context.with_beams or float(np.mean(offsets**2)) > OFFSET_OF_FEW**2
 
 
 def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | None:

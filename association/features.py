@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from registration.compiling import internal
+from registration.layout import Records
+
 from .context import SearchContext
-from .explain import Answer
-from .kernels.odds import left_unmatched, most_by_one_wall, null_features, root_gap
+from .explanations import Answer
+from .kernels import features as kernels
+from .kernels import odds
+from .layout import FACTS, FEATURES, MERIT, RIVAL, WEIGHED, record
 from .null import Null
 from .ranking import Ranked
-from .tuning import (
-    CROWD_TEMPERATURE,
-    LEAST_CHANCE_FEATURE,
-    LEAST_CROWD,
-    LEAST_MISFIT,
-    LONGEST_UNMATCHED,
-    MANY,
-    MAX_LEAD,
-    MOST_DEVIATION,
-    MOST_MISFIT,
-    MOST_UNMATCHED,
-    NEARLY_ALL,
-    NULL_SHARE,
-    RIVAL_SHARE,
-    TWIN_TEMPERATURE,
-    UNCOUNTED_SHARE,
-    USUAL_WALLS,
-)
+from .tuning import LONGEST_UNMATCHED
 
 
 class Features(NamedTuple):
@@ -100,118 +86,76 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
-NULL_PLACE = Features._fields.index("null")  # where these three begin
-DEVIATION_PLACE = Features._fields.index("deviation")
+_describe = internal(kernels.describe)
+_weigh = internal(kernels.weigh)
+_see_hinges = internal(kernels.see_hinges)
+_see_unmatched = internal(kernels.see_unmatched)
+_is_thin = internal(kernels.is_thin)
+_take_null = internal(odds.take_null)
+twin_share = internal(kernels.twin_share)
 
 
-def features_of(context: SearchContext, answer: Answer, weighed: Sequence[Weighed]) -> Features:
-    """Return the features of an answer beside its rivals, with the least null there is."""
-    best, hinges = answer.best, answer.settled.hinges
-    lead = -max(gap for gap, _ in weighed) if weighed else best.value
-    crowd = math.log(_evidence(weighed, CROWD_TEMPERATURE) + math.exp(LEAST_CROWD))
-    count = best.count
-    longest, unmatched = _unmatched(context, best)
-    moves, hinge_deviation = most_by_one_wall(hinges)
-    misfit = math.log(min(MOST_MISFIT, max(LEAST_MISFIT, best.misfit)))
-    return Features(
-        constant=1.0,
-        lead=min(lead, MAX_LEAD),
-        solitude=-crowd,
-        share=best.share,
-        root_count=math.sqrt(count),
-        root_length=math.sqrt(best.length),
-        deviation=min(answer.settled.weakest, MOST_DEVIATION),
-        misfit=misfit,
-        inverse_count=1.0 / max(1, count),
-        longest_unmatched=longest,
+def facts_of(context: SearchContext, answer: Answer) -> Records:
+    """Return what is known of an answer besides its merits, (1,) of `FACTS`."""
+    facts = record(
+        FACTS,
+        weakest=answer.settled.weakest,
         agreement=answer.agreement,
-        read=best.read,
-        passed=best.passed,
-        root_farther=math.sqrt(answer.beams.farther),
-        root_nearer=math.sqrt(answer.beams.nearer),
-        hinge_moves=min(moves, MOST_DEVIATION),
-        hinge_deviation=min(hinge_deviation, MOST_DEVIATION),
-        chance=max(LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
-        null=NULL_SHARE,
-        null_gap=root_gap((1.0 - NULL_SHARE) * best.score),
-        null_better=0.0,
-        root_score=math.sqrt(max(0.0, best.by_segments)),
-        blocked=math.sqrt(best.blocked),
-        walls=math.sqrt(len(hinges)),
-        misfit_of_many=misfit * min(count, MANY) / MANY,
-        beyond_nearly_all=max(0.0, best.share - NEARLY_ALL),
-        root_unmatched=math.sqrt(min(unmatched, MOST_UNMATCHED)),
-        squared_solitude=crowd**2,
+        farther=answer.beams.farther,
+        nearer=answer.beams.nearer,
+        significance=answer.significance,
     )
-
-
-def _unmatched(context: SearchContext, best: Ranked) -> tuple[float, float]:
-    """Return the length of the longest segment that is not matched, and of all of them, metres; of a drive by view.
-
-    The models know scans from one place: each view of a drive adds to what no map shows as it adds to what is matched.
-    """
+    _see_hinges(answer.settled.hinges, facts)
     views = context.scan.views
     if views is None or not views.uncertain:
-        most, together = left_unmatched(context.lines.rows, best.matches)
-        return min(most, LONGEST_UNMATCHED), together
+        _see_unmatched(context.lines.rows, answer.best.matches, facts)
+        return facts
+    # The models know scans from one place: each view of a drive adds to what no map shows as it adds to what is
+    # matched.
     seen = context.lines.sightings
-    seen = seen[~best.matched[seen["row"]]]
+    seen = seen[~answer.best.matched[seen["row"]]]
     longest, sums = np.zeros((2, len(views)))
     np.maximum.at(longest, seen["sensor"], np.minimum(seen["length"], LONGEST_UNMATCHED))
     np.add.at(sums, seen["sensor"], seen["length"])
-    return float(longest.mean()), float(sums.mean())
+    facts["longest"], facts["unmatched"] = longest.mean(), sums.mean()
+    return facts
+
+
+def is_thin(context: SearchContext, answer: Answer, facts: Records) -> bool:
+    """Tell whether so few walls fix the pose that one alone decides; `facts` (1,) are those of the answer."""
+    return bool(_is_thin(facts, answer.best.matches, context.with_beams))
+
+
+def describe(best: Ranked, facts: Records, weighed: Records) -> Records:
+    """Return the features of an answer beside its rivals, with the least null there is, (1,) of `FEATURES`.
+
+    `facts` (1,) of `FACTS`, `weighed` (k,) of `WEIGHED`.
+    """
+    features, merits = np.zeros(1, FEATURES), np.array([best.merit], MERIT)
+    _describe(merits, best.value, facts, weighed, features)
+    return features
+
+
+def features_of(context: SearchContext, answer: Answer, weighed: Records) -> Features:
+    """Return the same by name."""
+    return Features(*describe(answer.best, facts_of(context, answer), weighed).item())
 
 
 def with_null(features: Features, best: Ranked, null: Null) -> Features:
     """Return the features with what the mirrored scan comes to."""
-    null_share, gap, better = null_features(best.score, null.score, null.symmetry)
-    return features._replace(null=null_share, null_gap=gap, null_better=better)
+    described = np.array([features], FEATURES)
+    take_null(described, best, null)
+    return Features(*described.item())
 
 
-class Weighed(NamedTuple):
-    """A rival beside the best explanation.
-
-    Attributes
-    ----------
-    gap : by how much it is worth more, nats, with the walls as far off as they may be
-    counted : how far it counts, 0 to 1: fully where the search cannot have missed one as good
-    """
-
-    gap: float
-    counted: float
+def take_null(features: Records, best: Ranked, null: Null) -> None:
+    """Write what the mirrored scan comes to into the features, (1,) of `FEATURES`."""
+    _take_null(best.score, null.score, null.symmetry, features)
 
 
-def weigh(best: Ranked, rivals: Sequence[Ranked]) -> list[Weighed]:
-    """Weigh the rivals of the best explanation."""
-    least, value = worth(best), best.value
-    shares = [rival.value / value if value > 0.0 else 1.0 for rival in rivals]
-    counted = [min(1.0, max(0.0, (share - UNCOUNTED_SHARE) / (RIVAL_SHARE - UNCOUNTED_SHARE))) for share in shares]
-    return [Weighed(worth(rival) - least, part) for rival, part in zip(rivals, counted, strict=True)]
-
-
-def worth(one: Ranked) -> float:
-    """Return the value of an explanation, nats, where nobody knows how far the walls are off.
-
-    The value takes half the cost, the likelihood of its residuals where walls are off by `MODEL_OFFSET`. Of n matches
-    with an unknown variance, which `USUAL_WALLS` (k) before are taken to have shown to be as much, the likelihood is
-    Student's t: ``log G((n + k) / 2) - log G(k / 2) - n / 2 log(k / 2) - (n + k) / 2 log(1 + cost / k)``. Where the
-    walls of a map are off by more, the centimetres that tell rivals apart count that much less.
-    """
-    n, k = one.count, USUAL_WALLS
-    student = _student_constant(n) - 0.5 * (n + k) * math.log1p(one.cost / k)
-    return one.value + 0.5 * one.cost + student
-
-
-@lru_cache
-def _student_constant(n: int) -> float:
-    k = USUAL_WALLS
-    return math.lgamma(0.5 * (n + k)) - math.lgamma(0.5 * k) - 0.5 * n * math.log(0.5 * k)
-
-
-def twin_share(weighed: Sequence[Weighed]) -> float:
-    """Return the chance of the best explanation among its rivals that are about as good, above 0 and up to 1."""
-    return 1.0 / (1.0 + _evidence(weighed, TWIN_TEMPERATURE))
-
-
-def _evidence(weighed: Sequence[Weighed], temperature: float) -> float:
-    return sum(counted * math.exp(min(0.0, gap) / temperature) for gap, counted in weighed)
+def weigh(best: Ranked, rivals: Sequence[Ranked]) -> Records:
+    """Weigh the rivals of the best explanation, (k,) of `WEIGHED`."""
+    explanations = np.array([(one.value, one.cost, one.count) for one in (best, *rivals)], RIVAL)
+    weighed = np.zeros(len(rivals), WEIGHED)
+    _weigh(explanations, weighed)
+    return weighed

@@ -187,8 +187,8 @@ HOW = _fields((_F, "allowed spacing share"), (_I, "kept budget"))
 
 # A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
 # m^2; if walls were off by centimetres, the position's deviation along its weakest direction, m, and that unit
-# direction; how far the directions of the walls are from parallel, as a chi-square of their angles.
-SETTLED = np.dtype([("pose", ESTIMATE), *_fields((_F, "wall_variance weakest dx dy unlike")).descr])
+# direction; whether all walls are parallel within three standard deviations of their angles.
+SETTLED = np.dtype([("pose", ESTIMATE), *_fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
 
 # A pose among walls of which each is off by itself, with that standard deviation, m.
 POSE_AMONG_WALLS = _fields((_F, "theta x y wall_sigma"))
@@ -213,6 +213,38 @@ BLOCKER = _fields((_I, "to_matched to_clutter"))
 # What single beams say of a pose: the shares that read the wall they should, and that passed through one.
 BEAM_EVIDENCE = _fields((_F, "read passed"))
 
+
+# What an explanation is worth beside others: its value, nats; the joint cost in it; how many rows are matched. And of
+# one that is not the best: by how much it is worth more, nats, with the walls as far off as they may be; how far it
+# counts, 0 to 1: fully where the search cannot have missed one as good.
+RIVAL = _fields((_F, "value cost count"))
+WEIGHED = _fields((_F, "gap counted"))
+
+# What is known of an answer besides its merits: the position's deviation along its weakest direction, and by how much
+# it would move without one wall and its deviation then, m; how many walls hold a match; share of directions in which
+# the scan shows what the map does; shares of the beams that read farther, and nearer, than the map shows; probability
+# that chance scores as high; length of the longest segment that is not matched, and of all of these, m.
+FACTS = _fields((_F, "weakest moves hinge_deviation walls agreement farther nearer significance longest unmatched"))
+
+# The numbers of an answer that the verdict goes by: see `association.features.Features`.
+FEATURES = _fields(
+    (
+        _F,
+        "constant lead solitude share root_count root_length deviation misfit inverse_count longest_unmatched "
+        "agreement read passed root_farther root_nearer hinge_moves hinge_deviation chance null null_gap null_better "
+        "root_score blocked walls misfit_of_many beyond_nearly_all root_unmatched squared_solitude",
+    ),
+)
+
+# Chances of an answer: that it is right, given that the robot is on this map; the same where other buildings are
+# reckoned with; that it or a twin of it is right, wherever along a free direction; of it among the explanations that
+# are about as good, which is in the first two. Whether few walls fix the pose, and one of them alone decides.
+CHANCES = _fields((_F, "right careful explained share"), (_I, "thin"))
+
+# How far an answer was worked out in one call, and what is known of it: how many explanations there are, how many walls
+# hold a match of the best; significance and agreement are among the facts.
+REACHED = _fields((_I, "stage explanations walls"))
+SEARCHED, EXPLAINED, JUDGED = range(3)
 
 # What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
 # it below the first of them. From `start` on the slope is more by `more`.

@@ -7,14 +7,21 @@ fits well. What a place misses so, by centimetres, is no evidence against it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from registration.compiling import internal
+
 from .context import SearchContext
-from .explain import Answer
-from .ranking import Ranked, scores_again
+from .explanations import Answer
+from .kernels import loosening as kernels
+from .layout import MERIT
+from .ranking import Ranked, match_again
 from .scan_lines import ScanLines
-from .tuning import LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_RIVALS, LOOSE_WALLS, MODEL_OFFSET, TWIN_TEMPERATURE
+from .tuning import LOOSE_RIVALS
+
+_loose_sigma, _loose_share = internal(kernels.loose_sigma), internal(kernels.loose_share)
 
 
 def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]) -> float:
@@ -29,16 +36,8 @@ def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ra
     """
     if context.index.sigma is not None or not rivals:
         return 1.0
-    wall_sigma = max(LOOSE_WALLS, LOOSE_FACTOR * answer.settled.wall_sigma)
-    more = math.sqrt(wall_sigma**2 - MODEL_OFFSET**2)
-    lines = ScanLines.of(context.scan, more, context.options, context.lines.given)
-    loose = context.instead(context.scan, lines)
+    lines = ScanLines.of(context.scan, _loose_sigma(answer.settled.wall_sigma), context.options, context.lines.given)
     explanations = (answer.best, *rivals[:LOOSE_RIVALS])
-    best, *others = map(_worth, explanations, scores_again(loose, explanations))
-    return 1.0 / (1.0 + sum(math.exp(min(0.0, other - best) / TWIN_TEMPERATURE) for other in others))
-
-
-def _worth(one: Ranked, by_segments: float) -> float:
-    """Return what it is worth if its segments score so much, nats, with what beams say of centimetres the less."""
-    by_beams = one.score - one.by_segments
-    return by_segments + by_beams + one.value - one.score - (1.0 - LOOSE_BEAMS) * by_beams
+    again = match_again(context.instead(context.scan, lines), explanations)
+    values = np.array([one.value for one in explanations])
+    return float(_loose_share(np.array([one.merit for one in explanations], MERIT), values, again))

@@ -15,7 +15,7 @@ from .errors import InvalidMapError
 from .extents import diagonal
 from .grids import crossing_runs, directions_near, near_walls, swept_runs
 from .layout import ENDS, Integers, as_records
-from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
+from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
 
@@ -110,7 +110,7 @@ class MapIndex:
         sweep = swept_runs(runs)
         grids = near_walls(walls), sweep, crossing_runs(sweep.runs), directions_near(walls, runs)
         index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
-        for name in ("sorted_lengths", "crowd", "agreeing_share", "area", "diagonal", "tables"):
+        for name in ("wall_lengths", "crowd", "area", "diagonal", "tables"):
             getattr(index, name)  # kept from here on, so that the first search does not wait for them
         return index
 
@@ -122,10 +122,11 @@ class MapIndex:
         return MapIndex._of(both_ways(self.segments), self.sigma, self.origin, self.directed)
 
     @cached_property
-    def sorted_lengths(self) -> tuple[Floats, Floats]:
-        """The walls' lengths in ascending order, and for each place the sum from there on; metres."""
+    def wall_lengths(self) -> WallLengths:
+        """How long its walls are."""
         lengths = np.sort(self.walls.longest)
-        return lengths, np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+        beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+        return WallLengths(lengths, beyond, self._agreeing_share(), self.area)
 
     @cached_property
     def crowd(self) -> float:
@@ -133,9 +134,8 @@ class MapIndex:
         counts = np.diff(self.grid.starts).astype(np.float64)
         return float((counts * counts).sum() / max(1.0, counts.sum()))
 
-    @cached_property
-    def agreeing_share(self) -> float:
-        """The chance that two points of walls have the same direction, up to a neighbouring bin."""
+    def _agreeing_share(self) -> float:
+        """Return the chance that two points of walls have the same direction, up to a neighbouring bin."""
         shares = np.add.reduceat(
             np.append(self.walls.longest, 0.0), np.minimum(self.walls.bin_starts[:-1], len(self.walls.rows))
         )

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from registration.compiling import internal
 from registration.values import value
 
 from .candidates import Effort, allowed_by, find_candidates
 from .context import SearchContext
-from .kernels.symmetry import mirrored_share
+from .kernels import symmetry
 from .ranking import Ranked, rank_candidates
 from .scan import mirrored
 from .scan_lines import ScanLines
@@ -28,6 +27,8 @@ from .tuning import (
     NULL_SAMPLES,
     NULL_SHARE,
 )
+
+_mirrored_share = internal(symmetry.mirrored_share)
 
 
 @value(frozen=True, slots=True)
@@ -75,8 +76,6 @@ def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
 
 def symmetry_of(context: SearchContext, best: Ranked, null: Ranked) -> float:
     """Return how much of what the map shows from an answer it shows mirrored from there, at the null's pose, 0 to 1."""
-    seen, places = context.lines.sightings, context.sights.places
-    at = places[seen["sensor"]]
-    reach = float(np.max(np.hypot(seen["x"] - at["x"], seen["y"] - at["y"]) + 0.5 * seen["length"]))
-    place = context.index.tables.place
-    return float(mirrored_share(places, best.estimate, reach, null.estimate, context.gates, place, context.workspace))
+    seen, places, place = context.lines.sightings, context.sights.places, context.index.tables.place
+    poses = best.estimate, null.estimate
+    return float(_mirrored_share(places, seen, *poses, context.gates, place, context.workspace))

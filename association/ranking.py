@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import RigidTransform
+from registration.compiling import internal
 from registration.layout import Records
 from registration.values import value
 
 from .candidates import Candidates
 from .context import SearchContext
+from .kernels import ranking as kernels
 from .kernels.beams import weigh_beams
 from .kernels.best_poses import prior_values
-from .kernels.ranking import begin_at, distinct, rank
 from .layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Integers
 from .options import CancelledError, Estimator
 from .tables import Rays
@@ -39,6 +40,8 @@ from .tuning import (
 
 Floats = NDArray[np.float64]
 NOTHING = np.zeros(0)
+
+_rank, _distinct_places = internal(kernels.rank), internal(kernels.distinct)
 
 
 @value(frozen=True, slots=True)
@@ -93,11 +96,25 @@ class Ranked:
     count: int
     matches: Records
 
+    @classmethod
+    def of(cls, estimate: Records, merit: tuple[float, ...], matches: Records, *, value: float, inside: bool) -> Ranked:
+        """Return what a record of `MERIT`, as a tuple, says; its arguments otherwise by name."""
+        score, cost, one_step_cost, length, share, reliability, misfit, blocked, read, passed, count = merit
+        sums, seen = (cost, one_step_cost), (length, share, reliability, misfit, blocked)
+        return cls(estimate, score, value, inside, *sums, *seen, read, passed, int(count), matches)
+
     @property
     def pose(self) -> RigidTransform:
         """Index frame from scan frame."""
         theta, x, y, *_ = self.estimate[0].item()
         return RigidTransform(x, y, theta)
+
+    @property
+    def merit(self) -> tuple[float, ...]:
+        """The same numbers in the order of `MERIT`."""
+        sums = self.score, self.cost, self.one_step_cost
+        seen = self.length, self.share, self.reliability, self.misfit, self.blocked
+        return *sums, *seen, self.read, self.passed, self.count
 
     @property
     def by_segments(self) -> float:
@@ -146,7 +163,7 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     if not len(candidates.poses):
         return []
     estimates = np.zeros(len(candidates.poses), ESTIMATE)
-    begin_at(candidates.poses, estimates)
+    kernels.begin_at(candidates.poses, estimates)
     scored = _score(context, estimates)
     if context.with_beams:
         scored = _weigh_beams(context, scored)
@@ -159,20 +176,21 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
         value = merit[0] + (float(beside[place]) if len(beside) else 0.0)
         within = value >= INSIDE / 2
         inside = within or not windowed
-        explanations.append(_explanation(scored, place, merit, merit[0] if within else value, inside=inside))
+        value = merit[0] if within else value
+        estimate, matches = scored.estimates[place : place + 1], scored.matches[place]
+        explanations.append(Ranked.of(estimate, merit, matches, value=value, inside=inside))
     return explanations
 
 
-def scores_again(context: SearchContext, explanations: Sequence[Ranked]) -> list[float]:
-    """Match explanations anew, refined from where they are; return what their segments score then, in their order.
+def match_again(context: SearchContext, explanations: Sequence[Ranked]) -> Records:
+    """Match explanations anew, refined from where they are; return what their segments are worth then, (k,) of `MERIT`.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    scores: list[float] = _score(context, poses_of(explanations)).merits["score"].tolist()
-    return scores
+    return _score(context, poses_of(explanations)).merits
 
 
 def poses_of(explanations: Sequence[Ranked]) -> Records:
@@ -186,31 +204,9 @@ def matches_of(explanations: Sequence[Ranked]) -> Records:
     return np.frombuffer(together, MATCH).reshape(len(explanations), -1)
 
 
-def _explanation(scored: _Scored, place: int, merit: tuple[float, ...], value: float, *, inside: bool) -> Ranked:
-    score, cost, one_step_cost, length, share, reliability, misfit, blocked, read, passed, count = merit
-    estimate, matches = scored.estimates[place : place + 1], scored.matches[place]
-    return Ranked(
-        estimate,
-        score,
-        value,
-        inside,
-        cost,
-        one_step_cost,
-        length,
-        share,
-        reliability,
-        misfit,
-        blocked,
-        read,
-        passed,
-        int(count),
-        matches,
-    )
-
-
 def _distinct(scored: _Scored, beside: Floats, most: int) -> Integers:
     """Return the places of the best `most`, those of the greatest value first: score, and what is `beside` it (k,)."""
-    return distinct(
+    return _distinct_places(
         scored.estimates, scored.merits, beside, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION
     )
 
@@ -236,7 +232,7 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
         some = slice(begin, begin + step)
         parts = scored.estimates[some], scored.merits[some], scored.matches[some]
         sights = context.nothing_seen if context.too_late_to_look else context.lines_of_sight
-        rank(context.question_of_a_pose, place, sights, *parts, context.workspace)
+        _rank(context.question_of_a_pose, place, sights, *parts, context.workspace)
     if context.deadline.cancelled:
         raise CancelledError
     return scored

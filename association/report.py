@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from registration import Ambiguity
 from .acceptance import correspondences, overlaps_at
 from .causes import Cause
 from .context import SearchContext
-from .explain import Answer, Explanations
+from .explanations import Answer, Explanations
 from .kernels.measures import paper_measures
 from .layout import POSE_AMONG_WALLS
 from .ranking import Ranked, matches_of
@@ -109,24 +110,27 @@ def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> As
 
 def _hinge(context: SearchContext, answer: Answer) -> Hinge | None:
     """Return the wall without which the pose would move most or be free; None where it would hardly move."""
-    hinges = answer.settled.hinges
-    moves = np.maximum(hinges["moves"], hinges["deviation"])
-    if not len(hinges) or moves.max() < HINGES:
+    moves, wall, direction = 0.0, -1, (0.0, 0.0)
+    for w, moved, deviation, dx, dy in answer.settled.hinges.tolist():
+        if max(moved, deviation) > moves:
+            moves, wall, direction = max(moved, deviation), w, (dx, dy)
+    if moves < HINGES:
         return None
-    one = hinges[int(moves.argmax())]
-    on_it = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]] == one["wall"]
+    on_it = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]] == wall
     scan = answer.accepted.pairs[on_it, 0].tolist()
     on_map = sorted({i for i, there in zip(answer.accepted.map_indices(context.index), on_it, strict=True) if there})
-    return Hinge(tuple(scan), tuple(on_map), (float(one["dx"]), float(one["dy"])), float(moves.max()))
+    return Hinge(tuple(scan), tuple(on_map), direction, moves)
 
 
 def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
     return missing_segments(context, answer.best) if "missing_map" in context.options.parts else ()
 
 
-def _alternatives(context: SearchContext, others: tuple[Ranked, ...], *, usable: bool) -> tuple[Alternative, ...]:
-    shown = others[: context.options.max_alternatives]
-    if not shown or (usable and "alternatives" not in context.options.parts):
+def _alternatives(context: SearchContext, others: Iterable[Ranked], *, usable: bool) -> tuple[Alternative, ...]:
+    if usable and "alternatives" not in context.options.parts:
+        return ()
+    shown = tuple(islice(others, context.options.max_alternatives))
+    if not shown:
         return ()
     settled = settle(context, shown)
     poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)

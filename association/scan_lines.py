@@ -10,16 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments
+from registration.compiling import internal
 from registration.layout import Records
 from registration.values import value
 
-from .kernels.scans import (
-    describe_labelled,
-    describe_view,
-    join_lines,
-    lines_of_a_view,
-    mirror_lines,
-)
+from .kernels import scans as kernels
+from .kernels.scans import describe_labelled, join_lines, lines_of_a_view
 from .layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, as_records, record
 from .options import AssociationOptions
 from .scan import Scan, Views
@@ -35,13 +31,14 @@ from .tuning import (
     LEAST_OVERLAP,
     LINE_ANGLE,
     LINE_LATERAL,
-    MODEL_OFFSET,
     MOST_LATERAL,
     MOST_TURN,
     REACH,
-    ROUGHNESS,
     VIEW_SIGMAS,
 )
+
+_describe_view, _mirror_lines = internal(kernels.describe_view), internal(kernels.mirror_lines)
+_set_map_sigma = internal(kernels.set_map_sigma)
 
 
 @value(frozen=True, slots=True)
@@ -82,10 +79,10 @@ class ScanLines:
             Of other lines of the same scan, where there are any.
         """
         measured = scan.measured
-        variances, model = _variances(map_sigma or 0.0, options, with_beams=scan.beams is not None)
+        variances, model = variances_of(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
             given = given or _given(measured)
-            row_of, rows, seen = describe_view(given, measured.counted, variances, model)
+            row_of, rows, seen = _describe_view(given, measured.counted, variances, model)
             return cls(row_of, rows, model, seen, given)
         part_of, parts, views = parts_of(measured, scan.views)
         line_row, rows = describe_labelled(*_joined_views(parts, scan.views), variances, model)
@@ -93,7 +90,7 @@ class ScanLines:
 
     def mirrored(self) -> ScanLines:
         """Return those of the scan with left and right exchanged, which has to be of one view."""
-        rows, seen = mirror_lines(self.rows)
+        rows, seen = _mirror_lines(self.rows)
         return ScanLines(self.row_of, rows, self.model, seen)
 
 
@@ -171,17 +168,17 @@ def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) 
 
 
 @lru_cache
-def _variances(map_sigma: float, options: AssociationOptions, *, with_beams: bool) -> tuple[Records, Records]:
+def variances_of(map_sigma: float, options: AssociationOptions, *, with_beams: bool) -> tuple[Records, Records]:
     """Return what goes into the variances of lines, (1,) of `VARIANCES`, and of walls, (1,) of `MODEL`."""
-    of_map, wall = float(map_sigma) ** 2, MODEL_OFFSET**2 - ROUGHNESS**2
-    least_offset = ((options.offset_tolerance or 0.0) / GATE_SIGMAS) ** 2
-    return record(
+    variances = record(
         VARIANCES,
-        map=of_map,
         common=COMMON_ERROR**2 if with_beams else 0.0,
-        least_offset=least_offset,
+        least_offset=((options.offset_tolerance or 0.0) / GATE_SIGMAS) ** 2,
         least_angle=((options.angle_tolerance or 0.0) / GATE_SIGMAS) ** 2,
-    ), record(MODEL, wall_variance=max(of_map + wall, least_offset), free_distance=FREE_DISTANCE, free_angle=FREE_ANGLE)
+    )
+    model = record(MODEL, free_distance=FREE_DISTANCE, free_angle=FREE_ANGLE)
+    _set_map_sigma(float(map_sigma), variances, model)
+    return variances, model
 
 
 @lru_cache

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from registration import RigidTransform
-from registration.chi_square import chi_square_quantile
+from registration.compiling import internal
 from registration.layout import Floats, Records
-from registration.observability import MAX_DEVIATION, THREE_SIGMA_TAIL
+from registration.observability import MAX_DEVIATION
 from registration.values import value
 
 from .context import SearchContext
-from .kernels.settling import settle as settle_matches
+from .kernels import settling as kernels
 from .layout import HINGE, SETTLED
 from .ranking import Ranked, matches_of, poses_of
 from .scan import Views
@@ -25,6 +25,8 @@ from .tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY
 from .view_settling import SeenOnWalls, ViewsSettled
 
 NO_HINGES = np.zeros(0, HINGE)
+
+_settle = internal(kernels.settle)
 
 
 @value(frozen=True, slots=True)
@@ -63,6 +65,23 @@ class Settled:
     hinges: Records
     views: ViewsSettled | None = None
 
+    @classmethod
+    def of(cls, numbers: Any, hinges: Records) -> Settled:
+        """Return what a record of `SETTLED`, as a tuple, says."""
+        (theta, x, y, xx, xy, xt, yy, yt, tt), variance, weakest, dx, dy, parallel = numbers
+        sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
+        spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
+        return cls(
+            pose=RigidTransform(x, y, theta),
+            covariance=np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3),
+            wall_sigma=math.sqrt(variance),
+            weakest=weakest,
+            direction=(sign * dx, sign * dy),
+            free=bool(parallel) or spread > ONE_OF_MANY**2,
+            parallel=bool(parallel),
+            hinges=hinges,
+        )
+
     @property
     def degenerate(self) -> bool:
         """Whether a direction of the position is not fixed: parallel walls, or a deviation beyond 0.5 m."""
@@ -73,34 +92,15 @@ def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bo
     """Work out the poses of consensus sets, of one at least; with `hinges` of the first, where the others have none."""
     found = np.zeros(len(explanations), SETTLED)
     without = np.zeros(len(explanations[0].matches) if hinges else 0, HINGE)
-    known = context.index.sigma
-    count = settle_matches(
-        context.question_of_a_pose, context.index.walls.rows, matches_of(explanations), poses_of(explanations),
-        -1.0 if known is None else known**2, found, without, context.workspace,
+    count = _settle(
+        context.question_of_a_pose, context.standing, matches_of(explanations), poses_of(explanations), found, without,
+        context.workspace,
     )  # fmt: skip
-    settled = list(map(_settled, explanations, found.tolist(), chain([without[:count]], repeat(NO_HINGES))))
+    settled = list(map(Settled.of, found.tolist(), chain([without[:count]], repeat(NO_HINGES))))
     views = context.scan.views
     if views is None or not views.uncertain:
         return settled
     return [_with_views(context, one, views, alone) for one, alone in zip(explanations, settled, strict=True)]
-
-
-def _settled(one: Ranked, numbers: Any, hinges: Records) -> Settled:
-    """Return what a record of `SETTLED` says of an explanation."""
-    (theta, x, y, xx, xy, xt, yy, yt, tt), variance, weakest, dx, dy, unlike = numbers
-    sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
-    parallel = one.count < 2 or unlike <= chi_square_quantile(one.count - 1, THREE_SIGMA_TAIL)
-    spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
-    return Settled(
-        pose=RigidTransform(x, y, theta),
-        covariance=np.array((xx, xy, xt, xy, yy, yt, xt, yt, tt)).reshape(3, 3),
-        wall_sigma=math.sqrt(variance),
-        weakest=weakest,
-        direction=(sign * dx, sign * dy),
-        free=parallel or spread > ONE_OF_MANY**2,
-        parallel=parallel,
-        hinges=hinges,
-    )
 
 
 def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settled) -> Settled:

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from registration.compiling import internal
 from registration.layout import Records
 from registration.values import value
 
 from .context import SearchContext
+from .kernels import agreement as agreement_kernels
 from .kernels.acceptance import missing_pieces
-from .kernels.agreement import agreement as agreement_at
 from .kernels.beams import beam_shares
 from .layout import ESTIMATE, record
 from .ranking import Ranked, beam_evidence_at, rays_of
@@ -43,6 +44,8 @@ class BeamShares:
 
 NO_BEAMS = BeamShares()
 
+_agreement = internal(agreement_kernels.agreement)
+
 
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
     """List the map segments of walls that rays to the consensus set pass through.
@@ -63,7 +66,7 @@ def agreement(context: SearchContext, best: Ranked) -> float:
     if context.scan.viewpoint is None:
         return NEUTRAL
     pose, place = best.estimate, context.index.tables.place
-    return float(agreement_at(context.sights, pose, place, context.workspace))
+    return float(_agreement(context.sights, pose, place, context.workspace))
 
 
 def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from registration.compiling import internal
+
 from .context import SearchContext
-from .kernels.chance import chance_matches, log_tail
-from .tuning import LEAST_SIGNIFICANCE
+from .kernels import chance
 
 EXPONENTS = np.geomspace(0.01, 2.0, 40)  # of Chernoff's bound
+
+_significance = internal(chance.significance)
 
 
 def significance(context: SearchContext, score: float) -> float:
@@ -31,10 +32,4 @@ def significance(context: SearchContext, score: float) -> float:
     float
         0 to 1; small is good.
     """
-    index, scan, gates = context.index, context.lines.rows, context.gates
-    lengths, beyond = index.sorted_lengths
-    chances = chance_matches(scan, lengths, beyond, index.agreeing_share, index.area, gates)
-    exponent = float(log_tail(scan, chances, score, EXPONENTS))
-    places = index.area / (2.0 * float(gates["least_offset"][0])) ** 2
-    turns = math.tau / (2.0 * float(gates["least_angle"][0]))
-    return min(1.0, max(LEAST_SIGNIFICANCE, math.exp(min(0.0, exponent + math.log(max(1.0, places * turns))))))
+    return _significance(context.lines.rows, context.index.wall_lengths, context.gates, EXPONENTS, score)

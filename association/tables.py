@@ -240,6 +240,41 @@ class Odds(NamedTuple):
     pairs: Records
 
 
+class Standing(NamedTuple):
+    """The walls, and what is known of where they really stand.
+
+    Attributes
+    ----------
+    walls : (m,) of `WALL`
+    variance : float
+        Of a wall's own error, m^2; negative where nothing is known of it.
+    parallel : (k,) the chi-square of the angles of n matches up to which they are parallel, by n, for all that may be
+    """
+
+    walls: Records
+    variance: float
+    parallel: Floats
+
+
+class WallLengths(NamedTuple):
+    """How much wall there is: what chance goes by.
+
+    Attributes
+    ----------
+    ascending : (m,) their lengths, metres
+    beyond : (m + 1,) the sums of those from each on, metres
+    agreeing : float
+        The chance that two points of walls have the same direction.
+    area : float
+        Of the map, m^2.
+    """
+
+    ascending: Floats
+    beyond: Floats
+    agreeing: float
+    area: float
+
+
 class Blockers(NamedTuple):
     """The walls that rays pass through.
 
@@ -251,6 +286,75 @@ class Blockers(NamedTuple):
 
     counts: Records
     touched: Integers
+
+
+class Told(NamedTuple):
+    """What is written of an answer.
+
+    Attributes
+    ----------
+    reached : (1,) of `REACHED`
+    estimates : (k,) of `ESTIMATE`, of the explanations, the best first
+    merits : (k,) of `MERIT`
+    matches : (k, n) of `MATCH`
+    settled : (1,) of `SETTLED`, the best of them
+    hinges : (n,) of `HINGE`
+    facts : (1,) of `FACTS`
+    features : (1,) of `FEATURES`
+    chances : (1,) of `CHANCES`
+    """
+
+    reached: Records
+    estimates: Records
+    merits: Records
+    matches: Records
+    settled: Records
+    hinges: Records
+    facts: Records
+    features: Records
+    chances: Records
+
+
+class Answering(NamedTuple):
+    """What an answer that is worked out in one call goes by beside the search, and where it is written.
+
+    Attributes
+    ----------
+    sights : Sights
+    seen : (k,) of `SIGHTING`, of which there may be no lines of sight
+    standing : Standing
+    lengths : WallLengths
+    gates : (1,) of `GATES`
+    exponents : (m,) of Chernoff's bound, ascending
+    measured : Measured
+    variances : (1,) of `VARIANCES`
+    orders, ranks : as in `Samples`, for the search of the mirrored scan
+    usual, cautious : Odds
+    usual_deviation : float
+        Of the position of a usual right answer, along its weakest direction, m.
+    counted : bool
+        Whether the scan's points were counted.
+    to_scale : bool
+        Whether a factor between scan and map may be looked for.
+    told : Told
+    """
+
+    sights: Sights
+    seen: Records
+    standing: Standing
+    lengths: WallLengths
+    gates: Records
+    exponents: Floats
+    measured: Measured
+    variances: Records
+    orders: Integers
+    ranks: Integers
+    usual: Odds
+    cautious: Odds
+    usual_deviation: float
+    counted: bool
+    to_scale: bool
+    told: Told
 
 
 class Workspace(NamedTuple):

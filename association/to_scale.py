@@ -17,7 +17,9 @@ from registration.values import value
 from .acceptance import register_accepted
 from .candidates import Candidates, find_candidates
 from .context import SearchContext
-from .explain import Explanations, explain
+from .explain import explain
+from .explanations import Explanations
+from .kernels import similarity as kernels
 from .ranking import Ranked, rank_candidates
 from .scan import scaled
 from .similarity import Similarity, fit_similarity
@@ -25,12 +27,10 @@ from .tuning import (
     DISTINCT_ANGLE,
     DOUBTING_DEVIATIONS,
     DOUBTING_WALLS,
-    FACTOR_DEVIATIONS,
     FACTOR_GAP,
     FACTOR_ROUNDS,
     FACTOR_WALLS,
     LEAST_AS_SENT,
-    LEAST_FACTOR,
     LEAST_OFF_WALLS,
     LOOSE_RIVALS,
     MOST_FACTOR,
@@ -111,6 +111,8 @@ def _may_be_off(first: Explained) -> bool:
     it is.
     """
     context, answer = first.context, first.explanations.answer
+    if first.explanations.weighing is not None:
+        return False  # this was looked at then
     if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
         return False
     return context.index.sigma is None and answer.settled.wall_sigma >= LEAST_OFF_WALLS
@@ -148,7 +150,7 @@ def _similarity(found: Explained) -> Similarity | None:
 
 def is_off(similarity: Similarity) -> bool:
     """Tell whether a similarity says that the scan is not to scale."""
-    return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
+    return kernels.is_off(similarity.factor, similarity.deviation)
 
 
 def is_far_off(similarity: Similarity) -> bool:
@@ -201,7 +203,7 @@ def beside(explanations: Explanations, rivals: Sequence[Ranked]) -> Explanations
         if place == len(ranked) or ranked[place].value < one.value:
             ranked[place : place + 1] = [one]
     ranked.sort(key=lambda one: (not one.inside, -one.value))
-    return replace(explanations, ranked=tuple(ranked))
+    return replace(explanations, ranked=tuple(ranked), weighing=None)
 
 
 def _same_place(one: Ranked, other: Ranked) -> bool:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from registration import RigidTransform
-from registration.layout import Floats
+from registration.compiling import internal
+from registration.layout import Records
 from registration.values import value
 
 from .context import SearchContext
-from .explain import Answer, Explanations
-from .families import is_thin, place_on_family
-from .features import DEVIATION_PLACE, NULL_PLACE, Features, features_of, twin_share, weigh, with_null
-from .kernels.odds import allowed_null, three_log_odds
+from .explanations import Answer, Explanations
+from .families import place_on_family
+from .features import Features, describe, facts_of, is_thin, take_null, twin_share, weigh
+from .kernels import odds
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
 from .null import null_of
-from .ranking import Ranked
 from .reasons import Standing, reasons_of
 from .result import Reason, Status
 from .tuning import (
@@ -35,7 +31,9 @@ from .tuning import (
     USABLE_PROBABILITY,
 )
 
-ROUNDING = 1e-9  # of a chance
+_three_chances = internal(odds.three_chances)
+_allowed_null = internal(odds.allowed_null)
+_chance = internal(odds.chance)
 
 
 @value(frozen=True, slots=True)
@@ -78,7 +76,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
 
     `off_scale`: whether scan and map differ by a factor that nothing was done about.
     """
-    answer, rivals, complete = explanations.answer, explanations.rivals, explanations.search.complete
+    answer, complete = explanations.answer, explanations.search.complete
     if answer is None:
         why = reasons_of(
             Standing(Status.NO_MATCH, complete, bool(explanations.ranked), elsewhere=True),
@@ -87,42 +85,49 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
         )
         return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked), why, complete)
     best = answer.best
-    better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
+    better_elsewhere = explanations.weighing is None and any(
+        other.score > best.score + CONTRADICTION for other in explanations.others
+    )
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
     doubted = off_scale or _out_of_step(answer)
     certain = complete and not contradicted and context.window is None and not doubted
-    chances = _Chances.of(context, answer, rivals, capped=better_elsewhere, certain=certain)
+    chances = _Chances.of(context, explanations, capped=better_elsewhere, certain=certain)
     # The mirrored scan and the rivals with walls farther off are searched, and scored, no further than the deadline.
     complete = complete and not context.deadline.passed
-    thin = is_thin(context, answer)
-    status = _status(answer, chances, _bar(context), capped=better_elsewhere, doubted=doubted or thin)
+    status = _status(answer, chances, _bar(context), capped=better_elsewhere, doubted=doubted or chances.thin)
     pose = place_on_family(context, answer)
     if context.window is not None and pose is not None and not context.window.contains(pose):
         # It was inside before it was registered: the window is narrower than what the scan says.
         contradicted = contradicted or status is not Status.NO_MATCH
-    usable = status is Status.OK and complete and not contradicted
-    standing = Standing(
-        status,
-        complete,
-        contradicted,
-        elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
-        thin=thin,
-        twin=chances.share < USABLE_PROBABILITY,
-        mirrored=chances.mirrored,
-        out_of_step=_out_of_step(answer),
-        off_scale=off_scale,
-    )
+    usable, rival = status is Status.OK and complete and not contradicted, next(explanations.rivals, None)
     return Verdict(
         status=status,
         probability=min(chances.right, CONTRADICTED) if contradicted else chances.right,
         usable=usable,
         pose=pose,
-        margin=best.value - rivals[0].value if rivals else None,
-        runner_up=max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,
+        margin=None if rival is None else best.value - rival.value,
+        runner_up=None if rival is None or not best.value > 0.0 else max(0.0, rival.value / best.value),
         contradicted=contradicted,
-        reasons=() if usable else reasons_of(standing, chances.features, chances.cautious),
+        reasons=() if usable else _reasons(answer, chances, status, complete, contradicted, off_scale=off_scale),
         complete=complete,
     )
+
+
+def _reasons(
+    answer: Answer, chances: _Chances, status: Status, complete: bool, contradicted: bool, *, off_scale: bool
+) -> tuple[Reason, ...]:
+    standing = Standing(
+        status,
+        complete,
+        contradicted,
+        elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
+        thin=chances.thin,
+        twin=chances.share < USABLE_PROBABILITY,
+        mirrored=chances.mirrored,
+        out_of_step=_out_of_step(answer),
+        off_scale=off_scale,
+    )
+    return reasons_of(standing, Features(*chances.features.item()), chances.cautious)
 
 
 @value(frozen=True, slots=True)
@@ -139,7 +144,9 @@ class _Chances:
         That this or a twin of it is right, wherever along a free direction, other buildings reckoned with.
     share : float
         Of the answer among the explanations that are about as good; it is in `right` and `careful`.
-    features : Features
+    thin : bool
+        Whether few walls fix the pose, and one of them alone decides.
+    features : (1,) of `FEATURES`
         What these come from; with the null where it was needed and matters.
     cautious : Model
         By which the careful one does.
@@ -149,53 +156,43 @@ class _Chances:
     careful: float
     explained: float
     share: float
-    features: Features
+    thin: bool
+    features: Records
     cautious: Model
 
     @classmethod
-    def of(
-        cls, context: SearchContext, answer: Answer, rivals: tuple[Ranked, ...], *, capped: bool, certain: bool
-    ) -> _Chances:
-        """Work them out; `certain`: whether the answer is usable if they suffice."""
+    def of(cls, context: SearchContext, explanations: Explanations, *, capped: bool, certain: bool) -> _Chances:
+        """Work out those of an answer; `certain`: whether it is usable if they suffice."""
         form = "_with_beams" if context.with_beams else ""
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
-        weighed = weigh(answer.best, rivals)
-        features, share = features_of(context, answer, weighed), twin_share(weighed)
-        numbers = np.array(features)
+        answer, weighing = explanations.answer, explanations.weighing
+        assert answer is not None
+        if weighing is not None:
+            right, careful, explained, share, thin = weighing.chances.item()
+            return cls(right, careful, explained, share, bool(thin), weighing.features, cautious)
+        best, rivals = answer.best, tuple(explanations.rivals)
+        weighed, facts = weigh(best, rivals), facts_of(context, answer)
+        features, share = describe(best, facts, weighed), twin_share(weighed)
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
-        right, careful, fixed = three_log_odds(usual.odds, cautious.odds, numbers, DEVIATION_PLACE, USUAL.deviation)
-        likely = _logistic(right) * share >= USABLE_PROBABILITY and not capped
-        decidable = not answer.settled.degenerate and not is_thin(context, answer)
-        if likely and decidable and _logistic(careful) * share >= _bar(context):
+        right, careful, fixed = _three_chances(usual.odds, cautious.odds, features, USUAL.deviation)
+        likely, thin = right * share >= USABLE_PROBABILITY and not capped, is_thin(context, answer, facts)
+        decidable = not answer.settled.degenerate and not thin
+        if likely and decidable and careful * share >= _bar(context):
             share = min(share, loose_twin_share(context, answer, rivals))
-        if likely and decidable and _logistic(careful) * share >= _bar(context):
+        if likely and decidable and careful * share >= _bar(context):
             # Only what would be usable has to stand up to the mirrored scan, which costs another search. Where it is
             # usable nothing else is told of the null; where it is not, the reasons go by what it comes to.
-            certain = certain and _logistic(right) * share >= USABLE_PROBABILITY
-            allowed = _allowed_null(cautious, numbers, answer.best, _bar(context) / share) if certain else 0.0
-            features = with_null(features, answer.best, null_of(context, answer.best, allowed))
-            careful = cautious.logit(features)
-        return cls(_logistic(right) * share, _logistic(careful) * share, _logistic(fixed), share, features, cautious)
+            certain = certain and right * share >= USABLE_PROBABILITY
+            bar = _bar(context) / share
+            allowed = _allowed_null(cautious.odds, features.copy(), best.score, bar) if certain else 0.0
+            take_null(features, best, null_of(context, best, allowed))
+            careful = _chance(cautious.odds, features)
+        return cls(right * share, careful * share, fixed, share, thin, features, cautious)
 
     @property
     def mirrored(self) -> bool:
         """Whether the scan fits the map better with left and right exchanged."""
-        return self.features.null_better >= MIRRORED_BETTER
-
-
-def _logistic(logit: float) -> float:
-    return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
-
-
-def _allowed_null(cautious: Model, features: Floats, best: Ranked, bar: float) -> float:
-    """Return what share of the answer's score the mirrored scan may reach, and the cautious chance is `bar` at least.
-
-    `features` (n,) are those of the answer.
-    """
-    chance = bar + ROUNDING
-    if chance >= 1.0:
-        return 0.0
-    return allowed_null(cautious.odds, features.copy(), NULL_PLACE, best.score, math.log(chance / (1.0 - chance)))
+        return bool(self.features["null_better"][0] >= MIRRORED_BETTER)
 
 
 def _out_of_step(answer: Answer) -> bool:

@@ -108,7 +108,7 @@ class Case:
         context, found = to_scale.context, to_scale.explanations
         if found.answer is None:
             return None
-        best, rivals, pose = found.answer.best, found.rivals, found.answer.registered.pose
+        best, rivals, pose = found.answer.best, tuple(found.rivals), found.answer.registered.pose
         weighed, right = weigh(best, rivals), False
         if self.truth is not None and pose is not None:
             distance, angle = offset(pose, self.truth)
@@ -119,8 +119,8 @@ class Case:
             condition=self.condition,
             fold=self.fold,
             features=with_null(features_of(context, found.answer, weighed), best, null_of(context, best)),
-            gaps=np.minimum(0.0, [one.gap for one in weighed]),
-            counted=np.array([one.counted for one in weighed]),
+            gaps=np.minimum(0.0, weighed["gap"]),
+            counted=weighed["counted"],
             right=right,
             degenerate=found.answer.settled.degenerate,
             told=not right and (self.told is None or pose is None or self.told(pose)),

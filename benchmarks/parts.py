@@ -6,14 +6,14 @@ The models of the verdict stay those of the whole score, so that `usable` withou
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 
-from association import scan_lines
+from association import explain, scan_lines
 from association.kernels.scans import as_lines, describe_labelled, join_labelled, longest_first, seen_at_once
 from association.tables import Measured
 from registration.layout import Records
@@ -33,7 +33,7 @@ Terms = tuple[Records, Records]  # of lines, (1,) of `VARIANCES`, and of walls, 
 @contextmanager
 def changed(change: Callable[[Terms], None]) -> Iterator[None]:
     """Let the variances be changed that the search goes by."""
-    variances = scan_lines._variances
+    variances = scan_lines.variances_of
 
     def other(*args: Any, **named: Any) -> Terms:
         lines, model = variances(*args, **named)
@@ -41,7 +41,14 @@ def changed(change: Callable[[Terms], None]) -> Iterator[None]:
         change(terms)
         return terms
 
-    with patch.object(scan_lines, "_variances", other):
+    with step_by_step(), patch.object(scan_lines, "variances_of", other):
+        yield
+
+
+@contextmanager
+def step_by_step() -> Iterator[None]:
+    """Let every scan be answered in steps, which look up in Python what is changed here."""
+    with patch.object(explain, "is_plain", lambda _: False):
         yield
 
 
@@ -70,12 +77,19 @@ def each_by_itself(measured: Measured, counted: bool, variances: Records, model:
     return row_of, rows, seen_at_once(rows)
 
 
+@contextmanager
+def apart() -> Iterator[None]:
+    """Let no segments be joined."""
+    with step_by_step(), patch.object(scan_lines, "_describe_view", each_by_itself):
+        yield
+
+
 VARIANTS: dict[str, Callable[[], AbstractContextManager[Any]]] = {
-    "as it is": nullcontext,
+    "as it is": step_by_step,
     "without the freedom taken": partial(changed, without_freedom),
     "each match with an error of its own": partial(changed, without_common_error),
     "walls without an error": partial(changed, without_wall_error),
-    "no segments joined": partial(patch.object, scan_lines, "describe_view", each_by_itself),
+    "no segments joined": apart,
 }
 
 

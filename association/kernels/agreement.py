@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import internal, kernel
+from registration.compiling import kernel
 from registration.layout import Floats, Records
 
 from ..layout import Flags
@@ -79,7 +79,6 @@ def in_view(distances: Floats, view: Flags) -> None:
             view[(after + step) % rays] = False
 
 
-@internal
 @kernel
 def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> float:
     """Return of the directions that tell something the share in which the scan shows what the map does, 0 to 1.

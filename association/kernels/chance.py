@@ -4,23 +4,22 @@ import math
 
 import numpy as np
 
-from registration.compiling import internal, kernel
+from registration.compiling import kernel
 from registration.layout import Floats, Records
 
-from ..tuning import LEAST_CHANCE, MOST_CHANCE
+from ..tables import WallLengths
+from ..tuning import LEAST_CHANCE, LEAST_SIGNIFICANCE, MOST_CHANCE
 
 
-@internal
 @kernel
-def chance_matches(
-    scan: Records, lengths: Floats, beyond: Floats, agreeing: float, area: float, gates: Records
-) -> Floats:
+def chance_matches(scan: Records, walls: WallLengths, gates: Records) -> Floats:
     """Return (n,) the probability that each scan segment lies on a wall at a random pose with agreeing directions.
 
-    `lengths` (m,): of the walls, ascending; ``beyond[k]`` is the sum of those from k on, (m + 1,). `agreeing` is the
-    chance that two points of walls have the same direction. `gates` (1,).
+    `gates` (1,).
     """
     gate = gates[0]
+    lengths = walls.ascending
+    beyond = walls.beyond
     chances = np.empty(len(scan))
     for i in range(len(scan)):
         # The walls that are long enough: the first of them by bisection.
@@ -33,11 +32,12 @@ def chance_matches(
                 low = middle + 1
             else:
                 high = middle
-        chances[i] = min(MOST_CHANCE, max(LEAST_CHANCE, 2.0 * gate.least_offset * agreeing * beyond[low] / area))
+        chances[i] = min(
+            MOST_CHANCE, max(LEAST_CHANCE, 2.0 * gate.least_offset * walls.agreeing * beyond[low] / walls.area)
+        )
     return chances
 
 
-@internal
 @kernel
 def log_tail(scan: Records, chances: Floats, score: float, exponents: Floats) -> float:
     """Return Chernoff's bound on the log of the probability that gains drawn with `chances` come to `score`.
@@ -64,3 +64,26 @@ def log_tail(scan: Records, chances: Floats, score: float, exponents: Floats) ->
             total += math.log1p(chances[i] * math.expm1(exponents[k] * scan[i].gain))
         least = min(least, total)
     return least
+
+
+@kernel
+def worth_of(matches: Records) -> float:
+    """Return what the matches of a scan, (n,), are worth together, nats."""
+    total = 0.0
+    for i in range(len(matches)):
+        total += matches[i].worth
+    return total
+
+
+@kernel
+def significance(scan: Records, walls: WallLengths, gates: Records, exponents: Floats, score: float) -> float:
+    """Return a bound on the chance that some pose of the map scores that, nats: see `association.significance`.
+
+    `gates` (1,), `exponents` (k,) of Chernoff's bound, ascending.
+    """
+    gate = gates[0]
+    chances = chance_matches(scan, walls, gates)
+    exponent = log_tail(scan, chances, score, exponents)
+    places = walls.area / (2.0 * gate.least_offset) ** 2
+    turns = 2.0 * math.pi / (2.0 * gate.least_angle)
+    return min(1.0, max(LEAST_SIGNIFICANCE, math.exp(min(0.0, exponent + math.log(max(1.0, places * turns))))))

@@ -2,11 +2,15 @@
 
 import math
 
-from registration.compiling import inlined, internal, kernel
+import numpy as np
+
+from registration.compiling import inlined, kernel
 from registration.layout import Floats, Records
 
 from ..tables import Odds
 from ..tuning import MAX_GAP, MOST_NULL, NULL_SHARE, NULL_SHARES, SYMMETRIC, UNLIKE_SYMMETRY
+
+ROUNDING = 1e-9  # of a chance
 
 
 @inlined
@@ -39,18 +43,30 @@ def log_odds(odds: Odds, features: Floats) -> float:
     return by_curves + by_pairs
 
 
-@internal
 @kernel
-def three_log_odds(
-    usual: Odds, cautious: Odds, features: Floats, place: int, value: float
-) -> tuple[float, float, float]:
-    """Return the logarithms of the odds by both models, and by the second one with another value at one place."""
-    right = log_odds(usual, features)
-    careful = log_odds(cautious, features)
-    own = features[place]
-    features[place] = value
-    other = log_odds(cautious, features)
-    features[place] = own
+def logistic(logit: float) -> float:
+    """Return a chance from the logarithm of its odds."""
+    return 1.0 / (1.0 + math.exp(-max(-500.0, logit)))
+
+
+@kernel
+def chance(odds: Odds, features: Records) -> float:
+    """Return the chance that a model sees in features, (1,) of `FEATURES`."""
+    return logistic(log_odds(odds, features.view(np.float64)))
+
+
+@kernel
+def three_chances(usual: Odds, cautious: Odds, features: Records, deviation: float) -> tuple[float, float, float]:
+    """Return the chances by both models, and by the second one with another deviation.
+
+    `features` (1,) of `FEATURES`.
+    """
+    right = chance(usual, features)
+    careful = chance(cautious, features)
+    own = features[0].deviation
+    features[0].deviation = deviation
+    other = chance(cautious, features)
+    features[0].deviation = own
     return right, careful, other
 
 
@@ -70,43 +86,29 @@ def root_gap(gap: float) -> float:
     return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
 
 
-@internal
 @kernel
-def allowed_null(cautious: Odds, features: Floats, first: int, score: float, least: float) -> float:
-    """Return which of `NULL_SHARES` of the score the mirrored scan may reach, and the log odds are `least` still; or 0.
+def take_null(score: float, null: float, symmetry: float, features: Records) -> None:
+    """Write what an answer and the mirrored scan score into the features of the answer, (1,) of `FEATURES`."""
+    out = features[0]
+    out.null, out.null_gap, out.null_better = null_features(score, null, symmetry)
 
-    Wherever the map is not symmetric about the place. The more it reaches the less the odds. `features` (n,) are those
-    of the answer; of these ``null`` and the two after it, at `first`, are changed.
+
+@kernel
+def allowed_null(cautious: Odds, features: Records, score: float, bar: float) -> float:
+    """Return which of `NULL_SHARES` of the score the mirrored scan may reach, and the chance is over `bar` still; or 0.
+
+    Wherever the map is not symmetric about the place. The more it reaches the less the chance. `features` (1,) are
+    those of the answer; what they say of the null is changed.
     """
+    numbers = features.view(np.float64)
+    least = bar + ROUNDING
+    if least >= 1.0:
+        return 0.0
+    least = math.log(least / (1.0 - least))
     allowed = 0.0
     for share in NULL_SHARES:
-        features[first], features[first + 1], features[first + 2] = null_features(score, share * score, 0.0)
-        if log_odds(cautious, features) < least:
+        take_null(score, share * score, 0.0, features)
+        if log_odds(cautious, numbers) < least:
             break
         allowed = share
     return allowed
-
-
-@internal
-@kernel
-def left_unmatched(scan: Records, matches: Records) -> tuple[float, float]:
-    """Return the length of the longest scan line that is not matched, and of all of them together, metres."""
-    longest = 0.0
-    together = 0.0
-    for i in range(len(scan)):
-        if matches[i].wall < 0:
-            longest = max(longest, scan[i].length)
-            together += scan[i].length
-    return longest, together
-
-
-@internal
-@kernel
-def most_by_one_wall(hinges: Records) -> tuple[float, float]:
-    """Return by how much a pose would move at most without one wall, and its greatest deviation then, m; 0 of none."""
-    moves = 0.0
-    deviation = 0.0
-    for k in range(len(hinges)):
-        moves = max(moves, hinges[k].moves)
-        deviation = max(deviation, hinges[k].deviation)
-    return moves, deviation

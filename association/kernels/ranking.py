@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import borrowed, internal, kernel
+from registration.compiling import borrowed, kernel
 from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Floats, Records
 
@@ -17,7 +17,6 @@ from .ordering import ascending
 from .sight import count_blockers, sight_penalty
 
 
-@internal
 @kernel
 def rank(
     question: Question,
@@ -93,7 +92,6 @@ def begin_at(found: Records, estimates: Records) -> None:
         estimates[k].y = found[k].y
 
 
-@internal
 @kernel
 def distinct(
     poses: Records,

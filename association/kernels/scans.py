@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, internal, kernel
+from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, LEAST_POINTS, Floats, Record, Records
 
@@ -288,6 +288,17 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
 
 
 @kernel
+def set_map_sigma(sigma: float, variances: Records, model: Records) -> None:
+    """Write what follows from the deviation of the map's lines, metres, to both, (1,) each.
+
+    A tolerance that is wider says that the map is that far off.
+    """
+    given = variances[0]
+    given.map = sigma * sigma
+    model[0].wall_variance = max(given.map + (MODEL_OFFSET**2 - ROUGHNESS**2), given.least_offset)
+
+
+@kernel
 def join_lines(given: Records, lateral: float, least_cosine: float, counted: bool) -> tuple[Indices, Records]:
     """Join what continues or repeats one another; return (n,) the line of each part, and the lines."""
     order = longest_first(given)
@@ -338,7 +349,6 @@ def seen_at_once(rows: Records) -> Records:
     return seen
 
 
-@internal
 @kernel
 def describe_view(
     measured: Measured, counted: bool, variances: Records, model: Records
@@ -349,7 +359,6 @@ def describe_view(
     return row_of, rows, seen_at_once(rows)
 
 
-@internal
 @kernel
 def mirror_lines(rows: Records) -> tuple[Records, Records]:
     """Return the rows of the scan with left and right exchanged, and what one view shows of them.

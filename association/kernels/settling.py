@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from registration.compiling import borrowed, inlined, internal, kernel
+from registration.compiling import borrowed, inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
 from ..layout import ESTIMATE, Integers
-from ..tables import Question, Workspace
+from ..tables import Question, Standing, Workspace
 from ..tuning import (
     COMMON_WALL_ERROR,
     FREE_DEVIATION,
@@ -137,37 +137,37 @@ def walls_of(scan: Records, matches: Records) -> Integers:
     return of_wall[:count]
 
 
-@internal
 @kernel
 def settle(
-    question: Question, walls: Records, matches: Records, starts: Records, map_variance: float, settled: Records,
-    hinges: Records, work: Workspace,
+    question: Question, standing: Standing, matches: Records, starts: Records, settled: Records, hinges: Records,
+    work: Workspace,
 ) -> int:  # fmt: skip
     """Work out the poses of consensus sets from `starts` (k,), with the error of the walls as their residuals show it.
 
-    `matches` (k, n). `map_variance` is known of the walls, m^2; negative where nothing is. Writes `settled` (k,) and,
-    for each wall that holds a match of the first set, `hinges`, unless that has no room for any; returns how many walls
-    that are.
+    `matches` (k, n). Writes `settled` (k,) and, for each wall that holds a match of the first set, `hinges`, unless
+    that has no room for any; returns how many walls that are.
     """
     matches = borrowed(matches)
     count = 0
     for k in range(len(starts)):
-        of_wall = find_pose(question.scan, walls, matches[k], starts[k], map_variance, settled[k], work)
+        of_wall = find_pose(question.scan, standing, matches[k], starts[k], settled[k], work)
         if k == 0:
             count = len(of_wall)
             if len(hinges) > 0:
-                leave_each_out(question, walls, matches[0], of_wall, settled, hinges, work)
+                leave_each_out(question, standing.walls, matches[0], of_wall, settled, hinges, work)
     return count
 
 
 @kernel
 def find_pose(
-    scan: Records, walls: Records, matches: Records, start: Record, map_variance: float, out: Record, work: Workspace
+    scan: Records, standing: Standing, matches: Records, start: Record, out: Record, work: Workspace
 ) -> Integers:
     """Write to `out`, a record of `SETTLED`, what a consensus set comes to; its sums hold all matches then.
 
     Returns the walls that hold a match.
     """
+    walls = standing.walls
+    known = standing.variance
     pose = out.pose
     information = work.scratch[0].information
     value = work.scratch[0].value
@@ -175,12 +175,12 @@ def find_pose(
     of_wall = walls_of(scan, matches)
     add_all(scan, matches, walls, USUAL_WALL_ERROR**2, work)
     copy_estimate(start, pose)
-    out.wall_variance = max(map_variance, LEAST_KNOWN_VARIANCE) if map_variance >= 0.0 else USUAL_WALL_ERROR**2
-    for _ in range(1 if map_variance >= 0.0 else SETTLING_ROUNDS):
+    out.wall_variance = max(known, LEAST_KNOWN_VARIANCE) if known >= 0.0 else USUAL_WALL_ERROR**2
+    for _ in range(1 if known >= 0.0 else SETTLING_ROUNDS):
         add_all(scan, matches, walls, out.wall_variance, work)
         if not solve(sums, pose, information, value):
             break
-        if map_variance < 0.0:
+        if known < 0.0:
             out.wall_variance = estimated_variance(pose, of_wall, out.wall_variance, USUAL_WALL_ERROR**2, work)
     other = np.zeros(1, dtype=ESTIMATE)
     add_all(scan, matches, walls, max(out.wall_variance, COMMON_WALL_ERROR**2), work)
@@ -188,7 +188,10 @@ def find_pose(
     solve(sums, other[0], information, value)
     out.weakest, out.dx, out.dy = weakest(other[0])
     keep_alive(other)
-    out.unlike = unlike(scan, matches, walls, out.wall_variance)
+    count = 0
+    for i in range(len(matches)):
+        count += 1 if matches[i].wall >= 0 else 0
+    out.parallel = unlike(scan, matches, walls, out.wall_variance) <= standing.parallel[count]
     add_all(scan, matches, walls, out.wall_variance, work)
     solve(sums, pose, information, value)
     return of_wall

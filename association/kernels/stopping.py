@@ -79,7 +79,8 @@ def missed_sets(scan: Records, samples: Samples, fewest: int, needed: float, mos
         if not held:
             size = sizes[s]
             gain = gains[s]
-            while (gain < needed or size < fewest) and size < n:
+            # One that is larger than the place where it has a base holds that, however large it has to be.
+            while size <= found[s] and size < n and (gain < needed or size < fewest):
                 gain += scan[orders[s, size]].gain
                 size += 1
             sizes[s] = size

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import internal, kernel
+from registration.compiling import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import MATCH, SCAN_LINE
@@ -82,18 +82,32 @@ def mirror_walls(pose: Record, walls: Records, lows: Floats, highs: Floats) -> R
     return out
 
 
-@internal
+@kernel
+def reach_of(places: Records, seen: Records) -> float:
+    """Return how far anything lies from where it was seen, metres.
+
+    `places` (v,) of `POINT`, `seen` (k,) of `SIGHTING`.
+    """
+    farthest = 0.0
+    for i in range(len(seen)):
+        one = seen[i]
+        at = places[one.sensor]
+        farthest = max(farthest, math.hypot(one.x - at.x, one.y - at.y) + 0.5 * one.length)
+    return farthest
+
+
 @kernel
 def mirrored_share(
-    views: Records, pose: Records, reach: float, null: Records, gates: Records, place: Place, work: Workspace
+    views: Records, seen: Records, pose: Records, null: Records, gates: Records, place: Place, work: Workspace
 ) -> float:
     """Return how much of what the map shows from `pose` it shows mirrored from `null`, 0 to 1; both (1,).
 
-    Seen from the places (v,) of `views` together: the share of the gains of the walls that are seen, each matched as a
-    scan line would be.
+    From the places (v,) of `views` together, as far as what was `seen`, (k,) of `SIGHTING`: the share of the gains of
+    the walls that are seen, each matched as a scan line would be.
     """
     lows = np.full(len(place.walls), math.inf)
     highs = np.full(len(place.walls), -math.inf)
+    reach = reach_of(views, seen)
     for v in range(len(views)):
         shown_walls(views[v], pose[0], place, reach, work.scratch[0].ray, lows, highs)
     lines = mirror_walls(pose[0], place.walls, lows, highs)

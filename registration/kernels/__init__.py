@@ -6,10 +6,12 @@ Nothing here validates: callers hand over finite numbers and indices in range. E
 
 from .joint import joint_add, joint_cost, joint_information, joint_solve
 from .matrices import carried, eigen2, invert3, invert3_scaled, is_regular3
+from .observability import MAX_DEVIATION
 from .one_step import one_step_add
 from .records import keep_alive
 
 __all__ = [
+    "MAX_DEVIATION",
     "carried",
     "eigen2",
     "invert3",

@@ -12,7 +12,7 @@ import numpy as np
 from association import Prior, SearchReport
 from association.acceptance import Accepted
 from association.context import SearchContext
-from association.explain import Answer, Explanations
+from association.explanations import Answer, Explanations
 from association.layout import HINGE, MATCH
 from association.ranking import Ranked
 from association.settling import Settled

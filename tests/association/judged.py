@@ -12,7 +12,7 @@ import pytest
 
 from association import HardPrior, SoftPrior, loosening, reasons, verdict
 from association.context import SearchContext
-from association.explain import Explanations
+from association.explanations import Explanations
 from association.models import USUAL, as_model
 from association.options import Prior
 from association.verdict import Verdict, judge

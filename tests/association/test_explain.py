@@ -20,11 +20,11 @@ def test_rivals_lie_within_the_window_and_others_anywhere() -> None:
     outside = ranked(95.0, inside=False)
     explanations = explanations_of(answer_with(best), third, outside, second)
     assert explanations.ranked == (best, second, third, outside)
-    assert explanations.rivals == (second, third)
-    assert explanations.others == (second, third, outside)
+    assert list(explanations.rivals) == [second, third]
+    assert list(explanations.others) == [second, third, outside]
     nothing = explanations_of(None, outside)
-    assert nothing.rivals == ()
-    assert nothing.others == (outside,)
+    assert list(nothing.rivals) == []
+    assert list(nothing.others) == [outside]
 
 
 def test_the_answer_is_the_best_within_the_window() -> None:
@@ -78,7 +78,7 @@ def test_a_pose_that_is_given_is_explained_as_one_that_was_found() -> None:
     found, given = explain(context).answer, explain_at(context, pose(INSIDE.x + 50.0, INSIDE.y + 50.0, INSIDE.theta))
     assert found is not None
     assert given.answer is not None
-    assert given.rivals == ()
+    assert list(given.rivals) == []
     assert not given.search.complete
     assert given.answer.best.score == pytest.approx(found.best.score, abs=1e-6)
     assert same_pose(given.answer.settled.pose, found.settled.pose, 1e-6, 1e-6)

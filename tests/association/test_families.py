@@ -10,12 +10,12 @@ import pytest
 
 from association import HardPrior, MapIndex, SoftPrior
 from association.explain import explain
-from association.families import is_thin, place_on_family
+from association.families import place_on_family
 from association.settling import Settled
 from registration import RigidTransform
 from registration.layout import Floats
 
-from .answers import answer_with, hinges_of, ranked, registered_room, room, settled_of
+from .answers import answer_with, ranked, registered_room, room, settled_of
 from .scenes import INSIDE, context_of, index_of, pose, scan_of
 
 
@@ -26,25 +26,6 @@ from .scenes import INSIDE, context_of, index_of, pose, scan_of
 def test_a_position_is_fixed_to_half_a_metre(weakest: float, parallel: bool, degenerate: bool) -> None:
     """Along its weakest direction; and by walls that are not all parallel."""
     assert replace(settled_of(registered_room()), weakest=weakest, parallel=parallel).degenerate is degenerate
-
-
-@pytest.mark.parametrize(
-    ("walls", "deviation", "offset", "thin"),
-    [
-        (3, 0.51, 0.0021, True), (3, 0.51, -0.0021, True), (3, 0.51, 0.0019, False), (2, 0.51, 0.0, True),
-        (1, 0.51, 0.0, True), (3, 0.49, 0.1, False), (4, 0.51, 0.1, False),
-    ],
-)  # fmt: skip
-def test_few_walls_of_which_one_alone_decides_are_thin(walls: int, deviation: float, offset: float, thin: bool) -> None:
-    """Three of them only where they are farther from where the map has them than three sides of other rooms are."""
-    hinges = hinges_of(*((k, 0.0, deviation if k == 0 else 0.01) for k in range(walls)))
-    best = ranked(matched=walls)
-    best.matches["offset"] = np.where(best.matched, offset, 9.0)
-    answer = answer_with(best, settled=settled_of(registered_room(), hinges))
-    assert is_thin(room(), answer) is thin
-    assert is_thin(room(with_beams=True), answer) is (walls <= 3 and deviation > 0.5), (
-        "beams move poses to where they fit"
-    )
 
 
 def settled_on(walls: Floats, seen_walls: Floats) -> Settled:

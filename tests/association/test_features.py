@@ -6,13 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from association import tuning
-from association.explain import Answer
-from association.features import Features, features_of, twin_share, weigh, with_null
+from association.explanations import Answer
+from association.features import Features, facts_of, features_of, is_thin, twin_share, weigh, with_null
 from association.null import Null
 from association.ranking import Ranked
 from association.sight import BeamShares
@@ -186,3 +187,23 @@ def test_the_farther_walls_are_off_the_less_centimetres_tell_rivals_apart(cost: 
 def test_scan() -> None:
     """What the numbers above rest on."""
     assert pytest.approx([9.0, 5.5, 4.0, 4.0, 3.0, 3.0, 2.0, 1.5]) == LENGTHS
+
+
+@pytest.mark.parametrize(
+    ("walls", "deviation", "offset", "thin"),
+    [
+        (3, 0.51, 0.0021, True), (3, 0.51, -0.0021, True), (3, 0.51, 0.0019, False), (2, 0.51, 0.0, True),
+        (1, 0.51, 0.0, True), (3, 0.49, 0.1, False), (4, 0.51, 0.1, False),
+    ],
+)  # fmt: skip
+def test_few_walls_of_which_one_alone_decides_are_thin(walls: int, deviation: float, offset: float, thin: bool) -> None:
+    """Three of them only where they are farther from where the map has them than three sides of other rooms are."""
+    hinges = hinges_of(*((k, 0.0, deviation if k == 0 else 0.01) for k in range(walls)))
+    best = ranked(matched=walls)
+    best.matches["offset"] = np.where(best.matched, offset, 9.0)
+    answer = answer_with(best, settled=settled_of(registered_room(), hinges))
+    facts = facts_of(CONTEXT, answer)
+    assert is_thin(CONTEXT, answer, facts) is thin
+    assert is_thin(room(with_beams=True), answer, facts) is (walls <= 3 and deviation > 0.5), (
+        "beams move poses to where they fit"
+    )

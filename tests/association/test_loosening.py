@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from association.context import SearchContext
-from association.explain import Answer, explain
+from association.explain import explain
+from association.explanations import Answer
 from association.features import twin_share, weigh
 from association.loosening import loose_twin_share
 from association.ranking import Ranked
@@ -29,7 +30,7 @@ def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Ans
     context = context_of(index_of(walls, sigma), SCAN)
     found = explain(context)
     assert found.answer is not None
-    return context, found.answer, found.rivals
+    return context, found.answer, tuple(found.rivals)
 
 
 def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:

@@ -180,12 +180,12 @@ def test_runs_that_are_near_one_another_are_numbered_together() -> None:
 def test_what_the_verdict_takes_from_a_map() -> None:
     """Two walls of 4 m and 2 m the same way, one of 3 m across, one of 1 m the other way round."""
     index = index_of([[0, 0, 4, 0], [0, 5, 2, 5], [8, 0, 8, 3], [3, 3, 2, 3]])
-    ascending, beyond = index.sorted_lengths
+    ascending, beyond, agreeing, area = index.wall_lengths
     np.testing.assert_allclose(ascending, [1, 2, 3, 4])
     np.testing.assert_allclose(beyond, [10, 9, 7, 4, 0])
-    assert index.agreeing_share == pytest.approx(0.6 * 0.6 + 0.3 * 0.3 + 0.1 * 0.1)
+    assert agreeing == pytest.approx(0.6 * 0.6 + 0.3 * 0.3 + 0.1 * 0.1)
     columns, rows = index.grid.shape["columns"][0], index.grid.shape["rows"][0]
-    assert index.area == pytest.approx(CELL**2 * columns * rows)
+    assert index.area == area == pytest.approx(CELL**2 * columns * rows)
     assert (8.0 + 2.0 * REACH) * (5.0 + 2.0 * REACH) < index.area < 13.0 * 10.0
     counts = np.diff(index.grid.starts)
     assert index.crowd == pytest.approx((counts**2).sum() / counts.sum())
@@ -197,9 +197,9 @@ def test_neighbouring_directions_agree() -> None:
     ends = [
         [0.0, 3.0 * k, math.cos(a), 3.0 * k + math.sin(a)] for k, a in enumerate((math.pi - small, small - math.pi))
     ]
-    assert index_of(ends).agreeing_share == pytest.approx(1.0)
+    assert index_of(ends).wall_lengths.agreeing == pytest.approx(1.0)
     ends[1] = [0.0, 3.0, math.cos(3.0 * small - math.pi), 3.0 + math.sin(3.0 * small - math.pi)]
-    assert index_of(ends).agreeing_share == pytest.approx(0.5)
+    assert index_of(ends).wall_lengths.agreeing == pytest.approx(0.5)
 
 
 def test_its_memory_is_known() -> None:
@@ -257,5 +257,5 @@ def test_refusals(endpoints: Any, sigma: float, argument: str) -> None:
 def test_what_every_search_asks_of_a_map_is_there_before_the_first() -> None:
     """Else that one takes as long again, in a small map."""
     index = index_of(ROOM)
-    assert vars(index).keys() >= {"sorted_lengths", "crowd", "agreeing_share", "area", "diagonal", "tables"}
+    assert vars(index).keys() >= {"wall_lengths", "crowd", "area", "diagonal", "tables"}
     assert "undirected" not in vars(index), "which is as large, and seldom asked for"

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 
 from association import Beams, HardPrior, Scan, tuning
 from association.context import SearchContext
-from association.explain import Answer, explain
+from association.explain import explain
+from association.explanations import Answer
 from association.null import Null, null_of
 from association.report import report
 from association.scan import mirrored

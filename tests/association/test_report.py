@@ -10,7 +10,8 @@ import pytest
 
 from association import AssociationResult, MapIndex, Reason, Status, View, assemble, sentence_of
 from association.acceptance import Accepted
-from association.explain import Answer, explain
+from association.explain import explain
+from association.explanations import Answer
 from association.report import report
 from association.verdict import Verdict, judge
 from registration import RigidTransform, Segments

@@ -30,7 +30,7 @@ def test_it_bounds_the_chance_of_all_poses_that_can_be_told_apart(score: float) 
     """Those are as many as squares of the offset gate and turns of the angle gate fit in."""
     gates, rows = CONTEXT.gates[0], CONTEXT.lines.rows
     lengths = np.asarray(INDEX.walls.longest)
-    chances = twin.chance_matches(rows, lengths, INDEX.agreeing_share, INDEX.area, CONTEXT.gates)
+    chances = twin.chance_matches(rows, lengths, INDEX.wall_lengths.agreeing, INDEX.area, CONTEXT.gates)
     poses = INDEX.area / (2.0 * gates["least_offset"]) ** 2 * math.tau / (2.0 * gates["least_angle"])
     expected = math.exp(twin.log_tail(rows, chances, score, EXPONENTS)) * poses
     assert significance(CONTEXT, score) == pytest.approx(min(1.0, expected))

@@ -19,8 +19,10 @@ from association import (
     associate,
     to_scale,
 )
+from association import explain as explaining
 from association.context import SearchContext
-from association.explain import Explanations, explain
+from association.explain import explain
+from association.explanations import Explanations
 from association.ranking import Ranked
 from association.similarity import Similarity, fit_similarity
 from association.to_scale import explain_to_scale
@@ -304,6 +306,7 @@ def test_what_fits_to_millimetres_is_not_asked_for_a_factor(
         return fit_similarity(context, best)
 
     monkeypatch.setattr(to_scale, "fit_similarity", counted)
+    monkeypatch.setattr(explaining, "is_plain", lambda _: False)  # which sees for itself
     answer(off_by(WALLS, error, 2))
     assert (calls != []) == asked
 

@@ -11,7 +11,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import Deadline, HardPrior, Reason, Status, associate, loosening, null, reasons, tuning, verdict
+from association import (
+    Deadline,
+    HardPrior,
+    Reason,
+    Status,
+    answering,
+    associate,
+    explain,
+    loosening,
+    null,
+    reasons,
+    tuning,
+    verdict,
+)
 from association.context import SearchContext
 from association.ranking import Ranked
 from association.verdict import Verdict, judge
@@ -221,21 +234,28 @@ def test_an_incomplete_search_is_never_usable() -> None:
     assert [reason.code for reason in stopped.reasons] == ["search_incomplete"]
 
 
-@pytest.mark.parametrize("during", ["null_of", "loose_twin_share"])
+@pytest.mark.parametrize("during", ["null_of", "loose_twin_share", "_answer"])
 def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search was done in time, but the mirrored scan or the rivals were looked at no further."""
-    index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
-    sent, compared = scan_of(seen(ROOM, INSIDE)[0]), getattr(verdict, during)
+    """The search was done in time, but the mirrored scan or the rivals were looked at no further.
 
-    def late(context: SearchContext, *arguments: Any) -> Any:
-        context.deadline.at = 0.0
-        return compared(context, *arguments)
+    Or there is one call for all of it, after which nobody knows how far it was in time.
+    """
+    index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
+    sent, module = scan_of(seen(ROOM, INSIDE)[0]), answering if during == "_answer" else verdict
+    compared, deadline = getattr(module, during), Deadline(time.monotonic() + 60.0)
+
+    def late(*arguments: Any) -> Any:
+        deadline.at = 0.0
+        return compared(*arguments)
 
     in_time = associate(index, sent, None, deadline=Deadline(time.monotonic() + 60.0))
     assert in_time.usable
     assert in_time.search.complete
-    monkeypatch.setattr(verdict, during, late)
-    got = associate(index, sent, None, deadline=Deadline(time.monotonic() + 60.0))
+    monkeypatch.setattr(module, during, late)
+    if module is verdict:
+        monkeypatch.setattr(explain, "is_plain", lambda _: False)
+    got = associate(index, sent, None, deadline=deadline)
+    assert deadline.at == 0.0
     assert not got.usable
     assert not got.search.complete
     assert got.pose == in_time.pose

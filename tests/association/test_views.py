@@ -11,7 +11,7 @@ import pytest
 from association import InvalidSearchError, Scan, Status, View, assemble, mirrored
 from association.alignment import aligned
 from association.explain import explain
-from association.features import features_of
+from association.features import features_of, weigh
 from association.layout import SIGHTING, WALL
 from association.scan import Views, scaled
 from association.scan_lines import parts_of
@@ -334,6 +334,6 @@ def test_what_is_on_no_wall_counts_by_view_of_a_drive(
     context = context_of(INDEX, assemble(views))
     answer = explain(context).answer
     assert answer is not None
-    features = features_of(context, answer, [])
+    features = features_of(context, answer, weigh(answer.best, []))
     assert features.longest_unmatched == pytest.approx(longest, abs=0.01)
     assert features.root_unmatched**2 == pytest.approx(together, abs=0.02)

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association.kernels.settling import settle, weakest
+from association.kernels.settling import settle, unlike, weakest
 from association.layout import HINGE, SETTLED, WALL, Integers
-from association.tables import Workspace
+from association.tables import Standing, Workspace
 from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, UNSEEN_ERROR
 from registration import RigidTransform
 from registration.layout import Record, Records
+from registration.observability import most_parallel, most_parallel_up_to
 
 from ..records import covariance_of, estimate_of, pose_of
 from ..reference import settling as twin
@@ -38,9 +39,13 @@ class Set:
         out, hinges = np.zeros(1, SETTLED), np.zeros(len(self.scan), HINGE)
         question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
         start, matches = estimate_of(self.start), matches_on(self.held)[None]
-        count = settle(question, self.walls, matches, start, map_variance, out, hinges, work)
+        count = settle(question, standing(self, map_variance), matches, start, out, hinges, work)
         assert start == estimate_of(self.start)
         return out[0], hinges[:count]
+
+
+def standing(one: Set, map_variance: float = -1.0) -> Standing:
+    return Standing(one.walls, map_variance, most_parallel_up_to(len(one.scan)))
 
 
 def laid_on(walls: Records, held: Integers, at: RigidTransform, d: Drawn, wall_error: float, noise: float) -> Records:
@@ -86,7 +91,9 @@ def test_an_answer_is_settled_as_by_the_twin(seed: int) -> None:
         assert got["weakest"] == pytest.approx(expected.weakest, rel=1e-5)
         across = got["dx"] * expected.direction[1] - got["dy"] * expected.direction[0]
         assert abs(across) < 1e-3 or expected.weakest < 1e-3 or is_round(one, known)
-        assert got["unlike"] == pytest.approx(expected.unlike, rel=1e-4, abs=1e-4)
+        apart = unlike(one.scan, matches_on(one.held), one.walls, float(got["wall_variance"]))
+        assert apart == pytest.approx(expected.unlike, rel=1e-4, abs=1e-4)
+        assert got["parallel"] == (apart <= most_parallel(int((one.held >= 0).sum())))
 
 
 def is_round(one: Set, known: float | None) -> bool:
@@ -122,7 +129,7 @@ def test_several_sets_are_each_settled_as_if_alone() -> None:
     starts = np.concatenate([estimate_of(one.start)] * 2)
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = np.stack([matches_on(held) for held in helds])
-    count = settle(question, one.walls, matches, starts, -1.0, out, hinges, work)
+    count = settle(question, standing(one), matches, starts, out, hinges, work)
     for k, held in enumerate(helds):
         alone, without = Set(one.scan, one.walls, held, one.start).settled()
         assert out[k] == alone

@@ -10,7 +10,7 @@ import numpy as np
 
 from association import HardPrior, Status, tuning
 from association.context import SearchContext
-from association.explain import Answer, Explanations
+from association.explanations import Answer, Explanations
 from association.loosening import loose_twin_share
 from association.null import Null, null_of
 from association.ranking import Ranked

@@ -1,0 +1,327 @@
+"""Compiled answer: searched, explained and judged in one call, as `association.explain` and `.verdict` do it in steps.
+
+Of a scan from one place without beams and without a prior. What takes long, or has to be looked at otherwise, is left
+to those: a search that its budget ended, a map that may not be to scale.
+"""
+
+import math
+
+import numpy as np
+
+from registration.compiling import internal, kernel
+from registration.kernels import MAX_DEVIATION, keep_alive
+from registration.layout import Records
+
+from ..layout import (
+    ESTIMATE,
+    EXPLAINED,
+    FEATURES,
+    FOUND,
+    HOW,
+    JUDGED,
+    MATCH,
+    MERIT,
+    MODEL,
+    POINT,
+    PROGRESS,
+    RIVAL,
+    RULES,
+    SEARCHED,
+    TERMS,
+    VARIANCES,
+    WEIGHED,
+    Integers,
+)
+from ..planning_tables import Plan, Planning
+from ..tables import Answering, MapTables, Place, Question, Sights, Told, Workspace
+from ..tuning import (
+    CONTRADICTION,
+    DISTINCT_ANGLE,
+    DISTINCT_DISTANCE,
+    KEPT_SLIDES,
+    LEAST_OFF_WALLS,
+    LOOSE_RIVALS,
+    NEUTRAL,
+    NULL_ALLOWED,
+    NULL_ALLOWED_NEAR,
+    NULL_ENOUGH,
+    NULL_KEPT,
+    NULL_MARGIN,
+    NULL_SHARE,
+    SAME_FAMILY,
+    USABLE_CAUTIOUS,
+    USABLE_PROBABILITY,
+)
+from .agreement import agreement
+from .chance import significance, worth_of
+from .features import by_segments, describe, is_thin, see_hinges, see_unmatched, twin_share, weigh
+from .loosening import loose_share, loose_sigma
+from .odds import allowed_null, chance, take_null, three_chances
+from .ranking import begin_at, distinct, rank
+from .scans import describe_view, mirror_lines, set_map_sigma
+from .searching import search
+from .settling import settle
+from .similarity import is_off, pose_of_similarity, settle_similarity
+from .symmetry import mirrored_share
+
+
+@internal
+@kernel
+def answer(
+    question: Question,
+    tables: MapTables,
+    planning: Planning,
+    found: Records,
+    progress: Records,
+    work: Workspace,
+    how: Records,
+    given: Answering,
+) -> tuple[int, Plan | None]:
+    """Search as `search` does, and go on with what was found; writes to ``told`` of `given` as far as it comes."""
+    why, plan = search(question, tables, planning, found, progress, work, how)
+    reached = given.told.reached[0]
+    reached.stage = SEARCHED
+    if plan is None:
+        explain(question, tables.place, found[: progress[0].count], work, given)
+        reached.stage = EXPLAINED
+        judged = reached.explanations > 0 and not may_be_off(question, work, given)
+        if judged and judge(question, tables, planning, work, how, given):
+            reached.stage = JUDGED
+    return why, plan
+
+
+@kernel
+def explain(question: Question, place: Place, found: Records, work: Workspace, given: Answering) -> None:
+    """Rank what was found, (k,) of `FOUND`, tell apart what is distinct, and settle the best of it."""
+    told = given.told
+    n = len(question.scan)
+    estimates = np.zeros(len(found), dtype=ESTIMATE)
+    merits = np.zeros(len(found), dtype=MERIT)
+    matches = np.zeros((len(found), n), dtype=MATCH)
+    begin_at(found, estimates)
+    rank(question, place, given.sights, estimates, merits, matches, work)
+    most, none = len(told.estimates), np.zeros(0)
+    order = distinct(estimates, merits, none, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION)
+    tell(told, order, estimates, merits, matches)
+    reached = told.reached[0]
+    reached.explanations = len(order)
+    reached.walls = 0
+    if len(order) > 0:
+        best = told.estimates[:1]
+        reached.walls = settle(question, given.standing, told.matches[:1], best, told.settled, told.hinges, work)
+        fact = told.facts[0]
+        fact.farther = 0.0
+        fact.nearer = 0.0
+        fact.agreement = agreement(given.sights, best, place, work) if len(given.sights.seen) > 0 else NEUTRAL
+        score = worth_of(told.matches[0])
+        fact.significance = significance(question.scan, given.lengths, given.gates, given.exponents, score)
+
+
+@kernel
+def tell(told: Told, order: Integers, estimates: Records, merits: Records, matches: Records) -> None:
+    """Write explanations in an order."""
+    for k in range(len(order)):
+        told.estimates[k] = estimates[order[k]]
+        told.merits[k] = merits[order[k]]
+        for i in range(matches.shape[1]):
+            told.matches[k, i] = matches[order[k], i]
+
+
+@kernel
+def may_be_off(question: Question, work: Workspace, given: Answering) -> bool:
+    """Tell whether the best explanation says that the scan is not to scale: see `association.to_scale`."""
+    told = given.told
+    if not given.to_scale or math.sqrt(told.settled[0].wall_variance) < LEAST_OFF_WALLS:
+        return False
+    solution = np.zeros(4)
+    covariance = np.zeros((4, 4))
+    pose = np.zeros(1, dtype=ESTIMATE)
+    walls = given.standing.walls
+    variance, _ = settle_similarity(question, walls, told.matches[0], solution, covariance, work)
+    if variance < 0.0:
+        return False
+    factor, spread = pose_of_similarity(solution, covariance, pose[0])
+    keep_alive(pose)
+    return is_off(factor, math.sqrt(spread))
+
+
+@kernel
+def judge(
+    question: Question, tables: MapTables, planning: Planning, work: Workspace, how: Records, given: Answering
+) -> bool:
+    """Work out the chances of the best explanation; False where its null takes longer than the budget lets it."""
+    told = given.told
+    out = told.chances[0]
+    settled = told.settled[0]
+    weighed = beside(told.merits[: told.reached[0].explanations])
+    features = told.features
+    fact = told.facts[0]
+    fact.weakest = settled.weakest
+    see_hinges(told.hinges[: told.reached[0].walls], told.facts)
+    see_unmatched(question.scan, told.matches[0], told.facts)
+    describe(told.merits[:1], told.merits[0].score, told.facts, weighed, features)
+    share = twin_share(weighed)
+    right, careful, explained = three_chances(given.usual, given.cautious, features, given.usual_deviation)
+    thin = is_thin(told.facts, told.matches[0], False)
+    free = settled.parallel or settled.weakest > MAX_DEVIATION
+    asking = right * share >= USABLE_PROBABILITY and not free and not thin
+    if asking and careful * share >= USABLE_CAUTIOUS:
+        share = min(share, loose_twin_share(question, tables.place, work, given))
+    if asking and careful * share >= USABLE_CAUTIOUS:
+        allowed = 0.0
+        if right * share >= USABLE_PROBABILITY:
+            tried = np.zeros(1, dtype=FEATURES)
+            tried[0] = features[0]
+            allowed = allowed_null(given.cautious, tried, told.merits[0].score, USABLE_CAUTIOUS / share)
+        if not compare_with_null(question, tables, planning, work, how, given, allowed):
+            return False
+        careful = chance(given.cautious, features)
+    out.right = right * share
+    out.careful = careful * share
+    out.explained = explained
+    out.share = share
+    out.thin = thin
+    return True
+
+
+@kernel
+def beside(merits: Records) -> Records:
+    """Weigh explanations, (k + 1,) of `MERIT`, beside the first of them, without a prior: (k,) of `WEIGHED`."""
+    explanations = np.zeros(len(merits), dtype=RIVAL)
+    weighed = np.zeros(len(merits) - 1, dtype=WEIGHED)
+    for k in range(len(merits)):
+        explanations[k].value = merits[k].score
+        explanations[k].cost = merits[k].cost
+        explanations[k].count = merits[k].count
+    weigh(explanations, weighed)
+    return weighed
+
+
+@kernel
+def loose_twin_share(question: Question, place: Place, work: Workspace, given: Answering) -> float:
+    """Return the chance of the best explanation among its nearest rivals where walls may be off by more, up to 1."""
+    told = given.told
+    count = min(told.reached[0].explanations, LOOSE_RIVALS + 1)
+    if given.standing.variance >= 0.0 or count == 1:
+        return 1.0
+    variances = np.zeros(1, dtype=VARIANCES)
+    variances[0] = given.variances[0]
+    terms = np.zeros(1, dtype=TERMS)
+    terms[0] = question.terms[0]
+    model = np.zeros(1, dtype=MODEL)
+    model[0] = question.terms[0].model
+    set_map_sigma(loose_sigma(math.sqrt(told.settled[0].wall_variance)), variances, model)
+    terms[0].model.wall_variance = model[0].wall_variance
+    _, rows, seen = describe_view(given.measured, given.counted, variances, model)
+    loose = Question(rows, terms, question.rules)
+    sights = Sights(given.sights.places, given.sights.starts, seen[: len(given.sights.seen)])
+    estimates = np.zeros(count, dtype=ESTIMATE)
+    values = np.zeros(count)
+    for k in range(count):
+        estimates[k] = told.estimates[k]
+        values[k] = told.merits[k].score
+    again = np.zeros(count, dtype=MERIT)
+    rank(loose, place, sights, estimates, again, np.zeros((count, len(rows)), dtype=MATCH), work)
+    return loose_share(told.merits[:count], values, again)
+
+
+@kernel
+def compare_with_null(
+    question: Question,
+    tables: MapTables,
+    planning: Planning,
+    work: Workspace,
+    how: Records,
+    given: Answering,
+    share: float,
+) -> bool:
+    """Write what the mirrored scan comes to into the features, as `association.null` does it; False as `judge`.
+
+    Where it comes to less than `share` of the answer's score it may be told to be none.
+    """
+    told = given.told
+    score = told.merits[0].score
+    rows, seen = mirror_lines(question.scan)
+    places = np.zeros(len(given.sights.places), dtype=POINT)
+    for v in range(len(places)):
+        places[v].x = given.sights.places[v].x
+        places[v].y = -given.sights.places[v].y
+    sights = Sights(places, given.sights.starts, seen[: len(given.sights.seen)])
+    plans = Planning(planning.runs, planning.area, given.orders, given.ranks, planning.fade, planning.noise)
+    other = Question(rows, question.terms, np.zeros(2, dtype=RULES))
+    limits = np.zeros(1, dtype=HOW)
+    null = np.zeros(1, dtype=ESTIMATE)
+    for k in range(2):
+        other.rules[k] = question.rules[k]
+    limits[0] = how[0]
+    known = max(0.0, by_segments(told.merits[0]))
+    wanted = share * score
+    least = NULL_MARGIN * wanted / known if known > 0.0 else 0.0
+    if least > NULL_SHARE:
+        look_for(least, max(how[0].allowed, NULL_ALLOWED_NEAR), known, other.rules, limits)
+        near = best_of(other, tables, plans, sights, work, limits, known, null)
+        if near < wanted:
+            take_null(score, 0.0, 0.0, told.features)
+            return near >= 0.0
+    look_for(NULL_SHARE, max(how[0].allowed, NULL_ALLOWED), known, other.rules, limits)
+    reached = best_of(other, tables, plans, sights, work, limits, known, null)
+    symmetry = 0.0
+    if reached > 0.0:
+        views = given.sights.places
+        symmetry = mirrored_share(
+            views, given.seen, told.estimates[:1], null, given.gates, tables.place, work
+        )  # fmt: skip
+    take_null(score, reached, symmetry, told.features)
+    return reached >= 0.0
+
+
+@kernel
+def look_for(share: float, allowed: float, known: float, rules: Records, limits: Records) -> None:
+    """Write that only what comes to such a share of what is `known`, nats, is looked for.
+
+    To `rules` (2,) of `RULES` and `limits` (1,) of `HOW`.
+    """
+    for k in range(2):
+        rules[k].kept_share = share
+        rules[k].rival_share = share
+        rules[k].enough = NULL_ENOUGH * known
+    limits[0].allowed = allowed
+    limits[0].share = share
+    limits[0].kept = NULL_KEPT
+
+
+@kernel
+def best_of(
+    question: Question,
+    tables: MapTables,
+    planning: Planning,
+    sights: Sights,
+    work: Workspace,
+    how: Records,
+    known: float,
+    best: Records,
+) -> float:
+    """Search; return the score of the best explanation, which is written to `best` (1,) of `ESTIMATE`.
+
+    0 where there is none, -1 where the budget ended the search.
+    """
+    found = np.zeros(NULL_KEPT + KEPT_SLIDES, dtype=FOUND)
+    progress = np.zeros(1, dtype=PROGRESS)
+    progress[0].best_value = known
+    _, plan = search(question, tables, planning, found, progress, work, how)
+    poses = found[: progress[0].count]
+    if plan is not None:
+        return -1.0
+    estimates = np.zeros(len(poses), dtype=ESTIMATE)
+    merits = np.zeros(len(poses), dtype=MERIT)
+    begin_at(poses, estimates)
+    rank(question, tables.place, sights, estimates, merits, np.zeros((len(poses), len(question.scan)), MATCH), work)
+    score = 0.0
+    for k in range(len(poses)):
+        if merits[k].score > score:
+            score = max(score, merits[k].score)
+            best[0] = estimates[k]
+    keep_alive(progress)
+    keep_alive(estimates)
+    keep_alive(merits)
+    return score

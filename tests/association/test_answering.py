@@ -1,0 +1,164 @@
+"""An answer that is worked out in one call is the one that its steps come to, to the bit."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import cycle, product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from association import AssociationOptions, Deadline, HardPrior, MapIndex, Scan, associate, candidates, explain, layout
+from association.answering import answer_at_once, given_of, is_plain
+from association.candidates import Begun, Effort
+from association.context import SearchContext
+from association.kernels import answering as kernels
+from registration.layout import Floats
+
+from .scenes import (
+    CORRIDOR,
+    INSIDE,
+    ROOM,
+    SQUARE,
+    beams_of,
+    context_of,
+    equal_rooms,
+    index_of,
+    maze,
+    pose,
+    scan_of,
+    seen,
+)
+
+OPTIONS = (
+    AssociationOptions(),
+    AssociationOptions(max_alternatives=40, offset_tolerance=0.2),
+    AssociationOptions(sampling="random", seed=5, min_overlap=0.7),
+    AssociationOptions(oriented=False, estimator="one_step"),
+)
+STEPS, EXPLAINED, JUDGED = "left to the steps", "explained", "judged"
+
+
+def how_far(context: SearchContext) -> str:
+    """Tell up to where one call answers."""
+    if not is_plain(context):
+        return STEPS
+    told = answer_at_once(context)[1]
+    if told is None:
+        return STEPS
+    return EXPLAINED if told.weighing is None else JUDGED
+
+
+def both(index: MapIndex, scan: Scan, options: AssociationOptions) -> tuple[str, str]:
+    """Return the answer as it is, and by its steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        answer = repr(associate(index, scan, None, options))
+        patch.setattr(explain, "is_plain", lambda _: False)
+        return answer, repr(associate(index, scan, None, options))
+
+
+def scans(seed: int, walls: Floats, clutter: float) -> Scan:
+    """Return what is seen from somewhere on a map with so much beside it, from one place or from nowhere."""
+    rng = np.random.default_rng(seed)
+    x, y, turn = rng.uniform((8.0, 8.0, -3.0), (22.0, 22.0, 3.0)).tolist()
+    at, strange = pose(x, y, turn), round(10 * clutter)
+    ends = seen(walls, at, noise=0.01, clutter=strange, seed=seed, radius=9.0)[0]
+    return scan_of(ends, viewpoint=(0.0, 0.0) if seed % 2 else None)
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=range(len(OPTIONS)))
+def test_one_call_answers_as_the_steps_do(options: AssociationOptions) -> None:
+    """Usable or not, on maps of which the error is known and not, to scale and not, with rivals, and of strangers."""
+    reached: Counter[str] = Counter()
+    status: Counter[str] = Counter()
+    sigmas = cycle((None, 0.02, None, 0.0))
+    for seed, clutter in product(range(6), (0.0, 0.5, 1.5)):
+        walls, sigma = maze(seed), next(sigmas)
+        stretched, strange = seed == 2, seed == 3
+        index = index_of(walls * (1.03 if stretched else 1.0), sigma)
+        scan = scans(seed, maze(99) if strange else walls, clutter)
+        answer, expected = both(index, scan, options)
+        assert answer == expected
+        found = associate(index, scan, None, options)
+        reached[how_far(SearchContext.of(index, scan, None, options, Deadline()))] += 1
+        status[f"{found.status} {found.usable}"] += 1
+    assert reached[JUDGED] > 10
+    assert status["ok True"] > 2
+    assert len(status) > 1
+
+
+@pytest.mark.parametrize(
+    ("walls", "scanned"),
+    [
+        (ROOM, ROOM),
+        (SQUARE, SQUARE),
+        (equal_rooms(2), ROOM),
+        (equal_rooms(12), ROOM),
+        (CORRIDOR, CORRIDOR),
+        (ROOM, ROOM[:1]),
+        (ROOM, ROOM[:3]),
+        (ROOM, 0.1 * ROOM),
+    ],
+)
+def test_it_does_so_of_twins_and_of_what_is_free(walls: Floats, scanned: Floats) -> None:
+    for noise, sigma in ((0.0, None), (0.02, None), (0.02, 0.01)):
+        scan = scan_of(seen(scanned, INSIDE, noise=noise)[0], viewpoint=(0.0, 0.0))
+        answer, expected = both(index_of(walls, sigma), scan, AssociationOptions())
+        assert answer == expected
+
+
+def test_a_map_that_is_not_to_scale_is_left_to_the_steps() -> None:
+    walls = maze(2)
+    context = context_of(index_of(1.03 * walls), scans(2, walls, 0.0))
+    assert how_far(context) == EXPLAINED
+    assert how_far(context_of(index_of(1.03 * walls, 0.02), scans(2, walls, 0.0))) == JUDGED, "nobody asks for a factor"
+
+
+def test_what_its_budget_ends_is_left_to_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    walls = maze(1)
+    index, scan = index_of(walls), scans(1, walls, 0.5)
+    usual = repr(associate(index, scan))
+    far = {}
+    for chunk in (1, *range(200, 4_000, 50), 10_000_000):
+        monkeypatch.setattr(candidates, "CHUNK", chunk)
+        assert repr(associate(index, scan)) == usual
+        far[chunk] = how_far(context_of(index, scan))
+    assert list(dict.fromkeys(far.values())) == [STEPS, JUDGED]
+
+
+def test_so_is_a_verdict_whose_null_takes_longer() -> None:
+    context = context_of(index_of(maze(0)), scans(0, maze(0), 1.0))
+    tables, work = context.index.tables, context.workspace
+    begun, given = Begun.of(context, Effort.of(context)), given_of(context)
+    kernels.answer(begun.question, tables, begun.planning, begun.found, begun.progress, work, begun.how, given)
+    assert given.told.reached["stage"][0] == layout.JUDGED
+    judged = given.told.chances.copy()
+    how = begun.how.copy()  # which searches share
+    for budget, done in ((how["budget"][0], True), (-1, False)):
+        how["budget"] = budget
+        given.told.chances["right"] = 0.0
+        assert kernels.judge(begun.question, tables, begun.planning, work, how, given) is done
+        assert (given.told.chances == judged)[0] == done
+
+
+@pytest.mark.parametrize(
+    ("prior", "beams", "deadline"), [(HardPrior(INSIDE, 1.0, 1.0), False, None), (None, True, None), (None, False, 0.0)]
+)
+def test_what_is_not_plain_is_left_to_the_steps(prior: Any, beams: bool, deadline: float | None) -> None:
+    index = index_of(ROOM)
+    scan = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE) if beams else None)
+    assert how_far(context_of(index, scan)) == (STEPS if beams else JUDGED)
+    assert how_far(context_of(index, scan, prior, Deadline(deadline))) == STEPS
+
+
+def test_explanations_are_made_when_they_are_asked_for() -> None:
+    told = answer_at_once(context_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0])))[1]
+    assert told is not None
+    ranked = told.ranked
+    assert len(ranked) == len(list(ranked)) > 2
+    assert ranked[0] is ranked[0] is ranked[-len(ranked)]
+    assert ranked[1:3] == [ranked[1], ranked[2]]
+    assert [one.value for one in ranked] == sorted((one.value for one in ranked), reverse=True)
+    with pytest.raises(IndexError):
+        ranked[len(ranked)]
