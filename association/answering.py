@@ -5,28 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import overload
 
-import numpy as np
-
-from registration.compiling import internal
 from registration.layout import Records
 from registration.values import value
 
 from .candidates import Begun, Candidates, Effort, orders_of, segments_of_bases
 from .context import SearchContext
 from .explanations import Weighing
-from .kernels import answering
 from .layout import (
-    CHANCES,
-    ESTIMATE,
-    FACTS,
-    FEATURES,
-    HINGE,
     JUDGED,
-    MATCH,
-    MERIT,
-    REACHED,
-    SEARCHED,
-    SETTLED,
 )
 from .models import MODELS, USUAL
 from .ranking import Ranked
@@ -42,8 +28,6 @@ from .tuning import (
     NULL_SAMPLES,
     RANKED_AT_ONCE,
 )
-
-_answer = internal(answering.answer)
 
 
 @value(frozen=True, slots=True)
@@ -124,14 +108,13 @@ def answer_at_once(context: SearchContext) -> tuple[Candidates, AtOnce | None]:
     """
     begun = Begun.of(context, Effort.of(context))
     given = given_of(context)
-    stopped, plan = _answer(
-        begun.question, context.index.tables, begun.planning, begun.found, begun.progress, context.workspace, begun.how,
-        given,
-    )  # fmt: skip
+    stopped, plan = begun.search(context, given)
     candidates = begun.go_on(context, stopped, plan)
     told = given.told
+    if plan is not None:
+        return candidates, None
     stage, count, walls = told.reached.item()
-    if stage == SEARCHED or not count:
+    if not count:
         return candidates, None
     *_, agreement, _, _, significance, _, _ = told.facts.item()
     return candidates, AtOnce(
@@ -163,15 +146,5 @@ def given_of(context: SearchContext) -> Answering:
         USUAL.deviation,
         scan.measured.counted,
         index.sigma is None and options.estimator == "joint",
-        Told(
-            np.empty(1, REACHED),
-            np.empty(most, ESTIMATE),
-            np.empty(most, MERIT),
-            np.empty((most, n), MATCH),
-            np.empty(1, SETTLED),
-            np.empty(n, HINGE),
-            np.empty(1, FACTS),
-            np.empty(1, FEATURES),
-            np.empty(1, CHANCES),
-        ),
+        Told.room(1, most, n),
     )

@@ -7,13 +7,12 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from registration.compiling import internal
 from registration.layout import Records
 from registration.values import value
 
 from .context import SearchContext
-from .kernels import searching
 from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
+from .kernels.answering import answer
 from .kernels.planning import begin
 from .kernels.searching import go_on, put_in_order
 from .kernels.stopping import missed_share, restrict
@@ -22,7 +21,7 @@ from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
 from .sharing import Sharing
-from .tables import Question
+from .tables import Answering, Question
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,
@@ -44,9 +43,8 @@ from .tuning import (
     USUAL_CROWD,
 )
 
-_search_map = internal(searching.search)
-
 NO_NOISE = np.zeros(0)
+ONLY_SEARCHED = Answering.nothing()
 NONE_TRIED = np.zeros(0, TRIED)
 COUNT, BASES, HYPOTHESES, VERIFIED, MISSED = map(
     (PROGRESS.names or ()).index, ("count", "bases", "hypotheses", "verified", "missed")
@@ -175,6 +173,17 @@ class Begun:
         found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), record(PROGRESS, best_value=effort.known)
         return cls(effort, context.question(rules), _planning(context, effort), found, progress, how)
 
+    def search(self, context: SearchContext, given: Answering) -> tuple[int, Plan | None]:
+        """Search, and go on with what is found as far as is asked; return why bases were left, and how to `go_on`."""
+        return answer(
+            self.question, context.index.tables, self.planning, self.found, self.progress, context.workspace, self.how,
+            given,
+        )  # fmt: skip
+
+    def plan(self, context: SearchContext) -> tuple[int, Plan]:
+        """Return what `search` does, without having gone through any base."""
+        return BUDGET, begin(self.question, context.index.tables, self.planning, self.progress)
+
     def go_on(self, context: SearchContext, stopped: int, plan: Plan | None) -> Candidates:
         """Go on where `search` left it.
 
@@ -200,11 +209,10 @@ class Begun:
 
 
 def _search(context: SearchContext, effort: Effort, chunk: int | None) -> Candidates:
-    tables, begun = context.index.tables, Begun.of(context, effort, chunk)
-    question, planning, found, progress, how = begun.question, begun.planning, begun.found, begun.progress, begun.how
+    begun = Begun.of(context, effort, chunk)
     if context.deadline.passed:
-        return begun.go_on(context, BUDGET, begin(question, tables, planning, progress))
-    return begun.go_on(context, *_search_map(question, tables, planning, found, progress, context.workspace, how))
+        return begun.go_on(context, *begun.plan(context))
+    return begun.go_on(context, *begun.search(context, ONLY_SEARCHED))
 
 
 def _found(

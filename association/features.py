@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from registration.compiling import internal
+from registration.compiling import way_in
 from registration.layout import Records
 
 from .context import SearchContext
@@ -86,13 +86,13 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
-_describe = internal(kernels.describe)
-_weigh = internal(kernels.weigh)
-_see_hinges = internal(kernels.see_hinges)
-_see_unmatched = internal(kernels.see_unmatched)
-_is_thin = internal(kernels.is_thin)
-_take_null = internal(odds.take_null)
-twin_share = internal(kernels.twin_share)
+_describe = way_in(kernels.describe)
+_weigh = way_in(kernels.weigh)
+_see_hinges = way_in(kernels.see_hinges)
+_see_unmatched = way_in(kernels.see_unmatched)
+_is_thin = way_in(kernels.is_thin)
+_take_null = way_in(odds.take_null)
+twin_share = way_in(kernels.twin_share)
 
 
 def facts_of(context: SearchContext, answer: Answer) -> Records:

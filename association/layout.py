@@ -244,7 +244,7 @@ CHANCES = _fields((_F, "right careful explained share"), (_I, "thin"))
 # How far an answer was worked out in one call, and what is known of it: how many explanations there are, how many walls
 # hold a match of the best; significance and agreement are among the facts.
 REACHED = _fields((_I, "stage explanations walls"))
-SEARCHED, EXPLAINED, JUDGED = range(3)
+EXPLAINED, JUDGED = range(2)
 
 # What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
 # it below the first of them. From `start` on the slope is more by `more`.

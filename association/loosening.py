@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from registration.compiling import internal
+from registration.compiling import way_in
 
 from .context import SearchContext
 from .explanations import Answer
@@ -21,7 +21,7 @@ from .ranking import Ranked, match_again
 from .scan_lines import ScanLines
 from .tuning import LOOSE_RIVALS
 
-_loose_sigma, _loose_share = internal(kernels.loose_sigma), internal(kernels.loose_share)
+_loose_sigma, _loose_share = way_in(kernels.loose_sigma), way_in(kernels.loose_share)
 
 
 def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]) -> float:

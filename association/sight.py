@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from registration.compiling import internal
+from registration.compiling import way_in
 from registration.layout import Records
 from registration.values import value
 
@@ -44,7 +44,7 @@ class BeamShares:
 
 NO_BEAMS = BeamShares()
 
-_agreement = internal(agreement_kernels.agreement)
+_agreement = way_in(agreement_kernels.agreement)
 
 
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:

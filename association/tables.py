@@ -12,7 +12,31 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import MATCH, POSED, SCRATCH, WALL_SHARE, Indices, Integers, record
+from .layout import (
+    BEND,
+    CHANCES,
+    CURVE,
+    ESTIMATE,
+    FACTS,
+    FEATURES,
+    GATES,
+    HINGE,
+    MATCH,
+    MERIT,
+    POINT,
+    POSED,
+    REACHED,
+    SCRATCH,
+    SETTLED,
+    SIGHTING,
+    TWO_FEATURES,
+    VARIANCES,
+    WALL,
+    WALL_SHARE,
+    Indices,
+    Integers,
+    record,
+)
 from .tuning import AT_ONCE
 
 
@@ -314,6 +338,21 @@ class Told(NamedTuple):
     features: Records
     chances: Records
 
+    @classmethod
+    def room(cls, answers: int, explanations: int, lines: int) -> Told:
+        """Return room for so many answers, 1 or none, and explanations of a scan of so many lines."""
+        return cls(
+            np.empty(answers, REACHED),
+            np.empty(explanations, ESTIMATE),
+            np.empty(explanations, MERIT),
+            np.empty((explanations, lines), MATCH),
+            np.empty(answers, SETTLED),
+            np.empty(lines, HINGE),
+            np.empty(answers, FACTS),
+            np.empty(answers, FEATURES),
+            np.empty(answers, CHANCES),
+        )
+
 
 class Answering(NamedTuple):
     """What an answer that is worked out in one call goes by beside the search, and where it is written.
@@ -355,6 +394,35 @@ class Answering(NamedTuple):
     counted: bool
     to_scale: bool
     told: Told
+
+    @classmethod
+    def nothing(cls) -> Answering:
+        """Return that the search is all that is asked."""
+        points, numbers, counts = np.zeros(0, POINT), np.zeros(0), np.zeros((0, 0), np.uint8)
+        # Kernels are compiled once more for what may be written to; what is measured may not.
+        measured = [np.zeros(0, kind) for kind in (POINT, POINT, float, POINT, float, float, float)]
+        parallel = np.zeros(0)
+        for array in (*measured, parallel):
+            array.setflags(write=False)
+        odds = Odds(np.zeros(0, CURVE), np.zeros(0, BEND), np.zeros(0, TWO_FEATURES))
+        return cls(
+            Sights(points, np.zeros(0, np.int64), np.zeros(0, SIGHTING)),
+            np.zeros(0, SIGHTING),
+            Standing(np.zeros(0, WALL), -1.0, parallel),
+            WallLengths(numbers, numbers, 0.0, 0.0),
+            np.zeros(0, GATES),
+            numbers,
+            Measured(*measured),
+            np.zeros(0, VARIANCES),
+            counts,
+            counts,
+            odds,
+            odds,
+            0.0,
+            False,
+            False,
+            Told.room(0, 0, 0),
+        )
 
 
 class Workspace(NamedTuple):

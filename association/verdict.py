@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from registration import RigidTransform
-from registration.compiling import internal
+from registration.compiling import way_in
 from registration.layout import Records
 from registration.values import value
 
@@ -31,9 +31,9 @@ from .tuning import (
     USABLE_PROBABILITY,
 )
 
-_three_chances = internal(odds.three_chances)
-_allowed_null = internal(odds.allowed_null)
-_chance = internal(odds.chance)
+_three_chances = way_in(odds.three_chances)
+_allowed_null = way_in(odds.allowed_null)
+_chance = way_in(odds.chance)
 
 
 @value(frozen=True, slots=True)

@@ -23,7 +23,7 @@ import tempfile
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from functools import cache, partial, wraps
+from functools import cache, partial, update_wrapper, wraps
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -138,6 +138,33 @@ def internal(function: Function) -> Function:
         if not os.environ.get(CHECKED):
             entry = variants[0].entry_point
         return result
+
+    return cast(Function, call)
+
+
+def way_in(function: Function) -> Function:
+    """Call a kernel from Python that other kernels call as well, likewise: it is compiled once for both.
+
+    Parameters
+    ----------
+    function : callable
+        A kernel, as other kernels call it.
+    """
+    if not isinstance(function, Dispatcher):  # NUMBA_DISABLE_JIT is set
+        return function
+
+    def entry(arguments: tuple[Any, ...]) -> Any:
+        return function(*arguments)
+
+    update_wrapper(entry, function.py_func)
+    vars(entry).pop("__wrapped__")  # whose parameters Numba would look for here
+    compiled: Any = njit(nogil=True, pipeline_class=KernelCompiler, **FROM_PYTHON)(entry)
+    compiled._cache = KernelCache(function.py_func)
+    enter = internal(compiled)
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        return enter(arguments)
 
     return cast(Function, call)
 

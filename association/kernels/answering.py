@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import internal, kernel
+from registration.compiling import inlined, internal, kernel
 from registration.kernels import MAX_DEVIATION, keep_alive
 from registration.layout import Records
 
@@ -26,7 +26,6 @@ from ..layout import (
     PROGRESS,
     RIVAL,
     RULES,
-    SEARCHED,
     TERMS,
     VARIANCES,
     WEIGHED,
@@ -77,16 +76,20 @@ def answer(
     how: Records,
     given: Answering,
 ) -> tuple[int, Plan | None]:
-    """Search as `search` does, and go on with what was found; writes to ``told`` of `given` as far as it comes."""
+    """Search as `search` does, and go on with what was found; writes to ``told`` of `given` as far as it comes.
+
+    Where that has no room for how far that is, the search is all that is asked.
+    """
     why, plan = search(question, tables, planning, found, progress, work, how)
+    if plan is not None or len(given.told.reached) == 0:
+        return why, plan
+    explain(question, tables.place, found[: progress[0].count], work, given)
     reached = given.told.reached[0]
-    reached.stage = SEARCHED
-    if plan is None:
-        explain(question, tables.place, found[: progress[0].count], work, given)
-        reached.stage = EXPLAINED
-        judged = reached.explanations > 0 and not may_be_off(question, work, given)
-        if judged and judge(question, tables, planning, work, how, given):
-            reached.stage = JUDGED
+    if reached.explanations == 0 or may_be_off(question, work, given):
+        return why, plan
+    share = judge(question, tables.place, work, given)
+    if share < 0.0 or compare_with_null(question, tables, planning, work, how, given, share):
+        reached.stage = JUDGED
     return why, plan
 
 
@@ -104,6 +107,7 @@ def explain(question: Question, place: Place, found: Records, work: Workspace, g
     order = distinct(estimates, merits, none, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION)
     tell(told, order, estimates, merits, matches)
     reached = told.reached[0]
+    reached.stage = EXPLAINED
     reached.explanations = len(order)
     reached.walls = 0
     if len(order) > 0:
@@ -146,10 +150,11 @@ def may_be_off(question: Question, work: Workspace, given: Answering) -> bool:
 
 
 @kernel
-def judge(
-    question: Question, tables: MapTables, planning: Planning, work: Workspace, how: Records, given: Answering
-) -> bool:
-    """Work out the chances of the best explanation; False where its null takes longer than the budget lets it."""
+def judge(question: Question, place: Place, work: Workspace, given: Answering) -> float:
+    """Work out the chances of the best explanation before it is compared with its null.
+
+    Returns what share of its score the null may come to and be told to be none; -1 where nobody asks for it.
+    """
     told = given.told
     out = told.chances[0]
     settled = told.settled[0]
@@ -166,22 +171,19 @@ def judge(
     free = settled.parallel or settled.weakest > MAX_DEVIATION
     asking = right * share >= USABLE_PROBABILITY and not free and not thin
     if asking and careful * share >= USABLE_CAUTIOUS:
-        share = min(share, loose_twin_share(question, tables.place, work, given))
-    if asking and careful * share >= USABLE_CAUTIOUS:
-        allowed = 0.0
-        if right * share >= USABLE_PROBABILITY:
-            tried = np.zeros(1, dtype=FEATURES)
-            tried[0] = features[0]
-            allowed = allowed_null(given.cautious, tried, told.merits[0].score, USABLE_CAUTIOUS / share)
-        if not compare_with_null(question, tables, planning, work, how, given, allowed):
-            return False
-        careful = chance(given.cautious, features)
+        share = min(share, loose_twin_share(question, place, work, given))
     out.right = right * share
     out.careful = careful * share
     out.explained = explained
     out.share = share
     out.thin = thin
-    return True
+    if not asking or out.careful < USABLE_CAUTIOUS:
+        return -1.0
+    if out.right < USABLE_PROBABILITY:
+        return 0.0
+    tried = np.zeros(1, dtype=FEATURES)
+    tried[0] = features[0]
+    return allowed_null(given.cautious, tried, told.merits[0].score, USABLE_CAUTIOUS / share)
 
 
 @kernel
@@ -225,7 +227,7 @@ def loose_twin_share(question: Question, place: Place, work: Workspace, given: A
     return loose_share(told.merits[:count], values, again)
 
 
-@kernel
+@inlined
 def compare_with_null(
     question: Question,
     tables: MapTables,
@@ -235,9 +237,10 @@ def compare_with_null(
     given: Answering,
     share: float,
 ) -> bool:
-    """Write what the mirrored scan comes to into the features, as `association.null` does it; False as `judge`.
+    """Write what the mirrored scan comes to into features and chances, as `association.null` works it out.
 
-    Where it comes to less than `share` of the answer's score it may be told to be none.
+    Where it comes to less than `share` of the answer's score it may be told to be none. False where that takes longer
+    than the budget lets it.
     """
     told = given.told
     score = told.merits[0].score
@@ -261,18 +264,24 @@ def compare_with_null(
         look_for(least, max(how[0].allowed, NULL_ALLOWED_NEAR), known, other.rules, limits)
         near = best_of(other, tables, plans, sights, work, limits, known, null)
         if near < wanted:
-            take_null(score, 0.0, 0.0, told.features)
+            write_null(given, 0.0, 0.0)
             return near >= 0.0
     look_for(NULL_SHARE, max(how[0].allowed, NULL_ALLOWED), known, other.rules, limits)
     reached = best_of(other, tables, plans, sights, work, limits, known, null)
     symmetry = 0.0
     if reached > 0.0:
-        views = given.sights.places
-        symmetry = mirrored_share(
-            views, given.seen, told.estimates[:1], null, given.gates, tables.place, work
-        )  # fmt: skip
-    take_null(score, reached, symmetry, told.features)
+        views, poses = given.sights.places, told.estimates[:1]
+        symmetry = mirrored_share(views, given.seen, poses, null, given.gates, tables.place, work)
+    write_null(given, reached, symmetry)
     return reached >= 0.0
+
+
+@kernel
+def write_null(given: Answering, score: float, symmetry: float) -> None:
+    """Write what the mirrored scan scores into features and chances."""
+    told = given.told
+    take_null(told.merits[0].score, score, symmetry, told.features)
+    told.chances[0].careful = chance(given.cautious, told.features) * told.chances[0].share
 
 
 @kernel
@@ -290,7 +299,7 @@ def look_for(share: float, allowed: float, known: float, rules: Records, limits:
     limits[0].kept = NULL_KEPT
 
 
-@kernel
+@inlined
 def best_of(
     question: Question,
     tables: MapTables,

@@ -32,11 +32,16 @@ def compile_kernels() -> None:
     with FileLock(place / "linefix.lock"):
         if is_compiled():
             return
-        from .warmup import warm_up, warm_up_registering, warm_up_searching, warm_up_searching_long
+        from .warmup import (
+            warm_up,
+            warm_up_analyzing,
+            warm_up_registering,
+            warm_up_searching,
+        )
 
         if (os.cpu_count() or 1) > 1:
             with subprocess.Popen(command_of(BESIDE)):
                 warm_up_registering()
                 warm_up_searching()
-                warm_up_searching_long()
+                warm_up_analyzing()
         warm_up()

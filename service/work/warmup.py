@@ -17,7 +17,7 @@ from association import (
     assemble,
     associate,
 )
-from association.candidates import find_candidates
+from association.candidates import Begun, Effort
 from association.checking import check_map, try_sample
 from association.context import SearchContext
 from association.explain import explain_at
@@ -118,6 +118,11 @@ def warm_up_vectorizing() -> None:
     vectorize(points, viewpoint=None)
 
 
+def warm_up_indexing() -> None:
+    """Index a map."""
+    MapIndex.build(Segments.from_array(ROOM), 0.0)
+
+
 def warm_up_scans() -> None:
     """Join the segments of a scan as every search does."""
     ScanLines.of(Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM))), 0.0, AssociationOptions())
@@ -164,8 +169,11 @@ def warm_up_searching_late() -> None:
 
 
 def _search_in_steps(deadline: Deadline) -> None:
+    """Go on with a search that has just begun: what a whole one takes is compiled by who is searching meanwhile."""
     index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
-    find_candidates(SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), deadline), chunk=1)
+    context = SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), deadline)
+    begun = Begun.of(context, Effort.of(context), chunk=1)
+    begun.go_on(context, *begun.plan(context))
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
@@ -201,8 +209,9 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
 
 
 if __name__ == "__main__":
+    warm_up_indexing()
     warm_up_scans()
     warm_up_vectorizing()
     warm_up_explaining()
     warm_up_searching_late()
-    warm_up_analyzing()
+    warm_up_searching_long()

@@ -16,8 +16,8 @@ from association import (
     HardPrior,
     Reason,
     Status,
-    answering,
     associate,
+    candidates,
     explain,
     loosening,
     null,
@@ -234,14 +234,14 @@ def test_an_incomplete_search_is_never_usable() -> None:
     assert [reason.code for reason in stopped.reasons] == ["search_incomplete"]
 
 
-@pytest.mark.parametrize("during", ["null_of", "loose_twin_share", "_answer"])
+@pytest.mark.parametrize("during", ["null_of", "loose_twin_share", "answer"])
 def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The search was done in time, but the mirrored scan or the rivals were looked at no further.
 
     Or there is one call for all of it, after which nobody knows how far it was in time.
     """
     index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
-    sent, module = scan_of(seen(ROOM, INSIDE)[0]), answering if during == "_answer" else verdict
+    sent, module = scan_of(seen(ROOM, INSIDE)[0]), candidates if during == "answer" else verdict
     compared, deadline = getattr(module, during), Deadline(time.monotonic() + 60.0)
 
     def late(*arguments: Any) -> Any:

@@ -156,6 +156,27 @@ def test_the_types_of_what_an_internal_kernel_is_handed(compiled: SmallPackage, 
     compiled.run(CALLS.format(refused=checked), **{compiling.CHECKED: "1" if checked else ""})
 
 
+BOTH = """
+from numba.core import event
+from registration.compiling import way_in
+from small.kernels.inner import inner
+enter = way_in(inner)
+with event.install_recorder("numba:compile") as compiling:
+    assert enter(2.0) == enter(2.0) == enter(1.0) + 10.0
+names = [e.data["dispatcher"].py_func.__name__ for _, e in compiling.buffer if e.is_start]
+assert names.count("inner") == {compiled}, names
+assert enter.__name__ == "inner"
+"""
+
+
+def test_a_kernel_that_python_and_kernels_call_is_compiled_once(small: SmallPackage) -> None:
+    """But for the way in, which takes it in; both are kept."""
+    before = small.run(BOTH.replace("{compiled}", "1"))
+    small.run(BOTH.replace("{compiled}", "0"))
+    names = sorted(path.name.split("-")[0] for path in before.directory.iterdir())
+    assert names == ["small.kernels.inner.inner"] * 2 + ["small.kernels.outer.outer"]
+
+
 def test_unchanged_source_is_loaded_and_not_compiled(compiled: SmallPackage) -> None:
     again = compiled.run()
     assert (again.answer, again.loaded, again.compiled_before, again.compiled_after) == (22.0, True, True, True)
