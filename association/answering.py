@@ -8,6 +8,7 @@ from typing import overload
 from registration.layout import Records
 from registration.values import value
 
+from .answering_tables import Answering, Told
 from .candidates import Begun, Candidates, Effort, orders_of, segments_of_bases
 from .context import SearchContext
 from .explanations import Weighing
@@ -19,7 +20,6 @@ from .ranking import Ranked
 from .scan_lines import variances_of
 from .settling import Settled
 from .significance import EXPONENTS
-from .tables import Answering, Told
 from .tuning import (
     KEPT,
     KEPT_SLIDES,

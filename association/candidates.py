@@ -10,6 +10,7 @@ import numpy as np
 from registration.layout import Records
 from registration.values import value
 
+from .answering_tables import Answering
 from .context import SearchContext
 from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.answering import answer
@@ -21,7 +22,7 @@ from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
 from .sharing import Sharing
-from .tables import Answering, Question
+from .tables import Question
 from .tuning import (
     BASE_SEGMENTS,
     CHUNK,

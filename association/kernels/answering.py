@@ -8,60 +8,44 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, internal, kernel
+from registration.compiling import internal, kernel
 from registration.kernels import MAX_DEVIATION, keep_alive
 from registration.layout import Records
 
+from ..answering_tables import Answering, Told
 from ..layout import (
     ESTIMATE,
     EXPLAINED,
     FEATURES,
-    FOUND,
-    HOW,
     JUDGED,
     MATCH,
     MERIT,
-    MODEL,
-    POINT,
-    PROGRESS,
     RIVAL,
-    RULES,
-    TERMS,
-    VARIANCES,
     WEIGHED,
     Integers,
 )
 from ..planning_tables import Plan, Planning
-from ..tables import Answering, MapTables, Place, Question, Sights, Told, Workspace
+from ..tables import MapTables, Place, Question, Workspace
 from ..tuning import (
     CONTRADICTION,
     DISTINCT_ANGLE,
     DISTINCT_DISTANCE,
-    KEPT_SLIDES,
     LEAST_OFF_WALLS,
-    LOOSE_RIVALS,
     NEUTRAL,
-    NULL_ALLOWED,
-    NULL_ALLOWED_NEAR,
-    NULL_ENOUGH,
-    NULL_KEPT,
-    NULL_MARGIN,
-    NULL_SHARE,
     SAME_FAMILY,
     USABLE_CAUTIOUS,
     USABLE_PROBABILITY,
 )
 from .agreement import agreement
 from .chance import significance, worth_of
-from .features import by_segments, describe, is_thin, see_hinges, see_unmatched, twin_share, weigh
-from .loosening import loose_share, loose_sigma
-from .odds import allowed_null, chance, take_null, three_chances
+from .features import describe, is_thin, see_hinges, see_unmatched, twin_share, weigh
+from .loosening import loose_twin_share
+from .null import compare_with_null
+from .odds import allowed_null, three_chances
 from .ranking import begin_at, distinct, rank
-from .scans import describe_view, mirror_lines, set_map_sigma
 from .searching import search
 from .settling import settle
 from .similarity import is_off, pose_of_similarity, settle_similarity
-from .symmetry import mirrored_share
 
 
 @internal
@@ -197,140 +181,3 @@ def beside(merits: Records) -> Records:
         explanations[k].count = merits[k].count
     weigh(explanations, weighed)
     return weighed
-
-
-@kernel
-def loose_twin_share(question: Question, place: Place, work: Workspace, given: Answering) -> float:
-    """Return the chance of the best explanation among its nearest rivals where walls may be off by more, up to 1."""
-    told = given.told
-    count = min(told.reached[0].explanations, LOOSE_RIVALS + 1)
-    if given.standing.variance >= 0.0 or count == 1:
-        return 1.0
-    variances = np.zeros(1, dtype=VARIANCES)
-    variances[0] = given.variances[0]
-    terms = np.zeros(1, dtype=TERMS)
-    terms[0] = question.terms[0]
-    model = np.zeros(1, dtype=MODEL)
-    model[0] = question.terms[0].model
-    set_map_sigma(loose_sigma(math.sqrt(told.settled[0].wall_variance)), variances, model)
-    terms[0].model.wall_variance = model[0].wall_variance
-    _, rows, seen = describe_view(given.measured, given.counted, variances, model)
-    loose = Question(rows, terms, question.rules)
-    sights = Sights(given.sights.places, given.sights.starts, seen[: len(given.sights.seen)])
-    estimates = np.zeros(count, dtype=ESTIMATE)
-    values = np.zeros(count)
-    for k in range(count):
-        estimates[k] = told.estimates[k]
-        values[k] = told.merits[k].score
-    again = np.zeros(count, dtype=MERIT)
-    rank(loose, place, sights, estimates, again, np.zeros((count, len(rows)), dtype=MATCH), work)
-    return loose_share(told.merits[:count], values, again)
-
-
-@inlined
-def compare_with_null(
-    question: Question,
-    tables: MapTables,
-    planning: Planning,
-    work: Workspace,
-    how: Records,
-    given: Answering,
-    share: float,
-) -> bool:
-    """Write what the mirrored scan comes to into features and chances, as `association.null` works it out.
-
-    Where it comes to less than `share` of the answer's score it may be told to be none. False where that takes longer
-    than the budget lets it.
-    """
-    told = given.told
-    score = told.merits[0].score
-    rows, seen = mirror_lines(question.scan)
-    places = np.zeros(len(given.sights.places), dtype=POINT)
-    for v in range(len(places)):
-        places[v].x = given.sights.places[v].x
-        places[v].y = -given.sights.places[v].y
-    sights = Sights(places, given.sights.starts, seen[: len(given.sights.seen)])
-    plans = Planning(planning.runs, planning.area, given.orders, given.ranks, planning.fade, planning.noise)
-    other = Question(rows, question.terms, np.zeros(2, dtype=RULES))
-    limits = np.zeros(1, dtype=HOW)
-    null = np.zeros(1, dtype=ESTIMATE)
-    for k in range(2):
-        other.rules[k] = question.rules[k]
-    limits[0] = how[0]
-    known = max(0.0, by_segments(told.merits[0]))
-    wanted = share * score
-    least = NULL_MARGIN * wanted / known if known > 0.0 else 0.0
-    if least > NULL_SHARE:
-        look_for(least, max(how[0].allowed, NULL_ALLOWED_NEAR), known, other.rules, limits)
-        near = best_of(other, tables, plans, sights, work, limits, known, null)
-        if near < wanted:
-            write_null(given, 0.0, 0.0)
-            return near >= 0.0
-    look_for(NULL_SHARE, max(how[0].allowed, NULL_ALLOWED), known, other.rules, limits)
-    reached = best_of(other, tables, plans, sights, work, limits, known, null)
-    symmetry = 0.0
-    if reached > 0.0:
-        views, poses = given.sights.places, told.estimates[:1]
-        symmetry = mirrored_share(views, given.seen, poses, null, given.gates, tables.place, work)
-    write_null(given, reached, symmetry)
-    return reached >= 0.0
-
-
-@kernel
-def write_null(given: Answering, score: float, symmetry: float) -> None:
-    """Write what the mirrored scan scores into features and chances."""
-    told = given.told
-    take_null(told.merits[0].score, score, symmetry, told.features)
-    told.chances[0].careful = chance(given.cautious, told.features) * told.chances[0].share
-
-
-@kernel
-def look_for(share: float, allowed: float, known: float, rules: Records, limits: Records) -> None:
-    """Write that only what comes to such a share of what is `known`, nats, is looked for.
-
-    To `rules` (2,) of `RULES` and `limits` (1,) of `HOW`.
-    """
-    for k in range(2):
-        rules[k].kept_share = share
-        rules[k].rival_share = share
-        rules[k].enough = NULL_ENOUGH * known
-    limits[0].allowed = allowed
-    limits[0].share = share
-    limits[0].kept = NULL_KEPT
-
-
-@inlined
-def best_of(
-    question: Question,
-    tables: MapTables,
-    planning: Planning,
-    sights: Sights,
-    work: Workspace,
-    how: Records,
-    known: float,
-    best: Records,
-) -> float:
-    """Search; return the score of the best explanation, which is written to `best` (1,) of `ESTIMATE`.
-
-    0 where there is none, -1 where the budget ended the search.
-    """
-    found = np.zeros(NULL_KEPT + KEPT_SLIDES, dtype=FOUND)
-    progress = np.zeros(1, dtype=PROGRESS)
-    progress[0].best_value = known
-    _, plan = search(question, tables, planning, found, progress, work, how)
-    poses = found[: progress[0].count]
-    if plan is not None:
-        return -1.0
-    estimates = np.zeros(len(poses), dtype=ESTIMATE)
-    merits = np.zeros(len(poses), dtype=MERIT)
-    begin_at(poses, estimates)
-    rank(question, tables.place, sights, estimates, merits, np.zeros((len(poses), len(question.scan)), MATCH), work)
-    score = 0.0
-    for k in range(len(poses)):
-        if merits[k].score > score:
-            score = max(score, merits[k].score)
-            best[0] = estimates[k]
-    keep_alive(progress)
-    keep_alive(estimates)
-    keep_alive(merits)
-    return score

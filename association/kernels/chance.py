@@ -7,7 +7,7 @@ import numpy as np
 from registration.compiling import kernel
 from registration.layout import Floats, Records
 
-from ..tables import WallLengths
+from ..answering_tables import WallLengths
 from ..tuning import LEAST_CHANCE, LEAST_SIGNIFICANCE, MOST_CHANCE
 
 

@@ -2,11 +2,18 @@
 
 import math
 
+import numpy as np
+
 from registration.compiling import kernel
 from registration.layout import Floats, Records
 
-from ..tuning import LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_WALLS, MODEL_OFFSET, TWIN_TEMPERATURE
+from ..answering_tables import Answering
+from ..layout import ESTIMATE, MATCH, MERIT, MODEL, TERMS, VARIANCES
+from ..tables import Place, Question, Sights, Workspace
+from ..tuning import LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_RIVALS, LOOSE_WALLS, MODEL_OFFSET, TWIN_TEMPERATURE
 from .features import by_segments
+from .ranking import rank
+from .scans import describe_view, set_map_sigma
 
 
 @kernel
@@ -37,3 +44,31 @@ def loose_share(merits: Records, values: Floats, again: Records) -> float:
         else:
             total += math.exp(min(0.0, worth - least) / TWIN_TEMPERATURE)
     return 1.0 / (1.0 + total)
+
+
+@kernel
+def loose_twin_share(question: Question, place: Place, work: Workspace, given: Answering) -> float:
+    """Return the chance of the best explanation among its nearest rivals where walls may be off by more, up to 1."""
+    told = given.told
+    count = min(told.reached[0].explanations, LOOSE_RIVALS + 1)
+    if given.standing.variance >= 0.0 or count == 1:
+        return 1.0
+    variances = np.zeros(1, dtype=VARIANCES)
+    variances[0] = given.variances[0]
+    terms = np.zeros(1, dtype=TERMS)
+    terms[0] = question.terms[0]
+    model = np.zeros(1, dtype=MODEL)
+    model[0] = question.terms[0].model
+    set_map_sigma(loose_sigma(math.sqrt(told.settled[0].wall_variance)), variances, model)
+    terms[0].model.wall_variance = model[0].wall_variance
+    _, rows, seen = describe_view(given.measured, given.counted, variances, model)
+    loose = Question(rows, terms, question.rules)
+    sights = Sights(given.sights.places, given.sights.starts, seen[: len(given.sights.seen)])
+    estimates = np.zeros(count, dtype=ESTIMATE)
+    values = np.zeros(count)
+    for k in range(count):
+        estimates[k] = told.estimates[k]
+        values[k] = told.merits[k].score
+    again = np.zeros(count, dtype=MERIT)
+    rank(loose, place, sights, estimates, again, np.zeros((count, len(rows)), dtype=MATCH), work)
+    return loose_share(told.merits[:count], values, again)
