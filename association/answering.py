@@ -12,22 +12,13 @@ from .answering_tables import Answering, Told
 from .candidates import Begun, Candidates, Effort, orders_of, segments_of_bases
 from .context import SearchContext
 from .explanations import Weighing
-from .layout import (
-    JUDGED,
-)
+from .layout import JUDGED
 from .models import MODELS, USUAL
 from .ranking import Ranked
 from .scan_lines import variances_of
 from .settling import Settled
 from .significance import EXPONENTS
-from .tuning import (
-    KEPT,
-    KEPT_SLIDES,
-    LATE_CROWD,
-    LEAST_DISTINCT,
-    NULL_SAMPLES,
-    RANKED_AT_ONCE,
-)
+from .tuning import KEPT, KEPT_SLIDES, LATE_CROWD, LEAST_DISTINCT, NULL_SAMPLES, RANKED_AT_ONCE
 
 
 @value(frozen=True, slots=True)

@@ -13,17 +13,7 @@ from registration.kernels import MAX_DEVIATION, keep_alive
 from registration.layout import Records
 
 from ..answering_tables import Answering, Told
-from ..layout import (
-    ESTIMATE,
-    EXPLAINED,
-    FEATURES,
-    JUDGED,
-    MATCH,
-    MERIT,
-    RIVAL,
-    WEIGHED,
-    Integers,
-)
+from ..layout import ESTIMATE, EXPLAINED, FEATURES, JUDGED, MATCH, MERIT, RIVAL, WEIGHED, Integers
 from ..planning_tables import Plan, Planning
 from ..tables import MapTables, Place, Question, Workspace
 from ..tuning import (
