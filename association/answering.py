@@ -125,7 +125,7 @@ def given_of(context: SearchContext) -> Answering:
     return Answering(
         context.sights,
         lines.sightings,
-        context.standing,
+        context.known_walls,
         index.wall_lengths,
         context.gates,
         EXPONENTS,

@@ -28,7 +28,7 @@ from .layout import (
     WALL,
     Integers,
 )
-from .tables import Measured, Odds, Sights, Standing
+from .tables import KnownWalls, Measured, Odds, Sights
 
 
 class WallLengths(NamedTuple):
@@ -99,7 +99,7 @@ class Answering(NamedTuple):
     ----------
     sights : Sights
     seen : (k,) of `SIGHTING`, of which there may be no lines of sight
-    standing : Standing
+    known_walls : KnownWalls
     lengths : WallLengths
     gates : (1,) of `GATES`
     exponents : (m,) of Chernoff's bound, ascending
@@ -118,7 +118,7 @@ class Answering(NamedTuple):
 
     sights: Sights
     seen: Records
-    standing: Standing
+    known_walls: KnownWalls
     lengths: WallLengths
     gates: Records
     exponents: Floats
@@ -146,7 +146,7 @@ class Answering(NamedTuple):
         return cls(
             Sights(points, np.zeros(0, np.int64), np.zeros(0, SIGHTING)),
             np.zeros(0, SIGHTING),
-            Standing(np.zeros(0, WALL), -1.0, parallel),
+            KnownWalls(np.zeros(0, WALL), -1.0, parallel),
             WallLengths(numbers, numbers, 0.0, 0.0),
             np.zeros(0, GATES),
             numbers,

@@ -210,6 +210,7 @@ class Begun:
 
 
 def _search(context: SearchContext, effort: Effort, chunk: int | None) -> Candidates:
+    """Search the map, or the window of a hard prior."""
     begun = Begun.of(context, effort, chunk)
     if context.deadline.passed:
         return begun.go_on(context, *begun.plan(context))

@@ -31,7 +31,7 @@ from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
 from .scan_lines import ScanLines, gates
-from .tables import Question, Sights, Standing, Workspace
+from .tables import KnownWalls, Question, Sights, Workspace
 from .tuning import LATE_CROWD
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
@@ -144,11 +144,11 @@ class SearchContext:
         return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
 
     @cached_property
-    def standing(self) -> Standing:
+    def known_walls(self) -> KnownWalls:
         """The walls, and what is known of where they stand."""
         known = self.index.sigma
         parallel = most_parallel_up_to(len(self.lines.rows))
-        return Standing(self.index.walls.rows, -1.0 if known is None else known**2, parallel)
+        return KnownWalls(self.index.walls.rows, -1.0 if known is None else known**2, parallel)
 
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""

@@ -93,8 +93,8 @@ def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bo
     found = np.zeros(len(explanations), SETTLED)
     without = np.zeros(len(explanations[0].matches) if hinges else 0, HINGE)
     count = _settle(
-        context.question_of_a_pose, context.standing, matches_of(explanations), poses_of(explanations), found, without,
-        context.workspace,
+        context.question_of_a_pose, context.known_walls, matches_of(explanations), poses_of(explanations), found,
+        without, context.workspace,
     )  # fmt: skip
     settled = list(map(Settled.of, found.tolist(), chain([without[:count]], repeat(NO_HINGES))))
     views = context.scan.views

@@ -240,7 +240,7 @@ class Odds(NamedTuple):
     pairs: Records
 
 
-class Standing(NamedTuple):
+class KnownWalls(NamedTuple):
     """The walls, and what is known of where they really stand.
 
     Attributes

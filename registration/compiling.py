@@ -32,8 +32,8 @@ import llvmlite
 import numba
 import numpy as np
 from numba import njit, types
-from numba.extending import lower_builtin, type_callable
 
+from .borrowing import borrowed as borrowed
 from .interpreting import interpreted
 
 UNKNOWN_NUMBA = (
@@ -56,7 +56,6 @@ except (ImportError, AttributeError) as error:
     raise ImportError(UNKNOWN_NUMBA) from error
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Value = TypeVar("Value")
 
 logger = logging.getLogger("linefix")
 
@@ -191,40 +190,6 @@ def _call_template(template: Callable[..., Any], args: tuple[types.Type, ...], k
     return template(tuple(map(plain, args)), {name: plain(kind) for name, kind in kws.items()})
 
 
-def borrowed(value: Value) -> Value:
-    """Return arrays, or tuples of them, as they are, for a kernel that counts no references to them.
-
-    Numba counts references to each array that is taken from a tuple or handed on, atomically, which for threads that
-    search one map comes to waiting for one another. Whoever called the kernel holds what it is handed until it returns:
-    nothing that it borrowed, nor any part of it, may it return or write to where it is kept.
-    """
-    return value
-
-
-def _uncounted(context: Any, builder: Any, kind: types.Type, value: Any) -> Any:
-    if isinstance(kind, types.Array):
-        array = context.make_array(kind)(context, builder, value)
-        array.meminfo = array.meminfo.type(None)
-        return array._getvalue()
-    if isinstance(kind, types.BaseTuple):
-        members: Any = kind
-        for place, member in enumerate(members):
-            part = _uncounted(context, builder, member, builder.extract_value(value, place))
-            value = builder.insert_value(value, part, place)
-    return value
-
-
-# By itself and not as a function that is compiled into each kernel: that took a fortieth of a first start.
-@type_callable(borrowed)
-def _type_borrowed(_: Any) -> Callable[[types.Type], types.Type]:
-    return lambda value: value
-
-
-@lower_builtin(borrowed, types.Any)  # type: ignore[no-untyped-call, untyped-decorator]
-def _lower_borrowed(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    return _uncounted(context, builder, signature.args[0], arguments[0])
-
-
 def cache_directory(package: str) -> Path:
     """Return where the kernels of a package are kept that fit its present source; it need not be there yet.
 
@@ -261,7 +226,7 @@ def stamp(package: str) -> str:
         for path in sources(name):
             text = path.read_bytes()
             digest.update(f"{name}/{path.relative_to(_home(name)).as_posix()} {len(text)}\n".encode() + text)
-    for name in ("code_libraries.py", "compiling.py"):
+    for name in ("borrowing.py", "code_libraries.py", "compiling.py"):
         digest.update((_home(SHARED) / name).read_bytes())
     return digest.hexdigest()[:20]
 

@@ -86,7 +86,7 @@ def explain(question: Question, place: Place, found: Records, work: Workspace, g
     reached.walls = 0
     if len(order) > 0:
         best = told.estimates[:1]
-        reached.walls = settle(question, given.standing, told.matches[:1], best, told.settled, told.hinges, work)
+        reached.walls = settle(question, given.known_walls, told.matches[:1], best, told.settled, told.hinges, work)
         fact = told.facts[0]
         fact.farther = 0.0
         fact.nearer = 0.0
@@ -114,7 +114,7 @@ def may_be_off(question: Question, work: Workspace, given: Answering) -> bool:
     solution = np.zeros(4)
     covariance = np.zeros((4, 4))
     pose = np.zeros(1, dtype=ESTIMATE)
-    walls = given.standing.walls
+    walls = given.known_walls.walls
     variance, _ = settle_similarity(question, walls, told.matches[0], solution, covariance, work)
     if variance < 0.0:
         return False

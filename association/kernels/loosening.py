@@ -51,7 +51,7 @@ def loose_twin_share(question: Question, place: Place, work: Workspace, given: A
     """Return the chance of the best explanation among its nearest rivals where walls may be off by more, up to 1."""
     told = given.told
     count = min(told.reached[0].explanations, LOOSE_RIVALS + 1)
-    if given.standing.variance >= 0.0 or count == 1:
+    if given.known_walls.variance >= 0.0 or count == 1:
         return 1.0
     variances = np.zeros(1, dtype=VARIANCES)
     variances[0] = given.variances[0]

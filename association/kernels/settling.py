@@ -9,7 +9,7 @@ from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
 from ..layout import ESTIMATE, Integers
-from ..tables import Question, Standing, Workspace
+from ..tables import KnownWalls, Question, Workspace
 from ..tuning import (
     COMMON_WALL_ERROR,
     FREE_DEVIATION,
@@ -139,7 +139,7 @@ def walls_of(scan: Records, matches: Records) -> Integers:
 
 @kernel
 def settle(
-    question: Question, standing: Standing, matches: Records, starts: Records, settled: Records, hinges: Records,
+    question: Question, known_walls: KnownWalls, matches: Records, starts: Records, settled: Records, hinges: Records,
     work: Workspace,
 ) -> int:  # fmt: skip
     """Work out the poses of consensus sets from `starts` (k,), with the error of the walls as their residuals show it.
@@ -150,24 +150,24 @@ def settle(
     matches = borrowed(matches)
     count = 0
     for k in range(len(starts)):
-        of_wall = find_pose(question.scan, standing, matches[k], starts[k], settled[k], work)
+        of_wall = find_pose(question.scan, known_walls, matches[k], starts[k], settled[k], work)
         if k == 0:
             count = len(of_wall)
             if len(hinges) > 0:
-                leave_each_out(question, standing.walls, matches[0], of_wall, settled, hinges, work)
+                leave_each_out(question, known_walls.walls, matches[0], of_wall, settled, hinges, work)
     return count
 
 
 @kernel
 def find_pose(
-    scan: Records, standing: Standing, matches: Records, start: Record, out: Record, work: Workspace
+    scan: Records, known_walls: KnownWalls, matches: Records, start: Record, out: Record, work: Workspace
 ) -> Integers:
     """Write to `out`, a record of `SETTLED`, what a consensus set comes to; its sums hold all matches then.
 
     Returns the walls that hold a match.
     """
-    walls = standing.walls
-    known = standing.variance
+    walls = known_walls.walls
+    known = known_walls.variance
     pose = out.pose
     information = work.scratch[0].information
     value = work.scratch[0].value
@@ -191,7 +191,7 @@ def find_pose(
     count = 0
     for i in range(len(matches)):
         count += 1 if matches[i].wall >= 0 else 0
-    out.parallel = unlike(scan, matches, walls, out.wall_variance) <= standing.parallel[count]
+    out.parallel = unlike(scan, matches, walls, out.wall_variance) <= known_walls.parallel[count]
     add_all(scan, matches, walls, out.wall_variance, work)
     solve(sums, pose, information, value)
     return of_wall

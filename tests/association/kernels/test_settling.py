@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from association.kernels.settling import settle, unlike, weakest
 from association.layout import HINGE, SETTLED, WALL, Integers
-from association.tables import Standing, Workspace
+from association.tables import KnownWalls, Workspace
 from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, UNSEEN_ERROR
 from registration import RigidTransform
 from registration.layout import Record, Records
@@ -39,13 +39,13 @@ class Set:
         out, hinges = np.zeros(1, SETTLED), np.zeros(len(self.scan), HINGE)
         question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
         start, matches = estimate_of(self.start), matches_on(self.held)[None]
-        count = settle(question, standing(self, map_variance), matches, start, out, hinges, work)
+        count = settle(question, known_walls(self, map_variance), matches, start, out, hinges, work)
         assert start == estimate_of(self.start)
         return out[0], hinges[:count]
 
 
-def standing(one: Set, map_variance: float = -1.0) -> Standing:
-    return Standing(one.walls, map_variance, most_parallel_up_to(len(one.scan)))
+def known_walls(one: Set, map_variance: float = -1.0) -> KnownWalls:
+    return KnownWalls(one.walls, map_variance, most_parallel_up_to(len(one.scan)))
 
 
 def laid_on(walls: Records, held: Integers, at: RigidTransform, d: Drawn, wall_error: float, noise: float) -> Records:
@@ -129,7 +129,7 @@ def test_several_sets_are_each_settled_as_if_alone() -> None:
     starts = np.concatenate([estimate_of(one.start)] * 2)
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = np.stack([matches_on(held) for held in helds])
-    count = settle(question, standing(one), matches, starts, out, hinges, work)
+    count = settle(question, known_walls(one), matches, starts, out, hinges, work)
     for k, held in enumerate(helds):
         alone, without = Set(one.scan, one.walls, held, one.start).settled()
         assert out[k] == alone
