@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from itertools import cycle, product
 from typing import Any
 
@@ -13,6 +14,10 @@ from association import AssociationOptions, Deadline, HardPrior, MapIndex, Scan,
 from association.answering import answer_at_once, given_of, is_plain
 from association.candidates import Begun, Effort
 from association.context import SearchContext
+from association.features import twin_share, weigh
+from association.tuning import NULL_SHARE
+from association.verdict import _Chances as Chances
+from registration import Segments
 from registration.layout import Floats
 
 from .scenes import (
@@ -67,6 +72,16 @@ def scans(seed: int, walls: Floats, clutter: float) -> Scan:
     return scan_of(ends, viewpoint=(0.0, 0.0) if seed % 2 else None)
 
 
+def mirrored_walls(walls: Floats) -> Floats:
+    """Return walls with left and right exchanged, 60 m away, and some of them 0.3 m off."""
+    turned = (walls * [1.0, -1.0, 1.0, -1.0])[:, [2, 3, 0, 1]] + [60.0, 0.0, 60.0, 0.0]
+    turned[::8, [1, 3]] += 0.3
+    return turned
+
+
+MIRRORED = [(seed, maze(seed)) for seed in range(16)]
+
+
 @pytest.mark.parametrize("options", OPTIONS, ids=range(len(OPTIONS)))
 def test_one_call_answers_as_the_steps_do(options: AssociationOptions) -> None:
     """Usable or not, on maps of which the error is known and not, to scale and not, with rivals, and of strangers."""
@@ -86,6 +101,39 @@ def test_one_call_answers_as_the_steps_do(options: AssociationOptions) -> None:
     assert reached[JUDGED] > 10
     assert status["ok True"] > 2
     assert len(status) > 1
+
+
+def off_by_centimetres(seed: int) -> MapIndex:
+    """Return two equal rooms of which each wall is drawn some 5 cm off by itself."""
+    rooms = Segments.from_array(equal_rooms(2))
+    errors = np.random.default_rng(seed).normal(0.0, 0.05, len(rooms))
+    return index_of(rooms.endpoints + np.tile(errors[:, None] * rooms.normals, 2))
+
+
+def test_its_chances_are_those_of_the_steps() -> None:
+    """Before they come to a verdict, which shows little of them: the second look at rivals, and the null."""
+    in_rooms = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
+    asked = [(index_of(maze(seed)), scans(seed, maze(seed), clutter)) for seed in range(8) for clutter in (0.0, 1.0)]
+    asked += [(off_by_centimetres(seed), in_rooms) for seed in range(24)]
+    asked += [(index_of(np.vstack([walls, mirrored_walls(walls)])), scans(s, walls, 0.0)) for s, walls in MIRRORED]
+    seconds = nulls = 0
+    for index, scan in asked:
+        context = context_of(index, scan)
+        explanations = explain.explain(context)
+        if explanations.weighing is None:
+            continue
+        at_once, steps = (
+            Chances.of(context, one, capped=False, certain=True)
+            for one in (explanations, replace(explanations, weighing=None))
+        )
+        assert at_once.features.tobytes() == steps.features.tobytes()
+        assert replace(at_once, features=steps.features) == steps
+        assert explanations.answer is not None
+        weighed = weigh(explanations.answer.best, tuple(explanations.rivals))
+        seconds += at_once.share < twin_share(weighed)
+        nulls += at_once.features["null"][0] > NULL_SHARE
+    assert seconds > 2
+    assert nulls > 2
 
 
 @pytest.mark.parametrize(
