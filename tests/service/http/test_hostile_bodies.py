@@ -98,12 +98,14 @@ WIDE = {
 
 @pytest.mark.parametrize("kind", WIDE)
 def test_many_wrong_things_cost_no_more_than_a_few(service: RunningService, kind: str) -> None:
+    few = b'{"options": {"include": ["a"]}}' + b" " * len(WIDE[kind])  # the parser takes 40 MB once it has had a body
+    assert service.client.post("/v1/associate", content=few).status_code == 422
     before = service.memory_mb()
     with service.peak_mb() as peak:
         answer = service.client.post("/v1/associate", content=WIDE[kind])
         assert answer.status_code in (413, 422)
         assert len(answer.content) < 8192
-        assert peak() - before < 50.0
+        assert peak() - before < 25.0
 
 
 @pytest.mark.parametrize("kind", ["include", "unknown fields"])
