@@ -13,9 +13,42 @@ from typing import Any
 from llvmlite import binding
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager
+from numba.core.typed_passes import NopythonRewrites
+from numba.core.untyped_passes import (
+    FindLiterallyCalls,
+    InlineClosureLikes,
+    LiteralPropagationSubPipelinePass,
+    LiteralUnroll,
+    MakeFunctionToJitFunction,
+    RewriteDynamicRaises,
+    WithLifting,
+)
+
+# Passes for what kernels do not have: closures and comprehensions, contexts, literal values, errors, sums of arrays.
+UNNEEDED = {
+    FindLiterallyCalls,
+    InlineClosureLikes,
+    LiteralPropagationSubPipelinePass,
+    LiteralUnroll,
+    MakeFunctionToJitFunction,
+    NopythonRewrites,
+    RewriteDynamicRaises,
+    WithLifting,
+}
 
 
-class Bitcode(JITCodeLibrary):
+class _Code(JITCodeLibrary):
+    def _optimize_functions(self, module: Any) -> None:
+        """Optimize each function by itself; the passes are laid out once, and not for each nor for what is declared."""
+        module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+
+
+class Bitcode(_Code):
     """What is compiled of a function, to be linked into what calls it."""
 
     @classmethod
@@ -60,10 +93,10 @@ class CalleeCompiler(CompilerBase):
         """Return the passes that Numba goes through."""
         state = self.state
         state.library = Bitcode(state.targetctx.codegen(), state.func_id.func_qualname)
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return [_needed_passes(state)]
 
 
-class MachineCode(JITCodeLibrary):
+class MachineCode(_Code):
     """What is compiled of a function that Python calls; nothing is linked into anything of what was kept of it."""
 
     @classmethod
@@ -79,7 +112,7 @@ class MachineCode(JITCodeLibrary):
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, set[str]]]:
         """Return what is kept: the code, and the names of what is in it."""
-        module = self._get_module_for_linking()
+        module = self._final_module
         symbols = {part.name for part in (*module.functions, *module.global_variables) if not part.is_declaration}
         return self.name, "object", (self._get_compiled_object(), symbols)
 
@@ -92,7 +125,16 @@ class KernelCompiler(CompilerBase):
         state = self.state
         state.library = MachineCode(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return [_needed_passes(state)]
+
+
+def _needed_passes(state: Any) -> PassManager:
+    needed = PassManager("kernel")
+    for each, why in DefaultPassBuilder.define_nopython_pipeline(state).passes:
+        if each not in UNNEEDED:
+            needed.add_pass(each, why)
+    needed.finalize()
+    return needed
 
 
 class _Reader:

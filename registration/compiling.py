@@ -61,6 +61,7 @@ logger = logging.getLogger("linefix")
 
 SHARED = "registration"  # the package whose kernels those of every other may call
 SOURCES = ("layout.py", "*tables.py", "tuning.py", "_*kernels.py", "kernels/**/*.py")
+COMPILERS = ("allocating.py", "borrowing.py", "code_libraries.py", "compiling.py")  # of `SHARED`: what compiles them
 VERSIONS = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
 DIRECTORY = "LINEFIX_KERNELS"  # names where compiled kernels are kept
 CHECKED = "LINEFIX_CHECK_KERNELS"  # set, it has the types of what kernels are handed looked at each time
@@ -226,7 +227,7 @@ def stamp(package: str) -> str:
         for path in sources(name):
             text = path.read_bytes()
             digest.update(f"{name}/{path.relative_to(_home(name)).as_posix()} {len(text)}\n".encode() + text)
-    for name in ("borrowing.py", "code_libraries.py", "compiling.py"):
+    for name in COMPILERS:
         digest.update((_home(SHARED) / name).read_bytes())
     return digest.hexdigest()[:20]
 

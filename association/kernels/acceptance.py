@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty, zeros
 from registration.compiling import inlined, internal, kernel
 from registration.layout import Floats, Records
 
@@ -55,9 +56,9 @@ def accept_matches(
     at = pose[0]
     row_of = lines.row_of
     n = len(row_of)
-    members = np.zeros(len(matches), dtype=np.int64)
+    members = zeros(len(matches), np.int64)
     wall_of = np.full(n, -1)
-    bridging = np.zeros(n, dtype=np.bool_)
+    bridging = zeros(n, np.bool_)
     most_pieces = 0
     found = 0
     for i in range(n):
@@ -73,13 +74,13 @@ def accept_matches(
                 w = walls[w].after if bridging[i] else -1
             most_pieces = max(most_pieces, under)
             found += 1
-    pairs = np.empty((found, 2), dtype=np.intp)
-    overlaps = np.empty(found)
-    rivals = np.empty(found * MAX_RIVALS, dtype=np.intp)
-    rival_starts = np.zeros(found + 1, dtype=np.intp)
-    lows = np.empty(most_pieces)
-    highs = np.empty(most_pieces)
-    covering = np.empty(most_pieces, dtype=np.intp)
+    pairs = empty((found, 2), np.intp)
+    overlaps = empty(found, np.float64)
+    rivals = empty(found * MAX_RIVALS, np.intp)
+    rival_starts = zeros(found + 1, np.intp)
+    lows = empty(most_pieces, np.float64)
+    highs = empty(most_pieces, np.float64)
+    covering = empty(most_pieces, np.intp)
     c = math.cos(at.theta)
     s = math.sin(at.theta)
     pair = 0
@@ -143,7 +144,7 @@ def missing_pieces(
     """
     items = pieces.items
     piece_starts = pieces.starts
-    blockers = Blockers(np.zeros(len(place.walls), dtype=BLOCKER), np.empty(len(place.walls), dtype=np.int64))
+    blockers = Blockers(zeros(len(place.walls), BLOCKER), empty(len(place.walls), np.int64))
     counts = blockers.counts
     touched = blockers.touched
     passed = count_blockers(sights, matches, pose[0], place, blockers, work.scratch[0].ray)
@@ -157,7 +158,7 @@ def missing_pieces(
         w = touched[k]
         if 2 * counts[w].to_matched >= BLOCKING_RAYS:
             count += piece_starts[w + 1] - piece_starts[w]
-    missing = np.empty(count, dtype=np.intp)
+    missing = empty(count, np.intp)
     count = 0
     for k in range(passed):
         w = touched[k]

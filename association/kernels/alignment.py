@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
@@ -55,7 +56,7 @@ def step_variance(
     covariance: Floats, one: int, other: int, line: Record, x: float, y: float, places: Records
 ) -> tuple[float, float]:
     """Return the variances of an offset from `line` at a place, and of an angle, by what is not known of two views."""
-    g = np.empty(6)
+    g = empty(6, np.float64)
     for k in range(2):
         v = one if k == 0 else other
         sign = 1.0 if k == 0 else -1.0
@@ -88,7 +89,7 @@ def pair_lines(lines: Records, starts: Integers, places: Records, covariance: Fl
     places : (v,) of `POINT`, of the views
     covariance : (3 v, 3 v) of additive x, y, theta of the views' poses
     """
-    pairs = np.empty((len(lines), 2), dtype=np.int64)
+    pairs = empty((len(lines), 2), np.int64)
     count = 0
     for v in range(1, len(starts) - 1):
         for i in range(starts[v], starts[v + 1]):

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import zeros
 from registration.compiling import internal, kernel
 from registration.kernels import MAX_DEVIATION, keep_alive
 from registration.layout import Records
@@ -72,12 +73,12 @@ def explain(question: Question, place: Place, found: Records, work: Workspace, g
     """Rank what was found, (k,) of `FOUND`, tell apart what is distinct, and settle the best of it."""
     told = given.told
     n = len(question.scan)
-    estimates = np.zeros(len(found), dtype=ESTIMATE)
-    merits = np.zeros(len(found), dtype=MERIT)
-    matches = np.zeros((len(found), n), dtype=MATCH)
+    estimates = zeros(len(found), ESTIMATE)
+    merits = zeros(len(found), MERIT)
+    matches = zeros((len(found), n), MATCH)
     begin_at(found, estimates)
     rank(question, place, given.sights, estimates, merits, matches, work)
-    most, none = len(told.estimates), np.zeros(0)
+    most, none = len(told.estimates), zeros(0, np.float64)
     order = distinct(estimates, merits, none, most, DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, CONTRADICTION)
     tell(told, order, estimates, merits, matches)
     reached = told.reached[0]
@@ -111,9 +112,9 @@ def may_be_off(question: Question, work: Workspace, given: Answering) -> bool:
     told = given.told
     if not given.to_scale or math.sqrt(told.settled[0].wall_variance) < LEAST_OFF_WALLS:
         return False
-    solution = np.zeros(4)
-    covariance = np.zeros((4, 4))
-    pose = np.zeros(1, dtype=ESTIMATE)
+    solution = zeros(4, np.float64)
+    covariance = zeros((4, 4), np.float64)
+    pose = zeros(1, ESTIMATE)
     walls = given.known_walls.walls
     variance, _ = settle_similarity(question, walls, told.matches[0], solution, covariance, work)
     if variance < 0.0:
@@ -155,7 +156,7 @@ def judge(question: Question, place: Place, work: Workspace, given: Answering) -
         return -1.0
     if out.right < USABLE_PROBABILITY:
         return 0.0
-    tried = np.zeros(1, dtype=FEATURES)
+    tried = zeros(1, FEATURES)
     tried[0] = features[0]
     return allowed_null(given.cautious, tried, told.merits[0].score, USABLE_CAUTIOUS / share)
 
@@ -163,8 +164,8 @@ def judge(question: Question, place: Place, work: Workspace, given: Answering) -
 @kernel
 def beside(merits: Records) -> Records:
     """Weigh explanations, (k + 1,) of `MERIT`, beside the first of them, without a prior: (k,) of `WEIGHED`."""
-    explanations = np.zeros(len(merits), dtype=RIVAL)
-    weighed = np.zeros(len(merits) - 1, dtype=WEIGHED)
+    explanations = zeros(len(merits), RIVAL)
+    weighed = zeros(len(merits) - 1, WEIGHED)
     for k in range(len(merits)):
         explanations[k].value = merits[k].score
         explanations[k].cost = merits[k].cost

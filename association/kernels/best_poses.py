@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import inlined, internal, kernel
 from registration.layout import Floats, Record, Records
 
@@ -35,7 +36,7 @@ def prior_value(prior: Record, pose: Record) -> float:
 @kernel
 def prior_values(prior: Records, poses: Records) -> Floats:
     """Return what the prior (1,) says of each of the poses (k,), nats."""
-    values = np.empty(len(poses))
+    values = empty(len(poses), np.float64)
     for k in range(len(poses)):
         values[k] = prior_value(prior[0], poses[k])
     return values

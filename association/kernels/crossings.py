@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty, zeros
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
@@ -106,7 +107,7 @@ def sample_crossings(
     `reaches` (k,) in descending order; the others as of `find_crossings`. Stops after `most` looks at a pair of runs.
     Returns for each reach (k, 3) crossings, their entries in all lists, and looks.
     """
-    counts = np.zeros((len(reaches), 3))
+    counts = zeros((len(reaches), 3), np.float64)
     sampled = 0
     looks = 0
     at = 0
@@ -150,7 +151,7 @@ def find_crossings(
     near one another. Stops after `most` looks at a pair. Returns how many there are, and looks.
     """
     m = len(runs)
-    place = np.empty(m, dtype=np.int32)
+    place = empty(m, np.int32)
     for k in range(m):
         place[order[k]] = k
     found = 0
@@ -188,7 +189,7 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
     reach = shape[0].reach
     columns = shape[0].columns
     bins = np.full(CROSSING_ANGLES, -1, dtype=np.int32)
-    of_angle = np.empty(len(found), dtype=np.uint8)
+    of_angle = empty(len(found), np.uint8)
     for k in range(len(found)):
         a = runs[found[k].first]
         b = runs[found[k].second]
@@ -201,8 +202,8 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
         if bins[b] >= 0:
             bins[b] = grids
             grids += 1
-    starts = np.zeros(grids * columns * columns + 1, dtype=np.int32)
-    entries = np.empty(0, dtype=CROSSING)
+    starts = zeros(grids * columns * columns + 1, np.int32)
+    entries = empty(0, CROSSING)
     for counting in (True, False):
         if not counting:
             total = 0
@@ -210,7 +211,7 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
                 here = starts[c]
                 starts[c] = total
                 total += here
-            entries = np.empty(total, dtype=CROSSING)
+            entries = empty(total, CROSSING)
         for k in range(len(found)):
             left, right, bottom, top = cells_of(runs[found[k].first], runs[found[k].second], reach, columns)
             for column in range(left, right + 1):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
@@ -114,7 +115,7 @@ def on_crossings(
     columns = crossings.shape[0].columns
     half_a = figure.half_a - CROSSING_MARGIN
     half_b = figure.half_b - CROSSING_MARGIN
-    near = np.empty(len(met), dtype=np.int32)
+    near = empty(len(met), np.int32)
     n = 0
     at = 0
     for j in range(count):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import zeros
 from registration.compiling import kernel
 from registration.layout import Floats, Records
 
@@ -53,22 +54,22 @@ def loose_twin_share(question: Question, place: Place, work: Workspace, given: A
     count = min(told.reached[0].explanations, LOOSE_RIVALS + 1)
     if given.known_walls.variance >= 0.0 or count == 1:
         return 1.0
-    variances = np.zeros(1, dtype=VARIANCES)
+    variances = zeros(1, VARIANCES)
     variances[0] = given.variances[0]
-    terms = np.zeros(1, dtype=TERMS)
+    terms = zeros(1, TERMS)
     terms[0] = question.terms[0]
-    model = np.zeros(1, dtype=MODEL)
+    model = zeros(1, MODEL)
     model[0] = question.terms[0].model
     set_map_sigma(loose_sigma(math.sqrt(told.settled[0].wall_variance)), variances, model)
     terms[0].model.wall_variance = model[0].wall_variance
     _, rows, seen = describe_view(given.measured, given.counted, variances, model)
     loose = Question(rows, terms, question.rules)
     sights = Sights(given.sights.places, given.sights.starts, seen[: len(given.sights.seen)])
-    estimates = np.zeros(count, dtype=ESTIMATE)
-    values = np.zeros(count)
+    estimates = zeros(count, ESTIMATE)
+    values = zeros(count, np.float64)
     for k in range(count):
         estimates[k] = told.estimates[k]
         values[k] = told.merits[k].score
-    again = np.zeros(count, dtype=MERIT)
-    rank(loose, place, sights, estimates, again, np.zeros((count, len(rows)), dtype=MATCH), work)
+    again = zeros(count, MERIT)
+    rank(loose, place, sights, estimates, again, zeros((count, len(rows)), MATCH), work)
     return loose_share(told.merits[:count], values, again)

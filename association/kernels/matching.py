@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import inlined, kernel
 from registration.layout import Floats, Record, Records
 
@@ -205,13 +206,13 @@ def may_score(
     columns = shape.columns
     rows = shape.rows
     per_cell = 1.0 / shape.cell
-    cosines = np.empty(count)
-    sines = np.empty(count)
-    lefts = np.empty(count)
-    bottoms = np.empty(count)
-    turned = np.empty(count)
-    lacking = np.empty(count)
-    open_ones = np.empty(count, np.int32)
+    cosines = empty(count, np.float64)
+    sines = empty(count, np.float64)
+    lefts = empty(count, np.float64)
+    bottoms = empty(count, np.float64)
+    turned = empty(count, np.float64)
+    lacking = empty(count, np.float64)
+    open_ones = empty(count, np.int32)
     for p in range(count):
         one = posed[p]
         cosines[p] = one.cosine * per_cell

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty, zeros
 from registration.compiling import internal, kernel
 from registration.kernels import keep_alive, one_step_add
 from registration.layout import ONE_STEP_SUMS, Floats, Record, Records
@@ -19,7 +20,7 @@ def paper_measures(scan: Records, matches: Records, walls: Records, poses: Recor
     The translation's cost, ``sum w r^2``, the rotation's by Mitsuta, ``sum w a^2``, and by Wahba,
     ``2 sum w (1 - cos a)``, and Eq. (28). `matches` (k, n); `poses` (k,) of `POSE_AMONG_WALLS`.
     """
-    measures = np.empty((len(poses), 4))
+    measures = empty((len(poses), 4), np.float64)
     for k in range(len(poses)):
         sums = set_sums(scan, matches[k], walls, poses[k])
         value = sums[0]
@@ -35,7 +36,7 @@ def paper_measures(scan: Records, matches: Records, walls: Records, poses: Recor
 @kernel
 def set_sums(scan: Records, matches: Records, walls: Records, pose: Record) -> Records:
     """Return the one-step sums of a consensus set about a pose, walls being off one by one."""
-    sums = np.zeros(2, ONE_STEP_SUMS)
+    sums = zeros(2, ONE_STEP_SUMS)
     for i in range(len(scan)):
         if matches[i].wall < 0:
             continue

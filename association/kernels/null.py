@@ -1,7 +1,6 @@
 """Compiled search of the mirrored scan, as `association.null` does it in steps."""
 
-import numpy as np
-
+from registration.allocating import zeros
 from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import Records
@@ -37,15 +36,15 @@ def compare_with_null(
     told = given.told
     score = told.merits[0].score
     rows, seen = mirror_lines(question.scan)
-    places = np.zeros(len(given.sights.places), dtype=POINT)
+    places = zeros(len(given.sights.places), POINT)
     for v in range(len(places)):
         places[v].x = given.sights.places[v].x
         places[v].y = -given.sights.places[v].y
     sights = Sights(places, given.sights.starts, seen[: len(given.sights.seen)])
     plans = Planning(planning.runs, planning.area, given.orders, given.ranks, planning.fade, planning.noise)
-    other = Question(rows, question.terms, np.zeros(2, dtype=RULES))
-    limits = np.zeros(1, dtype=HOW)
-    null = np.zeros(1, dtype=ESTIMATE)
+    other = Question(rows, question.terms, zeros(2, RULES))
+    limits = zeros(1, HOW)
+    null = zeros(1, ESTIMATE)
     for k in range(2):
         other.rules[k] = question.rules[k]
     limits[0] = how[0]
@@ -106,17 +105,17 @@ def best_of(
 
     0 where there is none, -1 where the budget ended the search.
     """
-    found = np.zeros(NULL_KEPT + KEPT_SLIDES, dtype=FOUND)
-    progress = np.zeros(1, dtype=PROGRESS)
+    found = zeros(NULL_KEPT + KEPT_SLIDES, FOUND)
+    progress = zeros(1, PROGRESS)
     progress[0].best_value = known
     _, plan = search(question, tables, planning, found, progress, work, how)
     poses = found[: progress[0].count]
     if plan is not None:
         return -1.0
-    estimates = np.zeros(len(poses), dtype=ESTIMATE)
-    merits = np.zeros(len(poses), dtype=MERIT)
+    estimates = zeros(len(poses), ESTIMATE)
+    merits = zeros(len(poses), MERIT)
     begin_at(poses, estimates)
-    rank(question, tables.place, sights, estimates, merits, np.zeros((len(poses), len(question.scan)), MATCH), work)
+    rank(question, tables.place, sights, estimates, merits, zeros((len(poses), len(question.scan)), MATCH), work)
     score = 0.0
     for k in range(len(poses)):
         if merits[k].score > score:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty, zeros
 from registration.compiling import borrowed, inlined, kernel
 from registration.layout import Floats, Record, Records
 
@@ -42,8 +43,8 @@ def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats
     longest = runs.longest
     summed = runs.summed
     bins = len(bin_starts) - 1
-    slides = np.zeros((count, bins))
-    fitting = np.zeros(count)
+    slides = zeros((count, bins), np.float64)
+    fitting = zeros(count, np.float64)
     for i in range(count):
         need = least_length(scan[i].length)
         for b in range(bins):
@@ -105,14 +106,14 @@ def costs_of(count: int, runs: Walls, area: float, crossings: Crossings) -> Cost
     bins = len(runs.bin_starts) - 1
     return Costs(
         crossings,
-        np.empty(1, dtype=FIGURE),
-        np.empty(0, dtype=LISTED),
+        empty(1, FIGURE),
+        empty(0, LISTED),
         runs,
-        np.zeros(1, dtype=np.uint8),
-        np.empty(count, dtype=LINE_COST),
-        np.empty((count, bins)),
-        np.empty((count, 2 * bins)),
-        np.empty((count, bins), dtype=np.int64),
+        zeros(1, np.uint8),
+        empty(count, LINE_COST),
+        empty((count, bins), np.float64),
+        empty((count, 2 * bins), np.float64),
+        empty((count, bins), np.int64),
         HYPOTHESIS_SCALE / area,
     )
 
@@ -152,10 +153,10 @@ def pair_up(scan: Records, count: int) -> Records:
     Beyond the first `BASE_SEGMENTS` only those that tell enough. None is weighed.
     """
     middle = middle_of(scan)
-    tells = np.empty(count)
+    tells = empty(count, np.float64)
     for i in range(count):
         tells[i] = GAIN_POWER * math.log(scan[i].gain) - math.log(COST_BASE)
-    bases = np.empty(count * (count - 1) // 2, dtype=BASE)
+    bases = empty(count * (count - 1) // 2, BASE)
     k = 0
     for i in range(count):
         for j in range(i + 1, count):
@@ -264,9 +265,9 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     state.done = 0
     state.bound = 0.0
     state.missed = 1.0
-    residual = np.empty(len(scan))
-    freedoms = np.empty(len(scan))
-    losses = np.empty(n)
+    residual = empty(len(scan), np.float64)
+    freedoms = empty(len(scan), np.float64)
+    losses = empty(n, np.float64)
     for i in range(n):
         losses[i] = -scan[i].gain
     for i in range(len(scan)):
@@ -274,14 +275,14 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
         freedoms[i] = -scan[i].freedom
         state.bound += scan[i].gain
     # All of these have sets that may have missed all bases.
-    found = np.empty(count, dtype=np.uint8)
-    undecided = np.empty(count + 1, dtype=np.int32)
+    found = empty(count, np.uint8)
+    undecided = empty(count + 1, np.int32)
     for s in range(count):
         found[s] = n
         undecided[s] = s
     undecided[count] = count
     samples = Samples(
-        planning.orders, planning.ranks, found, np.zeros(count, dtype=np.uint8), np.zeros(count), undecided
+        planning.orders, planning.ranks, found, zeros(count, np.uint8), zeros(count, np.float64), undecided
     )
     costs = costs_of(n, planning.runs, planning.area, tables.crossings)
     bases = pair_up(scan, n)
@@ -290,7 +291,7 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     return Plan(
         bases,
         costs,
-        np.zeros(n),
+        zeros(n, np.float64),
         residual,
         residual[ascending(losses)],
         ascending(freedoms),

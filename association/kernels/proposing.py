@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
@@ -164,11 +165,11 @@ def sweep_base(
     b = question.scan[base.crossing]
     measure(a, b, gates, figure)
     gates_about(question.scan, figure, gates, work.spreads, work.shifts, work.later)
-    anchor_list = np.empty(len(runs), dtype=np.int32)
+    anchor_list = empty(len(runs), np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
-    laid = np.empty(AT_ONCE, dtype=LAID)
-    swept = np.empty(AT_ONCE, dtype=SWEPT)
-    met = np.empty(AT_ONCE, dtype=MET)
+    laid = empty(AT_ONCE, LAID)
+    swept = empty(AT_ONCE, SWEPT)
+    met = empty(AT_ONCE, MET)
     spent = TESTS_BASE
     while progress.anchor < n_anchors:
         begin = progress.anchor
@@ -228,8 +229,8 @@ def search_listed(
     a = question.scan[base.sliding]
     b = question.scan[base.crossing]
     measure(a, b, gates, figure)
-    lists = np.empty(MOST_LISTS, dtype=LISTED)
-    met = np.empty(AT_ONCE, dtype=MET)
+    lists = empty(MOST_LISTS, LISTED)
+    met = empty(AT_ONCE, MET)
     count, entries = look_up(figure, tables.crossings, lists)
     spent = TESTS_BASE
     gated = False

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty, zeros
 from registration.compiling import inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, LEAST_POINTS, Floats, Record, Records
@@ -40,7 +41,7 @@ def as_lines(measured: Measured) -> Records:
     spreads = measured.spreads
     sigma = measured.sigma
     points = measured.points
-    lines = np.zeros(len(lengths), dtype=LINE_PARTS)
+    lines = zeros(len(lengths), LINE_PARTS)
     for i in range(len(lengths)):
         line = lines[i]
         line.dx = directions[i].x
@@ -61,7 +62,7 @@ def as_lines(measured: Measured) -> Records:
 @kernel
 def longest_first(lines: Records) -> Integers:
     """Order lines by length, ties by index, (n,)."""
-    lengths = np.empty(len(lines))
+    lengths = empty(len(lines), np.float64)
     for i in range(len(lines)):
         lengths[i] = -lines[i].length
     return ascending(lengths)
@@ -77,9 +78,9 @@ def collinear_lines(given: Records, order: Integers, lateral: float, least_cosin
     """
     n = len(order)
     labels = np.full(n, -1)
-    near = np.empty(n, dtype=np.int64)
-    lows = np.empty(n)
-    highs = np.empty(n)
+    near = empty(n, np.int64)
+    lows = empty(n, np.float64)
+    highs = empty(n, np.float64)
     lines = 0
     for k in range(n):
         i = order[k]
@@ -129,9 +130,9 @@ def join_labelled(given: Records, order: Integers, labels: Integers, counted: bo
     count = 0
     for i in range(n):
         count = max(count, labels[i] + 1)
-    lines = np.empty(count, dtype=LINE_PARTS)
-    members = np.empty(n, dtype=np.int64)
-    starts = np.zeros(count + 1, dtype=np.int64)
+    lines = empty(count, LINE_PARTS)
+    members = empty(n, np.int64)
+    starts = zeros(count + 1, np.int64)
     for k in range(n):
         starts[labels[order[k]] + 1] += 1
     for k in range(count):
@@ -158,9 +159,9 @@ def join_labelled(given: Records, order: Integers, labels: Integers, counted: bo
 @kernel
 def shares_of(given: Records, members: Integers, line: Record) -> Floats:
     """Return (m,) the share of each part along a line that those before it do not cover; write `covered`."""
-    lows = np.empty(len(members))
-    highs = np.empty(len(members))
-    shares = np.empty(len(members))
+    lows = empty(len(members), np.float64)
+    highs = empty(len(members), np.float64)
+    shares = empty(len(members), np.float64)
     line.covered = 0.0
     for k in range(len(members)):
         i = members[k]
@@ -252,8 +253,8 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
     """Return the `lines` of a scan in `order`, (n,) of `SCAN_LINE`; `variances` and `model` (1,)."""
     given = variances[0]
     n = len(order)
-    out = np.zeros(n, dtype=SCAN_LINE)
-    alone = np.zeros(1, dtype=INFORMATION)
+    out = zeros(n, SCAN_LINE)
+    alone = zeros(1, INFORMATION)
     later = 0.0
     for k in range(n - 1, -1, -1):
         line = lines[order[k]]
@@ -326,10 +327,10 @@ def lines_of_a_view(measured: Measured, counted: bool) -> tuple[Indices, Records
 def describe_labelled(labels: Integers, lines: Records, variances: Records, model: Records) -> tuple[Indices, Records]:
     """Order lines by what they tell; return the row of each part that is labelled, and the rows."""
     order = longest_first(lines)
-    place = np.empty(len(order), dtype=np.int64)
+    place = empty(len(order), np.int64)
     for k in range(len(order)):
         place[order[k]] = k
-    row_of = np.empty(len(labels), dtype=np.int64)
+    row_of = empty(len(labels), np.int64)
     for i in range(len(labels)):
         row_of[i] = place[labels[i]]
     return row_of, describe_lines(lines, order, variances, model)
@@ -338,7 +339,7 @@ def describe_labelled(labels: Integers, lines: Records, variances: Records, mode
 @kernel
 def seen_at_once(rows: Records) -> Records:
     """Return what one view shows of the rows: each of them, in their order, (n,) of `SIGHTING`."""
-    seen = np.zeros(len(rows), dtype=SIGHTING)
+    seen = zeros(len(rows), SIGHTING)
     for i in range(len(rows)):
         seen[i].row = i
         seen[i].dx = rows[i].dx

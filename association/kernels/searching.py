@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import borrowed, internal, kernel
 from registration.kernels import keep_alive
 from registration.layout import Records
@@ -39,7 +40,7 @@ def search(
         progress[0].missed = 0.0  # walls of which no two cross are slid
     else:
         of_bases = found[: how[0].kept]
-        why = advance(question, tables, plan, of_bases, np.empty(0, dtype=TRIED), progress, work, how)
+        why = advance(question, tables, plan, of_bases, empty(0, TRIED), progress, work, how)
         if why == BUDGET:
             return why, plan
         if why == EXHAUSTED and not plan.random:
@@ -115,8 +116,8 @@ def put_in_order(found: Records, progress: Records, how: Records) -> None:
         state.of_bases = state.count
         state.count = 0
     n = state.of_bases + state.count
-    losses = np.empty(n)
-    together = np.empty(n, dtype=FOUND)
+    losses = empty(n, np.float64)
+    together = empty(n, FOUND)
     for k in range(n):
         together[k] = found[k if k < state.of_bases else how[0].kept + k - state.of_bases]
         losses[k] = -together[k].value

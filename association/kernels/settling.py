@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty, zeros
 from registration.compiling import borrowed, inlined, kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
@@ -123,7 +124,7 @@ def estimated_variance(pose: Record, of_wall: Integers, wall_variance: float, us
 @kernel
 def walls_of(scan: Records, matches: Records) -> Integers:
     """Return the walls that hold a match, each once, in the order of the scan's lines."""
-    of_wall = np.empty(len(scan), dtype=np.int64)
+    of_wall = empty(len(scan), np.int64)
     count = 0
     for i in range(len(scan)):
         w = matches[i].wall
@@ -182,7 +183,7 @@ def find_pose(
             break
         if known < 0.0:
             out.wall_variance = estimated_variance(pose, of_wall, out.wall_variance, USUAL_WALL_ERROR**2, work)
-    other = np.zeros(1, dtype=ESTIMATE)
+    other = zeros(1, ESTIMATE)
     add_all(scan, matches, walls, max(out.wall_variance, COMMON_WALL_ERROR**2), work)
     copy_estimate(pose, other[0])
     solve(sums, other[0], information, value)
@@ -210,7 +211,7 @@ def leave_each_out(
     sums = work.scratch[0].sums
     pose = settled[0].pose
     wall_variance = settled[0].wall_variance
-    one = np.zeros(1, dtype=ESTIMATE)
+    one = zeros(1, ESTIMATE)
     without = one[0]
     for k in range(len(of_wall)):
         w = of_wall[k]

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import empty
 from registration.compiling import borrowed, kernel
 from registration.layout import Floats, Records
 
@@ -22,7 +23,7 @@ def sliding_segments(scan: Records, count: int, floor: float, most: int) -> Inte
 
     More than `floor` nats, with all that are parallel to them; at most `most`.
     """
-    chosen = np.empty(most, dtype=np.int64)
+    chosen = empty(most, np.int64)
     n = 0
     for i in range(count):
         if n == most:
@@ -87,7 +88,7 @@ def search_slides(
     posed = work.posed
     a = question.scan[sliding]
     variance = a.angle_variance
-    nothing = np.empty(0, dtype=TRIED)
+    nothing = empty(0, TRIED)
     figure = work.scratch[0].figure
     figure.angle_variance = variance
     figure.pin_x = a.x
@@ -95,7 +96,7 @@ def search_slides(
     figure.slip = 0.0
     gates_about(question.scan, figure, question.terms[0].gates, work.spreads, work.shifts, work.later)
     leave_out_bases(question.scan, sliding, work.shifts, work.later)
-    anchor_list = np.empty(len(runs), dtype=np.int32)
+    anchor_list = empty(len(runs), np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
     left = budget
     n = 0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from registration.allocating import zeros
 from registration.compiling import kernel
 from registration.layout import Records
 
@@ -124,8 +125,8 @@ def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, 
     x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
     columns, rows = shape[0].columns, shape[0].rows
     places = columns * rows
-    starts = np.zeros(places + 1, dtype=np.int32)
-    items = np.zeros(0, dtype=np.int32)
+    starts = zeros(places + 1, np.int32)
+    items = zeros(0, np.int32)
     for counting in (True, False):
         if not counting:
             total = 0
@@ -133,7 +134,7 @@ def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, 
                 here = starts[c]
                 starts[c] = total
                 total += here
-            items = np.zeros(total, dtype=np.int32)
+            items = zeros(total, np.int32)
         for i in range(len(ends)):
             x1 = ends[i].x1
             y1 = ends[i].y1

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from ..allocating import zeros
 from ..compiling import kernel
 from ..layout import ONE_STEP_SUMS, Floats, Record, Records
 from .compensated import accumulated
@@ -63,7 +62,7 @@ def one_step_add(
 @kernel
 def one_step_sums(pairs: Records, x: float, y: float, alpha_ref: float, weights: Floats) -> Records:
     """Return the compensated sums of pairs about a reference; those of weight 0 do not count."""
-    sums = np.zeros(2, ONE_STEP_SUMS)
+    sums = zeros(2, ONE_STEP_SUMS)
     for i in range(len(pairs)):
         if weights[i] > 0.0:
             line = pairs[i].map

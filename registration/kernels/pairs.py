@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..allocating import empty
 from ..compiling import internal, kernel
 from ..layout import Floats, Record, Records, X, Y
 from ..tables import Drawn, Points
@@ -78,7 +79,7 @@ def offset_of(line: Record) -> float:
 @kernel
 def inverse_variances(pairs: Records, map_variance: float) -> tuple[Floats, bool]:
     """Return 1 / variance of each pair's offset (n,), and whether all pairs have a variance."""
-    inverses = np.empty(len(pairs))
+    inverses = empty(len(pairs), np.float64)
     for i in range(len(pairs)):
         variance = pairs[i].scan.variance + map_variance
         if not variance > 0.0:
@@ -147,7 +148,7 @@ def relative_angles(pairs: Records, theta: float) -> Floats:
     """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
     c = math.cos(theta)
     s = math.sin(theta)
-    angles = np.empty(len(pairs))
+    angles = empty(len(pairs), np.float64)
     for i in range(len(pairs)):
         line = pairs[i].map
         seen = pairs[i].scan
@@ -177,7 +178,7 @@ def residuals(
     c = math.cos(theta)
     s = math.sin(theta)
     angles = relative_angles(pairs, theta)
-    offsets = np.empty(len(pairs))
+    offsets = empty(len(pairs), np.float64)
     chi2 = 0.0
     squared_offsets = 0.0
     squared_angles = 0.0

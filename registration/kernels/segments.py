@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..allocating import empty
 from ..compiling import kernel
 from ..layout import Floats, X, Y
 
@@ -27,11 +28,11 @@ def are_within(values: Floats, low: float, high: float) -> bool:
 def lines_of(endpoints: Floats) -> Lines:
     """Return of segments (n, 4) the directions and normals (n, 2), offsets and lengths (n,), and midpoints (n, 2)."""
     count = len(endpoints)
-    directions = np.empty((count, 2))
-    normals = np.empty((count, 2))
-    offsets = np.empty(count)
-    lengths = np.empty(count)
-    midpoints = np.empty((count, 2))
+    directions = empty((count, 2), np.float64)
+    normals = empty((count, 2), np.float64)
+    offsets = empty(count, np.float64)
+    lengths = empty(count, np.float64)
+    midpoints = empty((count, 2), np.float64)
     for i in range(count):
         along_x = endpoints[i, X2] - endpoints[i, X]
         along_y = endpoints[i, Y2] - endpoints[i, Y]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import subprocess
+from contextlib import nullcontext
 
 from filelock import FileLock
 
 from registration import compiling
+from registration.many_kernels import compiling_many
 
 from ..parsing.own_modules import command_of
 
@@ -32,16 +34,12 @@ def compile_kernels() -> None:
     with FileLock(place / "linefix.lock"):
         if is_compiled():
             return
-        from .warmup import (
-            warm_up,
-            warm_up_analyzing,
-            warm_up_registering,
-            warm_up_searching,
-        )
+        with compiling_many():
+            alone = (os.cpu_count() or 1) == 1
+            with nullcontext() if alone else subprocess.Popen(command_of(BESIDE)):
+                from .warmup import warm_up, warm_up_analyzing, warm_up_registering, warm_up_searching
 
-        if (os.cpu_count() or 1) > 1:
-            with subprocess.Popen(command_of(BESIDE)):
                 warm_up_registering()
                 warm_up_searching()
                 warm_up_analyzing()
-        warm_up()
+            warm_up()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis import Analysis, Robot, standing_places
+from analysis.standing import is_free
 from association import (
     AssociationOptions,
     Deadline,
@@ -22,9 +23,9 @@ from association.checking import check_map, try_sample
 from association.context import SearchContext
 from association.explain import explain_at
 from association.null import symmetry_of
-from association.scan_lines import ScanLines
 from association.sight import missing_segments
 from association.similarity import fit_similarity
+from association.verdict import judge
 from registration import (
     Beams,
     Correspondences,
@@ -35,6 +36,8 @@ from registration import (
     Segments,
     register,
 )
+from registration.many_kernels import compiling_many
+from simulation import scan
 from vectorization import LaserScan, vectorize
 
 from ..admission.helpers import HelperThreads
@@ -78,9 +81,8 @@ def warm_up() -> None:
     warm_up_analyzing()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
-    one_wall = Scan(MeasuredSegments.from_segments(room.take([0])))  # never usable: mistakes are looked for
-    for scan in (_with_beams(), one_wall):
-        try_sample(index, scan, Deadline(), oriented=True)
+    for sample in (_with_beams(), _one_wall()):
+        try_sample(index, sample, Deadline(), oriented=True)
 
 
 def warm_up_analyzing() -> None:
@@ -91,6 +93,13 @@ def warm_up_analyzing() -> None:
     analysis = Analysis(index, room, robot, standing_places(room, robot, 3.0))
     for number in range(len(analysis.standing.poses)):
         analysis.look(number)
+
+
+def warm_up_simulating() -> None:
+    """Take a scan of a map, from where a robot can stand."""
+    room, pose, robot = Segments.from_array(ROOM), RigidTransform(0.0, 0.0, 0.0), Robot(beams=360)
+    assert is_free(room, pose, robot.range_max, oriented=True)
+    scan(room, pose, robot.scanner, np.random.default_rng(0))
 
 
 def warm_up_registering() -> None:
@@ -123,28 +132,26 @@ def warm_up_indexing() -> None:
     MapIndex.build(Segments.from_array(ROOM), 0.0)
 
 
-def warm_up_scans() -> None:
-    """Join the segments of a scan as every search does."""
-    ScanLines.of(Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM))), 0.0, AssociationOptions())
-
-
 def warm_up_explaining() -> None:
     """Work out the answer to scans that nobody searches for, at a given pose, and what is asked of it afterwards."""
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
-    for scan, prior, how in _asked():
-        context = SearchContext.of(index, scan, prior, how, Deadline())
+    for asked, prior, how in _asked():
+        context = SearchContext.of(index, asked, prior, how, Deadline())
         answer = explain_at(context, RigidTransform(0, 0, 0)).answer
         assert answer is not None
         missing_segments(context, answer.best)
         symmetry_of(context, answer.best, answer.best)
         fit_similarity(context, answer.best)
+    # It is nothing that would have to stand up to a null, which costs a search.
+    context = SearchContext.of(index, _one_wall(), None, AssociationOptions(), Deadline())
+    assert not judge(context, explain_at(context, RigidTransform(0, 0, 0))).usable
 
 
 def warm_up_searching() -> None:
     """Associate once in each way that has kernels of its own."""
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
-    for scan, prior, how in _asked():
-        associate(index, scan, prior, how, Deadline())
+    for asked, prior, how in _asked():
+        associate(index, asked, prior, how, Deadline())
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
@@ -194,6 +201,11 @@ def _with_beams() -> Scan:
     return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM)), (0.0, 0.0), beams)
 
 
+def _one_wall() -> Scan:
+    """Return a scan that is never usable, so that mistakes of the map are looked for."""
+    return Scan(MeasuredSegments.from_segments(Segments.from_array(ROOM).take([0])))
+
+
 def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the distance from the origin to the room's walls along each angle, metres."""
     nearest = np.full(len(angles), np.inf)
@@ -209,9 +221,10 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
 
 
 if __name__ == "__main__":
-    warm_up_indexing()
-    warm_up_scans()
-    warm_up_vectorizing()
-    warm_up_explaining()
-    warm_up_searching_late()
-    warm_up_searching_long()
+    with compiling_many():
+        warm_up_indexing()
+        warm_up_vectorizing()
+        warm_up_explaining()
+        warm_up_searching_late()
+        warm_up_searching_long()
+        warm_up_simulating()
