@@ -37,12 +37,14 @@ UNNEEDED = {
     WithLifting,
 }
 
+OPTIMIZED = 1  # of LLVM's levels; kernels are no faster of the third, which takes a tenth more of a first start
+
 
 class _Code(JITCodeLibrary):
     def _optimize_functions(self, module: Any) -> None:
         """Optimize each function by itself; the passes are laid out once, and not for each nor for what is declared."""
         module.data_layout = self._codegen._data_layout
-        passes, builder = self._codegen._function_pass_manager()
+        passes, builder = self._codegen._function_pass_manager(opt=OPTIMIZED)
         for function in module.functions:
             if not function.is_declaration:
                 passes.run(function, builder)
@@ -115,6 +117,13 @@ class MachineCode(_Code):
         module = self._final_module
         symbols = {part.name for part in (*module.functions, *module.global_variables) if not part.is_declaration}
         return self.name, "object", (self._get_compiled_object(), symbols)
+
+    def _optimize_final_module(self) -> None:
+        """Bring counts of references together, which leave in pairs then, and optimize what is left, as Numba does."""
+        together = {"loop_vectorize": False, "slp_vectorize": False, "opt": 0, "cost": "cheap"}
+        for how in (together, {"opt": OPTIMIZED}):
+            passes, builder = self._codegen._module_pass_manager(**how)
+            passes.run(self._final_module, builder)
 
 
 class KernelCompiler(CompilerBase):
