@@ -41,11 +41,12 @@ from .telemetry.traces import traces_of_environment
 from .threads import Threads
 from .version import VERSION
 from .work.association import Associator
-from .work.compiling import compile_kernels, is_compiled
+from .work.compiling import compile_kernels, compiled_share, is_compiled
 from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
+PROGRESS_SECONDS = 5.0  # between two lines that say how far compiling is
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
@@ -191,10 +192,7 @@ async def _get_ready(services: Services) -> None:
         logger.error("the store does not open: %s", error, extra={"store": where})
     threads, parser = services.parse_threads, services.parser
     if not is_compiled():
-        logger.info("compiling, which takes half a minute, or two where cores are busy; it is kept for the next start")
-        with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
-            await threads.run(partial(parser.call, compile_kernels))
-        parser.close()
+        await _compile(services)
     keys = services.key_threads.run(services.keyring.refresh)
     await asyncio.gather(threads.run(warm_up), threads.run(parser.start), keys)
     # What was made until now lives as long as the process: the garbage collector need not look through it, ever. It has
@@ -204,6 +202,26 @@ async def _get_ready(services: Services) -> None:
     services.readiness.warm = True
     services.metrics.refresh()
     logger.info("ready")
+
+
+async def _compile(services: Services) -> None:
+    """Compile the kernels in a process that ends with it, and say how far it is."""
+    logger.info("compiling, which takes half a minute, or two where cores are busy; it is kept for the next start")
+    services.readiness.compiled = compiled_share
+    telling = asyncio.create_task(_tell_progress())
+    try:
+        with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
+            await services.parse_threads.run(partial(services.parser.call, compile_kernels))
+    finally:
+        telling.cancel()
+    services.parser.close()
+    services.readiness.compiled = None
+
+
+async def _tell_progress() -> None:
+    while True:
+        await asyncio.sleep(PROGRESS_SECONDS)
+        logger.info("compiling", extra={"share": round(compiled_share(), 2)})
 
 
 async def _follow_keys(services: Services) -> None:

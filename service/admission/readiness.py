@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from .errors import NotReadyError
 
 
@@ -14,11 +16,14 @@ class Readiness:
         Whether the kernels are loaded.
     draining : bool
         Whether the service was told to end.
+    compiled : callable, or None
+        Returns which share of the kernels is compiled, 0 to 1; None before and after that.
     """
 
     def __init__(self) -> None:
         self.warm = False
         self.draining = False
+        self.compiled: Callable[[], float] | None = None
 
     @property
     def takes_requests(self) -> bool:
@@ -27,8 +32,11 @@ class Readiness:
 
     def require_warm(self) -> None:
         """Raise `NotReadyError` as long as nothing can be searched."""
-        if not self.warm:
-            raise NotReadyError("the kernels are being compiled")
+        if self.warm:
+            return
+        if self.compiled is None:
+            raise NotReadyError("the kernels are being loaded")
+        raise NotReadyError(f"the kernels are being compiled, {self.compiled():.0%} so far")
 
     def require_all(self) -> None:
         """Raise `NotReadyError` when requests should go elsewhere."""

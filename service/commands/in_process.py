@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import secrets
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +19,6 @@ from ..importing.bounded import ReadMap
 from ..importing.fields import Fields, options_of
 from ..maps import IndexCache, MapStore, Preconditions
 from ..maps.lookup import FoundMap, MapLookup, outline_of
-from ..parsing.errors import ParserEndedError
 from ..parsing.parser_process import ParserProcess
 from ..parsing.reading import read_map as read_document
 from ..parsing.reading import read_model
@@ -33,12 +31,13 @@ from ..work.analyzing import analysis_json, analysis_of, reference_to
 from ..work.answers import outline_json
 from ..work.association import Associator
 from ..work.checking import check, check_done, conclude, sample
-from ..work.compiling import compile_kernels, is_compiled
+from ..work.compiling import is_compiled
 from ..work.importing import answer_import
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
 from ..work.vectorization import answer_vectorization
 from .all_cores import look_on_all_cores
+from .compiling import compile_in
 from .errors import NOTHING, Asked, CommandError, WrongUseError, error_of
 from .inputs import document_of, needing_formats
 from .service import Json, Progress, Question, id_of
@@ -151,18 +150,11 @@ class InProcess:
             return {**analysis_json(analysis, found), **sealed}
 
     def _compile(self) -> None:
-        """Compile what is not kept from before, in a process that ends with it: the compiler keeps 330 MB.
-
-        Once: where nothing can be kept this process compiles what it needs.
-        """
+        """Compile what is not kept from before; once: where nothing can be kept this process compiles what it needs."""
         if self._has_compiled or is_compiled():
             return
         self._has_compiled = True
-        print("linefix: compiling, which takes a minute; what comes of it is kept for the next time", file=sys.stderr)
-        # If it ends early or can keep nothing this one compiles what it needs.
-        with suppress(ParserEndedError, OSError):
-            self._parser.call(compile_kernels)
-        self._parser.close()
+        compile_in(self._parser)
 
     def _done(self, question: Question, data: bytes) -> Done:
         watch = Stopwatch()

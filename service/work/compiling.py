@@ -8,7 +8,7 @@ from contextlib import nullcontext
 
 from filelock import FileLock
 
-from registration import compiling
+from registration import kept_kernels
 from registration.many_kernels import compiling_many
 
 from ..parsing.own_modules import command_of
@@ -19,7 +19,13 @@ PACKAGES = ("registration", "vectorization", "association")
 
 def is_compiled() -> bool:
     """Tell whether the kernels are kept for their present source."""
-    return all(compiling.is_compiled(package) for package in PACKAGES)
+    return all(kept_kernels.is_compiled(package) for package in PACKAGES)
+
+
+def compiled_share() -> float:
+    """Return which share of the kernels is kept for their present source, 0 to 1; a few are never needed."""
+    kept, present = map(sum, zip(*map(kept_kernels.how_many, PACKAGES), strict=True))
+    return kept / present
 
 
 def compile_kernels() -> None:
@@ -29,7 +35,7 @@ def compile_kernels() -> None:
     another core a process beside this one takes half: the compiler takes one core. Each kernel is kept as soon as it is
     compiled, so that the other process loads it; the halves are laid so that they seldom meet at one.
     """
-    place = compiling.cache_directory("association").parent
+    place = kept_kernels.cache_directory("association").parent
     place.mkdir(parents=True, exist_ok=True)
     with FileLock(place / "linefix.lock"):
         if is_compiled():

@@ -27,9 +27,10 @@ def outer(x: float) -> float:
 """
 RUN = """
 from small.kernels.outer import outer
-from registration import compiling
-before = compiling.is_compiled("small")
-print(outer(1.0), sum(outer.stats.cache_hits.values()), before, compiling.is_compiled("small"), outer.stats.cache_path)
+from registration import kept_kernels
+is_compiled = kept_kernels.is_compiled
+before = is_compiled("small")
+print(outer(1.0), sum(outer.stats.cache_hits.values()), before, is_compiled("small"), outer.stats.cache_path)
 """
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from registration import compiling
+from registration import compiling, kept_kernels
 
 from .small_package import SmallPackage
 
@@ -43,6 +43,23 @@ def compiled(ran_once: SmallPackage, tmp_path: Path) -> SmallPackage:
     return SmallPackage(shutil.copytree(ran_once.home, tmp_path / "small"))
 
 
+def test_how_many_are_compiled(small: SmallPackage) -> None:
+    """Of four kernels one calls another, a third is never called, and a fourth calls nothing."""
+    inner = small.home / "kernels" / "inner.py"
+    inner.write_text(inner.read_text() + INNER_TWO)
+    many = "from registration import kept_kernels\nassert kept_kernels.how_many('small') == {}"
+    small.run(many.format((2, 4)))
+    small.run(f"from small.kernels.inner import last\nassert last(1.0) == 2.0\n{many.format((3, 4))}")
+
+
+INNER_TWO = """
+@kernel
+def never(x: float) -> float:
+    return x
+@kernel
+def last(x: float) -> float:
+    return x + 1.0
+"""
 FIRST = """
 import numpy as np
 from registration.compiling import internal, kernel
@@ -195,13 +212,13 @@ def test_what_kernels_call_is_kept_for_them_alone(compiled: SmallPackage) -> Non
 
 def test_old_source_is_forgotten_in_the_end(small: SmallPackage) -> None:
     place = small.home / "kernels" / "__pycache__"
-    stamps = [place / f"small-{k:020x}" for k in range(compiling.KEPT_STAMPS + 3)]
+    stamps = [place / f"small-{k:020x}" for k in range(kept_kernels.KEPT_STAMPS + 3)]
     others = [place / "small-notes", place / f"smaller-{0:020x}"]
     for age, path in enumerate([*others, *reversed(stamps)]):
         path.mkdir(parents=True)
         os.utime(path, (age, age))
     newest = small.run().directory
-    assert set(place.iterdir()) == {newest, *others, *stamps[: compiling.KEPT_STAMPS - 1]}
+    assert set(place.iterdir()) == {newest, *others, *stamps[: kept_kernels.KEPT_STAMPS - 1]}
 
 
 def test_a_constant_is_no_variant_of_its_own(small: SmallPackage) -> None:
@@ -238,15 +255,15 @@ def test_other_numbas_are_refused() -> None:
 
 
 def test_the_directory_changes_with_the_versions(monkeypatch: pytest.MonkeyPatch) -> None:
-    stamps = {compiling.stamp("registration")}
+    stamps = {kept_kernels.stamp("registration")}
     for target, name, value in (
         (np, "__version__", "0"),
-        (compiling, "VERSIONS", ()),
-        (compiling, "PROCESSOR", ("another",)),
+        (kept_kernels, "VERSIONS", ()),
+        (kept_kernels, "PROCESSOR", ("another",)),
     ):
         with monkeypatch.context() as patch:
             patch.setattr(target, name, value)
-            stamps.add(compiling.stamp.__wrapped__("registration"))
+            stamps.add(kept_kernels.stamp.__wrapped__("registration"))
     assert len(stamps) == 4
 
 
@@ -276,12 +293,12 @@ def _file_of(module: str) -> Path | None:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_kernels_reach_only_what_the_stamp_covers(package: str) -> None:
-    compilers = {Path(compiling.__file__).with_name(name) for name in compiling.COMPILERS}
-    covered = {*compiling.sources(package), *compiling.sources("registration"), *compilers}
+    compilers = {Path(compiling.__file__).with_name(name) for name in kept_kernels.COMPILERS}
+    covered = {*kept_kernels.sources(package), *kept_kernels.sources("registration"), *compilers}
     home = Path(compiling.__file__).parents[1].joinpath(*package.split("."))
     ways = [
         ".".join((package, *path.relative_to(home).with_suffix("").parts)).removesuffix(".__init__")
-        for path in compiling.sources(package)
+        for path in kept_kernels.sources(package)
         if path.stem.endswith("kernels") or "kernels" in path.parts
     ]
     assert ways, "the package has no kernels"

@@ -1,0 +1,37 @@
+"""Compiling kernels before a command's first search."""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import suppress
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+from ..parsing.errors import ParserEndedError
+from ..parsing.parser_process import ParserProcess
+from ..work.compiling import compile_kernels, compiled_share
+
+LOOK_SECONDS = 0.3
+
+
+def compile_in(parser: ParserProcess) -> None:
+    """Compile what is not kept from before in a process that ends with it: the compiler keeps 330 MB.
+
+    A person who looks on sees how far it is.
+    """
+    print("linefix: compiling, which takes half a minute; what comes of it is kept for the next time", file=sys.stderr)
+    columns = TextColumn("kernels"), BarColumn(), TaskProgressColumn()
+    bar = Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True)
+    with ThreadPoolExecutor(1) as threads, bar:
+        shown = bar.add_task("kernels", total=1.0)
+        # If it ends early or can keep nothing this process compiles what it needs.
+        with suppress(ParserEndedError, OSError):
+            try:
+                compiling = threads.submit(parser.call, compile_kernels)
+                while wait([compiling], LOOK_SECONDS).not_done:
+                    bar.update(shown, completed=compiled_share())
+                compiling.result()
+            finally:
+                parser.close()
