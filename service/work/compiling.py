@@ -42,10 +42,12 @@ def compile_kernels() -> None:
             return
         with compiling_many():
             alone = (os.cpu_count() or 1) == 1
-            with nullcontext() if alone else subprocess.Popen(command_of(BESIDE)):
+            with nullcontext() if alone else subprocess.Popen(command_of(BESIDE), stdin=subprocess.PIPE) as beside:
                 from .warmup import warm_up, warm_up_analyzing, warm_up_registering, warm_up_searching
 
                 warm_up_registering()
                 warm_up_searching()
                 warm_up_analyzing()
+                if beside is not None:
+                    beside.wait()  # before its standard input is closed, at which it ends
             warm_up()

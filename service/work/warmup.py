@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import threading
+
 import numpy as np
 
 from analysis import Analysis, Robot, standing_places
@@ -68,6 +71,7 @@ SYMMETRIC_ROOM = np.array(
 )
 
 
+STANDARD_INPUT = 0
 TURN = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
 
@@ -220,7 +224,15 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
     return nearest
 
 
+def _end_with_the_other() -> None:
+    """End when whoever started this process has ended and so closed its standard input, however that went."""
+    while os.read(STANDARD_INPUT, 1):
+        pass
+    os._exit(1)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_the_other, daemon=True).start()
     with compiling_many():
         warm_up_indexing()
         warm_up_vectorizing()
