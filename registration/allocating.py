@@ -7,36 +7,31 @@ first start. These are made where they stand.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar, overload
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import types
-from numba.core.cgutils import memset, unpack_tuple
-from numba.core.typing.npydecl import parse_dtype
 from numba.extending import lower_builtin, type_callable
-from numba.np.arrayobj import _empty_nd_impl
+from numpy.typing import NDArray
+
+from .kept_kernels import UNKNOWN_NUMBA
+
+try:
+    from numba.core.cgutils import memset, unpack_tuple
+    from numba.core.typing.npydecl import parse_dtype
+    from numba.np.arrayobj import _empty_nd_impl
+except ImportError as error:
+    raise ImportError(UNKNOWN_NUMBA) from error
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-@overload
-def empty(shape: int, kind: type[Scalar] | np.dtype[Scalar]) -> np.ndarray[tuple[int], np.dtype[Scalar]]: ...
-@overload
-def empty(
-    shape: tuple[int, int], kind: type[Scalar] | np.dtype[Scalar]
-) -> np.ndarray[tuple[int, int], np.dtype[Scalar]]: ...
-def empty(shape: int | tuple[int, int], kind: Any) -> Any:
+def empty(shape: int | tuple[int, int], kind: type[Scalar] | np.dtype[Scalar]) -> NDArray[Scalar]:
     """Return an array of one or two dimensions, with whatever is in its memory."""
     return np.empty(shape, kind)
 
 
-@overload
-def zeros(shape: int, kind: type[Scalar] | np.dtype[Scalar]) -> np.ndarray[tuple[int], np.dtype[Scalar]]: ...
-@overload
-def zeros(
-    shape: tuple[int, int], kind: type[Scalar] | np.dtype[Scalar]
-) -> np.ndarray[tuple[int, int], np.dtype[Scalar]]: ...
-def zeros(shape: int | tuple[int, int], kind: Any) -> Any:
+def zeros(shape: int | tuple[int, int], kind: type[Scalar] | np.dtype[Scalar]) -> NDArray[Scalar]:
     """Return an array of one or two dimensions, full of zeros."""
     return np.zeros(shape, kind)
 

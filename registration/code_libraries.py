@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import binding
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import CPUCodegen, JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager
 from numba.core.typed_passes import NopythonRewrites
@@ -37,6 +37,8 @@ UNNEEDED = {
     WithLifting,
 }
 
+if not hasattr(CPUCodegen, "_pass_builder"):
+    raise ImportError("Numba up to 0.61 lays passes out in another way")
 OPTIMIZED = 1  # of LLVM's levels; kernels are no faster of the third, which takes a tenth more of a first start
 
 

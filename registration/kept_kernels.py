@@ -33,7 +33,7 @@ import numba
 import numpy as np
 
 UNKNOWN_NUMBA = (
-    f"Numba {numba.__version__} keeps compiled functions in a way that is not known here; "
+    f"Numba {numba.__version__} compiles and keeps functions in a way that is not known here; "
     "install one of the versions that linefix names"
 )
 try:

@@ -247,9 +247,14 @@ def test_a_kernel_elsewhere_is_refused() -> None:
             return factor * x
 
 
-def test_other_numbas_are_refused() -> None:
-    """As if a later Numba had no such class any more."""
-    script = "import numba.core.caching as caching; del caching._Cache; import registration.compiling"
+@pytest.mark.parametrize(
+    "inside", ["core.caching._Cache", "np.arrayobj._empty_nd_impl", "core.codegen.CPUCodegen._pass_builder"]
+)
+def test_other_numbas_are_refused(inside: str) -> None:
+    """As if a later Numba had no such thing any more, or an earlier one not yet."""
+    script = (
+        f"import numba.core.caching, numba.core.codegen, numba.np.arrayobj\ndel numba.{inside}\nimport registration"
+    )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
     assert "install one of the versions" in ended.stderr
 
