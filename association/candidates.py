@@ -10,12 +10,10 @@ import numpy as np
 from registration.layout import Records
 from registration.values import value
 
-from .answering_tables import Answering
 from .context import SearchContext
 from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
-from .kernels.answering import answer
 from .kernels.planning import begin
-from .kernels.searching import go_on, put_in_order
+from .kernels.searching import go_on, put_in_order, search
 from .kernels.stopping import missed_share, restrict
 from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
 from .options import AssociationOptions, CancelledError
@@ -45,7 +43,6 @@ from .tuning import (
 )
 
 NO_NOISE = np.zeros(0)
-ONLY_SEARCHED = Answering.nothing()
 NONE_TRIED = np.zeros(0, TRIED)
 COUNT, BASES, HYPOTHESES, VERIFIED, MISSED = map(
     (PROGRESS.names or ()).index, ("count", "bases", "hypotheses", "verified", "missed")
@@ -174,12 +171,10 @@ class Begun:
         found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), record(PROGRESS, best_value=effort.known)
         return cls(effort, context.question(rules), _planning(context, effort), found, progress, how)
 
-    def search(self, context: SearchContext, given: Answering) -> tuple[int, Plan | None]:
-        """Search, and go on with what is found as far as is asked; return why bases were left, and how to `go_on`."""
-        return answer(
-            self.question, context.index.tables, self.planning, self.found, self.progress, context.workspace, self.how,
-            given,
-        )  # fmt: skip
+    def search(self, context: SearchContext) -> tuple[int, Plan | None]:
+        """Search as far as the budget lets it; return why bases were left, and the plan to `go_on` with, if any."""
+        tables, work = context.index.tables, context.workspace
+        return search(self.question, tables, self.planning, self.found, self.progress, work, self.how)
 
     def plan(self, context: SearchContext) -> tuple[int, Plan]:
         """Return what `search` does, without having gone through any base."""
@@ -212,9 +207,8 @@ class Begun:
 def _search(context: SearchContext, effort: Effort, chunk: int | None) -> Candidates:
     """Search the map, or the window of a hard prior."""
     begun = Begun.of(context, effort, chunk)
-    if context.deadline.passed:
-        return begun.go_on(context, *begun.plan(context))
-    return begun.go_on(context, *begun.search(context, ONLY_SEARCHED))
+    started = begun.plan(context) if context.deadline.passed else begun.search(context)
+    return begun.go_on(context, *started)
 
 
 def _found(

@@ -12,7 +12,7 @@ from registration.limits import MAX_LENGTH, MIN_LENGTH
 
 from .candidates import Effort, allowed_by
 from .context import SearchContext
-from .explain import explain
+from .explain import search_and_explain
 from .explanations import Explanations
 from .extents import inner_extent
 from .scaling import scale_near_one
@@ -135,7 +135,8 @@ def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, Scan]]:
 def _tried(context: SearchContext, mistake: Mistake, factor: float, scan: Scan, known: float) -> Cause | None:
     """Search the scan without a mistake; None where that fits no better."""
     changed = SearchContext.of(context.index, scan, None, context.options, context.deadline)
-    explanations = explain(changed, Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(context.options), known))
+    effort = Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(context.options), known)
+    explanations = search_and_explain(changed, effort)
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None
     best, verdict = explanations.answer.best, judge(changed, explanations)

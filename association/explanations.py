@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from registration import RegistrationResult
-from registration.layout import Records
 from registration.values import value
 
 from .acceptance import Accepted
@@ -46,38 +45,21 @@ class Answer:
 
 
 @value(frozen=True, slots=True)
-class Weighing:
-    """What the verdict weighs, where it was worked out with the answer.
-
-    Attributes
-    ----------
-    chances : (1,) of `CHANCES`
-    features : (1,) of `FEATURES`
-    """
-
-    chances: Records
-    features: Records
-
-
-@value(frozen=True, slots=True)
 class Explanations:
     """What a search found.
 
     Attributes
     ----------
-    ranked : sequence of Ranked
+    ranked : tuple of Ranked
         Distinct; those within a hard prior's window first, the best first.
     answer : Answer or None
         The first within the window; None where there is none.
     search : SearchReport
-    weighing : Weighing or None
-        Only of an answer that is the best of all, with scan and map to scale.
     """
 
-    ranked: Sequence[Ranked]
+    ranked: tuple[Ranked, ...]
     answer: Answer | None
     search: SearchReport
-    weighing: Weighing | None = None
 
     @property
     def rivals(self) -> Iterator[Ranked]:

@@ -236,16 +236,6 @@ FEATURES = _fields(
     ),
 )
 
-# Chances of an answer: that it is right, given that the robot is on this map; the same where other buildings are
-# reckoned with; that it or a twin of it is right, wherever along a free direction; of it among the explanations that
-# are about as good, which is in the first two. Whether few walls fix the pose, and one of them alone decides.
-CHANCES = _fields((_F, "right careful explained share"), (_I, "thin"))
-
-# How far an answer was worked out in one call, and what is known of it: how many explanations there are, how many walls
-# hold a match of the best; significance and agreement are among the facts.
-REACHED = _fields((_I, "stage explanations walls"))
-EXPLAINED, JUDGED = range(2)
-
 # What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
 # it below the first of them. From `start` on the slope is more by `more`.
 CURVE = _fields((_I, "feature begin end"), (_F, "slope"))

@@ -7,21 +7,18 @@ fits well. What a place misses so, by centimetres, is no evidence against it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from registration.compiling import way_in
+from registration.layout import Floats
 
 from .context import SearchContext
 from .explanations import Answer
-from .kernels import loosening as kernels
-from .layout import MERIT
 from .ranking import Ranked, match_again
 from .scan_lines import ScanLines
-from .tuning import LOOSE_RIVALS
-
-_loose_sigma, _loose_share = way_in(kernels.loose_sigma), way_in(kernels.loose_share)
+from .tuning import LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_RIVALS, LOOSE_WALLS, MODEL_OFFSET, TWIN_TEMPERATURE
 
 
 def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ranked]) -> float:
@@ -39,5 +36,21 @@ def loose_twin_share(context: SearchContext, answer: Answer, rivals: Sequence[Ra
     lines = ScanLines.of(context.scan, _loose_sigma(answer.settled.wall_sigma), context.options, context.lines.given)
     explanations = (answer.best, *rivals[:LOOSE_RIVALS])
     again = match_again(context.instead(context.scan, lines), explanations)
-    values = np.array([one.value for one in explanations])
-    return float(_loose_share(np.array([one.merit for one in explanations], MERIT), values, again))
+    return _share_of_first(explanations, again["score"])
+
+
+def _loose_sigma(wall_sigma: float) -> float:
+    """Return the standard deviation of a wall's offset beyond `MODEL_OFFSET`, metres, for an estimate of its whole."""
+    loose = max(LOOSE_WALLS, LOOSE_FACTOR * wall_sigma)
+    return math.sqrt(loose * loose - MODEL_OFFSET * MODEL_OFFSET)
+
+
+def _share_of_first(explanations: Sequence[Ranked], scores: Floats) -> float:
+    """Return the probability of the first explanation among all, from what their segments score now, (k,) nats.
+
+    The prior counts in full; the beams' part, which depends on centimetres, counts by `LOOSE_BEAMS`.
+    """
+    prior_and_beams = [one.value - one.score + LOOSE_BEAMS * (one.score - one.by_segments) for one in explanations]
+    values = scores + np.array(prior_and_beams)
+    rivals = np.exp(np.minimum(0.0, values[1:] - values[0]) / TWIN_TEMPERATURE)
+    return 1.0 / (1.0 + float(rivals.sum()))

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .answering_tables import WallLengths
 from .errors import InvalidMapError
 from .extents import diagonal
 from .grids import crossing_runs, directions_near, near_walls, swept_runs
 from .layout import ENDS, Integers, as_records
-from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, Walls
+from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
 

@@ -163,7 +163,8 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Rank
     if not len(candidates.poses):
         return []
     estimates = np.zeros(len(candidates.poses), ESTIMATE)
-    kernels.begin_at(candidates.poses, estimates)
+    for name in ("theta", "x", "y"):
+        estimates[name] = candidates.poses[name]
     scored = _score(context, estimates)
     if context.with_beams:
         scored = _weigh_beams(context, scored)

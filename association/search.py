@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time
 
+from .candidates import find_candidates
 from .causes import find_causes
 from .context import SearchContext
+from .explain import explain
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, Prior
 from .report import report
 from .result import AssociationResult
 from .scan import Scan
-from .to_scale import explain_to_scale
+from .to_scale import put_to_scale
 from .verdict import judge
 
 DEFAULT_OPTIONS = AssociationOptions()
@@ -26,7 +28,11 @@ def associate(
 ) -> AssociationResult:
     """Find where in a map a scan was taken, without knowing which segment is which.
 
-    Propose poses from bases of two scan segments, verify them, grow and shrink their consensus sets, judge.
+    1. Search: propose poses from bases of two scan segments, verify them, grow and shrink their consensus sets.
+    2. Explain: rank the best poses with the lines of sight, the beams and the prior, and work out the best of them.
+    3. Search again to scale, where the best explanation says that scan and map differ by a factor near one.
+    4. Judge: how likely the best explanation is right, and whether a robot may use it.
+    5. Find causes, where it may not: search the scan without each of a caller's usual mistakes.
 
     Parameters
     ----------
@@ -50,7 +56,9 @@ def associate(
     """
     began = time.monotonic()
     context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
-    found = explain_to_scale(context)
+    candidates = find_candidates(context)
+    explanations = explain(context, candidates)
+    found = put_to_scale(context, explanations)
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     causes = find_causes(context, found.explanations, verdict, began)
     return report(found.context, found.explanations, verdict, causes, found.factor)

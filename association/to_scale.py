@@ -17,9 +17,8 @@ from registration.values import value
 from .acceptance import register_accepted
 from .candidates import Candidates, find_candidates
 from .context import SearchContext
-from .explain import explain
+from .explain import search_and_explain
 from .explanations import Explanations
-from .kernels import similarity as kernels
 from .ranking import Ranked, rank_candidates
 from .scan import scaled
 from .similarity import Similarity, fit_similarity
@@ -27,10 +26,12 @@ from .tuning import (
     DISTINCT_ANGLE,
     DOUBTING_DEVIATIONS,
     DOUBTING_WALLS,
+    FACTOR_DEVIATIONS,
     FACTOR_GAP,
     FACTOR_ROUNDS,
     FACTOR_WALLS,
     LEAST_AS_SENT,
+    LEAST_FACTOR,
     LEAST_OFF_WALLS,
     LOOSE_RIVALS,
     MOST_FACTOR,
@@ -84,20 +85,25 @@ class Explained:
         return 0.0 if self.explanations.answer is None else self.explanations.answer.best.score
 
 
-def explain_to_scale(context: SearchContext) -> Explained:
-    """Explain a scan, put to scale where the best explanation says that it is not, and fits much better then.
+def put_to_scale(context: SearchContext, as_sent: Explanations) -> Explained:
+    """Search a scan again to scale, where its best explanation says that it is not, and keep what fits much better.
+
+    Parameters
+    ----------
+    context : SearchContext
+    as_sent : Explanations
+        Of the scan as it was sent.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    as_sent = explain(context)
     first = Explained(context, as_sent, as_sent)
     if not _may_be_off(first):
         return first
     similarity = _similarity(first)
-    found = _put_to_scale(first, similarity)
+    found = _search_to_scale(first, similarity)
     if found.factor is None:
         return replace(first, off_scale=similarity is not None and is_far_off(similarity))
     rivals = beside(found.explanations, _at_their_scales(first, found))
@@ -111,14 +117,12 @@ def _may_be_off(first: Explained) -> bool:
     it is.
     """
     context, answer = first.context, first.explanations.answer
-    if first.explanations.weighing is not None:
-        return False  # this was looked at then
     if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
         return False
     return context.index.sigma is None and answer.settled.wall_sigma >= LEAST_OFF_WALLS
 
 
-def _put_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
+def _search_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
     """Search again with the factor of a similarity, until it is right; what fits no better is left as it was."""
     found, factor = first, 1.0
     for _ in range(FACTOR_ROUNDS):
@@ -128,7 +132,8 @@ def _put_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
         if not abs(factor - 1.0) <= MOST_FACTOR:
             break
         again = _at_scale(first.context, factor)
-        stretched = Explained(again, explain(again), first.explanations, Factor(factor, similarity.deviation))
+        explanations = search_and_explain(again)
+        stretched = Explained(again, explanations, first.explanations, Factor(factor, similarity.deviation))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.
         if fitted is None or fitted.more < FACTOR_WALLS or stretched.score <= found.score + FACTOR_GAP:
@@ -150,7 +155,7 @@ def _similarity(found: Explained) -> Similarity | None:
 
 def is_off(similarity: Similarity) -> bool:
     """Tell whether a similarity says that the scan is not to scale."""
-    return kernels.is_off(similarity.factor, similarity.deviation)
+    return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
 
 
 def is_far_off(similarity: Similarity) -> bool:
@@ -203,7 +208,7 @@ def beside(explanations: Explanations, rivals: Sequence[Ranked]) -> Explanations
         if place == len(ranked) or ranked[place].value < one.value:
             ranked[place : place + 1] = [one]
     ranked.sort(key=lambda one: (not one.inside, -one.value))
-    return replace(explanations, ranked=tuple(ranked), weighing=None)
+    return replace(explanations, ranked=tuple(ranked))
 
 
 def _same_place(one: Ranked, other: Ranked) -> bool:

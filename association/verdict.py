@@ -31,7 +31,6 @@ from .tuning import (
     USABLE_PROBABILITY,
 )
 
-_three_chances = way_in(odds.three_chances)
 _allowed_null = way_in(odds.allowed_null)
 _chance = way_in(odds.chance)
 
@@ -85,9 +84,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
         )
         return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, bool(explanations.ranked), why, complete)
     best = answer.best
-    better_elsewhere = explanations.weighing is None and any(
-        other.score > best.score + CONTRADICTION for other in explanations.others
-    )
+    better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
     contradicted = better_elsewhere or best.value - best.score < FAR_FROM_PRIOR
     doubted = off_scale or _out_of_step(answer)
     certain = complete and not contradicted and context.window is None and not doubted
@@ -165,16 +162,18 @@ class _Chances:
         """Work out those of an answer; `certain`: whether it is usable if they suffice."""
         form = "_with_beams" if context.with_beams else ""
         usual, cautious = MODELS["probability" + form], MODELS["cautious" + form]
-        answer, weighing = explanations.answer, explanations.weighing
+        answer = explanations.answer
         assert answer is not None
-        if weighing is not None:
-            right, careful, explained, share, thin = weighing.chances.item()
-            return cls(right, careful, explained, share, bool(thin), weighing.features, cautious)
         best, rivals = answer.best, tuple(explanations.rivals)
         weighed, facts = weigh(best, rivals), facts_of(context, answer)
         features, share = describe(best, facts, weighed), twin_share(weighed)
         # Whether the scan is of this map is another question than whether it fixes the position, and where on it.
-        right, careful, fixed = _three_chances(usual.odds, cautious.odds, features, USUAL.deviation)
+        fixed = features.copy()
+        fixed["deviation"] = USUAL.deviation
+        right, careful, explained = (
+            _chance(model.odds, numbers)
+            for model, numbers in ((usual, features), (cautious, features), (cautious, fixed))
+        )
         likely, thin = right * share >= USABLE_PROBABILITY and not capped, is_thin(context, answer, facts)
         decidable = not answer.settled.degenerate and not thin
         if likely and decidable and careful * share >= _bar(context):
@@ -187,7 +186,7 @@ class _Chances:
             allowed = _allowed_null(cautious.odds, features.copy(), best.score, bar) if certain else 0.0
             take_null(features, best, null_of(context, best, allowed))
             careful = _chance(cautious.odds, features)
-        return cls(right * share, careful * share, fixed, share, thin, features, cautious)
+        return cls(right * share, careful * share, explained, share, thin, features, cautious)
 
     @property
     def mirrored(self) -> bool:

@@ -11,9 +11,10 @@ import numpy as np
 
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
+from association.explain import search_and_explain
 from association.features import Features, features_of, weigh, with_null
 from association.null import null_of
-from association.to_scale import explain_to_scale
+from association.to_scale import put_to_scale
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES
 from simulation import Case as DrawnCase
@@ -104,7 +105,8 @@ class Case:
 
     def example(self) -> Example | None:
         """Search up to where the verdict is due; None where there is no explanation."""
-        to_scale = explain_to_scale(SearchContext.of(self.index, self.scan, None, OPTIONS, Deadline()))
+        searched = SearchContext.of(self.index, self.scan, None, OPTIONS, Deadline())
+        to_scale = put_to_scale(searched, search_and_explain(searched))
         context, found = to_scale.context, to_scale.explanations
         if found.answer is None:
             return None

@@ -6,14 +6,14 @@ The models of the verdict stay those of the whole score, so that `usable` withou
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 
-from association import explain, scan_lines
+from association import scan_lines
 from association.kernels.scans import as_lines, describe_labelled, join_labelled, longest_first, seen_at_once
 from association.tables import Measured
 from registration.layout import Records
@@ -41,14 +41,7 @@ def changed(change: Callable[[Terms], None]) -> Iterator[None]:
         change(terms)
         return terms
 
-    with step_by_step(), patch.object(scan_lines, "variances_of", other):
-        yield
-
-
-@contextmanager
-def step_by_step() -> Iterator[None]:
-    """Let every scan be answered in steps, which look up in Python what is changed here."""
-    with patch.object(explain, "is_plain", lambda _: False):
+    with patch.object(scan_lines, "variances_of", other):
         yield
 
 
@@ -80,12 +73,12 @@ def each_by_itself(measured: Measured, counted: bool, variances: Records, model:
 @contextmanager
 def apart() -> Iterator[None]:
     """Let no segments be joined."""
-    with step_by_step(), patch.object(scan_lines, "_describe_view", each_by_itself):
+    with patch.object(scan_lines, "_describe_view", each_by_itself):
         yield
 
 
 VARIANTS: dict[str, Callable[[], AbstractContextManager[Any]]] = {
-    "as it is": step_by_step,
+    "as it is": nullcontext,
     "without the freedom taken": partial(changed, without_freedom),
     "each match with an error of its own": partial(changed, without_common_error),
     "walls without an error": partial(changed, without_wall_error),

@@ -10,13 +10,14 @@ from registration import RigidTransform
 
 from ..causes import Cause, Mistake, find_causes
 from ..context import SearchContext
+from ..explain import search_and_explain
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
 from ..report import report
 from ..result import AssociationResult
 from ..scaling import scale_near_one
 from ..scan import Scan, mirrored, scaled
-from ..to_scale import Explained, explain_to_scale
+from ..to_scale import Explained, put_to_scale
 from ..verdict import Verdict, judge
 from .tuning import (
     BETTER_SCALED,
@@ -103,7 +104,7 @@ def try_sample(
     """
     began, present = time.monotonic(), (oriented, index.sigma)
     context = SearchContext.of(index, scan, None, AssociationOptions(oriented=oriented, causes=True), deadline)
-    found = explain_to_scale(context)
+    found = _searched(context)
     result, trial, verdict = _judged(context, found)
     trials = {present: trial}
     for way in _other_ways(present):
@@ -137,7 +138,11 @@ def _tried(index: MapIndex, scan: Scan, way: Way, deadline: Deadline) -> Trial:
     directed, sigma = way
     place = replace(index if directed else index.undirected, sigma=sigma)
     context = SearchContext.of(place, scan, None, AssociationOptions(oriented=directed), deadline)
-    return _judged(context, explain_to_scale(context))[1]
+    return _judged(context, _searched(context))[1]
+
+
+def _searched(context: SearchContext) -> Explained:
+    return put_to_scale(context, search_and_explain(context))
 
 
 def _judged(context: SearchContext, found: Explained) -> tuple[AssociationResult, Trial, Verdict]:
@@ -208,4 +213,4 @@ def _at_scale(context: SearchContext, factor: float) -> Explained:
     """Search the scan with its lengths times a factor."""
     options = AssociationOptions(oriented=context.options.oriented)
     scan = scaled(context.scan, factor)
-    return explain_to_scale(SearchContext.of(context.index, scan, None, options, context.deadline))
+    return _searched(SearchContext.of(context.index, scan, None, options, context.deadline))

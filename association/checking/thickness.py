@@ -9,7 +9,7 @@ import numpy as np
 from registration import Segments
 
 from ..context import SearchContext
-from ..explain import explain
+from ..explain import search_and_explain
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
 from ..scan import Scan, mirrored
@@ -106,7 +106,7 @@ def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
 def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
     index, options = MapIndex.build(faces, THICKNESS_SIGMA), AssociationOptions()
     # As they were sent: a scan that may be put to scale fits a room of walls too thick as well.
-    found = (explain(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
+    found = (search_and_explain(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
     return sum(max(0.0, one.best.score) for one in found if one is not None)
 
 

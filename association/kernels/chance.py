@@ -8,7 +8,7 @@ from registration.allocating import empty
 from registration.compiling import kernel
 from registration.layout import Floats, Records
 
-from ..answering_tables import WallLengths
+from ..tables import WallLengths
 from ..tuning import LEAST_CHANCE, LEAST_SIGNIFICANCE, MOST_CHANCE
 
 

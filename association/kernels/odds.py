@@ -56,21 +56,6 @@ def chance(odds: Odds, features: Records) -> float:
 
 
 @kernel
-def three_chances(usual: Odds, cautious: Odds, features: Records, deviation: float) -> tuple[float, float, float]:
-    """Return the chances by both models, and by the second one with another deviation.
-
-    `features` (1,) of `FEATURES`.
-    """
-    right = chance(usual, features)
-    careful = chance(cautious, features)
-    own = features[0].deviation
-    features[0].deviation = deviation
-    other = chance(cautious, features)
-    features[0].deviation = own
-    return right, careful, other
-
-
-@kernel
 def null_features(score: float, null: float, symmetry: float) -> tuple[float, float, float]:
     """Return the features ``null``, ``null_gap`` and ``null_better``, of what an answer and the mirrored scan score."""
     share = min(MOST_NULL, null / score) if score > 0.0 else MOST_NULL

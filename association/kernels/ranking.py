@@ -85,15 +85,6 @@ def rank(
 
 
 @kernel
-def begin_at(found: Records, estimates: Records) -> None:
-    """Write the poses that a search found, (k,) of `FOUND`, to `estimates` (k,)."""
-    for k in range(len(found)):
-        estimates[k].theta = found[k].theta
-        estimates[k].x = found[k].x
-        estimates[k].y = found[k].y
-
-
-@kernel
 def distinct(
     poses: Records,
     merits: Records,

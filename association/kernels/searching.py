@@ -18,6 +18,7 @@ from .sliding import search_slides, sliding_segments
 from .stopping import missed_share
 
 
+@internal
 @kernel
 def search(
     question: Question,

@@ -12,8 +12,6 @@ from registration.layout import Floats, Record, Records
 from ..layout import Integers
 from ..tables import Question, Workspace
 from ..tuning import (
-    FACTOR_DEVIATIONS,
-    LEAST_FACTOR,
     LEAST_WALL_ERROR,
     SETTLING_ROUNDS,
     UNSEEN_ERROR,
@@ -146,9 +144,3 @@ def pose_of_similarity(solution: Floats, covariance: Floats, pose: Record) -> tu
     pose.tt = turn / (factor * factor)
     spread = c * c * covariance[0, 0] + 2.0 * c * s * covariance[0, 1] + s * s * covariance[1, 1]
     return factor, spread
-
-
-@kernel
-def is_off(factor: float, deviation: float) -> bool:
-    """Tell whether a similarity of such a factor says that the scan is not to scale."""
-    return abs(factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * deviation)

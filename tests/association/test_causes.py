@@ -12,7 +12,7 @@ import pytest
 
 from association import AssociationOptions, Beams, CancelledError, Deadline, MapIndex, Scan, associate
 from association.causes import UNITS, find_causes
-from association.explain import explain
+from association.explain import search_and_explain
 from association.scaling import scale_near_one
 from association.scan import mirrored, scaled, turned_round
 from association.verdict import judge
@@ -27,7 +27,7 @@ SCAN = scan_of(seen(ROOM, INSIDE)[0])
 def told(scan: Scan, index: MapIndex = INDEX, **options: Any) -> dict[str, str]:
     """Return the warnings of mistakes by their codes."""
     context = context_of(index, scan, causes=True, **options)
-    explanations = explain(context)
+    explanations = search_and_explain(context)
     verdict = judge(context, explanations)
     causes = find_causes(context, explanations, verdict, time.monotonic() - 60.0)  # time enough
     found = warnings_of(context, explanations.search, verdict, causes)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from association import HardPrior, MapIndex, SoftPrior
-from association.explain import explain
+from association.explain import search_and_explain
 from association.families import place_on_family
 from association.settling import Settled
 from registration import RigidTransform
@@ -30,7 +30,7 @@ def test_a_position_is_fixed_to_half_a_metre(weakest: float, parallel: bool, deg
 
 def settled_on(walls: Floats, seen_walls: Floats) -> Settled:
     """Search, and return the answer worked out."""
-    answer = explain(context_of(index_of(walls), scan_of(seen_walls))).answer
+    answer = search_and_explain(context_of(index_of(walls), scan_of(seen_walls))).answer
     assert answer is not None
     return answer.settled
 
@@ -65,7 +65,7 @@ def test_two_walls_that_are_nearly_parallel_fix_no_position(degrees: float, dege
 def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | None = None) -> RigidTransform:
     """Search, and return the member of the family that is answered."""
     context = context_of(index, scan_of(endpoints), prior)
-    answer = explain(context).answer
+    answer = search_and_explain(context).answer
     assert answer is not None
     assert answer.settled.degenerate
     found = place_on_family(context, answer)

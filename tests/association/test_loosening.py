@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from association.context import SearchContext
-from association.explain import explain
+from association.explain import search_and_explain
 from association.explanations import Answer
 from association.features import twin_share, weigh
 from association.loosening import loose_twin_share
@@ -28,7 +28,7 @@ def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Ans
     errors = np.random.default_rng(seed).normal(0.0, 0.05, len(rooms))
     walls = rooms.endpoints + np.tile(errors[:, None] * rooms.normals, 2)
     context = context_of(index_of(walls, sigma), SCAN)
-    found = explain(context)
+    found = search_and_explain(context)
     assert found.answer is not None
     return context, found.answer, tuple(found.rivals)
 

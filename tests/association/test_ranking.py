@@ -13,7 +13,7 @@ from association import Beams, CancelledError, Deadline, HardPrior, MapIndex, Pr
 from association import explain as explaining
 from association.candidates import Candidates, find_candidates
 from association.context import SearchContext
-from association.explain import explain
+from association.explain import search_and_explain
 from association.layout import FOUND
 from association.ranking import Ranked, rank_candidates
 from association.sight import missing_segments
@@ -285,12 +285,12 @@ def test_no_rays_are_followed_through_a_crowd_when_the_deadline_has_passed() -> 
 
 def test_what_the_deadline_leaves_unranked_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     context = replace(context_of(index_of(equal_rooms(3)), ROOM_SCAN), deadline=Deadline(at=time.monotonic() + 1e3))
-    assert explain(context).search.complete
+    assert search_and_explain(context).search.complete
     # It passes after the last base and before the first pose is ranked: there is an answer all the same.
     candidates = find_candidates(context)
     late = replace(context, deadline=Deadline(at=0.0))
     assert candidates.report.complete
     assert len(rank_candidates(late, candidates)) == len(rank_candidates(context, candidates)) > 0
     monkeypatch.setattr(explaining, "find_candidates", lambda context, effort: candidates)
-    assert explain(context).search.complete
-    assert not explain(late).search.complete
+    assert search_and_explain(context).search.complete
+    assert not search_and_explain(late).search.complete

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from association import MapIndex
-from association.explain import explain
+from association.explain import search_and_explain
 from association.settling import Settled
 from association.tuning import LEAST_KNOWN_VARIANCE
 from registration import RigidTransform, Segments
@@ -20,7 +20,7 @@ PLACE = pose(15.0, 14.0, 0.5)
 
 
 def settled(index: MapIndex, ends: Floats) -> Settled:
-    answer = explain(context_of(index, scan_of(ends))).answer
+    answer = search_and_explain(context_of(index, scan_of(ends))).answer
     assert answer is not None
     return answer.settled
 

@@ -19,13 +19,12 @@ from association import (
     associate,
     to_scale,
 )
-from association import explain as explaining
 from association.context import SearchContext
-from association.explain import explain
+from association.explain import search_and_explain
 from association.explanations import Explanations
 from association.ranking import Ranked
 from association.similarity import Similarity, fit_similarity
-from association.to_scale import explain_to_scale
+from association.to_scale import put_to_scale
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 from registration.options import Estimator
@@ -92,7 +91,8 @@ def test_the_pose_is_where_the_map_has_it(factor: float) -> None:
 
 def test_pose_and_covariance_are_those_of_the_similarity() -> None:
     """What is not known of the factor is in the covariance, and the residuals are those at that pose."""
-    found = explain_to_scale(context_of(index_of(1.02 * WALLS), SCAN))
+    context = context_of(index_of(1.02 * WALLS), SCAN)
+    found = put_to_scale(context, search_and_explain(context))
     one = found.explanations.answer
     assert one is not None
     similarity = fit_similarity(found.context, one.best)
@@ -219,7 +219,7 @@ def test_a_window_holds_the_pose_in_the_map_as_it_is() -> None:
 
 
 def test_what_has_no_time_to_be_put_to_scale_is_not_usable(monkeypatch: pytest.MonkeyPatch) -> None:
-    index, searched = index_of(1.02 * WALLS), explain
+    index, searched = index_of(1.02 * WALLS), search_and_explain
     in_time = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
     assert in_time.usable
 
@@ -228,7 +228,7 @@ def test_what_has_no_time_to_be_put_to_scale_is_not_usable(monkeypatch: pytest.M
             context.deadline.at = 0.0
         return searched(context)
 
-    monkeypatch.setattr(to_scale, "explain", late)
+    monkeypatch.setattr(to_scale, "search_and_explain", late)
     got = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
     assert not got.usable
     assert not got.search.complete
@@ -306,7 +306,6 @@ def test_what_fits_to_millimetres_is_not_asked_for_a_factor(
         return fit_similarity(context, best)
 
     monkeypatch.setattr(to_scale, "fit_similarity", counted)
-    monkeypatch.setattr(explaining, "is_plain", lambda _: False)  # which sees for itself
     answer(off_by(WALLS, error, 2))
     assert (calls != []) == asked
 
