@@ -18,7 +18,6 @@ from association import (
     Status,
     associate,
     candidates,
-    explain,
     loosening,
     null,
     reasons,
@@ -234,14 +233,11 @@ def test_an_incomplete_search_is_never_usable() -> None:
     assert [reason.code for reason in stopped.reasons] == ["search_incomplete"]
 
 
-@pytest.mark.parametrize("during", ["null_of", "loose_twin_share", "answer"])
+@pytest.mark.parametrize("during", ["null_of", "loose_twin_share", "search"])
 def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search was done in time, but the mirrored scan or the rivals were looked at no further.
-
-    Or there is one call for all of it, after which nobody knows how far it was in time.
-    """
+    """The deadline passes while the mirrored scan or the rivals are compared, or at the very end of the search."""
     index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
-    sent, module = scan_of(seen(ROOM, INSIDE)[0]), candidates if during == "answer" else verdict
+    sent, module = scan_of(seen(ROOM, INSIDE)[0]), candidates if during == "search" else verdict
     compared, deadline = getattr(module, during), Deadline(time.monotonic() + 60.0)
 
     def late(*arguments: Any) -> Any:
@@ -252,8 +248,6 @@ def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypa
     assert in_time.usable
     assert in_time.search.complete
     monkeypatch.setattr(module, during, late)
-    if module is verdict:
-        monkeypatch.setattr(explain, "is_plain", lambda _: False)
     got = associate(index, sent, None, deadline=deadline)
     assert deadline.at == 0.0
     assert not got.usable
