@@ -19,9 +19,9 @@ from .grids.cells import Grid
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
 from .line_map import ImportedMap, LineMap
-from .logs.bags import SUFFIXES as BAG_SUFFIXES
-from .logs.bags import is_bag
-from .logs.ros import grid_of, read_bag_grid
+from .logs.folders import SUFFIXES as BAG_SUFFIXES
+from .logs.folders import is_bag
+from .logs.grids import grid_of, read_bag_grid
 from .options import DEFAULT_OPTIONS, ImportOptions
 from .report import Notes
 
@@ -101,7 +101,7 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
         When its fields do not fit each other, or it is too large.
     """
     notes = Notes()
-    grid, frame = grid_of(message, name)
+    grid, frame = grid_of(message, name, notes)
     return ImportedMap(_from_grid(grid, notes, name, frame), notes.report("occupancy_grid", (name,)))
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from .errors import UnsupportedFormatError
 from .files import name_of
-from .logs.bags import SUFFIXES, is_bag
 from .logs.carmen import read_carmen
+from .logs.folders import SUFFIXES, is_bag
 from .logs.ros import read_bag
 from .logs.scan import Log, LogOptions
 

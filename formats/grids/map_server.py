@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from registration import RigidTransform
 
@@ -28,6 +26,7 @@ from ..limits import (
     MIN_RESOLUTION,
 )
 from ..report import Notes, shown
+from ..yaml import yaml_of
 from .cells import Grid
 
 PICTURES = ("PPM", "PNG", "BMP")  # what Pillow may take a picture for
@@ -101,10 +100,7 @@ def read_description(path: Path, notes: Notes) -> Description:
     """
     name = name_of(path)
     text = text_of(read_bounded(path, MAX_YAML_BYTES), name)
-    try:
-        values = YAML(typ="safe", pure=True).load(text)
-    except (YAMLError, RecursionError, ValueError) as error:
-        raise MalformedFileError("is no YAML", argument=name) from error
+    values = yaml_of(text, name)
     if not isinstance(values, dict):
         raise MalformedFileError("expected a YAML mapping with image, resolution and origin", argument=name)
     missing = [key for key in ("image", "resolution", "origin") if key not in values]

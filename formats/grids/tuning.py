@@ -40,3 +40,14 @@ LEAST_POINTS = 4
 
 # Points of a contour that are fitted together.
 LONGEST_CONTOUR = 50_000
+
+# Messages of ROS ------------------------------------------------------------------------------------------------------
+
+# Least cosine between the z axes of a grid and of its frame: 2.6 degrees, far above the rounding of a quaternion.
+UPRIGHT = 0.999
+
+# Fraction of the cells around obstacles that have the cost of an inflated obstacle, from which on a grid is a costmap,
+# and how many of them have to be known. Maps of slam_toolbox and cartographer have below 0.05, costmaps of Nav2 above
+# 0.9.
+INFLATED = 0.5
+LETHAL_CELLS = 20

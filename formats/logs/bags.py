@@ -1,4 +1,4 @@
-"""Bags of ROS 1 and 2, opened by rosbags.
+"""Recordings of ROS 1 and 2: ``.bag``, ``.mcap`` and ``.db3`` files, and folders of them.
 
 A bag brings its own definitions of messages, and rosbags would make code of them. They are not used: messages are read
 by the definitions that ROS itself has, and only the few kinds that are wanted.
@@ -9,26 +9,27 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import apsw
-from rosbags.interfaces import Connection
-from rosbags.rosbag1 import Reader as Reader1
+import zstandard
 from rosbags.rosbag1 import ReaderError as ReaderError1
-from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import ReaderError as ReaderError2
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from ..errors import FormatError, IncompleteFileError, MalformedFileError, TooLargeError, UnsupportedFormatError
-from ..files import name_of, read_bounded, text_of
-from ..limits import MAX_MESSAGE_BYTES, MAX_METADATA_BYTES
-from ..report import shown
+from ..errors import FormatError, MalformedFileError
+from ..files import name_of
+from ..limits import MAX_MESSAGE_BYTES
+from ..report import Notes, shown
+from .folders import recorded_files
+from .mcap_files import McapFile
+from .recording import CDR, ROS1, Connection, RawMessage, RecordedFile
+from .rosbag_files import RosbagFile
 
 SCAN = "sensor_msgs/msg/LaserScan"
 GRID = "nav_msgs/msg/OccupancyGrid"
@@ -36,95 +37,163 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 OLD_TRANSFORMS = "tf/msg/tfMessage"  # of ROS 1, laid out alike
 
-SUFFIXES = (".bag", ".mcap", ".db3")
-METADATA = "metadata.yaml"
+NAMED = 20  # topics that an error lists at most
+ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a message that rosbag2 has compressed; no encoding begins so
 
 # What rosbags lets through of a file that is broken on purpose.
 BROKEN = (
     ReaderError1, ReaderError2, SerdeError, apsw.Error, struct.error, zlib.error, OSError, EOFError, ValueError,
     TypeError, LookupError, AttributeError, ArithmeticError, AssertionError, RecursionError, RuntimeError, MemoryError,
+    zstandard.ZstdError,
 )  # fmt: skip
+
+
+class Received(NamedTuple):
+    """A message, and when the recorder received it."""
+
+    connection: Connection
+    received: int  # ns since the epoch
+    message: Any
 
 
 @dataclass(frozen=True, slots=True)
 class Bag:
-    """An open bag.
+    """An open recording.
 
     Attributes
     ----------
     name : str
-        Of the file, for errors and reports.
+        Of the file or folder, for errors and reports.
     format : str
         ``rosbag1``, ``rosbag2`` or ``mcap``.
     """
 
     name: str
     format: str
-    _reader: Any
-    _types: Any
+    _files: tuple[RecordedFile, ...]
+    _notes: Notes
 
     def connections(self, *kinds: str) -> list[Connection]:
-        """Return the connections that carry messages of some kinds."""
-        return [c for c in self._reader.connections if c.msgtype in kinds]
+        """Return the connections that carry messages of some kinds in an encoding that is read; all without kinds."""
+        every = [one for file in self._files for one in file.connections]
+        return [one for one in every if one.msgtype in kinds and one.encoding in (CDR, ROS1)] if kinds else every
 
     def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, Any]]:
-        """Yield the messages of some connections, in the order of the bag.
+        """Yield the messages of some connections, in the order of the bag; see `received`."""
+        for connection, _received, message in self.received(connections):
+            yield connection, message
+
+    def received(self, connections: Collection[Connection]) -> Iterator[Received]:
+        """Yield the messages of some connections with the time of their reception, in the order of the bag.
+
+        Messages that are too long or cannot be decoded are left out, and counted in the notes.
 
         Raises
         ------
         MalformedFileError
-            When a message is broken.
-        TooLargeError
-            When one is too long.
+            Where the file cannot be read any further.
         """
-        if not connections:
-            return
-        read = self._types.deserialize_ros1 if self.format == "rosbag1" else self._types.deserialize_cdr
-        with refusing(self.name):
-            for connection, _time, raw in self._reader.messages(connections=connections):
-                if len(raw) > MAX_MESSAGE_BYTES:
-                    raise TooLargeError(f"expected messages of at most {MAX_MESSAGE_BYTES} bytes", argument=self.name)
-                kind = TRANSFORMS if connection.msgtype == OLD_TRANSFORMS else connection.msgtype
-                message = read(raw, kind)
-                yield connection, message
+        for file in self._files:
+            wanted = [one for one in connections if any(one is held for held in file.connections)]
+            if not wanted:
+                continue
+            with refusing(file.name, _mended_by(file.name)):
+                for raw in file.messages(wanted):
+                    message = self._decoded(raw)
+                    if message is not None:
+                        yield Received(raw.connection, raw.received, message)
 
+    def _decoded(self, raw: RawMessage) -> Any:
+        """Return a message; None for one that is left out."""
+        topic = shown(raw.connection.topic)
+        if len(raw.data) > MAX_MESSAGE_BYTES:
+            self._notes.add_dropped("long_message", f"messages of {topic} above {MAX_MESSAGE_BYTES} bytes", 1)
+            return None
+        kind = TRANSFORMS if raw.connection.msgtype == OLD_TRANSFORMS else raw.connection.msgtype
+        try:
+            data = _unpacked(raw.data)
+            if raw.connection.encoding == ROS1:
+                return _definitions(first=True).deserialize_ros1(data, kind)
+            return _definitions(first=False).deserialize_cdr(data, kind)
+        except BROKEN:
+            self._notes.add_dropped(f"broken_{kind.rpartition('/')[2].lower()}", f"broken messages of {topic}", 1)
+            return None
 
-def is_bag(path: Path) -> bool:
-    """Tell whether a path is a bag: by its ending, or as the folder of one."""
-    return path.suffix.lower() in SUFFIXES or (path / METADATA).is_file()
+    def topics(self) -> str:
+        """Return the topics with their types and counts, for errors that name what there is."""
+        counts: dict[tuple[str, str, str], int] = {}
+        for one in self.connections():
+            key = one.topic, one.msgtype, one.encoding
+            counts[key] = counts.get(key, 0) + one.msgcount
+        told = [
+            f"{shown(topic)} ({shown(kind) or 'no type'}{'' if code in (CDR, ROS1) else f' as {shown(code)}'}, {count})"
+            for (topic, kind, code), count in sorted(counts.items())
+        ]
+        more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+        return f"its topics, with type and count: {', '.join(told[:NAMED])}{more}" if told else "it has no topics"
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Bag]:
-    """Open a bag.
+def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
+    """Open a recording.
 
     Parameters
     ----------
     path : Path
         A ``.bag``, ``.mcap`` or ``.db3``, or the folder of a bag of ROS 2.
+    notes : Notes, optional
+        Takes what of it cannot be read.
 
     Raises
     ------
     FormatError
         When it cannot be read.
     """
-    name = name_of(path)
-    if not path.exists():
-        raise IncompleteFileError("there is no such file", argument=name)
-    first = path.suffix.lower() == ".bag"
-    if (path / METADATA).is_file():
-        _refuse_packed(path / METADATA, name)
-    with refusing(name, _mended_by(path)):
-        reader: Any = Reader1(path) if first else Reader2(path)
-        reader.open()
-    try:
-        form = "rosbag1" if first else "mcap" if path.suffix.lower() == ".mcap" else "rosbag2"
-        yield Bag(name, form, reader, _definitions(first))
-    finally:
-        reader.close()
+    notes = Notes() if notes is None else notes
+    paths, name = recorded_files(path, notes), name_of(path)
+    with ExitStack() as stack:
+        files: list[RecordedFile] = []
+        for one in paths:
+            try:
+                with refusing(name if len(paths) == 1 else one.name, _mended_by(one.name)):
+                    files.append(McapFile(one) if one.suffix.lower() == ".mcap" else RosbagFile(one))
+            except FormatError as error:
+                if one is paths[-1] and not files:  # nothing else is left
+                    raise
+                notes.add_dropped("broken_files", f"files that cannot be read, such as {error}", 1)
+                continue
+            stack.callback(files[-1].close)
+        bag = Bag(name, _format_of(path), tuple(sorted(files, key=lambda file: file.start)), notes)
+        _note_left_out(bag, notes)
+        yield bag
+        for code, said, count in (remark for file in files for remark in file.remarks):
+            notes.add_dropped(code, said, count)
 
 
-def _definitions(first: bool) -> Any:
+def _format_of(path: Path) -> str:
+    alone = {".bag": "rosbag1", ".mcap": "mcap"}
+    return "rosbag2" if path.is_dir() else alone.get(path.suffix.lower(), "rosbag2")
+
+
+def _note_left_out(bag: Bag, notes: Notes) -> None:
+    """Note the channels whose messages are not those of ROS."""
+    others = [one for one in bag.connections() if one.encoding not in (CDR, ROS1) or not one.msgtype]
+    if others:
+        some = ", ".join(f"{shown(one.topic)} ({shown(one.encoding) or 'no encoding'})" for one in others[:3])
+        notes.add_dropped("other_channels", f"channels without messages of ROS, such as {some}", len(others))
+
+
+def _unpacked(data: bytes) -> bytes:
+    """Return a message that rosbag2 may have compressed."""
+    if not data.startswith(ZSTD):
+        return data
+    if zstandard.frame_content_size(data) > MAX_MESSAGE_BYTES:
+        raise ValueError("a message that is too long")
+    return zstandard.ZstdDecompressor().decompress(data, max_output_size=MAX_MESSAGE_BYTES)
+
+
+@cache
+def _definitions(*, first: bool) -> Any:
     """Return ROS's own definitions of messages."""
     if not first:
         return get_typestore(Stores.ROS2_HUMBLE)
@@ -134,11 +203,12 @@ def _definitions(first: bool) -> Any:
     return types
 
 
-def _mended_by(path: Path) -> str:
-    """Return how a bag is mended that ends early, as of a robot whose power went; empty where no tool is known."""
-    if path.suffix.lower() == ".bag":
+def _mended_by(name: str) -> str:
+    """Return how a file is mended that ends early, as of a robot whose power went; empty where no tool is known."""
+    suffix = Path(name).suffix.lower()
+    if suffix == ".bag":
         return "; where it was cut off, `rosbag reindex` mends it"
-    if path.suffix.lower() == ".mcap" or any(path.glob("*.mcap")):
+    if suffix == ".mcap":
         return "; where it was cut off, `mcap recover` mends it"
     return ""
 
@@ -153,15 +223,3 @@ def refusing(name: str, mended_by: str = "") -> Iterator[None]:
     except BROKEN as error:
         lines = str(error).splitlines() or [type(error).__name__]
         raise MalformedFileError(f"is a broken bag: {shown(lines[0])}{mended_by}", argument=name) from error
-
-
-def _refuse_packed(metadata: Path, name: str) -> None:
-    """Refuse a bag whose files are compressed whole: it would be unpacked to disk without a bound."""
-    text = text_of(read_bounded(metadata, MAX_METADATA_BYTES), name)
-    try:
-        told = YAML(typ="safe", pure=True).load(text)
-        mode = str(told["rosbag2_bagfile_information"].get("compression_mode", ""))
-    except (YAMLError, RecursionError, TypeError, LookupError, AttributeError, ValueError) as error:
-        raise MalformedFileError(f"has a broken {METADATA}", argument=name) from error
-    if mode.lower() == "file":
-        raise UnsupportedFormatError("is compressed file by file; unpack it first", argument=name)

@@ -1,4 +1,4 @@
-"""Scans and grids of ROS bags."""
+"""Scans of ROS bags."""
 
 from __future__ import annotations
 
@@ -7,19 +7,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from rosbags.interfaces import Connection
-
-from registration import InputError, RigidTransform
+from registration import InputError
 from vectorization import LaserScan
 
-from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
 from ..files import name_of
-from ..grids.cells import Grid
-from ..limits import MAX_CELLS, MAX_RESOLUTION, MIN_RESOLUTION
 from ..report import Notes, shown
-from .bags import GRID, ODOMETRY, OLD_TRANSFORMS, SCAN, TRANSFORMS, Bag, opened
+from .bags import ODOMETRY, OLD_TRANSFORMS, TRANSFORMS, Bag, opened
+from .lasers import laser_of, none_usable
 from .scan import Log, LoggedScan, LogOptions
+from .stamps import Stamps
+from .topics import scan_connections
 from .transforms import Transforms, matrix_of, planar, stamp_of
 
 STATIC = "tf_static"
@@ -37,46 +34,31 @@ def read_bag(path: Path, options: LogOptions) -> Log:
     """
     with opened(path) as bag:
         form = bag.format
-        count = sum(c.msgcount for c in _chosen(bag, SCAN, options.topic, Notes()))
+        count = sum(c.msgcount for c in scan_connections(bag, options.topic, Notes()))
     return Log(form, name_of(path), partial(_scans, path, options), count)
 
 
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
-    with opened(path) as bag:
-        wanted = _chosen(bag, SCAN, options.topic, notes)
+    with opened(path, notes) as bag:
+        wanted = scan_connections(bag, options.topic, notes)
         frames = _transforms(bag, notes)
-        for connection, message in bag.messages(wanted):
+        stamps, first = Stamps(notes), ""
+        for connection, received, message in bag.received(wanted):
             try:
-                scan = _scan(connection.topic, message, frames, options)
+                laser = laser_of(message, notes)
             except InputError as error:
-                notes.add_dropped("broken_scan", f"scans that are none, such as: {error.message}", 1)
+                first = first or error.message
+                notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
                 continue
+            scan = _scan(
+                connection.topic, message, laser, stamps.of(stamp_of(message.header), received), frames, options
+            )
             if scan.pose is None:
                 notes.add_dropped("no_pose", "scans whose pose the log does not say (they are kept)", 1)
             notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
             yield scan
-
-
-def _chosen(bag: Bag, kind: str, topic: str | None, notes: Notes) -> list[Connection]:
-    """Return the connections of one topic.
-
-    Raises
-    ------
-    IncompleteFileError
-        When there is none.
-    """
-    short = kind.rpartition("/")[2]
-    found = bag.connections(kind)
-    counts: dict[str, int] = {}
-    for connection in found:
-        counts[connection.topic] = counts.get(connection.topic, 0) + connection.msgcount
-    if topic is None and len(counts) > 1:
-        topic = max(sorted(counts), key=lambda t: counts[t])
-        others = ", ".join(shown(t) for t in sorted(counts) if t != topic)
-        notes.add_assumed("topic", f"{short} of {shown(topic)}, which has most; not of {shown(others)}")
-    if not counts or (topic is not None and topic not in counts):
-        raise IncompleteFileError(f"has no {short}" + (f" on {shown(topic)}" if topic else ""), argument=bag.name)
-    return [c for c in found if topic is None or c.topic == topic]
+        if "scans" not in notes.read:
+            raise none_usable(bag.name, notes, first)
 
 
 def _transforms(bag: Bag, notes: Notes) -> Transforms:
@@ -99,16 +81,10 @@ def _transforms(bag: Bag, notes: Notes) -> Transforms:
     return frames
 
 
-def _scan(topic: str, message: Any, frames: Transforms, options: LogOptions) -> LoggedScan:
-    ranges = np.asarray(message.ranges, dtype=np.float64)
-    laser = LaserScan(
-        float(message.angle_min),
-        float(message.angle_increment),
-        ranges,
-        float(message.range_min),
-        float(message.range_max),
-    )
-    stamp, frame = stamp_of(message.header), str(message.header.frame_id)
+def _scan(
+    topic: str, message: Any, laser: LaserScan, stamp: int, frames: Transforms, options: LogOptions
+) -> LoggedScan:
+    frame = str(message.header.frame_id)
     above = frames.above(frame)
     outer = (options.pose_frame or (ODOM if ODOM in above else above[-1])).strip("/")
     base = next((b for b in BASES if b in above), None)
@@ -120,53 +96,3 @@ def _scan(topic: str, message: Any, frames: Transforms, options: LogOptions) -> 
         stamp, topic, shown(frame), laser, float(message.time_increment), pose, outer if pose else "", mount,
         flipped or upside_down, base if base and mount else "",
     )  # fmt: skip
-
-
-def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, str, str]:
-    """Read the last grid of a bag.
-
-    Returns
-    -------
-    Grid
-    str
-        The frame that it is in.
-    str
-        The format of the bag.
-
-    Raises
-    ------
-    FormatError
-        When the bag is broken, or has no grid.
-    """
-    with opened(path) as bag:
-        last: Any = None
-        for _connection, message in bag.messages(_chosen(bag, GRID, topic, notes)):
-            last = message
-            notes.add_read("grids", "grids, of which the last is taken", 1)
-        if last is None:
-            raise IncompleteFileError("has no OccupancyGrid", argument=bag.name)
-        return *grid_of(last, bag.name), bag.format
-
-
-def grid_of(message: Any, name: str) -> tuple[Grid, str]:
-    """Return the cells of a message, and the frame that they are in.
-
-    Raises
-    ------
-    FormatError
-        When its fields do not fit each other, or it is too large.
-    """
-    width, height = int(message.info.width), int(message.info.height)
-    resolution = float(np.float32(message.info.resolution))
-    if width * height > MAX_CELLS:
-        raise TooLargeError(f"expected at most {MAX_CELLS} cells", argument=name)
-    if width * height != len(message.data) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
-        raise MalformedFileError("has a grid whose cells do not fit its size or resolution", argument=name)
-    values = np.asarray(message.data, dtype=np.int8).reshape(height, width).astype(np.float32)
-    occupancy = np.where((values >= 0) & (values <= 100), values / np.float32(100), np.float32(np.nan))
-    try:
-        origin, _ = planar(matrix_of(message.info.origin.position, message.info.origin.orientation))
-    except ValueError as error:
-        raise MalformedFileError("has a grid without an origin", argument=name) from error
-    grid = Grid(occupancy, round(resolution, 7), RigidTransform(origin.x, origin.y, origin.theta))
-    return grid, shown(str(message.header.frame_id)) or "map"

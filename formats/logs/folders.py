@@ -1,0 +1,151 @@
+"""The files of a recording: one alone, or those in the folder of a bag of ROS 2, whose description may be missing."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path, PureWindowsPath
+
+from ..errors import FormatError, IncompleteFileError, MalformedFileError, UnsupportedFormatError
+from ..files import name_of, read_bounded, text_of
+from ..limits import MAX_METADATA_BYTES, MAX_RECORDED_FILES
+from ..report import Notes, shown
+from ..yaml import yaml_of
+
+FOLDER_SUFFIXES = (".mcap", ".db3")  # of files in the folder of a bag of ROS 2
+SUFFIXES = (".bag", *FOLDER_SUFFIXES)
+METADATA = "metadata.yaml"
+PACKED = ".zstd"  # what rosbag2 appends where it compresses whole files
+_NUMBER = re.compile(r"_\d+$")  # of a file among those that one recording was split into
+
+
+def is_bag(path: Path) -> bool:
+    """Tell whether a path is a recording: by its ending, or as a folder with such files."""
+    if path.is_dir():
+        return (path / METADATA).is_file() or bool(_recorded(path) or _packed(path) or _active(path))
+    return path.suffix.lower() in SUFFIXES or _hint(path) is not None
+
+
+def recorded_files(path: Path, notes: Notes) -> list[Path]:
+    """Return the files of a recording.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.bag``, ``.mcap`` or ``.db3``, or the folder of a bag of ROS 2.
+    notes : Notes
+        Takes what is missing.
+
+    Raises
+    ------
+    FormatError
+        When there is none that can be read.
+    """
+    name = name_of(path)
+    if not path.exists():
+        raise IncompleteFileError("there is no such file", argument=name)
+    if not path.is_dir():
+        hint = _hint(path)
+        if hint is not None:
+            raise UnsupportedFormatError(hint, argument=name)
+        return [path]
+    listed = _listed(path, notes) if (path / METADATA).is_file() else None
+    if listed is None:
+        return _unlisted(path, notes)
+    found = [file for file in map(_unpacked, listed) if file.is_file()]
+    missing = [file.name for file in listed if _unpacked(file) not in found]
+    if not found:
+        _refuse_packed(path)
+        raise MalformedFileError(f"is missing the files that {METADATA} lists: {_named(missing)}", argument=name)
+    if missing:
+        notes.add_dropped(
+            "missing_files", f"files that {METADATA} lists and that are missing: {_named(missing)}", len(missing)
+        )
+    return found
+
+
+def _listed(folder: Path, notes: Notes) -> list[Path] | None:
+    """Return the files that the description of a bag lists; None where it cannot be used."""
+    try:
+        told = yaml_of(text_of(read_bounded(folder / METADATA, MAX_METADATA_BYTES), METADATA), METADATA)
+        listed = told["rosbag2_bagfile_information"]["relative_file_paths"]  # type: ignore[index]
+        if not (isinstance(listed, list) and listed and all(isinstance(one, str) for one in listed)):
+            raise TypeError
+    except (FormatError, TypeError, LookupError):
+        notes.add_assumed("broken_metadata", f"{METADATA} is broken: the files in the folder are read without it")
+        return None
+    # Names only: what lies elsewhere is not this bag's.
+    return [folder / PureWindowsPath(one).name for one in listed[:MAX_RECORDED_FILES]]
+
+
+def _unlisted(folder: Path, notes: Notes) -> list[Path]:
+    """Return the files in a folder without a description, where they are of one recording."""
+    found = _recorded(folder)
+    if not found:
+        _refuse_packed(folder)
+        raise IncompleteFileError(
+            f"is a folder without a bag: expected {METADATA}, or files that end in {' or '.join(FOLDER_SUFFIXES)}",
+            argument=name_of(folder),
+        )
+    stems = sorted({_NUMBER.sub("", file.stem) for file in found})
+    if len(stems) > 1 or len({file.suffix.lower() for file in found}) > 1:
+        raise IncompleteFileError(
+            f"has no {METADATA}, and files of several recordings: {_named([f.name for f in found])}; name one of them",
+            argument=name_of(folder),
+        )
+    if not (folder / METADATA).is_file():
+        notes.add_assumed(
+            "no_metadata", f"{METADATA} is missing, as where the recorder was killed: files read without it", len(found)
+        )
+    return found[:MAX_RECORDED_FILES]
+
+
+def _recorded(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in FOLDER_SUFFIXES and file.is_file())
+
+
+def _packed(folder: Path) -> list[Path]:
+    return sorted(
+        file
+        for file in folder.iterdir()
+        if file.suffix.lower() in (PACKED, ".zst") and Path(file.stem).suffix.lower() in FOLDER_SUFFIXES
+    )
+
+
+def _active(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.name.lower().endswith((".bag", ".bag.active")))
+
+
+def _unpacked(file: Path) -> Path:
+    """Return the file that a compressed one becomes when it is unpacked next to it."""
+    return file.with_suffix("") if file.suffix.lower() == PACKED else file
+
+
+def _refuse_packed(folder: Path) -> None:
+    packed, active = _packed(folder), _active(folder)
+    if packed:
+        raise UnsupportedFormatError(
+            f"is compressed file by file ({_named([file.name for file in packed])}); unpack it first, by zstd -d",
+            argument=name_of(folder),
+        )
+    if active:
+        raise UnsupportedFormatError(
+            f"is no bag of ROS 2, and has {_named([file.name for file in active])}; name one file",
+            argument=name_of(folder),
+        )
+
+
+def _hint(path: Path) -> str | None:
+    """Return what to do with a file that is a recording once something was done to it."""
+    lower = path.name.lower()
+    if lower.endswith(tuple(f"{kind}{packed}" for kind in SUFFIXES for packed in (PACKED, ".zst"))):
+        return "is compressed as a whole; unpack it first, by zstd -d"
+    if lower.endswith(tuple(f"{kind}.gz" for kind in SUFFIXES)):
+        return "is compressed as a whole; unpack it first, by gunzip"
+    if lower.endswith(".bag.active"):
+        return "was not closed by the recorder; rosbag reindex makes a .bag of it"
+    return None
+
+
+def _named(names: list[str], most: int = 5) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(shown(name) for name in names[:most]) + more

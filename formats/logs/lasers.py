@@ -1,0 +1,103 @@
+"""A LaserScan message to a scan: fields that contradict each other or say nothing.
+
+REP 117 and the message's own comments say what the fields mean; drivers leave some of them out, or at 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from registration.limits import MAX_LENGTH
+from vectorization import InvalidScanError, LaserScan
+
+from ..errors import MalformedFileError
+from ..report import Notes
+from .tuning import BEAMS_OFF
+
+Message = Any  # sensor_msgs/LaserScan, whatever library it comes from
+
+
+def laser_of(message: Message, notes: Notes) -> LaserScan:
+    """Return the scan of a message.
+
+    A `range_max` that is no distance above `range_min` says nothing of how far the laser sees: infinite ranges are then
+    taken as unknown, not as free space.
+
+    Parameters
+    ----------
+    message : object
+        With the fields of ``sensor_msgs/LaserScan``.
+    notes : Notes
+        Takes the fields that were not believed.
+
+    Raises
+    ------
+    InvalidScanError
+        When there are no ranges, or the angles contradict each other.
+    """
+    ranges = np.asarray(message.ranges, dtype=np.float64)
+    if not len(ranges):
+        raise InvalidScanError("expected at least one range, found none", argument="ranges")
+    first, last, step = (float(getattr(message, f"angle_{name}")) for name in ("min", "max", "increment"))
+    _check_angles(first, last, step, len(ranges))
+    low, high = _limits(float(message.range_min), float(message.range_max), notes)
+    if high == math.inf:
+        ranges = np.where(np.isinf(ranges), math.nan, ranges)
+    scan = LaserScan(first, step, ranges, low, high)
+    if not np.isfinite(scan.cleaned).any() and np.isfinite(ranges).any():
+        told = f"range_min {low:g} m and range_max {high:g} m"
+        notes.add_assumed("no_range_within", f"scans with no range between {told}, such as the last", 1)
+    return scan
+
+
+def _check_angles(first: float, last: float, step: float, count: int) -> None:
+    """Raise where the angles of a message contradict each other; drivers are often off by one beam."""
+    span = (count - 1) * step
+    if step != 0.0 and abs(last - first - span) <= BEAMS_OFF * abs(step):
+        return
+    raise InvalidScanError(
+        f"angle_min {first:g} rad, angle_max {last:g} rad and angle_increment {step:g} rad contradict each other over "
+        f"{count} ranges: expected angle_max near angle_min + {count - 1} angle_increment = {first + span:g} rad; "
+        "correct the driver",
+        argument="angle_max",
+    )
+
+
+def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:
+    """Return the limits of the ranges that are believed, metres; 0 and infinity where a field says nothing."""
+    if not 0.0 <= low < MAX_LENGTH:
+        notes.add_assumed("range_min", f"range_min is {low:g} m, which is no distance: taken as 0 m; scans", 1)
+        low = 0.0
+    if low < high <= MAX_LENGTH:
+        return low, high
+    if 0.0 < high <= low:  # which of the two is wrong is not known
+        told = f"range_max is {high:g} m and range_min {low:g} m: neither is believed"
+        low = 0.0
+    else:
+        told = f"range_max is {high:g} m, which does not say how far the laser sees"
+    notes.add_assumed("range_max", f"{told}; infinite ranges are taken as unknown, not as free space; scans", 1)
+    return low, math.inf
+
+
+def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
+    """Return the error of a log of whose scans none can be used.
+
+    Parameters
+    ----------
+    name : str
+        Of the log.
+    notes : Notes
+        With what was left out.
+    reason : str
+        Why the first scan cannot be used; empty where none could be decoded.
+    """
+    count = sum(
+        note.count
+        for note in notes.dropped.values()
+        if note.code in ("broken_scan", "broken_laserscan", "long_message")
+    )
+    why = f"; the first of them: {reason}" if reason else ", for none can be decoded"
+    return MalformedFileError(f"none of its {count} scans can be used{why}", argument=name)

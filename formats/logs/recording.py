@@ -1,0 +1,76 @@
+"""What the files of a recording have in common, whatever their format: connections and raw messages."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+CDR, ROS1 = "cdr", "ros1"  # the encodings that are read here
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A topic in one file of a recording.
+
+    Attributes
+    ----------
+    topic : str
+    msgtype : str
+        As ROS 2 writes it, such as ``sensor_msgs/msg/LaserScan``; empty where the file does not name it.
+    encoding : str
+        ``cdr`` of ROS 2 or ``ros1``; others, such as ``json``, are not read.
+    msgcount : int
+        Number of messages.
+    key : object
+        What the file calls it.
+    file : str
+        Name of the file.
+    """
+
+    topic: str
+    msgtype: str
+    encoding: str
+    msgcount: int
+    key: Any
+    file: str
+
+
+class RawMessage(NamedTuple):
+    """A message before it is decoded."""
+
+    connection: Connection
+    received: int  # ns since the epoch, by the clock of the recorder
+    data: bytes
+
+
+class RecordedFile(Protocol):
+    """One file of a recording, open."""
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+
+    @property
+    def connections(self) -> list[Connection]:
+        """All topics of the file."""
+
+    @property
+    def start(self) -> int:
+        """Time of the first message, nanoseconds; 0 where there is none."""
+
+    @property
+    def remarks(self) -> list[tuple[str, str, int]]:
+        """Code, sentence and count of what cannot be read of the file, complete after all messages were read."""
+
+    def messages(self, connections: Collection[Connection]) -> Iterator[RawMessage]:
+        """Yield the messages of some connections of this file, in the order in which they were received."""
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+def ros_type(name: str) -> str:
+    """Return the name of a message type as ROS 2 writes it: ROS 1 leaves ``msg`` out."""
+    package, slash, kind = name.partition("/")
+    return f"{package}/msg/{kind}" if slash and "/" not in kind else name

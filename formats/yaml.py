@@ -1,0 +1,54 @@
+"""YAML of others, read within a bound."""
+
+from __future__ import annotations
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from .errors import MalformedFileError, TooLargeError
+from .limits import MAX_YAML_VALUES
+
+
+def yaml_of(text: str, name: str) -> object:
+    """Return what a text in YAML holds.
+
+    Aliases and merge keys let a few lines stand for any number of values; these are counted before any is built.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        Of the file, for errors.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is no YAML.
+    TooLargeError
+        When it stands for too many values.
+    """
+    try:
+        root = YAML(typ="safe", pure=True).compose(text)
+        if root is not None and _values(root, {}) > MAX_YAML_VALUES:
+            raise TooLargeError(f"expected at most {MAX_YAML_VALUES} values, aliases counted each time", argument=name)
+        return YAML(typ="safe", pure=True).load(text)
+    except (YAMLError, RecursionError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
+        if isinstance(error, TooLargeError):
+            raise
+        raise MalformedFileError("is no YAML", argument=name) from error
+
+
+def _values(node: Node, known: dict[int, int]) -> int:
+    """Return the number of values that a node stands for; one that holds itself is refused as a recursion."""
+    if isinstance(node, ScalarNode):
+        return 1
+    if id(node) not in known:
+        known[id(node)] = MAX_YAML_VALUES + 1  # while it is counted: what holds itself has no end
+        held: list[Node] = []
+        if isinstance(node, SequenceNode):
+            held = list(node.value)
+        elif isinstance(node, MappingNode):
+            held = [one for pair in node.value for one in pair]
+        known[id(node)] = 1 + sum(_values(one, known) for one in held)
+    return known[id(node)]
