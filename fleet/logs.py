@@ -108,7 +108,7 @@ def _filled(rows: Iterator[dict[str, Any]], count: int) -> Iterator[list[dict[st
 
 def _scans(log: str) -> Iterator[dict[str, Any]]:
     """Yield the scans of a log of another tool; at the end a row for each that is none, and for what ends it."""
-    from formats import read_log
+    from formats import UNUSABLE, read_log
 
     try:
         opened = read_log(log)
@@ -124,7 +124,7 @@ def _scans(log: str) -> Iterator[dict[str, Any]]:
                 "range_max": laser.range_max,
             }
         for note in opened.report.dropped:
-            if note.code == "broken_scan":
+            if note.code in UNUSABLE:
                 yield from ({"error": note.message} for _ in range(note.count))
     except InputError as error:
         yield {"error": f"the log could not be read any further: {error}"}

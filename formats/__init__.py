@@ -9,7 +9,7 @@ from .errors import (
     UnsupportedFormatError,
 )
 from .line_map import ImportedMap, LineMap
-from .logs.scan import Log, LoggedScan, LogOptions
+from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions
 from .maps import MAP_SUFFIXES, map_of_grid, read_map
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map
@@ -20,6 +20,7 @@ from .writing import write_map
 
 __all__ = [
     "MAP_SUFFIXES",
+    "UNUSABLE",
     "FormatError",
     "ImportOptions",
     "ImportReport",

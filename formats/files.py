@@ -7,6 +7,9 @@ from pathlib import Path
 from .errors import IncompleteFileError, MalformedFileError, TooLargeError
 from .report import shown
 
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
+WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
+
 
 def name_of(path: Path) -> str:
     """Return what errors and reports call a file."""
@@ -51,6 +54,8 @@ def text_of(content: bytes, name: str) -> str:
     MalformedFileError
         When it is something else.
     """
+    if content.startswith(WIDE):
+        raise MalformedFileError("is text in UTF-16; save it as UTF-8", argument=name)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

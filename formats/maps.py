@@ -13,7 +13,7 @@ from .drawings.geojson import read_geojson
 from .drawings.svg import read_svg
 from .drawings.tables import read_csv, read_json
 from .drawings.walls import to_map
-from .errors import UnsupportedFormatError
+from .errors import MalformedFileError, UnsupportedFormatError
 from .files import name_of
 from .grids.cells import Grid
 from .grids.faces import find_faces
@@ -80,9 +80,18 @@ def _read_map_server(file: Path) -> ImportedMap:
 
 
 def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
-    notes = Notes()
-    grid, frame, form = read_bag_grid(file, options.topic, notes)
-    return ImportedMap(_from_grid(grid, notes, name_of(file), frame), notes.report(form, (name_of(file),)))
+    notes, name = Notes(), name_of(file)
+    found = read_bag_grid(file, options.topic, notes)
+    try:
+        line_map = _from_grid(found.grid, notes, name, found.frame)
+    except MalformedFileError as error:
+        if not found.costmap:
+            raise
+        raise MalformedFileError(
+            f"{error.message}; {found.topic} is a costmap, in which obstacles are inflated: name the topic of the map",
+            argument=name,
+        ) from error
+    return ImportedMap(line_map, notes.report(found.format, (name,)))
 
 
 def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:

@@ -16,5 +16,5 @@ Each room imports only from those below it; import-linter holds them to that (`p
     parsing/               from the bytes of a body to a checked request, large ones in another process
     schemas/, telemetry/   models of requests and answers, their limits; counts and the log
     page/                  the files of the page at /, built
-    database_url, memory, part, threads, version
+    database_url, memory, part, printable, threads, version
 """

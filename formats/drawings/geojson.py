@@ -9,7 +9,7 @@ from typing import Any
 import orjson
 
 from ..errors import IncompleteFileError, MalformedFileError
-from ..files import name_of, read_bounded
+from ..files import name_of, read_bounded, text_of
 from ..limits import MAX_MAP_BYTES
 from ..options import ImportOptions
 from ..report import Notes
@@ -56,7 +56,7 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 
 
 def load_json(content: bytes, name: str) -> Any:
-    """Parse JSON.
+    """Parse JSON, with or without a byte-order mark.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def load_json(content: bytes, name: str) -> Any:
         When it is none; orjson goes 1,024 levels deep at most.
     """
     try:
-        return orjson.loads(content)
+        return orjson.loads(text_of(content, name))
     except orjson.JSONDecodeError as error:
         raise MalformedFileError("is no JSON", argument=name) from error
 

@@ -106,17 +106,18 @@ class Bag:
     def _decoded(self, raw: RawMessage) -> Any:
         """Return a message; None for one that is left out."""
         topic = shown(raw.connection.topic)
-        if len(raw.data) > MAX_MESSAGE_BYTES:
-            self._notes.add_dropped("long_message", f"messages of {topic} above {MAX_MESSAGE_BYTES} bytes", 1)
-            return None
         kind = TRANSFORMS if raw.connection.msgtype == OLD_TRANSFORMS else raw.connection.msgtype
+        short = kind.rpartition("/")[2].lower()
+        if len(raw.data) > MAX_MESSAGE_BYTES:
+            self._notes.add_dropped(f"long_{short}", f"messages of {topic} above {MAX_MESSAGE_BYTES} bytes", 1)
+            return None
         try:
             data = _unpacked(raw.data)
             if raw.connection.encoding == ROS1:
                 return _definitions(first=True).deserialize_ros1(data, kind)
             return _definitions(first=False).deserialize_cdr(data, kind)
         except BROKEN:
-            self._notes.add_dropped(f"broken_{kind.rpartition('/')[2].lower()}", f"broken messages of {topic}", 1)
+            self._notes.add_dropped(f"broken_{short}", f"broken messages of {topic}", 1)
             return None
 
     def topics(self) -> str:

@@ -11,11 +11,12 @@ from pathlib import Path
 from registration import InputError, RigidTransform
 from vectorization import LaserScan
 
-from ..errors import IncompleteFileError, TooLargeError
-from ..files import name_of
+from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
+from ..files import BYTE_ORDER_MARK, WIDE, name_of
 from ..limits import MAX_LINE_BYTES
 from ..report import Notes
-from .scan import Log, LoggedScan, LogOptions
+from .scan import Log, LoggedScan, LogOptions, none_usable
+from .stamps import Stamps
 
 KINDS = ("FLASER", "RLASER", "ROBOTLASER1", "ROBOTLASER2", "RAWLASER1", "RAWLASER2")
 MESSAGES = {"ODOM", "TRUEPOS", "PARAM", "SYNC", "NMEAGGA", "NMEARMC", *KINDS}
@@ -46,7 +47,7 @@ def read_carmen(path: Path, options: LogOptions) -> Log:
 
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
     name = name_of(path)
-    wanted = options.topic
+    wanted, stamps, first = options.topic, Stamps(notes), ""
     for number, words in _messages(path, notes):
         kind = words[0]
         if kind not in KINDS or (wanted is not None and kind != wanted):
@@ -59,13 +60,18 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
         try:
             scan = READERS[kind](words, kind)
         except InputError as error:
-            notes.add_dropped("broken_scan", f"scans that are none, such as: {error.message}", 1)
+            first = first or error.message
+            notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
             continue
         except (ValueError, LookupError, OverflowError):
+            first = first or f"line {number} is broken"
             notes.add_dropped("broken_line", f"broken lines, the last of them {number}", 1)
             continue
+        stamps.of(scan.stamp_ns)
         notes.add_read("scans", f"{kind} scans", 1)
         yield scan
+    if "scans" not in notes.read and first:
+        raise none_usable(name, notes, first)
     if "scans" not in notes.read:
         raise IncompleteFileError(f"has no {wanted or 'scan'} of CARMEN", argument=name)
 
@@ -77,7 +83,9 @@ def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:
             number += 1
             if len(line) > MAX_LINE_BYTES:
                 raise TooLargeError(f"line {number}: expected at most {MAX_LINE_BYTES} bytes", argument=name_of(path))
-            words = line.decode("ascii", "replace").split()
+            if number == 1 and line.startswith(WIDE):
+                raise MalformedFileError("is text in UTF-16; save it as UTF-8", argument=name_of(path))
+            words = line.removeprefix(BYTE_ORDER_MARK if number == 1 else b"").decode("ascii", "replace").split()
             if not words or words[0].startswith("#"):
                 continue
             if words[0] in MESSAGES:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +25,30 @@ LETHAL, INSCRIBED = 100, 99  # costs of an obstacle, and of what is nearer to on
 ZERO = 1e-6  # a quaternion shorter than this was never set
 
 
-def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, str, str]:
-    """Read the last grid of the topic that is the map.
+@dataclass(frozen=True, slots=True)
+class BagGrid:
+    """A grid, and where it comes from.
 
-    Returns
-    -------
-    Grid
-    str
+    Attributes
+    ----------
+    grid : Grid
+    frame : str
         The frame that it is in.
-    str
-        The format of the bag.
+    format : str
+        Of the bag.
+    topic : str
+    costmap : bool
+    """
+
+    grid: Grid
+    frame: str
+    format: str
+    topic: str
+    costmap: bool
+
+
+def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
+    """Read the last grid of the topic that is the map.
 
     Raises
     ------
@@ -53,11 +68,12 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, st
             raise MalformedFileError(f"has no grid with cells on {_listed(wanted)}", argument=bag.name)
         chosen = next(iter(grids)) if len(wanted) == 1 else _map_among(grids, bag.name, notes)
         notes.add_read("grids", f"grids of {shown(chosen)}, of which the last is taken", counts[chosen])
-        if is_costmap(chosen, grids[chosen]):
-            notes.add_assumed(
-                "costmap", f"{shown(chosen)} is a costmap: obstacles are inflated, walls may lie beside their place"
-            )
-        return *grid_of(grids[chosen], bag.name, notes), bag.format
+        costmap = is_costmap(chosen, grids[chosen])
+        if costmap:
+            said = f"{shown(chosen)} is a costmap: obstacles are inflated, walls may lie in front of their place"
+            notes.add_assumed("costmap", said)
+        grid, frame = grid_of(grids[chosen], bag.name, notes)
+        return BagGrid(grid, frame, bag.format, shown(chosen), costmap)
 
 
 def _last_grids(bag: Bag, topics: Collection[str]) -> dict[str, Any]:

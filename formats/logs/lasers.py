@@ -13,7 +13,6 @@ import numpy as np
 from registration.limits import MAX_LENGTH
 from vectorization import InvalidScanError, LaserScan
 
-from ..errors import MalformedFileError
 from ..report import Notes
 from .tuning import BEAMS_OFF
 
@@ -56,8 +55,15 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
 def _check_angles(first: float, last: float, step: float, count: int) -> None:
     """Raise where the angles of a message contradict each other; drivers are often off by one beam."""
     span = (count - 1) * step
-    if step != 0.0 and abs(last - first - span) <= BEAMS_OFF * abs(step):
+    agree = step != 0.0 and abs(last - first - span) <= BEAMS_OFF * abs(step)
+    if agree and abs(span) <= math.tau + abs(step):
         return
+    if agree:
+        raise InvalidScanError(
+            f"angle_min {first:g} rad, angle_max {last:g} rad and angle_increment {step:g} rad over {count} ranges are "
+            "more than a turn: expected radians, not degrees; correct the driver",
+            argument="angle_increment",
+        )
     raise InvalidScanError(
         f"angle_min {first:g} rad, angle_max {last:g} rad and angle_increment {step:g} rad contradict each other over "
         f"{count} ranges: expected angle_max near angle_min + {count - 1} angle_increment = {first + span:g} rad; "
@@ -80,24 +86,3 @@ def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:
         told = f"range_max is {high:g} m, which does not say how far the laser sees"
     notes.add_assumed("range_max", f"{told}; infinite ranges are taken as unknown, not as free space; scans", 1)
     return low, math.inf
-
-
-def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
-    """Return the error of a log of whose scans none can be used.
-
-    Parameters
-    ----------
-    name : str
-        Of the log.
-    notes : Notes
-        With what was left out.
-    reason : str
-        Why the first scan cannot be used; empty where none could be decoded.
-    """
-    count = sum(
-        note.count
-        for note in notes.dropped.values()
-        if note.code in ("broken_scan", "broken_laserscan", "long_message")
-    )
-    why = f"; the first of them: {reason}" if reason else ", for none can be decoded"
-    return MalformedFileError(f"none of its {count} scans can be used{why}", argument=name)

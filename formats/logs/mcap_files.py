@@ -19,7 +19,7 @@ from mcap.records import Channel, Chunk, ChunkIndex, Footer, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 
-from ..errors import MalformedFileError
+from ..errors import MalformedFileError, UnsupportedFormatError
 from ..files import name_of
 from ..limits import MAX_CHUNK_BYTES
 from .recording import Connection, RawMessage, ros_type
@@ -30,6 +30,7 @@ BROKEN = (
     MemoryError, zstandard.ZstdError,
 )  # fmt: skip
 
+ZSTD = b"\x28\xb5\x2f\xfd"
 MAGIC = b"\x89MCAP0\r\n"
 
 
@@ -88,9 +89,8 @@ class McapFile:
         try:
             self._begin()
             summary = self._summary()
-            indexed = summary is not None and self._indexed(summary)
-            self._chunks = summary.chunk_indexes if indexed and summary is not None else []
-            self.connections = self._from_summary(summary) if indexed and summary is not None else self._scanned()
+            self._chunks: list[ChunkIndex] = []
+            self.connections = self._scanned() if summary is None else self._from_summary(summary)
             self._refuse_empty()
         except BaseException:
             self.close()
@@ -125,6 +125,8 @@ class McapFile:
             magic = self._file.read(len(MAGIC))
         except EndOfFile:
             magic = b""
+        if magic.startswith(ZSTD):
+            raise UnsupportedFormatError("is compressed as a whole; unpack it first, by zstd -d", argument=self.name)
         if magic != MAGIC:
             raise MalformedFileError("is no mcap: its first bytes are not those of the format", argument=self.name)
 
@@ -138,23 +140,25 @@ class McapFile:
             )
 
     def _summary(self) -> Summary | None:
+        """Return the summary; None where it does not name all that has to be known of the messages."""
+        self._file.seek(0)
         try:
-            return SeekingReader(self._file, record_size_limit=self._limit).get_summary()  # type: ignore[arg-type]
+            found = SeekingReader(self._file, record_size_limit=self._limit).get_summary()  # type: ignore[arg-type]
         except BROKEN:
             return None
-
-    def _indexed(self, summary: Summary) -> bool:
-        """Tell whether a summary names all that has to be known of the messages."""
-        told = summary.statistics
+        if found is None or found.statistics is None:
+            return None
+        counts, schemas = found.statistics.channel_message_counts, {one.schema_id for one in found.channels.values()}
+        complete = found.statistics.message_count == sum(counts.values())
         return (
-            told is not None
-            and told.message_count == sum(told.channel_message_counts.values())
-            and all(key in summary.channels for key in told.channel_message_counts)
-            and all(one.schema_id in summary.schemas for one in summary.channels.values() if one.schema_id)
+            found
+            if complete and counts.keys() <= found.channels.keys() and schemas - {0} <= found.schemas.keys()
+            else None
         )
 
     def _from_summary(self, summary: Summary) -> list[Connection]:
-        assert summary.statistics is not None  # as `_indexed` says
+        assert summary.statistics is not None  # as `_summary` says
+        self._chunks = summary.chunk_indexes
         self.start = summary.statistics.message_start_time
         counts = summary.statistics.channel_message_counts
         return self._named(list(summary.channels.values()), summary.schemas, counts)

@@ -13,8 +13,8 @@ from vectorization import LaserScan
 from ..files import name_of
 from ..report import Notes, shown
 from .bags import ODOMETRY, OLD_TRANSFORMS, TRANSFORMS, Bag, opened
-from .lasers import laser_of, none_usable
-from .scan import Log, LoggedScan, LogOptions
+from .lasers import laser_of
+from .scan import Log, LoggedScan, LogOptions, none_usable
 from .stamps import Stamps
 from .topics import scan_connections
 from .transforms import Transforms, matrix_of, planar, stamp_of

@@ -8,7 +8,11 @@ from dataclasses import dataclass, field
 from registration import RigidTransform
 from vectorization import LaserScan
 
+from ..errors import MalformedFileError
 from ..report import ImportReport, Notes
+
+UNUSABLE = ("broken_scan", "broken_line", "broken_laserscan", "long_laserscan")
+"""Codes of the notes that count scans which cannot be used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,3 +99,20 @@ class Log:
     def report(self) -> ImportReport:
         """What the last iteration read so far."""
         return self._notes.report(self.format, (self.name,))
+
+
+def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
+    """Return the error of a log of whose scans none can be used.
+
+    Parameters
+    ----------
+    name : str
+        Of the log.
+    notes : Notes
+        With what was left out.
+    reason : str
+        Why the first scan cannot be used; empty where none could be decoded.
+    """
+    count = sum(notes.dropped[code].count for code in UNUSABLE if code in notes.dropped)
+    why = f"; the first of them: {reason}" if reason else ", for none can be decoded"
+    return MalformedFileError(f"none of its {count} scans can be used{why}", argument=name)

@@ -64,6 +64,15 @@ def batch(
         print_json(asdict(summary))
     else:
         print_rows(_rows(summary, time.monotonic() - begun))
+    if summary.scans and summary.errors == summary.scans:
+        raise RefusedError(f"none of the {summary.scans:,} scans could be searched; the first: {_first_error(out)}")
+
+
+def _first_error(out: Path) -> str:
+    """Return what is wrong with the first scan of a file of poses."""
+    import pyarrow.parquet as pq
+
+    return next((str(told) for told in pq.read_table(out, columns=["error"])["error"].to_pylist() if told), "unknown")
 
 
 def _options(block: int, deadline_ms: float, *, undirected: bool) -> FleetOptions:

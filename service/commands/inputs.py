@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from formats import LineMap
 
 STDIN = "-"
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
+WIDE = (b"\xff\xfe", b"\xfe\xff")  # what UTF-16 begins with, as a redirection in PowerShell writes it
 MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's business
 _ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
@@ -37,14 +39,16 @@ def read_json(name: str) -> Any:
     WrongUseError
         When there is no such file, or it cannot be read.
     RefusedError
-        When it is not JSON.
+        When it is not JSON; a byte-order mark in front of it is passed over.
     """
     try:
         data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
     except OSError as error:
         raise WrongUseError(f"{name}: {error.strerror}") from None
+    if data.startswith(WIDE):
+        raise RefusedError(f"{name}: is text in UTF-16; save it as UTF-8")
     try:
-        return parse(data, _ANY)
+        return parse(data.removeprefix(BYTE_ORDER_MARK), _ANY)
     except (NotJsonError, TooManyError) as error:
         raise RefusedError(f"{name}: not JSON: {error}") from None
 

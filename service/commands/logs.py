@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
@@ -14,6 +15,7 @@ from registration import RigidTransform
 
 from .errors import WrongUseError
 from .inputs import needing_formats
+from .printing import noted, plain
 from .service import Json
 
 if TYPE_CHECKING:
@@ -78,6 +80,13 @@ def scans_of(log: Log) -> Iterator[ReplayedScan]:
     with needing_formats(f"reading {log.name}"):
         for one in log:
             yield ReplayedScan(one.stamp_ns, _scan(one), one.pose, one.frame_id, one.mount, one.base_frame)
+
+
+def print_notes(log: Log) -> None:
+    """Print on stderr what was assumed of a log and what was left out; stdout holds the answer alone."""
+    for kind in ("assumed", "dropped"):
+        for note in getattr(log.report, kind):
+            print(f"{kind:10}{plain(noted(asdict(note)))}", file=sys.stderr)
 
 
 def spread(found: Sequence[T], most: int) -> list[T]:

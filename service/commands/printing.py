@@ -12,12 +12,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ..printable import escaped
 from .service import Json
 
 
 def print_json(answer: Any) -> None:
-    """Print one document in one line."""
-    sys.stdout.write(orjson.dumps(answer).decode() + "\n")
+    """Print one document in one line, without what a terminal would obey."""
+    sys.stdout.write(escaped(orjson.dumps(answer).decode()) + "\n")
 
 
 def console() -> Console:

@@ -9,6 +9,7 @@ import http.client
 import re
 import secrets
 import socket
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -24,6 +25,9 @@ from .errors import NOTHING, Asked, NoServerError, WrongUseError, error_of
 from .service import KEY, Json, Progress, Question, id_of
 
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
+MAX_ANSWER_BYTES = 256 * 2**20  # eight times what the largest map may have by default
+MAX_PAGES = 100_000  # of a list of maps
+CHUNK = 2**20  # bytes
 _HEADER = re.compile(r"[!-~]+")
 
 
@@ -87,11 +91,14 @@ class RemoteService:
 
     def maps(self) -> Iterator[Json]:
         """Give what is told of each stored map, page by page."""
-        cursor: str | None = ""
-        while cursor is not None:
-            page = self._json(self._send("GET", f"/v1/maps?cursor={cursor}"))
+        cursor = ""
+        for _ in range(MAX_PAGES):
+            page = self._json(self._send("GET", f"/v1/maps?cursor={urllib.parse.quote(cursor)}"))
             yield from page["maps"]
-            cursor = page["next"]
+            if page["next"] is None:
+                return
+            cursor = str(page["next"])
+        raise NoServerError(f"{self._url} lists more than {MAX_PAGES} pages of maps; check the URL")
 
     def remove(self, map_id: str) -> None:
         """Forget a stored map."""
@@ -124,11 +131,10 @@ class RemoteService:
         request = urllib.request.Request(self._url + path, body, headers, method=method)
         try:
             with self._opener.open(request, timeout=SECONDS) as response:
-                content: bytes = response.read()
-                return content
+                return self._content(response)
         except urllib.error.HTTPError as error:
             with error:
-                raise self._refusal(error.code, error.read(), asked) from None
+                raise self._refusal(error.code, self._content(error), asked) from None
         except (OSError, http.client.HTTPException) as error:
             reason = error.reason if isinstance(error, urllib.error.URLError) else error
             said = reason.strerror if isinstance(reason, OSError) and reason.strerror else reason
@@ -137,6 +143,23 @@ class RemoteService:
             raise NoServerError(
                 f"no server answers at {self._url}: {said}; start one with linefix serve, or leave --server out"
             ) from None
+
+    def _content(self, response: IO[bytes]) -> bytes:
+        """Return what was answered.
+
+        Raises
+        ------
+        NoServerError
+            When there is more of it than a service sends, or it takes longer.
+        """
+        content, until = bytearray(), time.monotonic() + SECONDS
+        while chunk := response.read1(CHUNK):  # type: ignore[attr-defined]
+            content += chunk
+            if len(content) > MAX_ANSWER_BYTES:
+                raise NoServerError(f"{self._url} answers with more than {MAX_ANSWER_BYTES // 2**20} MB; check the URL")
+            if time.monotonic() > until:
+                raise NoServerError(f"{self._url} has not ended its answer after {SECONDS:.0f} s; check the URL")
+        return bytes(content)
 
     def _refusal(self, status: int, content: bytes, asked: Asked) -> Exception:
         problem = self._json(content)

@@ -17,6 +17,8 @@ from typing import Any
 
 import orjson
 
+from ..printable import escaped
+
 STDERR = 2
 WAITING_LINES = 4096  # that are kept for a reader who is late
 LAST_SECONDS = 0.5  # that an ending process waits for the reader
@@ -37,7 +39,7 @@ class JsonFormatter(logging.Formatter):
         line |= {name: value for name, value in vars(record).items() if name not in _USUAL}
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return orjson.dumps(line, default=str).decode()
+        return escaped(orjson.dumps(line, default=str).decode())
 
 
 class PatientHandler(logging.Handler):

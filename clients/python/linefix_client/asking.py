@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import time
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
 
 import httpx
 
-from .problems import problem_of
+from .problems import UnreachableError, problem_of
 
 AGAIN = (429, 503)  # nothing was done, and the service says when to come again
 LONGEST_WAIT = 30.0  # s, for one Retry-After
+MAX_ANSWER_BYTES = 256 * 2**20  # eight times what the largest map may have by default
 FIRST_WAIT = 0.5  # s, doubled with each try, where the service does not say
 
 
@@ -61,26 +64,97 @@ class Settings:
         return {"base_url": self.url.rstrip("/"), "headers": headers, "timeout": self.timeout}
 
 
-def wait_before_next(response: httpx.Response, tries: int, retries: int) -> float | None:
+@dataclass
+class Reading:
+    """Takes an answer piece by piece, within bounds.
+
+    Attributes
+    ----------
+    response : httpx.Response
+        Whose body was not read yet.
+    timeout : float
+        Seconds for all of it.
+    content : bytearray
+        What came so far.
+    """
+
+    response: httpx.Response
+    timeout: float
+    content: bytearray = field(default_factory=bytearray)
+    begun: float = field(default_factory=time.monotonic)
+
+    def take(self, piece: bytes) -> None:
+        """Take one piece.
+
+        Raises
+        ------
+        UnreachableError
+            When there is more of it than a service sends, or it takes longer.
+        """
+        self.content += piece
+        if len(self.content) > MAX_ANSWER_BYTES:
+            raise UnreachableError(f"{self.response.url}: the answer is longer than {MAX_ANSWER_BYTES // 2**20} MB")
+        if time.monotonic() - self.begun > self.timeout:
+            raise UnreachableError(f"{self.response.url}: the answer has not ended after {self.timeout:g} s")
+
+    def done(self) -> Answer:
+        """Return the whole answer."""
+        return Answer(
+            self.response.status_code, self.response.reason_phrase, self.response.headers, bytes(self.content)
+        )
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was answered."""
+
+    status: int
+    phrase: str
+    headers: httpx.Headers
+    content: bytes
+
+    def json(self) -> Any:
+        """Return the body; raises `ValueError` where it is no JSON, or nested too deep."""
+        try:
+            return json.loads(self.content)
+        except RecursionError:
+            raise ValueError("nested too deep") from None
+
+
+def wait_before_next(answer: Answer, tries: int, retries: int) -> float | None:
     """Return how long to wait before the request is sent again, seconds; None where it is not."""
-    if response.status_code not in AGAIN or tries > retries:
+    if answer.status not in AGAIN or tries > retries:
         return None
-    told = response.headers.get("Retry-After", "")
-    wait = float(told) if told.isdigit() else FIRST_WAIT * 2.0 ** (tries - 1)
+    told = answer.headers.get("Retry-After", "")
+    wait = float(told) if told.isascii() and told.isdigit() else FIRST_WAIT * 2.0 ** (tries - 1)
     return min(wait, LONGEST_WAIT)
 
 
-def answer_of(response: httpx.Response) -> Any:
+def answer_of(answer: Answer) -> Any:
     """Return what was answered.
 
     Raises
     ------
     ProblemError
         When the request was refused.
+    UnreachableError
+        When what answers is no Linefix.
     """
-    if response.is_success:
-        return response.json() if response.content else None
-    raise problem_of(response)
+    if not 200 <= answer.status < 300:
+        raise problem_of(answer.status, answer.phrase, _json_of(answer))
+    if not answer.content:
+        return None
+    told = _json_of(answer)
+    if told is None:
+        raise UnreachableError("what answers is no Linefix: its answer is no JSON; check the URL")
+    return told
+
+
+def _json_of(answer: Answer) -> Any:
+    try:
+        return answer.json()
+    except ValueError:
+        return None
 
 
 def map_path(map_id: str) -> str:

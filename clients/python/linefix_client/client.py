@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import time
+from contextlib import aclosing, closing
 from typing import Any, cast
 
 import httpx
 
 from . import schema
-from .asking import Question, Settings, answer_of, if_match, map_path, wait_before_next
+from .asking import Answer, Question, Reading, Settings, answer_of, if_match, map_path, wait_before_next
 from .problems import UnreachableError
 
 
@@ -60,13 +61,21 @@ class Client:
         while True:
             tries += 1
             try:
-                response = self._http.send(question.on(self._http))
-            except httpx.TransportError as error:
+                answer = self._send(question)
+            except (httpx.TransportError, httpx.DecodingError) as error:
                 raise UnreachableError(f"{self._settings.url}: {error}") from error
-            wait = wait_before_next(response, tries, self._settings.retries)
+            wait = wait_before_next(answer, tries, self._settings.retries)
             if wait is None:
-                return answer_of(response)
+                return answer_of(answer)
             time.sleep(wait)
+
+    def _send(self, question: Question) -> Answer:
+        response = self._http.send(question.on(self._http), stream=True)
+        with closing(response):
+            reading = Reading(response, self._settings.timeout)
+            for piece in response.iter_bytes():
+                reading.take(piece)
+            return reading.done()
 
     def associate(self, body: schema.AssociateRequest) -> schema.AssociateAnswer:
         """Find where in a map a scan was taken; gate on `usable`."""
@@ -158,13 +167,21 @@ class AsyncClient:
         while True:
             tries += 1
             try:
-                response = await self._http.send(question.on(self._http))
-            except httpx.TransportError as error:
+                answer = await self._send(question)
+            except (httpx.TransportError, httpx.DecodingError) as error:
                 raise UnreachableError(f"{self._settings.url}: {error}") from error
-            wait = wait_before_next(response, tries, self._settings.retries)
+            wait = wait_before_next(answer, tries, self._settings.retries)
             if wait is None:
-                return answer_of(response)
+                return answer_of(answer)
             await asyncio.sleep(wait)
+
+    async def _send(self, question: Question) -> Answer:
+        response = await self._http.send(question.on(self._http), stream=True)
+        async with aclosing(response):
+            reading = Reading(response, self._settings.timeout)
+            async for piece in response.aiter_bytes():
+                reading.take(piece)
+            return reading.done()
 
     async def associate(self, body: schema.AssociateRequest) -> schema.AssociateAnswer:
         """Find where in a map a scan was taken; gate on `usable`."""

@@ -5,15 +5,12 @@
     LinefixError
     ├── ProblemError         the service refused a request, with a problem document
     │   └── BusyError        and said when to come again: 429 and 503, after the last try
-    └── UnreachableError     nobody answered
+    └── UnreachableError     nobody answered, or what answered is no Linefix
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    import httpx
+from typing import Any
 
 
 class LinefixError(Exception):
@@ -21,7 +18,7 @@ class LinefixError(Exception):
 
 
 class UnreachableError(LinefixError):
-    """Nobody answered."""
+    """Nobody answered, or what answered is no Linefix: too long, too slow, no JSON."""
 
 
 class ProblemError(LinefixError):
@@ -44,7 +41,10 @@ class ProblemError(LinefixError):
         self.status = status
         self.code = str(problem.get("code", "unknown"))
         self.detail = str(problem.get("detail", ""))
-        self.errors: list[dict[str, str]] = list(problem.get("errors") or [])
+        errors = problem.get("errors")
+        self.errors: list[dict[str, str]] = (
+            [one for one in errors if isinstance(one, dict)] if isinstance(errors, list) else []
+        )
         self.request_id = str(problem.get("request_id", ""))
         places = "".join(f"; {item.get('pointer')}: {item.get('message')}" for item in self.errors)
         super().__init__(f"{status} {self.code}: {self.detail}{places}")
@@ -54,12 +54,17 @@ class BusyError(ProblemError):
     """The service has too much to do, or is not ready, and was so at the last try, too."""
 
 
-def problem_of(response: httpx.Response) -> ProblemError:
-    """Return the exception that a refusal stands for; a proxy may have refused without a problem document."""
-    try:
-        told = response.json()
-    except ValueError:
-        told = None
-    problem = told if isinstance(told, dict) else {"detail": response.reason_phrase}
-    kind = BusyError if response.status_code in (429, 503) else ProblemError
-    return kind(response.status_code, problem)
+def problem_of(status: int, phrase: str, told: Any) -> ProblemError:
+    """Return the exception that a refusal stands for; a proxy may have refused without a problem document.
+
+    Parameters
+    ----------
+    status : int
+    phrase : str
+        Of the status.
+    told : object
+        The body, where it is JSON.
+    """
+    problem = told if isinstance(told, dict) else {"detail": phrase}
+    kind = BusyError if status in (429, 503) else ProblemError
+    return kind(status, problem)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..inputs import read_map_or_id, read_scan
-from ..logs import Topic, opened, scans_of, spread
+from ..logs import Topic, opened, print_notes, scans_of, spread
 from ..options import AsJson, MapArgument, Server
 from ..printing import print_json, print_rows
 from ..service import Json, answering
@@ -39,8 +39,14 @@ def check(
 
 
 def samples_of(log: Path, topic: str | None) -> list[Json]:
-    """Return some scans of a log, spread over all of it; raises `RefusedError` when it cannot be read."""
-    return [one.scan for one in spread(list(scans_of(opened(log, topic))), SAMPLES)]
+    """Return some scans of a log, spread over all of it; raises `RefusedError` when it cannot be read.
+
+    What was assumed of the log and what was left out is printed on stderr.
+    """
+    source = opened(log, topic)
+    found = list(scans_of(source))
+    print_notes(source)
+    return [one.scan for one in spread(found, SAMPLES)]
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:

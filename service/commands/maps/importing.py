@@ -157,7 +157,7 @@ def _with_what_it_names(file: Path) -> list[Path]:
         return sorted(path for path in file.iterdir() if path.is_file())
     if file.suffix.lower() not in (".yaml", ".yml"):
         return [file]
-    named = IMAGE.search(file.read_text(encoding="utf-8", errors="replace"))
+    named = IMAGE.search(file.read_text(encoding="utf-8-sig", errors="replace"))
     picture = file.with_name(named[1]) if named else file
     return [file, picture] if named and picture.is_file() else [file]
 

@@ -1,0 +1,160 @@
+"""Servers that send without end, files that say what terminals obey, text with a byte-order mark."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from linefix_client import Client, ProblemError, UnreachableError, asking
+
+from service.commands import remote
+from tests.formats.recorded import BEGUN, Recording
+
+from .running import Linefix, refused
+
+ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+WALLS = [
+    [-1.01, 0.99, -0.99, -4.98],
+    [-1.00, -4.99, 0.98, -5.01],
+    [1.01, -2.99, 3.98, -3.01],
+    [4.01, -2.98, 3.99, 0.98],
+]
+MARK = b"\xef\xbb\xbf"
+
+
+@pytest.fixture(autouse=True)
+def _files(folder: Path) -> None:
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    (folder / "scan.json").write_text(json.dumps({"segments": WALLS}))
+
+
+@contextmanager
+def sending(head: bytes, piece: bytes) -> Iterator[str]:
+    """Answer each request with a head, and pieces until the other side closes; give the URL."""
+    ended = threading.Event()
+
+    def serve(listener: socket.socket) -> None:
+        while not ended.is_set():
+            try:
+                connection, _ = listener.accept()
+            except OSError:
+                return
+            with connection, suppress(OSError):
+                connection.recv(65536)
+                connection.sendall(head)
+                while piece and not ended.is_set():
+                    connection.sendall(piece)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        thread = threading.Thread(target=serve, args=(listener,))
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+        finally:
+            ended.set()
+            with suppress(OSError):
+                listener.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+
+ENDLESS = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n\r\n"
+REFUSAL = b"HTTP/1.1 503 No\r\nContent-Type: application/json\r\n\r\n"
+CHUNKED = b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n"
+PIECE = b" " * 4096
+
+
+@pytest.mark.parametrize(
+    ("head", "piece"), [(ENDLESS, PIECE), (REFUSAL, PIECE), (CHUNKED, b"1000\r\n" + PIECE + b"\r\n")]
+)
+def test_an_answer_without_end_is_refused(
+    linefix: Linefix, monkeypatch: pytest.MonkeyPatch, head: bytes, piece: bytes
+) -> None:
+    monkeypatch.setattr(remote, "MAX_ANSWER_BYTES", 2**20)
+    monkeypatch.setattr(asking, "MAX_ANSWER_BYTES", 2**20)
+    with sending(head, piece) as url:
+        line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
+        assert "answers with more than 1 MB" in line
+        with Client(url, retries=0) as client, pytest.raises(UnreachableError, match="longer than 1 MB"):
+            client.version()
+
+
+def test_an_answer_that_takes_for_ever_is_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(remote, "SECONDS", 0.2)
+    with sending(ENDLESS, b" ") as url:
+        assert "not ended its answer" in refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
+        with Client(url, timeout=0.2) as client, pytest.raises(UnreachableError, match=r"not ended after 0.2 s"):
+            client.version()
+
+
+@pytest.mark.parametrize("body", [b"<html>", b"[" * 100_000])
+def test_what_is_no_json_is_no_linefix(linefix: Linefix, body: bytes) -> None:
+    with sending(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
+        assert "is no Linefix" in refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
+        with Client(url) as client, pytest.raises(UnreachableError, match="is no Linefix"):
+            client.version()
+
+
+@pytest.mark.parametrize("body", [b"[]", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b"<html>"])
+def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
+    head = b"HTTP/1.1 429 No\r\nRetry-After: \xb2\r\nContent-Length: %d\r\n\r\n"
+    with sending(head % len(body) + body, b"") as url, Client(url, retries=0) as client:
+        with pytest.raises(ProblemError) as told:
+            client.version()
+        assert told.value.status == 429
+
+
+def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(remote, "MAX_PAGES", 5)
+    body = b'{"maps": [], "next": "a b\\r\\n"}'
+    with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
+        assert "lists more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)
+
+
+def test_what_terminals_obey_is_escaped(linefix: Linefix, folder: Path) -> None:
+    title = "\x9b31m\x7f\u202e\U000e0001end"
+    (folder / "odd.json").write_text(json.dumps({"segments": ROOM, "meta": {"title": title}, "frame_id": title}))
+    assert linefix("map", "put", "odd", "odd.json").code == 0
+    told = linefix("map", "get", "odd")
+    assert told.out.strip().isprintable()
+    assert json.loads(told.out)["meta"] == {"title": title}
+    recording = Recording(folder / "a.mcap")
+    recording.scans(2, f"/{title}")
+    recording.scans(1, "/\x9bother")
+    recording.put("/j\x9b", BEGUN, b"", "odd\x9b", "json\x9b", "odd")
+    recording.done()
+    for arguments in (("replay", "a.mcap", "--map", "room.json"), ("map", "import", "a.mcap")):
+        ended = linefix(*arguments)
+        assert (ended.out + ended.err).replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("locate", "room.json", "scan.json"),
+        ("map", "check", "room.json"),
+        ("map", "import", "room.json", "--units", "m"),
+        ("map", "import", "room.csv", "--units", "m"),
+    ],
+)
+def test_a_byte_order_mark_is_passed_over(linefix: Linefix, folder: Path, command: tuple[str, ...]) -> None:
+    for name in ("room.json", "scan.json"):
+        (folder / name).write_bytes(MARK + (folder / name).read_bytes())
+    (folder / "room.csv").write_bytes(MARK + b"x1,y1,x2,y2\n" + b"".join(b"%d,%d,%d,%d\n" % tuple(row) for row in ROOM))
+    ended = linefix(*command)
+    assert ended.code == 0, ended.err
+
+
+def test_text_in_utf_16_is_named(linefix: Linefix, folder: Path) -> None:
+    (folder / "scan.json").write_text(json.dumps({"segments": WALLS}), encoding="utf-16")
+    assert "scan.json: is text in UTF-16; save it as UTF-8" in refused(linefix("locate", "room.json", "scan.json"), 3)
+
+
+def test_a_description_that_stands_for_too_much_is_refused(linefix: Linefix, folder: Path) -> None:
+    lines = ["a0: &a0 {k: v}"] + [f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 9)}]}}" for k in range(1, 12)]
+    (folder / "map.yaml").write_text("\n".join([*lines, "image: map.pgm", "resolution: 0.05", "origin: [0, 0, 0]"]))
+    assert "expected at most 100000 values" in refused(linefix("map", "import", "map.yaml"), 3)

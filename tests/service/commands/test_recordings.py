@@ -1,0 +1,85 @@
+"""Recordings with scans that cannot be used, as a user meets them: replay, map check, batch."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import linefix as library
+from tests.formats.recorded import BEGUN, SECOND, Laser, Recording, scan_bytes
+
+from .running import Linefix, refused
+
+ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+BEAMS = 360
+SCANNER = library.simulation.Scanner(beams=BEAMS, angle_increment=math.tau / BEAMS, sigma=0.01, range_max=12.0)
+WALLS = library.Segments.from_array(np.array(ROOM, dtype=float))
+
+
+def seen(count: int) -> list[Laser]:
+    step, found = SCANNER.angle_increment, []
+    for k in range(count):
+        pose = library.RigidTransform(1.0 + 0.3 * k, 1.0, 0.4 * k)
+        ranges = library.simulation.scan(WALLS, pose, SCANNER, np.random.default_rng(k)).ranges
+        found.append(Laser(ranges, SCANNER.angle_min, SCANNER.angle_min + (BEAMS - 1) * step, step, 0.05, 12.0))
+    return found
+
+
+def write(folder: Path, lasers: list[Laser], stamp: int | None = None) -> None:
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    recording = Recording(folder / "drive.mcap")
+    for k, laser in enumerate(lasers):
+        at = BEGUN + k * SECOND
+        recording.put("/scan", at, scan_bytes(at if stamp is None else stamp, laser))
+    recording.done()
+
+
+REPLAY = ("replay", "drive.mcap", "--map", "room.json")
+CHECK = ("map", "check", "room.json", "--log", "drive.mcap")
+BATCH = ("batch", "drive.mcap", "--maps", "room.json", "--out", "poses.parquet", "--workers", "1")
+
+
+@pytest.mark.parametrize("most", [0.0, math.inf, math.nan])
+def test_scans_whose_greatest_range_says_nothing_are_located(linefix: Linefix, folder: Path, most: float) -> None:
+    write(folder, [laser.but(range_max=most) for laser in seen(4)])
+    ended = linefix(*REPLAY)
+    assert ended.code == 0
+    assert "ok, usable      4" in ended.out
+    assert f"range_max is {most:g} m" in ended.out
+    assert f"range_max is {most:g} m" in linefix(*CHECK).err
+    assert json.loads(linefix(*BATCH, "--json").out)["usable"] == 4
+
+
+def test_where_no_scan_is_left_it_is_said_why(linefix: Linefix, folder: Path) -> None:
+    write(folder, [laser.but(angle_min=laser.angle_max, angle_max=laser.angle_min) for laser in seen(3)])
+    for command in (REPLAY, CHECK):
+        line = refused(linefix(*command), 3)
+        assert "none of its 3 scans can be used" in line
+        assert all(name in line for name in ("angle_min", "angle_max", "angle_increment"))
+    ended = linefix(*BATCH)
+    assert ended.code == 3
+    assert "angle_increment" in ended.err
+
+
+def test_some_scans_that_cannot_be_used_cost_no_others(linefix: Linefix, folder: Path) -> None:
+    good, (bad,) = seen(3), seen(1)
+    write(folder, [*good, bad.but(angle_increment=0.0)])
+    ended = linefix(*REPLAY)
+    assert ended.code == 0
+    assert "ok, usable      3" in ended.out
+    assert "(1)" in next(line for line in ended.out.splitlines() if "angle_increment 0 rad" in line)
+    assert json.loads(linefix(*BATCH, "--json").out) == {
+        "scans": 4, "taken_over": 0, "usable": 3, "errors": 1, "statuses": {"ok": 3},
+    }  # fmt: skip
+
+
+def test_poses_of_scans_without_stamps_have_the_times_of_the_recorder(linefix: Linefix, folder: Path) -> None:
+    write(folder, seen(3), stamp=0)
+    ended = linefix(*REPLAY, "--out", "poses.tum")
+    assert "scans without a stamp" in ended.out
+    times = [float(line.split()[0]) for line in (folder / "poses.tum").read_text().splitlines()]
+    assert times == [BEGUN / SECOND + k for k in range(3)]
