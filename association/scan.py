@@ -91,12 +91,15 @@ class Scan:
         The raw ranges, where the scan came as such; they start at `viewpoint`, or where each of them says.
     views : Views or None
         Where it was put together of several.
+    ordered : bool
+        Whether the points that it was made of came in scanning order.
     """
 
     measured: MeasuredSegments
     viewpoint: tuple[float, float] | None = (0.0, 0.0)
     beams: Beams | None = None
     views: Views | None = None
+    ordered: bool = True
 
 
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
@@ -107,7 +110,7 @@ def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     at, views = scan.viewpoint, scan.views
     beams = None if scan.beams is None else scan.beams.mirrored()
     measured = _mirrored(scan.measured) if segments else NOTHING_MEASURED
-    return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored())
+    return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered)
 
 
 def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
@@ -136,4 +139,4 @@ def scaled(scan: Scan, factor: float) -> Scan:
         spreads=seen.spreads * factor**2,
     )
     place = at and (at[0] * factor, at[1] * factor)
-    return Scan(measured, place, beams and beams.scaled(factor), views and views.scaled(factor))
+    return Scan(measured, place, beams and beams.scaled(factor), views and views.scaled(factor), scan.ordered)

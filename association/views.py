@@ -85,6 +85,7 @@ def assemble(views: Sequence[View]) -> Scan:
             found=np.zeros(root.shape[1]),
             spread=np.eye(root.shape[1]),
         ),
+        ordered=all(view.scan.ordered for view in views),
     )
 
 
@@ -107,7 +108,7 @@ def corrected(scan: Scan, found: Floats, spread: Floats) -> Scan:
     sighted = places[~np.isnan(places[:, 0])]
     viewpoint = (float(sighted[0, 0]), float(sighted[0, 1])) if len(sighted) else None
     views = replace(views, poses=poses, viewpoints=places, found=found, spread=spread)
-    return Scan(measured, viewpoint, beams, views)
+    return Scan(measured, viewpoint, beams, views, scan.ordered)
 
 
 def moved(measured: MeasuredSegments, by: RigidTransform) -> MeasuredSegments:

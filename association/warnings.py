@@ -34,6 +34,11 @@ SENTENCES: Mapping[Mistake, str] = {
     "on the left of the segments of scan and map alike. Exchange the ends of those that have it on the right, or say "
     '"oriented": false.',
 }
+NOT_IN_ORDER = (
+    "The points are not in scanning order: once around the viewpoint in one direction, or, without a viewpoint, one "
+    "next to the other. Segments are found in points that follow one another, so walls are missed. Send the points of one "
+    "scan in the order in which they were measured."
+)
 
 
 def warnings_of(
@@ -46,6 +51,7 @@ def warnings_of(
     """List what is strange about the scan, about the search, and about the map; then what mistakes would explain."""
     found = {
         "no_segments": _no_segments(context),
+        "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
         "stuck_ranges": _stuck_ranges(context.scan.beams),
         "scan_exceeds_map": _exceeding(context),
         "faces_away": _facing_away(context),

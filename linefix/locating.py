@@ -146,4 +146,4 @@ def scan_of(scan: Scan | LaserScan | Segments | ArrayLike, angles: tuple[float, 
 
 def _vectorized(scan: LaserScan | ArrayLike) -> Scan:
     found = vectorize(scan)
-    return Scan(found.measured, found.viewpoint, found.beams)
+    return Scan(found.measured, found.viewpoint, found.beams, ordered=found.ordered)

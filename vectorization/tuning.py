@@ -46,6 +46,36 @@ SPACINGS = 6.0
 # Angle (rad) between rays that is assumed at least.
 LEAST_INCREMENT = 1e-6
 
+# Order ---------------------------------------------------------------------------------------------------------------
+
+# Steps are told as shares of the usual one, between beams: this quantile of so many around, so that each point may come
+# three times and a few steps may be over gaps. Points are repeated where steps below the first share are that many of
+# all, and so many times as frequent as those between the next two, beyond chance (standard deviations of the counts).
+# Points that are spaced at random, as in a subsample of a cloud (1.6 times), or scattered sideways are not. Points nearer
+# than the last share are left out then. Measured on drawn scans with each point two or three times: they are found up to
+# a scatter of a sixth of the points' spacing, in most scans up to a third.
+SAME_BEAM = 0.8
+STEP_WINDOW = 31
+REPEATED = 0.2
+REPEATED_SHARE = 0.15
+VALLEY = 0.3
+VALLEY_DEPTH = 1.8
+DEVIATIONS = 4.0
+REPEATED_STEP = 0.5
+
+# Standard deviations that two readings of one beam are apart at most.
+REPEATED_NOISE = 8.0
+
+# Points below which no order is asked for; steps (rad) that noise may make in either direction; how often the points
+# may go over what they cover.
+LEAST_ORDERED = 12
+JITTER = 0.05
+MOST_PASSES = 1.5
+
+# Points whose nearest is looked for, and how many times farther than that the next may lie, both in the median.
+PROBES = 64
+SCATTERED = 6.0
+
 # Pieces --------------------------------------------------------------------------------------------------------------
 
 # The farthest point's distance from the chord, in standard deviations, from which on a stretch is split there.

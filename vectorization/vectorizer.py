@@ -18,12 +18,14 @@ from .kernels.tracing import describe, trace
 from .laser import LaserScan, Motion
 from .layout import FITTED, SCANNER
 from .options import VectorizationOptions
+from .order import first_of_each, runs_along, runs_around, without_repeats
 from .tuning import (
     GAP_NOISE,
     LEAST_INCREMENT,
     LEAST_SIGMA,
     LONGEST_STEP,
     RELATIVE_ROUGHNESS,
+    REPEATED_NOISE,
     ROUGHNESS,
     SPACINGS,
     UNKNOWN_SIGMA,
@@ -52,6 +54,9 @@ class Vectorization:
         counts down, and a segment across the seam of a full turn wraps.
     beams : Beams or None
         The single ranges, cleaned, with which `association` weighs a pose; None where the scan came as points.
+    ordered : bool
+        Whether points came in scanning order: once around their viewpoint, in one direction; without a viewpoint one
+        next to the other.
     """
 
     measured: MeasuredSegments
@@ -59,6 +64,7 @@ class Vectorization:
     sigma: float
     spans: Indices = field(repr=False)
     beams: Beams | None = field(default=None, repr=False)
+    ordered: bool = True
 
     @property
     def viewpoint(self) -> tuple[float, float]:
@@ -146,9 +152,9 @@ def _from_moving_laser(scan: LaserScan, motion: Motion, options: VectorizationOp
 def _from_viewed_points(places: Floats, viewpoint: Floats, options: VectorizationOptions) -> Vectorization:
     seen = places - viewpoint
     r = np.hypot(seen[:, 0], seen[:, 1])
-    order = np.flatnonzero(r > 0.0)
-    directions = seen[order] / r[order, None]
-    turns = directions[:-1, 0] * directions[1:, 1] - directions[:-1, 1] * directions[1:, 0]
+    order = first_of_each(seen)
+    order = order[r[order] > 0.0]
+    order, turns, ordered = _around(seen, r, order, options)
     if np.sum(np.sign(turns)) < 0.0:
         order = order[::-1]
     points = place(seen[order], r[order])
@@ -160,10 +166,38 @@ def _from_viewed_points(places: Floats, viewpoint: Floats, options: Vectorizatio
     backward = _runs_backward(lines, points)
     spans[backward] = spans[backward, ::-1]
     measured, rms = _measured(lines, (viewpoint[0], viewpoint[1]))
-    return Vectorization(measured, rms, sigma, order[spans])
+    return Vectorization(measured, rms, sigma, order[spans], ordered=ordered)
 
 
-def _from_bare_points(places: Floats, options: VectorizationOptions) -> Vectorization:
+def _around(
+    seen: Floats, ranges: Floats, order: Indices, options: VectorizationOptions
+) -> tuple[Indices, Floats, bool]:
+    """Return points without those that come again, the sines between their rays, and whether they run around once."""
+    if len(order) < 2:
+        return order, np.zeros(0), True
+    directions = seen[order] / ranges[order, None]
+    sines, cosines = _between_rays(directions)
+    apart = np.hypot(*np.diff(seen[order], axis=0).T)
+    near = apart <= REPEATED_NOISE * (options.sigma or UNKNOWN_SIGMA)
+    left = without_repeats(np.abs(np.arctan2(sines, cosines)), near)
+    if len(left) < len(order):
+        order = order[left]
+        sines, cosines = _between_rays(directions[left])
+    return order, sines, runs_around(np.arctan2(sines, cosines))
+
+
+def _between_rays(directions: Floats) -> tuple[Floats, Floats]:
+    """Return sine and cosine from each ray to the next."""
+    sines = directions[:-1, 0] * directions[1:, 1] - directions[:-1, 1] * directions[1:, 0]
+    return sines, (directions[:-1] * directions[1:]).sum(axis=1)
+
+
+def _from_bare_points(every: Floats, options: VectorizationOptions) -> Vectorization:
+    order = first_of_each(every)
+    if len(order) > 1:
+        steps = np.hypot(*np.diff(every[order], axis=0).T)
+        order = order[without_repeats(steps, np.ones(len(steps), dtype=np.bool_))]
+    places = every[order]
     origin = places.mean(axis=0) if len(places) else np.zeros(2)
     points = place(places - origin, np.zeros(len(places)))
     sigma = options.sigma or _estimated(window_noise(points), points[:0])
@@ -173,7 +207,7 @@ def _from_bare_points(places: Floats, options: VectorizationOptions) -> Vectoriz
     lines["begin"][backward] = lines["end"][backward]
     lines["end"][backward] = begin[backward]
     measured, rms = _measured(lines, (origin[0], origin[1]))
-    return Vectorization(measured, rms, sigma, _spans(lines))
+    return Vectorization(measured, rms, sigma, order[_spans(lines)], ordered=runs_along(places))
 
 
 def _spans(lines: Records) -> Indices:

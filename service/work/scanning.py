@@ -85,7 +85,7 @@ def scan_laser(
 def scan_points(points: Floats, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan") -> Scan:
     """Return points in scanning order as a scan."""
     found = vectorize_points(points, VectorizationOptions(sigma=sigma), viewpoint, (place, place))
-    return Scan(found.measured, viewpoint)
+    return Scan(found.measured, viewpoint, ordered=found.ordered)
 
 
 @contextmanager

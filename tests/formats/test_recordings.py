@@ -13,7 +13,6 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from formats import FormatError, IncompleteFileError, LogOptions, MalformedFileError, UnsupportedFormatError, read_log
 from formats.report import ImportReport
-
 from tests.formats.recorded import BEGUN, SCAN, SECOND, TYPES, Recording, scan_bytes
 
 
