@@ -92,7 +92,7 @@ class Scan:
     views : Views or None
         Where it was put together of several.
     ordered : bool
-        Whether the points that it was made of came in scanning order.
+        True unless the scan was made of points that are not in scanning order.
     """
 
     measured: MeasuredSegments

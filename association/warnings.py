@@ -36,8 +36,8 @@ SENTENCES: Mapping[Mistake, str] = {
 }
 NOT_IN_ORDER = (
     "The points are not in scanning order: once around the viewpoint in one direction, or, without a viewpoint, one "
-    "next to the other. Segments are found in points that follow one another, so walls are missed. Send the points of one "
-    "scan in the order in which they were measured."
+    "next to the other. Segments are found in points that follow one another, so walls are missed. "
+    "Send the points of one scan in the order in which they were measured."
 )
 
 

@@ -53,7 +53,7 @@ def without_repeats(steps: Floats, near: NDArray[np.bool_]) -> Indices:
     steps : (n - 1,)
         From each point to the next, not negative: radians between their rays, or metres.
     near : (n - 1,)
-        Whether noise explains how far apart the two are.
+        True where noise explains the distance of the two.
 
     Returns
     -------

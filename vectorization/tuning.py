@@ -48,12 +48,12 @@ LEAST_INCREMENT = 1e-6
 
 # Order ---------------------------------------------------------------------------------------------------------------
 
-# Steps are told as shares of the usual one, between beams: this quantile of so many around, so that each point may come
-# three times and a few steps may be over gaps. Points are repeated where steps below the first share are that many of
-# all, and so many times as frequent as those between the next two, beyond chance (standard deviations of the counts).
-# Points that are spaced at random, as in a subsample of a cloud (1.6 times), or scattered sideways are not. Points nearer
-# than the last share are left out then. Measured on drawn scans with each point two or three times: they are found up to
-# a scatter of a sixth of the points' spacing, in most scans up to a third.
+# Steps are compared with the usual step between beams: this quantile of so many steps around. It allows for points that
+# come three times and for a few gaps. Points are repeated where the steps below REPEATED are that fraction of all, and
+# VALLEY_DEPTH times as frequent as those from VALLEY to REPEATED_STEP, by so many standard deviations of the counts.
+# Points that are spaced at random, as in a subsample of a cloud, have 1.6 times as many. Points nearer than REPEATED_STEP
+# are left out then. Measured on drawn scans with each point two or three times: repeats are found up to a scatter of a
+# sixth of the points' spacing, in most scans up to a third.
 SAME_BEAM = 0.8
 STEP_WINDOW = 31
 REPEATED = 0.2
@@ -66,8 +66,8 @@ REPEATED_STEP = 0.5
 # Standard deviations that two readings of one beam are apart at most.
 REPEATED_NOISE = 8.0
 
-# Points below which no order is asked for; steps (rad) that noise may make in either direction; how often the points
-# may go over what they cover.
+# Least number of points whose order is checked; steps (rad) that noise may make in either direction; passes over the
+# covered angle.
 LEAST_ORDERED = 12
 JITTER = 0.05
 MOST_PASSES = 1.5

@@ -55,8 +55,8 @@ class Vectorization:
     beams : Beams or None
         The single ranges, cleaned, with which `association` weighs a pose; None where the scan came as points.
     ordered : bool
-        Whether points came in scanning order: once around their viewpoint, in one direction; without a viewpoint one
-        next to the other.
+        False where points are not in scanning order: once around their viewpoint, in one direction; without a
+        viewpoint one next to the other.
     """
 
     measured: MeasuredSegments

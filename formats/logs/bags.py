@@ -91,7 +91,7 @@ class Bag:
         Raises
         ------
         MalformedFileError
-            Where the file cannot be read any further.
+            When the rest of the file cannot be read.
         """
         for file in self._files:
             wanted = [one for one in connections if any(one is held for held in file.connections)]

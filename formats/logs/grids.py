@@ -154,7 +154,7 @@ def grid_of(message: Any, name: str, notes: Notes) -> tuple[Grid, str]:
     message : object
         With the fields of ``nav_msgs/OccupancyGrid``.
     name : str
-        What errors call it.
+        Name of the file, for errors.
     notes : Notes
         Takes an orientation that was never set.
 

@@ -1,6 +1,6 @@
 """A LaserScan message to a scan: fields that contradict each other or say nothing.
 
-REP 117 and the message's own comments say what the fields mean; drivers leave some of them out, or at 0.
+REP 117 and the comments of the message define the fields. Drivers leave some of them at 0.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from ..files import name_of
 from ..limits import MAX_CHUNK_BYTES
 from .recording import Connection, RawMessage, ros_type
 
-# What the library raises for bytes that are no record. Decompressors raise RuntimeError (lz4) and ZstdError.
+# Errors of the library for bytes that are no record. Decompressors raise RuntimeError (lz4) and ZstdError.
 BROKEN = (
     McapError, struct.error, ValueError, OSError, EOFError, LookupError, TypeError, RuntimeError, OverflowError,
     MemoryError, zstandard.ZstdError,
@@ -98,7 +98,7 @@ class McapFile:
 
     @property
     def remarks(self) -> list[tuple[str, str, int]]:
-        """What cannot be read of the file: code, sentence and count."""
+        """Code, sentence and count of each part of the file that cannot be read."""
         found = []
         if self._cut:
             readable = sum(connection.msgcount for connection in self.connections)

@@ -1,4 +1,4 @@
-"""What the files of a recording have in common, whatever their format: connections and raw messages."""
+"""The common interface of the files of a recording: connections and raw messages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Connection:
     msgcount : int
         Number of messages.
     key : object
-        What the file calls it.
+        Identifier within its file.
     file : str
         Name of the file.
     """
@@ -61,7 +61,7 @@ class RecordedFile(Protocol):
 
     @property
     def remarks(self) -> list[tuple[str, str, int]]:
-        """Code, sentence and count of what cannot be read of the file, complete after all messages were read."""
+        """Code, sentence and count of each part of the file that cannot be read; complete after the last message."""
 
     def messages(self, connections: Collection[Connection]) -> Iterator[RawMessage]:
         """Yield the messages of some connections of this file, in the order in which they were received."""

@@ -54,7 +54,7 @@ class RosbagFile:
 
     @property
     def remarks(self) -> list[tuple[str, str, int]]:
-        """What cannot be read of the file: code, sentence and count."""
+        """Code, sentence and count of each part of the file that cannot be read."""
         if self._log.is_file() and self._log.stat().st_size:
             said = f"{self._log.name} next to {self.name}, as of a recorder that was killed, is not read: "
             said += "sqlite3 FILE 'pragma wal_checkpoint' puts its messages into the .db3"

@@ -1,4 +1,4 @@
-"""The stamps of a log's scans: those that nobody set, that repeat, or that jump back."""
+"""The stamps of a log's scans: those that are 0, that repeat, or that jump back."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def scans_of(log: Log) -> Iterator[ReplayedScan]:
 
 
 def print_notes(log: Log) -> None:
-    """Print on stderr what was assumed of a log and what was left out; stdout holds the answer alone."""
+    """Print the assumptions and omissions of a log on stderr; stdout holds the answer alone."""
     for kind in ("assumed", "dropped"):
         for note in getattr(log.report, kind):
             print(f"{kind:10}{plain(noted(asdict(note)))}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Fields of LaserScan messages that contradict each other or say nothing, and stamps that nobody set."""
+"""Fields of LaserScan messages that contradict each other or were never set; stamps of 0."""
 
 from __future__ import annotations
 

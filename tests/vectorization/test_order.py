@@ -1,4 +1,4 @@
-"""Points that come more than once count once, and points in no order are told."""
+"""Points that come more than once count once; points in no order are reported."""
 
 from __future__ import annotations
 

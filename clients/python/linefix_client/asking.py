@@ -75,7 +75,7 @@ class Reading:
     timeout : float
         Seconds for all of it.
     content : bytearray
-        What came so far.
+        The bytes received so far.
     """
 
     response: httpx.Response
@@ -106,7 +106,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was answered."""
+    """A whole answer."""
 
     status: int
     phrase: str

@@ -5,7 +5,7 @@
     LinefixError
     ├── ProblemError         the service refused a request, with a problem document
     │   └── BusyError        and said when to come again: 429 and 503, after the last try
-    └── UnreachableError     nobody answered, or what answered is no Linefix
+    └── UnreachableError     no answer, or one that is not Linefix's
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def check(
 def samples_of(log: Path, topic: str | None) -> list[Json]:
     """Return some scans of a log, spread over all of it; raises `RefusedError` when it cannot be read.
 
-    What was assumed of the log and what was left out is printed on stderr.
+    Assumptions and omissions are printed on stderr.
     """
     source = opened(log, topic)
     found = list(scans_of(source))

@@ -1,4 +1,4 @@
-"""Servers that send without end, files that say what terminals obey, text with a byte-order mark."""
+"""Answers without end, control characters in files, text with a byte-order mark."""
 
 from __future__ import annotations
 
