@@ -51,9 +51,9 @@ LEAST_INCREMENT = 1e-6
 # Steps are compared with the usual step between beams: this quantile of so many steps around. It allows for points that
 # come three times and for a few gaps. Points are repeated where the steps below REPEATED are that fraction of all, and
 # VALLEY_DEPTH times as frequent as those from VALLEY to REPEATED_STEP, by so many standard deviations of the counts.
-# Points that are spaced at random, as in a subsample of a cloud, have 1.6 times as many. Points nearer than REPEATED_STEP
-# are left out then. Measured on drawn scans with each point two or three times: repeats are found up to a scatter of a
-# sixth of the points' spacing, in most scans up to a third.
+# Points that are spaced at random, as in a subsample of a cloud, have 1.6 times as many. Where points are repeated,
+# those nearer than REPEATED_STEP are left out. Measured on drawn scans with each point two or three times: repeats are
+# found up to a scatter of a sixth of the points' spacing, in most scans up to a third.
 SAME_BEAM = 0.8
 STEP_WINDOW = 31
 REPEATED = 0.2
