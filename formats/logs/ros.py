@@ -13,18 +13,16 @@ from rosbags.interfaces import Connection
 from registration import InputError, RigidTransform
 from vectorization import LaserScan
 
-from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
+from ..errors import IncompleteFileError, MalformedFileError, TooLargeError, UprightFrameError
 from ..files import name_of
 from ..grids.cells import Grid
 from ..limits import MAX_CELLS, MAX_RESOLUTION, MIN_RESOLUTION
 from ..report import Notes, shown
-from .bags import GRID, ODOMETRY, OLD_TRANSFORMS, SCAN, TRANSFORMS, Bag, opened
+from .bags import GRID, SCAN, Bag, opened
 from .scan import Log, LoggedScan, LogOptions
-from .transforms import Transforms, matrix_of, planar, stamp_of
-
-STATIC = "tf_static"
-BASES = ("base_link", "base_footprint")
-ODOM = "odom"
+from .sensors import Sensor, Sensors, note_tilt
+from .transforms import matrix_of, planar, stamp_of
+from .trees import read_frames
 
 
 def read_bag(path: Path, options: LogOptions) -> Log:
@@ -44,17 +42,25 @@ def read_bag(path: Path, options: LogOptions) -> Log:
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
     with opened(path) as bag:
         wanted = _chosen(bag, SCAN, options.topic, notes)
-        frames = _transforms(bag, notes)
+        sensors = Sensors(read_frames(bag, notes), options, notes)
         for connection, message in bag.messages(wanted):
+            sensor = sensors.of(connection.topic, str(message.header.frame_id))
             try:
-                scan = _scan(connection.topic, message, frames, options)
+                scan = _scan(connection.topic, message, sensor, notes)
+            except UprightFrameError as error:
+                notes.add_dropped("upright_frame", f"scans in the frame {error}", 1)
+                continue
             except InputError as error:
                 notes.add_dropped("broken_scan", f"scans that are none, such as: {error.message}", 1)
                 continue
-            if scan.pose is None:
+            if scan.pose is None and sensor.odometry is not None:
                 notes.add_dropped("no_pose", "scans whose pose the log does not say (they are kept)", 1)
             notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
             yield scan
+        if "scans" not in notes.read and "upright_frame" in notes.dropped:
+            raise IncompleteFileError(
+                f"no scan is left; {notes.dropped['upright_frame'].message}", argument=name_of(path)
+            )
 
 
 def _chosen(bag: Bag, kind: str, topic: str | None, notes: Notes) -> list[Connection]:
@@ -79,47 +85,24 @@ def _chosen(bag: Bag, kind: str, topic: str | None, notes: Notes) -> list[Connec
     return [c for c in found if topic is None or c.topic == topic]
 
 
-def _transforms(bag: Bag, notes: Notes) -> Transforms:
-    frames = Transforms(bag.name)
-    moving = set()
-    for connection, message in bag.messages(bag.connections(TRANSFORMS, OLD_TRANSFORMS)):
-        static = connection.topic.strip("/") == STATIC
-        for one in message.transforms:
-            matrix = matrix_of(one.transform.translation, one.transform.rotation)
-            frames.add(one.header.frame_id, one.child_frame_id, stamp_of(one.header), matrix, static=static)
-            moving.add(one.child_frame_id.strip("/"))
-        notes.add_read("transforms", "messages of tf", 1)
-    for _connection, message in bag.messages(bag.connections(ODOMETRY)):
-        child = message.child_frame_id.strip("/") or BASES[0]
-        if child not in moving:
-            pose = message.pose.pose
-            matrix = matrix_of(pose.position, pose.orientation)
-            frames.add(message.header.frame_id or ODOM, child, stamp_of(message.header), matrix, static=False)
-            notes.add_read("odometry", "messages of odometry", 1)
-    return frames
-
-
-def _scan(topic: str, message: Any, frames: Transforms, options: LogOptions) -> LoggedScan:
-    ranges = np.asarray(message.ranges, dtype=np.float64)
+def _scan(topic: str, message: Any, sensor: Sensor, notes: Notes) -> LoggedScan:
+    increment, motion = sensor.motion(message, notes)
     laser = LaserScan(
         float(message.angle_min),
         float(message.angle_increment),
-        ranges,
+        np.asarray(message.ranges, dtype=np.float64),
         float(message.range_min),
         float(message.range_max),
+        motion,
     )
-    stamp, frame = stamp_of(message.header), str(message.header.frame_id)
-    above = frames.above(frame)
-    outer = (options.pose_frame or (ODOM if ODOM in above else above[-1])).strip("/")
-    base = next((b for b in BASES if b in above), None)
-    known = frames.lookup(outer, frame, stamp) if len(above) > 1 else None
-    mounted = frames.lookup(base, frame, stamp) if base else None
-    pose, flipped = planar(known) if known is not None else (None, False)
-    mount, upside_down = planar(mounted) if mounted is not None else (None, flipped)
+    stamp = stamp_of(message.header)
+    place = sensor.place(stamp)
+    note_tilt(sensor, place, notes)
+    outer = sensor.odometry.outer if place.pose is not None and sensor.odometry is not None else ""
+    base = sensor.base if place.mount is not None else ""
     return LoggedScan(
-        stamp, topic, shown(frame), laser, float(message.time_increment), pose, outer if pose else "", mount,
-        flipped or upside_down, base if base and mount else "",
-    )  # fmt: skip
+        stamp, topic, shown(sensor.frame), laser, increment, place.pose, outer, place.mount, place.flipped, base
+    )
 
 
 def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, str, str]:
