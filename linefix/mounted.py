@@ -54,7 +54,7 @@ class MountedScan(Protocol):
         ...
 
 
-def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE) -> View:
+def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: float | None = None) -> View:
     """Return what a mounted scanner saw, in the frame of the robot; of the sensor where its mount is not known.
 
     Parameters
@@ -62,6 +62,8 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE) -> View:
     seen : MountedScan
     base_from_then : RigidTransform
         Where the robot was at the time of the first beam, in the frame that a pose is wanted of.
+    sigma : float, optional
+        Of single ranges, metres; None: estimated.
 
     Returns
     -------
@@ -88,7 +90,7 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE) -> View:
     [0.3, -0.25]
     >>> scan = linefix.assemble(views)
     """
-    scan = ranges_scan(seen.laser)
+    scan = ranges_scan(seen.laser, sigma)
     place = base_from_then.compose(seen.mount or HERE)
     return View(mirrored(scan) if seen.flipped else scan, place, motion_covariance(seen, base_from_then))
 
