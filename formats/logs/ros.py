@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -86,23 +87,29 @@ def _chosen(bag: Bag, kind: str, topic: str | None, notes: Notes) -> list[Connec
 
 
 def _scan(topic: str, message: Any, sensor: Sensor, notes: Notes) -> LoggedScan:
-    increment, motion = sensor.motion(message, notes)
     laser = LaserScan(
         float(message.angle_min),
         float(message.angle_increment),
         np.asarray(message.ranges, dtype=np.float64),
         float(message.range_min),
         float(message.range_max),
-        motion,
     )
-    stamp = stamp_of(message.header)
+    return _placed(topic, laser, float(message.time_increment), stamp_of(message.header), sensor, notes)
+
+
+def _placed(
+    topic: str, laser: LaserScan, time_increment: float, stamp: int, sensor: Sensor, notes: Notes
+) -> LoggedScan:
+    """Return a scan with where its sensor was, and how it moved."""
     place = sensor.place(stamp)
     note_tilt(sensor, place, notes)
+    increment, motion = sensor.motion(time_increment, len(laser.ranges), stamp, notes)
     outer = sensor.odometry.outer if place.pose is not None and sensor.odometry is not None else ""
     base = sensor.base if place.mount is not None else ""
     return LoggedScan(
-        stamp, topic, shown(sensor.frame), laser, increment, place.pose, outer, place.mount, place.flipped, base
-    )
+        stamp, topic, shown(sensor.frame), replace(laser, motion=motion), increment, place.pose, outer, place.mount,
+        place.flipped, base,
+    )  # fmt: skip
 
 
 def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ..errors import UprightFrameError
 from ..report import Notes, shown
 from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
-from .transforms import NS, Floats, Transforms, planar, stamp_of
+from .transforms import NS, Floats, Transforms, planar
 from .trees import BagFrames
 from .tuning import FASTEST, LONGEST_SCAN, MOST_TILT, SAID_TILT
 
@@ -121,12 +120,25 @@ class Sensor:
         mount, flipped = mounted(upright, self.frame, above)
         return Place(pose, mount if self.base and by_log is not None else None, flipped, tilt_of(upright))
 
-    def motion(self, message: Any, notes: Notes) -> tuple[float, Motion | None]:
-        """Return the time from beam to beam of a LaserScan, seconds, and how the sensor moved meanwhile.
+    def motion(self, increment: float, beams: int, begin: int, notes: Notes) -> tuple[float, Motion | None]:
+        """Return the time from beam to beam, and how the sensor moved meanwhile.
 
-        The time is 0 where the message does not state it; the motion None where it is not known.
+        Parameters
+        ----------
+        increment : float
+            `time_increment` of a LaserScan, seconds.
+        beams : int
+        begin : int
+            Time of the first beam, nanoseconds.
+        notes : Notes
+
+        Returns
+        -------
+        float
+            0 where the message does not state it.
+        Motion or None
+            None where it is not known.
         """
-        increment, beams = float(message.time_increment), len(message.ranges)
         if not 0.0 < increment * beams < math.inf:
             return 0.0, None
         if increment * beams > LONGEST_SCAN:
@@ -136,7 +148,6 @@ class Sensor:
                 f"{LONGEST_SCAN:.1f} s",
             )
             return 0.0, None
-        begin = stamp_of(message.header)
         mount = np.eye(4) if self.given is None else self.given
         end = begin + round(increment * beams * NS)
         speed = None if self.odometry is None else self.odometry.speed(begin, end, mount)

@@ -450,3 +450,17 @@ def test_a_robot_that_stands_has_a_motion_of_zero(tmp_path: Path) -> None:
     motion = scan.laser.motion
     assert motion is not None
     assert (motion.vx, motion.vy, motion.omega) == (0.0, 0.0, 0.0)
+
+
+def carmen(laser: str, robot: str, stamp: int) -> str:
+    return f"FLASER 4 1.0 2.0 3.0 3.0 {laser} {robot} {stamp} host {stamp}\n"
+
+
+@pytest.mark.parametrize(("robot", "known"), [("0 0 0", False), ("0 0 0.2", True), ("3 4 0", True)])
+def test_a_carmen_log_whose_robot_is_never_anywhere_has_no_odometry(tmp_path: Path, robot: str, known: bool) -> None:
+    path = tmp_path / "robot.log"
+    path.write_text(carmen("0.1 0 0", "0 0 0", 1) + carmen("0.1 0 0", robot, 2) + carmen("0.1 0 0", "0 0 0", 3))
+    log = read_log(path)
+    assert [scan.pose is not None for scan in log] == [known] * 3
+    assert ("no_odometry" in codes(log)) is not known
+    assert near(next(iter(log)).mount, 0.1, 0.0, 0.0)
