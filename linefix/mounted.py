@@ -11,8 +11,8 @@ from association import Scan, View, mirrored
 from registration import RigidTransform
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
-# What a robot does during a scan of whose motion nothing is known, as standard deviations: the default limits of Nav2's
-# controllers, 0.5 m/s and 1 rad/s.
+# Standard deviations of the speed of a robot whose motion is not known, m/s and rad/s: default limits of Nav2's
+# controllers.
 SPEED, TURN = 0.5, 1.0
 HERE = RigidTransform(0.0, 0.0, 0.0)
 
@@ -30,7 +30,7 @@ class MountedScan(Protocol):
     mount : RigidTransform or None
         base_from_sensor; None: not known, poses are those of the sensor.
     flipped : bool
-        Whether the sensor is mounted upside down: y becomes -y in its data before `mount` applies.
+        True: the sensor is mounted upside down, y becomes -y in its data before `mount` applies.
     """
 
     @property
@@ -61,7 +61,7 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     ----------
     seen : MountedScan
     base_from_then : RigidTransform
-        Where the robot was at the time of the first beam, in the frame that a pose is wanted of.
+        Pose of the robot at the time of the first beam, in the frame whose pose is located.
     sigma : float, optional
         Of single ranges, metres; None: estimated.
 
@@ -123,7 +123,7 @@ def motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) 
 
 
 def ranges_scan(scan: LaserScan | ArrayLike, sigma: float | None = None) -> Scan:
-    """Return ranges, or points in scanning order, as a scan: segments, and single beams beside them as evidence.
+    """Return ranges, or points in scanning order, as a scan: segments, and the single beams as evidence.
 
     Parameters
     ----------

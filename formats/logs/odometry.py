@@ -20,7 +20,7 @@ BASES = ("base_link", "base_footprint")
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """How fast a frame moves: m/s and rad/s, in itself."""
+    """The speed of a frame: m/s and rad/s, in the frame itself."""
 
     vx: float
     vy: float
@@ -59,7 +59,7 @@ class Odometry:
 
     @property
     def stands(self) -> bool:
-        """Whether all poses are equal."""
+        """True where all poses are equal."""
         return not self._moving
 
     def at(self, stamp: int) -> Floats | None:
@@ -118,8 +118,8 @@ def outer_frames(tree: Transforms, frame: str) -> list[str]:
 def moves(tree: Transforms, path: Sequence[str]) -> bool:
     """Tell whether a robot moves, by the frames from its sensor outwards: a mount that moves is no robot that does.
 
-    The frame that has to move is the robot's own; where none has its name, one whose place in its parent changes, as
-    that of no hinge does.
+    The frame that has to move is the robot's own. Where no frame has that name, a frame has to change its position in
+    its parent: a sensor that turns on a hinge does not.
     """
     bases = [k for k, frame in enumerate(path) if frame.rpartition("/")[2] in BASES]
     if bases:

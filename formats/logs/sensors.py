@@ -58,7 +58,7 @@ def mounted(matrix: Floats, frame: str, base: str) -> tuple[RigidTransform, bool
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a scanner was at a time.
+    """The pose and the mount of a scanner at a time.
 
     Attributes
     ----------

@@ -82,11 +82,11 @@ class Track:
     Attributes
     ----------
     static : bool
-        Whether the last value holds at every time.
+        True: the last value holds at every time.
     refixed : bool
-        Whether static values differ.
+        True: static values differ.
     moves : bool
-        Whether values that are not static differ by more than rounding.
+        True: values that are not static differ by more than rounding.
     """
 
     static: bool

@@ -49,7 +49,7 @@ class OdometryTopic:
 
 @dataclass(slots=True)
 class BagFrames:
-    """What a bag has of frames.
+    """The transforms and the odometry of a bag.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class BagFrames:
         own = sorted((one for one in self.trees if within(topic, one)), key=len, reverse=True)
         holding = [one for one in own if self.trees[one].knows(frame)]
         others = sorted(one for one in self.trees if one not in own and self.trees[one].knows(frame))
-        # Where a tree around the topic exists, that of another robot is none of its own.
+        # The tree of another robot is not used where the topic has one of its own.
         if holding or (own and (own[0] or not others)) or not others:
             chosen = (holding or own or [""])[0]
             return chosen, self.trees.get(chosen) or Transforms(self.name)
@@ -147,7 +147,7 @@ def read_frames(bag: Bag, notes: Notes) -> BagFrames:
     scans = tuple(sorted({one.topic for one in bag.connections(SCAN)}))
     frames = BagFrames(bag.name, scans)
     namespaces = _namespaces(bag)
-    # Where all scans lie in one namespace, global transforms beside it are of the same robot.
+    # Global transforms are of the same robot if all scans lie in one namespace.
     single = {one for one in namespaces.values() if one}
     merged = len(single) == 1 and all(within(topic, next(iter(single))) for topic in scans)
     wanted = [one for one in bag.connections(TRANSFORMS, OLD_TRANSFORMS) if one.topic in namespaces]
@@ -209,7 +209,7 @@ def _added(
 
 
 def _note_doubts(tree: Transforms, notes: Notes) -> None:
-    """Say which frames have several parents, and which are said to be fixed in several places."""
+    """Note the frames with several parents, and static transforms that change."""
     several = [frame for frame in tree.frames() if len(tree.parents(frame)) > 1]
     if several:
         told = "; ".join(f"{shown(one)} in {_listed(tree.parents(one))}" for one in several[:3])

@@ -40,7 +40,7 @@ class Frames:
     def taken(self, one: LoggedScan) -> LoggedScan:
         """Return a scan with the mount that counts; none where poses are those of the laser.
 
-        What the first scan says holds for all.
+        The first scan decides for all.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Where scans of a log were taken: by the search in this process, or by a server."""
+"""Scans of a log to poses: by the search in this process, or by a server."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SEARCH = linefix.AssociationOptions(max_alternatives=0, parts=())
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a replay needs of an answer; `pose` and `covariance` are of the robot, of the sensor without a mount.
+    """The part of an answer that a replay needs; `pose` and `covariance` are of the robot, of the sensor without a mount.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Local:
 
 
 class Remote:
-    """A server that is asked over HTTP."""
+    """A server, over HTTP."""
 
     def __init__(self, service: Service, on: Json) -> None:
         self._service = service

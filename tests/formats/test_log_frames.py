@@ -274,7 +274,7 @@ def two_robots(bag: Robots, *, scans: tuple[str, ...] = ("/robot1/scan", "/robot
 def test_the_namespace_of_the_scans_chooses_their_transforms(tmp_path: Path, kind: str, robot: int) -> None:
     bag = Robots(kind, tmp_path)
     two_robots(bag)
-    # What another robot, or none, publishes without a namespace.
+    # Transforms without a namespace, of whichever robot.
     bag.transform("/tf_static", 0, "base_link", "laser", (7.0, 0.0, 0.0))
     (scan,), _ = read(bag, LogOptions(topic=f"/robot{robot}/scan"))
     assert near(scan.mount, 0.1 * robot, 0.0, 0.0)
