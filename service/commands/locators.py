@@ -26,7 +26,7 @@ SEARCH = linefix.AssociationOptions(max_alternatives=0, parts=())
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The part of an answer that a replay needs; `pose` and `covariance` are of the robot, of the sensor without a mount.
+    """The part of an answer that a replay needs, for the robot, or the sensor where its mount is not known.
 
     Attributes
     ----------
