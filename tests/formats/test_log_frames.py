@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from formats import IncompleteFileError, Log, LoggedScan, LogOptions, read_log
+from formats import FormatError, IncompleteFileError, Log, LoggedScan, LogOptions, read_log
 from registration import RigidTransform
 
 from .test_logs import SECOND, Recorder, near
@@ -359,7 +359,7 @@ def test_scans_in_an_upright_frame_are_refused(tmp_path: Path, base: str, turn: 
     bag.drive("/tf", "odom", base)
     bag.scan(SECOND, frame="camera_optical")
     path = bag.done()
-    with pytest.raises(IncompleteFileError, match=r"camera_optical: the scan plane is .* degrees from horizontal in"):
+    with pytest.raises(FormatError, match=r"camera_optical: the scan plane is .* degrees from horizontal in"):
         list(read_log(path))
     (scan,) = read_log(path, LogOptions(mount=RigidTransform(0.2, 0.0, 0.5)))
     assert near(scan.mount, 0.2, 0.0, 0.5)
