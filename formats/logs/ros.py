@@ -21,7 +21,7 @@ from ..limits import MAX_CELLS, MAX_RESOLUTION, MIN_RESOLUTION
 from ..report import Notes, shown
 from .bags import GRID, SCAN, Bag, opened
 from .scan import Log, LoggedScan, LogOptions
-from .sensors import Sensor, Sensors, note_tilt
+from .sensors import Sensor, Sensors, note_tilt, time_increment_of
 from .transforms import matrix_of, planar, stamp_of
 from .trees import read_frames
 
@@ -94,7 +94,7 @@ def _scan(topic: str, message: Any, sensor: Sensor, notes: Notes) -> LoggedScan:
         float(message.range_min),
         float(message.range_max),
     )
-    return _placed(topic, laser, float(message.time_increment), stamp_of(message.header), sensor, notes)
+    return _placed(topic, laser, time_increment_of(message, notes), stamp_of(message.header), sensor, notes)
 
 
 def _placed(
@@ -103,13 +103,13 @@ def _placed(
     """Return a scan with where its sensor was, and how it moved."""
     place = sensor.place(stamp)
     note_tilt(sensor, place, notes)
-    increment, motion = sensor.motion(time_increment, len(laser.ranges), stamp, notes)
+    motion = sensor.motion(time_increment, len(laser.ranges), stamp, notes)
     outer = sensor.odometry.outer if place.pose is not None and sensor.odometry is not None else ""
     base = sensor.base if place.mount is not None else ""
+    moved = replace(laser, motion=motion)
     return LoggedScan(
-        stamp, topic, shown(sensor.frame), replace(laser, motion=motion), increment, place.pose, outer, place.mount,
-        place.flipped, base,
-    )  # fmt: skip
+        stamp, topic, shown(sensor.frame), moved, time_increment, place.pose, outer, place.mount, place.flipped, base
+    )
 
 
 def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> tuple[Grid, str, str]:

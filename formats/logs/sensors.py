@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
 from .transforms import NS, Floats, Transforms, planar
 from .trees import BagFrames
-from .tuning import FASTEST, LONGEST_SCAN, MOST_TILT, SAID_TILT
+from .tuning import FASTEST, LONGEST_SCAN, MOST_TILT, SAID_TILT, USUAL_SCAN
 
 
 def tilt_of(matrix: Floats) -> float:
@@ -120,34 +121,20 @@ class Sensor:
         mount, flipped = mounted(upright, self.frame, above)
         return Place(pose, mount if self.base and by_log is not None else None, flipped, tilt_of(upright))
 
-    def motion(self, increment: float, beams: int, begin: int, notes: Notes) -> tuple[float, Motion | None]:
-        """Return the time from beam to beam, and how the sensor moved meanwhile.
+    def motion(self, increment: float, beams: int, begin: int, notes: Notes) -> Motion | None:
+        """Return how the sensor moved during a scan; None where that is not known.
 
         Parameters
         ----------
         increment : float
-            `time_increment` of a LaserScan, seconds.
+            From beam to beam, seconds; 0: not known.
         beams : int
         begin : int
             Time of the first beam, nanoseconds.
         notes : Notes
-
-        Returns
-        -------
-        float
-            0 where the message does not state it.
-        Motion or None
-            None where it is not known.
         """
-        if not 0.0 < increment * beams < math.inf:
-            return 0.0, None
-        if increment * beams > LONGEST_SCAN:
-            notes.add_assumed(
-                "time_increment",
-                f"the time_increment of scans that would take {increment * beams:.3g} s is not used; expected at most "
-                f"{LONGEST_SCAN:.1f} s",
-            )
-            return 0.0, None
+        if not increment:
+            return None
         mount = np.eye(4) if self.given is None else self.given
         end = begin + round(increment * beams * NS)
         speed = None if self.odometry is None else self.odometry.speed(begin, end, mount)
@@ -155,8 +142,29 @@ class Sensor:
             notes.add_assumed(
                 "motion", "scans with a time_increment during which the motion of the sensor is not known", 1
             )
-            return increment, None
-        return increment, Motion(increment, speed.vx, speed.vy, speed.omega)
+            return None
+        return Motion(increment, speed.vx, speed.vy, speed.omega)
+
+
+def time_increment_of(message: Any, notes: Notes) -> float:
+    """Return the time from beam to beam of a LaserScan, seconds; 0 where it is not stated.
+
+    One that makes a scan too long is in another unit, and the whole scan takes its `scan_time`.
+    """
+    increment, beams, scan_time = float(message.time_increment), len(message.ranges), float(message.scan_time)
+    seconds = increment * beams
+    if not 0.0 < seconds < math.inf:
+        return 0.0
+    if seconds <= LONGEST_SCAN:
+        return increment
+    taken = scan_time if 0.0 < scan_time <= LONGEST_SCAN else USUAL_SCAN
+    notes.add_assumed(
+        "time_increment",
+        f"by its time_increment a scan takes {seconds:.3g} s, expected at most {LONGEST_SCAN:.1f} s; {taken:.3g} s "
+        "are assumed",
+        1,
+    )
+    return taken / beams
 
 
 class Sensors:

@@ -464,3 +464,15 @@ def test_a_carmen_log_whose_robot_is_never_anywhere_has_no_odometry(tmp_path: Pa
     assert [scan.pose is not None for scan in log] == [known] * 3
     assert ("no_odometry" in codes(log)) is not known
     assert near(next(iter(log)).mount, 0.1, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("scan_time", "expected"), [(0.1, 0.025), (0.0, 0.05), (math.nan, 0.05), (30.0, 0.05)])
+def test_a_time_increment_in_another_unit_is_replaced(tmp_path: Path, scan_time: float, expected: float) -> None:
+    bag = Robots("mcap", tmp_path)
+    kind = "sensor_msgs/msg/LaserScan"
+    ranges, nothing = np.ones(4, dtype=np.float32), np.zeros(0, dtype=np.float32)
+    numbers = (-0.2, 0.1, 0.1, 100.0, scan_time, 0.05, 10.0)
+    bag.write("/scan", kind, 1, bag.type(kind, bag.header(1, "laser"), *numbers, ranges, nothing))
+    (scan,), log = read(bag)
+    assert scan.time_increment == pytest.approx(expected)
+    assert codes(log)["time_increment"] == 1
