@@ -7,6 +7,7 @@ MAX_LINE_BYTES = 2 * 2**20  # of a text log: some 200,000 ranges
 MAX_CELLS = 40_000_000  # of a grid
 MAX_SEGMENTS = 500_000  # of a map
 MAX_ENTITIES = 500_000  # of a drawing, with what its blocks expand to
+MAX_DXF_OBJECTS = 750_000  # of the text of a DXF: entities, blocks, and objects that are not drawn
 MAX_DEPTH = 64  # of elements in one another
 MAX_BLOCK_DEPTH = 8  # of blocks in one another
 MAX_PATH_BYTES = 4 * 2**20  # of all paths of an SVG, some 20 microseconds a number
@@ -16,6 +17,8 @@ MAX_METADATA_BYTES = 256 * 2**10  # of the description of a bag of ROS 2
 MAX_TRANSFORMS = 2_000_000  # of a bag, kept while its scans are read
 MAX_UNITS = 1e13  # coordinates of a drawing
 MAX_TEXT = 200  # characters of a name taken from a file
+MAX_NAMED = 10  # names in one message
 
 MIN_RESOLUTION, MAX_RESOLUTION = 1e-3, 10.0  # m
 MAX_ORIGIN = 1e6  # m
+MAX_EXTENT = 1e5  # m, of a map; as the map index has it

@@ -12,6 +12,7 @@ from ..line_map import LineMap
 from ..options import ImportOptions
 from .centres import are_centres, walls_of
 from .drawing import Drawing
+from .far import near_lines
 from .inside import Sides, sides_seen
 from .solid import outline
 
@@ -43,11 +44,14 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if metres is None:
         raise IncompleteFileError("does not say its unit; say units, such as mm or m", argument=drawing.name)
     if not drawing.segments:
-        raise MalformedFileError("has no lines that could be walls", argument=drawing.name)
+        raise drawing.without_lines()
     endpoints = np.vstack(drawing.segments) * metres
-    widths = np.repeat(np.asarray(drawing.widths), [len(s) for s in drawing.segments]) * metres
+    lengths = [len(s) for s in drawing.segments]
+    widths = np.repeat(np.asarray(drawing.widths), lengths) * metres
     oriented = _means_directions(drawing, options)
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
+        near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
+        endpoints, widths = endpoints[near], widths[near]
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
     if are_centres(endpoints, drawing, options):
         endpoints, oriented = _with_faces(endpoints, widths, drawing, options), True

@@ -159,8 +159,10 @@ def _edges_decided(cells: Cells, kept: Flags, grid: Grid) -> Cells:
     if not between.any():
         return cells
     edge = between.copy()
+    beside = np.ones((3, 3), dtype=np.bool_)
     for kind in (FREE, OCCUPIED):  # through other such cells, not through a wall
-        edge &= ndimage.binary_dilation(cells == kind, np.ones((3, 3)), EDGE_REACH, mask=between | (cells == kind))
+        own = cells == kind
+        edge &= ndimage.binary_dilation(own, beside, EDGE_REACH, mask=between | own)
     middle = np.float32(0.5 * (grid.free_below + grid.occupied_above))
     decided = np.where(grid.occupancy > middle, OCCUPIED, FREE)
     return np.where(edge, decided, cells).astype(np.int8)
