@@ -95,7 +95,7 @@ class Measure:
             numbers.append(float(found[1]))
             at = found.end()
         if text[at:].strip(" \t\r\n,"):
-            raise self.refused(key, text[at : at + 20], "numbers, two for each point")
+            raise self.refused(key, text[at:].strip(" \t\r\n,")[:20], "numbers, two for each point")
         return numbers
 
     def refused(self, key: str, found: str, expected: str) -> MalformedFileError:
