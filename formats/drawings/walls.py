@@ -15,6 +15,7 @@ from .drawing import Drawing
 from .far import near_lines
 from .inside import Sides, sides_seen
 from .solid import outline
+from .units import note_unit
 
 Floats = NDArray[np.float64]
 
@@ -52,6 +53,8 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
         near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
         endpoints, widths = endpoints[near], widths[near]
+        if drawing.format in ("dxf", "svg"):
+            note_unit(endpoints, metres, drawing, options)
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
     if are_centres(endpoints, drawing, options):
         endpoints, oriented = _with_faces(endpoints, widths, drawing, options), True
@@ -81,7 +84,9 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
         drawing.notes.add_dropped("short", f"lines shorter than {LEAST_LENGTH:g} m", int((~long).sum()))
     endpoints, widths = endpoints[long], widths[long]
     if len(endpoints) == 0:
-        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: is the unit right?", argument=drawing.name)
+        doubt = drawing.notes.assumed.get("unlikely_unit")
+        why = doubt.message if doubt is not None else "is the unit right?"
+        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: {why}", argument=drawing.name)
     keys = np.rint(endpoints / SAME)
     if not oriented:
         backward = (keys[:, 0] > keys[:, 2]) | ((keys[:, 0] == keys[:, 2]) & (keys[:, 1] > keys[:, 3]))

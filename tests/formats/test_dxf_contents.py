@@ -62,7 +62,6 @@ def test_multilines(tmp_path: Path) -> None:
     style = document.mline_styles.new("WALL")
     style.elements.append(0.15)
     style.elements.append(-0.15)
-    style.update_all()
     document.modelspace().add_mline([(0, 0), (5, 0), (5, 4)], dxfattribs={"style_name": "WALL"})
     block = document.blocks.new("PLAN")
     block.add_mline([(0, 0), (2, 0)], dxfattribs={"style_name": "WALL"})

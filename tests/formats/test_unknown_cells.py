@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def imported(
     *,
     name: str = "map.png",
     said: str = "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
-    **saved: int,
+    **saved: Any,
 ) -> ImportedMap:
     picture.transpose(Image.Transpose.FLIP_TOP_BOTTOM).save(folder / name, **saved)
     (folder / "map.yaml").write_text(f"image: {name}\nresolution: 0.1\norigin: [0, 0, 0]\n{said}")
