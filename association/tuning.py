@@ -319,6 +319,11 @@ CAUSE_GAP = 30.0  # nats
 CAUSE_RATIO = 1.5
 CAUSE_SHARE = 0.7  # of the length
 USUAL_EXTENT = 12.0  # m, tables; of a scan
+GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
+# Times; a scan that is scaled by more falls out of the gates of the search, which are metres: then the map is scaled.
+GREATEST_SAME_GATES = 5.0
+USUAL_PART = (0.25, 2.0)  # times, tables; usual length of scan lines, once of one unit, over that of walls
+MOST_FOR_UNITS = 2000  # map segments; indexing them anew takes some 20 ms
 LEAST_STRETCH, GREATEST_STRETCH = 0.004, 0.12  # tables; how far a factor near one may be from it
 SCALE_LENGTH = 0.5  # of the scan's length, tables; that has to match where the gates are wide
 SCALE_KEPT = 8  # poses, tables

@@ -8,7 +8,7 @@ import numpy as np
 
 from registration import Beams
 
-from .causes import Cause, Mistake
+from .causes import Cause, Mistake, unit_mistake
 from .context import SearchContext
 from .extents import extent, inner_extent
 from .kernels.extents import facing_away
@@ -64,8 +64,12 @@ def warnings_of(
 def _mistaken(cause: Cause) -> str:
     if cause.mistake is not Mistake.SCALE:
         return SENTENCES[cause.mistake]
-    unit = UNITS.get(cause.factor)
-    what = f"the scan seems to be in {unit}" if unit else "the scan or the map is not to scale"
+    unit, taken = UNITS.get(cause.factor), unit_mistake(cause.factor)
+    what = "the scan or the map is not to scale"
+    if unit is not None:
+        what = f"the scan seems to be in {unit}"
+    elif taken is not None:
+        what = f"the map seems to be in {taken}"
     return (
         f"With all lengths times {cause.factor:.4g} the scan fits much better: {what}. Send both in metres: multiply "
         "the scan by this, or divide the map."

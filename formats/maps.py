@@ -59,7 +59,7 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     file = Path(path)
     suffix = file.suffix.lower()
     if suffix in (".yaml", ".yml"):
-        return _read_map_server(file)
+        return _read_map_server(file, options)
     if is_bag(file):
         return _read_bag(file, options)
     if suffix in DRAWINGS:
@@ -72,9 +72,9 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     )
 
 
-def _read_map_server(file: Path) -> ImportedMap:
+def _read_map_server(file: Path, options: ImportOptions) -> ImportedMap:
     notes = Notes()
-    grid, files = read_grid(file, notes)
+    grid, files = read_grid(file, options, notes)
     line_map = _from_grid(grid, notes, files[0], "map")
     return ImportedMap(line_map, notes.report("map_server", files))
 

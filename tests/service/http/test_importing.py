@@ -88,6 +88,26 @@ def test_a_bomb_of_xml(client: httpx.Client) -> None:
     assert refused(answer, 422, "invalid_request").startswith("/files/0: declares XML entities")
 
 
+def test_an_encoding_that_nobody_knows(client: httpx.Client) -> None:
+    drawing = b'<?xml version="1.0" encoding="unknown-enc"?><svg xmlns="http://www.w3.org/2000/svg"/>'
+    answer = send(client, {"plan.svg": drawing}, ("units", "m"))
+    assert "encoding that is not known" in refused(answer, 422, "invalid_request")
+
+
+@pytest.mark.parametrize(("count", "status", "code"), [(8_000_000, 413, "too_large"), (1000, 422, "invalid_request")])
+def test_features_without_geometry(client: httpx.Client, count: int, status: int, code: str) -> None:
+    features = b'{"type": "FeatureCollection", "features": [' + b"{}," * count + b"{}]}"
+    refused(send(client, {"plan.geojson": features}, ("local_metres", "true")), status, code)
+
+
+def test_the_grey_value_of_unknown_cells(client: httpx.Client) -> None:
+    answer = send(client, room_grid(), ("unknown", "none"))
+    assert answer.status_code == 200, answer.text
+    assert {note["code"]: note["count"] for note in answer.json()["report"]["read"]}["unknown_cells"] == 0
+    answer = send(client, room_grid(), ("unknown", "grey"))
+    assert refused(answer, 422, "invalid_request").startswith("/unknown: expected none, or a grey value from 0 to 255")
+
+
 def test_a_format_that_is_not_read(client: httpx.Client) -> None:
     assert "ends in one of .yaml" in refused(send(client, {"a.dwg": b"AC1032"}), 415, "unsupported_media_type")
 
