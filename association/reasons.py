@@ -48,7 +48,8 @@ class Standing:
 
 SENTENCES: Mapping[str, str] = {
     "prior_contradicted": "The prior and the scan do not agree on where the robot is.",
-    "search_incomplete": "The deadline ended the search; a better pose may have been missed.",
+    "search_incomplete": "The deadline, or too many walls in one place of the map, ended the search; a better pose may "
+    "have been missed.",
     "free_direction": "The walls that were seen leave the position free along one direction.",
     "elsewhere": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
     "twin": "Another pose explains the scan about as well.",
