@@ -91,9 +91,9 @@ class SearchContext:
     def of(
         cls, index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline
     ) -> SearchContext:
-        """Prepare a search; views that are not exact are laid on one another."""
+        """Prepare a search; views that are not exact are laid on one another, as far as the deadline lets it."""
         place = index if options.oriented else index.undirected
-        scan = aligned(scan)
+        scan = aligned(scan, deadline)
         lines = ScanLines.of(scan, place.sigma, options)
         return cls(place, scan, prior, options, deadline, lines, gates(options))
 

@@ -133,6 +133,7 @@ def _alternatives(context: SearchContext, others: Iterable[Ranked], *, usable: b
     if not shown:
         return ()
     settled = settle(context, shown)
+    shown = shown[: len(settled)]
     poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)
     measures = paper_measures(context.lines.rows, matches_of(shown), context.index.walls.rows, poses)
     return tuple(map(partial(_alternative, context), shown, settled, measures.tolist()))

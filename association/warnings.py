@@ -74,8 +74,8 @@ def _incomplete(context: SearchContext) -> str:
     if context.can_look:
         return "The deadline ended the search; a better pose may have been missed."
     return (
-        f"Up to {context.index.most_near} walls lie in one place of the map, too many to follow lines of sight, so that "
-        "a wrong pose may score too high. Remove segments that repeat or overlap one another from the map."
+        f"Up to {context.index.most_near} walls lie in one place of the map, too many to follow lines of sight: a "
+        "wrong pose may score too high. Remove segments that repeat or overlap one another from the map."
     )
 
 
