@@ -85,6 +85,17 @@ def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.
     assert "twin" in [reason.code for reason in got.reasons]
 
 
+def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
+    """By a prior that likes the place little, it leads by less than twins do, but there is none."""
+    best, other = ranked(9.0, prior=-4.0), ranked(8.0, prior=-4.0, at=pose(9.0, 9.0))
+    with judged_by({**SURE, "cautious": {"constant": [-1.5], "lead": [0.2]}}):
+        alone, beside = (judge(room(), explanations_of(answer_with(best), *others)) for others in ((), (other,)))
+    assert alone.status is beside.status is Status.AMBIGUOUS
+    assert (alone.margin, beside.margin) == (None, 1.0)
+    assert [reason.code for reason in alone.reasons] == ["too_little"]
+    assert [reason.code for reason in beside.reasons] == ["twin"]
+
+
 def test_the_probability_is_that_for_scans_of_the_map() -> None:
     """Where other buildings are reckoned with decides whether it is usable, and is not told."""
     with judged_by({**SURE, "probability": {"constant": [3.0]}, "cautious": {"constant": [0.0]}}):
