@@ -61,7 +61,7 @@ def explain(context: SearchContext, candidates: Candidates) -> Explanations:
 def _as_far_as(context: SearchContext, candidates: Candidates) -> SearchReport:
     """Return how the search went; what the deadline left unranked, or rays speak against, may have been worse."""
     as_far = context.can_look and not context.deadline.passed
-    return candidates.report if as_far else replace(candidates.report, complete=False)
+    return candidates.report if as_far else candidates.report.cut_short()
 
 
 def _answer(context: SearchContext, best: Ranked) -> Answer | None:

@@ -42,8 +42,8 @@ def report(
     factor: Factor | None = None,
 ) -> AssociationResult:
     """Put an answer together; `factor` is what the scan was put to scale by."""
-    if verdict.complete is not explanations.search.complete:
-        explanations = replace(explanations, search=replace(explanations.search, complete=verdict.complete))
+    if not verdict.complete:
+        explanations = replace(explanations, search=explanations.search.cut_short())
     answer = explanations.answer
     if answer is None or verdict.status is Status.NO_MATCH:
         return _no_match(context, explanations, verdict, causes)

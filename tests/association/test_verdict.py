@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from association import (
+    AssociationOptions,
     Deadline,
     HardPrior,
     Reason,
@@ -33,6 +34,7 @@ from .judged import AROUND, BESIDE, LIKELY, PLAIN, SOFT, Drawn, Numbers, crossin
 from .scenes import INSIDE, ROOM, equal_rooms, index_of, pose, same_pose, scan_of, seen
 
 SURE = {name: {"constant": [30.0]} for name in PLAIN}  # by which every answer is right
+THROUGH = AssociationOptions(exhaustive=True)
 BARS = {"USABLE_PROBABILITY": 0.7, "USABLE_CAUTIOUS": 0.6, "USABLE_CAUTIOUS_WITH_BEAMS": 0.9}
 
 
@@ -255,14 +257,15 @@ def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypa
         deadline.at = 0.0
         return compared(*arguments)
 
-    in_time = associate(index, sent, None, deadline=Deadline(time.monotonic() + 60.0))
+    in_time = associate(index, sent, None, THROUGH, Deadline(time.monotonic() + 60.0))
     assert in_time.usable
-    assert in_time.search.complete
+    assert (in_time.search.complete, in_time.search.exhaustive) == (True, True)
+    assert in_time.search.rivals_above < 1.0
     monkeypatch.setattr(module, during, late)
-    got = associate(index, sent, None, deadline=deadline)
+    got = associate(index, sent, None, THROUGH, deadline)
     assert deadline.at == 0.0
     assert not got.usable
-    assert not got.search.complete
+    assert (got.search.complete, got.search.exhaustive, got.search.rivals_above) == (False, False, 1.0)
     assert got.pose == in_time.pose
     assert got.reasons[0].code == "search_incomplete"
     assert "search_incomplete" in [warning.code for warning in got.warnings]
