@@ -110,7 +110,7 @@ class MapIndex:
         sweep = swept_runs(runs)
         grids = near_walls(walls), sweep, crossing_runs(sweep.runs), directions_near(walls, runs)
         index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
-        for name in ("wall_lengths", "crowd", "area", "diagonal", "tables"):
+        for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
             getattr(index, name)  # kept from here on, so that the first search does not wait for them
         return index
 
@@ -133,6 +133,11 @@ class MapIndex:
         """How many walls are on the list of a cell, seen from the walls: the mean over all entries of all lists."""
         counts = np.diff(self.grid.starts).astype(np.float64)
         return float((counts * counts).sum() / max(1.0, counts.sum()))
+
+    @cached_property
+    def most_near(self) -> int:
+        """How many walls the longest list of a cell holds."""
+        return int(np.diff(self.grid.starts).max())
 
     def _agreeing_share(self) -> float:
         """Return the chance that two points of walls have the same direction, up to a neighbouring bin."""

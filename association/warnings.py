@@ -52,9 +52,7 @@ def warnings_of(
         "prior_contradicted": "A clearly better pose lies where the prior says it should not."
         if verdict.contradicted
         else None,
-        "search_incomplete": None
-        if search.complete
-        else "The deadline ended the search; a better pose may have been missed.",
+        "search_incomplete": None if search.complete else _incomplete(context),
         str(Mistake.SCALE): None if factor is None else _off_scale(factor),
     }
     found |= {str(cause.mistake): _mistaken(cause) for cause in causes}
@@ -73,6 +71,15 @@ def _mistaken(cause: Cause) -> str:
     return (
         f"With all lengths times {cause.factor:.4g} the scan fits much better: {what}. Send both in metres: multiply "
         "the scan by this, or divide the map."
+    )
+
+
+def _incomplete(context: SearchContext) -> str:
+    if context.can_look:
+        return "The deadline ended the search; a better pose may have been missed."
+    return (
+        f"Up to {context.index.most_near} walls lie in one place of the map, too many to follow lines of sight: a "
+        "wrong pose may score too high. Remove segments that repeat or overlap one another from the map."
     )
 
 
