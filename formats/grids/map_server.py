@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -62,7 +63,7 @@ class Description:
     mode: str
 
 
-def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
+def read_grid(path: Path, notes: Notes, pictures: Mapping[str, Path] | None = None) -> tuple[Grid, tuple[str, ...]]:
     """Read a grid and tell the names of its files.
 
     Parameters
@@ -70,6 +71,8 @@ def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
     path : Path
         Of the YAML; the picture is looked for beside it, whatever folder the YAML names.
     notes : Notes
+    pictures : mapping of str to Path, optional
+        Where pictures are, by the names that a YAML may give them; no others are read then.
 
     Raises
     ------
@@ -77,7 +80,9 @@ def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
         When either file is missing, too large or not what it should be.
     """
     told = read_description(path, notes)
-    picture = path.parent / told.image
+    picture = path.parent / told.image if pictures is None else pictures.get(told.image)
+    if picture is None:
+        raise IncompleteFileError("there is no such file", argument=shown(told.image))
     pixels, alpha = read_picture(picture)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map
