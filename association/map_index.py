@@ -213,5 +213,5 @@ class MapIndex:
 
 
 def _require_time(deadline: Deadline | None) -> None:
-    if deadline is not None and deadline.passed:
+    if deadline is not None and deadline.over:
         raise IndexingEndedError

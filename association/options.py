@@ -207,8 +207,13 @@ class Deadline:
 
     @property
     def passed(self) -> bool:
-        """Whether the search has to end."""
+        """Whether the search has to end; a look at it may rest."""
         self._may_rest()
+        return self.over
+
+    @property
+    def over(self) -> bool:
+        """The same without a rest: what holds much memory goes on, so that no more of it is held at once."""
         return self.cancelled or (self.at is not None and time.monotonic() >= self.at)
 
     @property

@@ -6,9 +6,11 @@ memory and time than it was given and no keys in its environment, and what it sa
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import resource
+import shutil
 import sys
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -18,13 +20,15 @@ from typing import TYPE_CHECKING, Any
 import orjson
 
 from ..schemas.errors import Fault, InvalidRequestError
-from .bounds import Bounds
+from .bounds import NO_ROOM, Bounds
 
 if TYPE_CHECKING:
     from formats import FormatError, ImportedMap
 
 MAPPED_BYTES = 1_000_000_000  # of address space beside the memory: libraries, and room that is never used
 MOST_OPEN = 64  # files
+NICE = 5  # searches go before it, at three times as much of a core that both want
+FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
 METADATA, BAG = "metadata.yaml", "bag"
 PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9 ._()+=@-]*")
 PLAIN_NAMES = "expected the name of a file of a bag to be letters, digits, spaces and any of ._()+=@- only; rename it"
@@ -45,9 +49,17 @@ def main(told: str, folder: str) -> None:
         lines = [{"missing": True}]
     except (MemoryError, RecursionError):
         lines = [{"too_large": "reading it takes more memory than it may have"}]
-    for line in lines:
-        sys.stdout.buffer.write(orjson.dumps(line, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
+    sys.stdout.buffer.write(_printed(lines, bounds.file_bytes))
     sys.stdout.flush()
+
+
+def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
+    """Return lines as JSON, or one that says that they are too long: such a map could not be put either."""
+    option = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE
+    printed = b"".join(orjson.dumps(line, option=option) for line in lines)
+    if len(printed) <= most:
+        return printed
+    return orjson.dumps({"too_large": f"the map, or its report, takes more than {most} bytes"}, option=option)
 
 
 def _bind(bounds: Bounds) -> None:
@@ -63,6 +75,8 @@ def _bind(bounds: Bounds) -> None:
     ):
         with suppress(ValueError, OSError):  # less is allowed already, or the system knows no such limit
             resource.setrlimit(what, (limit, limit))
+    with suppress(OSError):
+        os.nice(NICE)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE)
 
@@ -202,8 +216,12 @@ def _answer(imported: ImportedMap, files: OwnFiles) -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
+    told, folder, service = sys.argv[1:]
     try:
-        main(*sys.argv[1:])
+        main(told, folder)
     except Exception as error:  # a defect; its kind is told, and nothing of the file
-        print(f"{type(error).__name__}", file=sys.stderr)
-        os._exit(1)
+        print(f"{type(error).__name__}", file=sys.stderr, flush=True)
+        os._exit(NO_ROOM if isinstance(error, OSError) and error.errno in FULL else 1)
+    finally:
+        if os.getppid() != int(service):  # it was killed, and removes nothing any more
+            shutil.rmtree(folder, ignore_errors=True)
