@@ -49,6 +49,7 @@ from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
+LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
 FIRST_KEYS_SECONDS = (
     12.0  # that a start waits for the issuer's keys: as long as a fetch of them may take, and some more
 )
