@@ -151,7 +151,11 @@ def _services(settings: Settings, part: Part) -> Services:
         documents=_budget(settings, part, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
         importing=Gate(1, settings.max_connections, "importing"),
-        import_bounds=Bounds(part.share(settings.max_import_bytes), settings.max_body_bytes, settings.max_map_segments),
+        import_bounds=Bounds(
+            max(LEAST_IMPORT_BYTES, part.share(settings.max_import_bytes)),
+            settings.max_body_bytes,
+            settings.max_map_segments,
+        ),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
         key_threads=Threads(1, "keys"),
