@@ -51,8 +51,8 @@ def read_map(
     options : ImportOptions
         What the file does not say.
     pictures : mapping of str to Path, optional
-        Where the pictures of a ``.yaml`` are, by the names that it may give them, if not beside it; no other file is
-        read then.
+        Paths of the pictures of a ``.yaml``, by the names that it may contain; no other picture is read then. Without
+        it the picture lies in the folder of the ``.yaml``.
 
     Returns
     -------

@@ -88,7 +88,7 @@ def cache_directory(package: str) -> Path:
     folder = home / "kernels"
     beside = (folder if folder.is_dir() else home) / "__pycache__"
     kept = _can_write(beside if beside.exists() else beside.parent) or _holds_all(beside / name, package)
-    # Whoever can write to the folders above can write to the source as well.
+    # Users who can write to the folders above can write to the source as well.
     if kept and (not beside.exists() or is_trusted_folder(beside)):
         return beside / name
     return _own_directory() / name
@@ -206,7 +206,7 @@ def read_trusted(path: Path) -> bytes | None:
     """Return what a file holds that is to be run; None, and a warning, where others may write to it."""
     if is_trusted_file(path):
         return path.read_bytes()
-    logger.warning("compiling anew what %s should hold: others may write to that file", path)
+    logger.warning("%s is not loaded: other users may write to that file; the kernel is compiled again", path)
     return None
 
 
@@ -240,7 +240,7 @@ def _holds_all(directory: Path, package: str) -> bool:
 
 @cache
 def _is_trusted(folder: Path) -> bool:
-    """Tell whether kernels may be kept in a folder; where not it is said once, and why."""
+    """Return whether kernels may be stored in a folder; where not, the reason is logged once."""
     why = why_untrusted(folder)
     if why is not None:
         logger.warning("compiled kernels are not kept in %s: %s", folder, why)

@@ -1,4 +1,4 @@
-"""Whether what lies in a folder may be run, as compiled kernels are: whoever can write there can put others there."""
+"""Check the owner and mode of a folder whose files are run, as compiled kernels are."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def why_untrusted(folder: Path) -> str | None:
-    """Return what lets others than this user and root write to a folder, or put another in its place.
+    """Return the reason why users other than this one and root can write to a folder, or replace it.
 
     Parameters
     ----------
@@ -18,8 +18,8 @@ def why_untrusted(folder: Path) -> str | None:
     Returns
     -------
     str or None
-        One sentence with the path, what was found and what to do; None where nobody else can write. Always None where
-        the system has no owners of files as POSIX has them.
+        One sentence with the path, the owner or mode found and what to do; None where no other user can write. Always
+        None where the system has no owners of files as POSIX has them.
     """
     if not hasattr(os, "geteuid"):
         return None
@@ -33,17 +33,17 @@ def why_untrusted(folder: Path) -> str | None:
             return f"{path} cannot be looked at ({error.strerror}): expected a folder of this user"
         found = _found(state, is_parent=path != whole)
         if found is not None:
-            return f"{path} {found}: make it this user's own and writable by nobody else (chmod go-w), or name another"
+            return f"{path} {found}: expected this user's own folder with mode 0755; chmod go-w, or name another folder"
     return None
 
 
 def is_trusted_folder(folder: Path) -> bool:
-    """Tell whether a folder by itself, whatever those above, is this user's, or root's, and nobody else may write."""
+    """Return whether a folder, without those above, is this user's or root's and no other user can write to it."""
     return not hasattr(os, "geteuid") or _found(folder.stat(), is_parent=False) is None
 
 
 def is_trusted_file(path: Path) -> bool:
-    """Tell whether a file is this user's, or root's, and nobody else may write to it; raises `FileNotFoundError`."""
+    """Return whether a file is this user's or root's and no other user can write; raises `FileNotFoundError`."""
     if not hasattr(os, "geteuid"):
         return True
     state = path.stat(follow_symlinks=False)
@@ -54,7 +54,7 @@ def _found(state: os.stat_result, *, is_parent: bool) -> str | None:
     """Return what is wrong with one file or folder."""
     if state.st_uid not in (0, os.geteuid()):
         return f"belongs to the user {state.st_uid}"
-    # In a folder with the sticky bit, such as /tmp, nobody replaces what belongs to somebody else.
+    # In a folder with the sticky bit, such as /tmp, users can replace their own files only.
     if is_parent and state.st_mode & stat.S_ISVTX:
         return None
     if state.st_mode & stat.S_IWOTH:

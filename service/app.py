@@ -231,7 +231,7 @@ async def _prepare(services: Services) -> None:
 
 
 async def _fetch_first_keys(services: Services) -> None:
-    """Wait for the keys of the issuer, but no longer than it may take: whoever has another key can be answered."""
+    """Wait for the keys of the issuer, but not longer than a fetch may take: other keys are checked without them."""
     with suppress(Exception):  # `_follow` tries again, and logs
         async with asyncio.timeout(FIRST_KEYS_SECONDS):
             await services.issuer_threads.run(services.keyring.refresh_tokens)

@@ -72,7 +72,7 @@ def read_grid(path: Path, notes: Notes, pictures: Mapping[str, Path] | None = No
         Of the YAML; the picture is looked for beside it, whatever folder the YAML names.
     notes : Notes
     pictures : mapping of str to Path, optional
-        Where pictures are, by the names that a YAML may give them; no others are read then.
+        Paths of pictures, by the names that a YAML may contain; no other picture is read then.
 
     Raises
     ------

@@ -162,7 +162,7 @@ def refusing(name: str, mended_by: str = "", folder: Path | None = None) -> Iter
 
 
 def _refuse_special(path: Path, name: str) -> None:
-    """Refuse what is no path where SQLite is asked for it, as rosbags does, by a URI that it does not quote."""
+    """Refuse paths that SQLite reads as other ones: rosbags opens them by a URI that it does not quote."""
     for file in path.iterdir() if path.is_dir() else [path]:
         found = [character for character in SPECIAL if character in str(file)]
         if found:

@@ -114,7 +114,7 @@ class _Watch:
 
     @property
     def is_over(self) -> bool:
-        """Whether the time is over."""
+        """True when the time is over."""
         return time.monotonic() >= self._end
 
     def add(self, connection: socket.socket) -> None:

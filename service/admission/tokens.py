@@ -71,7 +71,7 @@ class Tokens:
     def refresh(self) -> None:
         """Fetch the keys where that is due, off the event loop.
 
-        What cannot be had leaves them as they were for `LONGEST_SECONDS`; a set without keys is one.
+        While the set cannot be fetched the keys stay for `LONGEST_SECONDS`; a set without keys removes them all.
         """
         now = time.monotonic()
         if now < self._next_fetch:

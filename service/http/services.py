@@ -57,7 +57,7 @@ class Services:
         Bytes of stored maps that wait to be indexed.
     associator : Associator
     importing : Gate
-        Where the map of another tool has its turn to be read, one at a time: each may take much memory.
+        Slot in which maps of other tools are read, one at a time: each may take much memory.
     import_bounds : Bounds
         That reading one is held to.
     parse_threads, store_threads, key_threads, issuer_threads : Threads

@@ -117,7 +117,7 @@ def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadl
             command, env=clean, process_group=0, stdin=subprocess.PIPE, stdout=answer, stderr=failure
         ) as process,
     ):
-        # Written by a thread of its own: this one looks whether somebody still waits.
+        # A thread of its own writes the form: this one checks the deadline.
         pipe, process.stdin = process.stdin, None
         assert pipe is not None
         feeding = threading.Thread(target=_feed, args=(pipe, content))

@@ -39,7 +39,7 @@ def own_folder() -> Iterator[Path]:
 def remove_abandoned(place: Path | None = None) -> None:
     """Remove the folders of this user's imports whose service was killed: nothing holds their locks any more."""
     for folder in (place or _place()).glob(f"{PREFIX}*"):
-        with suppress(OSError):  # of somebody else, gone meanwhile, or in use
+        with suppress(OSError):  # of another user, removed meanwhile, or in use
             _remove(folder)
 
 

@@ -54,7 +54,7 @@ def main(told: str, folder: str) -> None:
 
 
 def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
-    """Return lines as JSON, or one that says that they are too long: such a map could not be put either."""
+    """Return lines as JSON, or one line with an error where they are too long: such a map could not be put either."""
     option = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE
     printed = b"".join(orjson.dumps(line, option=option) for line in lines)
     if len(printed) <= most:
@@ -116,7 +116,7 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
 
 @dataclass(frozen=True, slots=True)
 class OwnFiles:
-    """Files that were sent, under names of our own: nothing that is read goes by a name that somebody made up.
+    """Uploaded files under names of our own: no path is made of an uploaded name.
 
     Attributes
     ----------

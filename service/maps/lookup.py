@@ -119,7 +119,7 @@ class MapLookup:
         return self._cache.get(key, lambda: self._index(asked, directed), deadline)
 
     def index_once(self, asked: InlineMap, deadline: Deadline) -> MapIndex:
-        """Return the index, with its directions, of a map that nobody searches; it has no place in the cache.
+        """Return the index, with its directions, of a map that is not searched; it is not cached.
 
         Raises
         ------

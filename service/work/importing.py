@@ -18,7 +18,7 @@ from .job import Done, Job
 
 
 def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> MapIndex:
-    """Index a map that was imported; it is not kept, for nobody searches it.
+    """Index an imported map, with the deadline; the index is not cached, since no search uses it.
 
     Raises
     ------

@@ -97,7 +97,7 @@ def test_a_key_is_refused_however_its_files_change(
 
 
 def test_the_unit_reads_keys_where_they_are_changed() -> None:
-    """What systemd copies at the start it copies once."""
+    """LoadCredential= copies a file once, at the start."""
     settings = [line for line in (DEPLOY / "linefix.service").read_text().splitlines() if not line.startswith("#")]
     assert not any(line.startswith(("LoadCredential", "SetCredential", "ImportCredential")) for line in settings)
     (file,) = [line.removeprefix("Environment=LINEFIX_KEYS_FILE=") for line in settings if "LINEFIX_KEYS_FILE=" in line]

@@ -110,7 +110,7 @@ class Planted:
 
 @pytest.mark.parametrize("variable", ["LINEFIX_KERNELS", "NUMBA_CACHE_DIR"])
 def test_kernels_come_from_no_folder_of_others(own: Path, tmp_path: Path, variable: str) -> None:
-    """What is planted there is not run, and nothing is kept there."""
+    """Files there are not loaded, and no file is stored there."""
     own.chmod(0o777)
     program = (
         "import os, registration.kernels, sys; from pathlib import Path; from registration import kept_kernels as k;"
@@ -139,5 +139,5 @@ def test_a_file_that_others_may_write_to_is_compiled_anew(
     file.chmod(0o666)
     with caplog.at_level(logging.WARNING, "linefix"):
         assert kept_kernels.read_trusted(file) is None
-    assert "others may write" in caplog.text
+    assert "other users may write" in caplog.text
     assert not mark.exists()

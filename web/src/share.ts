@@ -10,8 +10,8 @@ function body(): string | null {
   return made ? JSON.stringify(made.asked) : null;
 }
 
-// What an opened file says may stand in the request, and the text may be pasted into any shell: cmd.exe knows no single
-// quotes, and PowerShell takes typographic ones for such. So nothing is left in it that means something to one of them.
+// Text of an opened file may be part of the request, and the user may paste it into any shell. cmd.exe has no single
+// quotes, and PowerShell reads typographic ones as such. So every character with a meaning to a shell is escaped.
 const UNSAFE = /[^A-Za-z0-9{}[\]",:.+\-_\\/]/g;
 const escaped = (c: string) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`;
 const plain = (json: string) => json.replace(/\\(["\\])/g, (_, c: string) => escaped(c)).replace(UNSAFE, escaped);

@@ -20,7 +20,7 @@ from registration.layout import Floats
 
 COUNT = 40_000
 MOST_BETWEEN_LOOKS = 0.5  # s of this thread's processor time
-MOST_HELD = 100_000_000  # bytes beside the index
+MOST_HELD = 100_000_000  # bytes in addition to the index
 
 
 def scattered(width: float, length: float) -> Floats:

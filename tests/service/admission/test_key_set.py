@@ -122,7 +122,7 @@ def redirect_to(port: int) -> Callable[[socket.socket], None]:
 
 
 def test_a_key_set_leads_nowhere_else() -> None:
-    """Class of attack: a request forged by the server. What is inside is not even asked."""
+    """Class of attack: a request forged by the server. No request reaches the other address."""
     asked: list[bytes] = []
     with (
         serving(lambda connection: asked.append(connection.recv(4096))) as inside,

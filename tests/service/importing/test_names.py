@@ -1,6 +1,6 @@
 """Class of attack: path traversal, by names and references in what is uploaded.
 
-A name that was sent, and a name in a file, opens nothing but what was sent; and no error tells where files are put.
+Uploaded names, and names in uploaded files, open uploaded files only. No error contains a temporary path.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Place:
         return told["report"], found
 
     def refused(self, files: dict[str, bytes]) -> str:
-        """Return what is said of files that are not; nothing of where they are put."""
+        """Return the error of files that are not read; it contains no temporary path."""
         try:
             (told,) = self.answer(files)
             said = next(iter(told.values()))

@@ -312,7 +312,7 @@ def test_the_maps_of_one_prefix_take_no_more_than_half(database: str) -> None:
             store.put("hq-c", b"", BOX, ANY, "hq-")
         with pytest.raises(StoreFullError):
             store.put("hq-a", bytes(5_001), BOX, ANY, "hq-")
-        store.put("lab-a", bytes(9_000), BOX, ANY, "lab-")  # whoever else has its own half
+        store.put("lab-a", bytes(9_000), BOX, ANY, "lab-")  # other prefixes have their own half
         store.delete("hq-b", ANY)
         for number in range(8):
             store.put(f"hq-{number}", b"", BOX, ANY, "hq-")

@@ -1,4 +1,4 @@
-"""What follows the reading of an import is bounded as that is."""
+"""The stages of an import after its reading are bounded as the reading is."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def lookup(tmp_path: Path) -> Iterator[Lookup]:
 
 
 def test_an_import_is_indexed_until_its_deadline_or_its_client_is_gone(lookup: Lookup) -> None:
-    """Class of attack: work that nobody waits for."""
+    """Class of attack: work without a client."""
     with pytest.raises(DeadlinePassedError):
         index_import(lookup, inline(), Deadline(time.monotonic()))
     gone = Deadline()
