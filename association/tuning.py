@@ -18,6 +18,7 @@ MERGE_ANGLE = math.radians(2.0)  # tables
 BEGIN_CELL = 1.0  # m, by which begins of pieces are found, at least; measured: little changes near it
 MOST_STEPS = 100  # places along one piece around which others are looked for; geometry: 190 m of wall
 MOST_LOOKS = 600  # begins that one piece is compared with; measured: no fewer walls are found on 443 maps of buildings
+PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadline: 0.2 s where each takes the most
 DIRECTION_BINS = 90  # tables
 SECTOR_BITS = 4
 SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degrees is the middle of one; tables

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -64,7 +65,9 @@ class Description:
     mode: str
 
 
-def read_grid(path: Path, options: ImportOptions, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
+def read_grid(
+    path: Path, options: ImportOptions, notes: Notes, pictures: Mapping[str, Path] | None = None
+) -> tuple[Grid, tuple[str, ...]]:
     """Read a grid and tell the names of its files.
 
     Parameters
@@ -74,6 +77,8 @@ def read_grid(path: Path, options: ImportOptions, notes: Notes) -> tuple[Grid, t
     options : ImportOptions
         Which grey value unknown cells have.
     notes : Notes
+    pictures : mapping of str to Path, optional
+        Paths of pictures, by the names that a YAML may contain; no other picture is read then.
 
     Raises
     ------
@@ -81,7 +86,9 @@ def read_grid(path: Path, options: ImportOptions, notes: Notes) -> tuple[Grid, t
         When either file is missing, too large or not what it should be.
     """
     told = read_description(path, notes)
-    picture = path.parent / told.image
+    picture = path.parent / told.image if pictures is None else pictures.get(told.image)
+    if picture is None:
+        raise IncompleteFileError("there is no such file", argument=shown(told.image))
     pixels, alpha = read_picture(picture)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map

@@ -6,6 +6,7 @@ by the definitions that ROS itself has, and only the few kinds that are wanted.
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from collections.abc import Collection, Iterator
@@ -38,6 +39,7 @@ OLD_TRANSFORMS = "tf/msg/tfMessage"  # of ROS 1, laid out alike
 
 SUFFIXES = (".bag", ".mcap", ".db3")
 METADATA = "metadata.yaml"
+SPECIAL = "%?#"  # in a URI
 
 # What rosbags lets through of a file that is broken on purpose.
 BROKEN = (
@@ -112,9 +114,10 @@ def opened(path: Path) -> Iterator[Bag]:
     if not path.exists():
         raise IncompleteFileError("there is no such file", argument=name)
     first = path.suffix.lower() == ".bag"
-    if (path / METADATA).is_file():
-        _refuse_packed(path / METADATA, name)
-    with refusing(name, _mended_by(path)):
+    storage = _storage_of(path / METADATA, name) if (path / METADATA).is_file() else path.suffix.lower()[1:]
+    if storage not in ("bag", "mcap"):
+        _refuse_special(path, name)
+    with refusing(name, _mended_by(path), path.parent):
         reader: Any = Reader1(path) if first else Reader2(path)
         reader.open()
     try:
@@ -144,24 +147,43 @@ def _mended_by(path: Path) -> str:
 
 
 @contextmanager
-def refusing(name: str, mended_by: str = "") -> Iterator[None]:
-    """Turn what a broken bag brings about into an error of this package."""
+def refusing(name: str, mended_by: str = "", folder: Path | None = None) -> Iterator[None]:
+    """Turn what a broken bag brings about into an error of this package; the `folder` that it is in is left out."""
     try:
         yield
     except FormatError:
         raise
     except BROKEN as error:
-        lines = str(error).splitlines() or [type(error).__name__]
+        text = str(error)
+        for place in () if folder is None else (str(folder.resolve()), str(folder)):
+            text = text.replace(place.rstrip(os.sep) + os.sep, "")
+        lines = text.splitlines() or [type(error).__name__]
         raise MalformedFileError(f"is a broken bag: {shown(lines[0])}{mended_by}", argument=name) from error
 
 
-def _refuse_packed(metadata: Path, name: str) -> None:
-    """Refuse a bag whose files are compressed whole: it would be unpacked to disk without a bound."""
+def _refuse_special(path: Path, name: str) -> None:
+    """Refuse paths that SQLite reads as other ones: rosbags opens them by a URI that it does not quote."""
+    for file in path.iterdir() if path.is_dir() else [path]:
+        found = [character for character in SPECIAL if character in str(file)]
+        if found:
+            raise UnsupportedFormatError(
+                f"has {found[0]!r} in its path, which means something else where SQLite opens a bag: rename it",
+                argument=name,
+            )
+
+
+def _storage_of(metadata: Path, name: str) -> str:
+    """Return what the files of a bag are: ``sqlite3`` or ``mcap``.
+
+    Files that are compressed whole are refused: they would be unpacked to disk without a bound.
+    """
     text = text_of(read_bounded(metadata, MAX_METADATA_BYTES), name)
     try:
         told = YAML(typ="safe", pure=True).load(text)
-        mode = str(told["rosbag2_bagfile_information"].get("compression_mode", ""))
+        known = told["rosbag2_bagfile_information"]
+        mode, storage = str(known.get("compression_mode", "")), str(known.get("storage_identifier", ""))
     except (YAMLError, RecursionError, TypeError, LookupError, AttributeError, ValueError) as error:
         raise MalformedFileError(f"has a broken {METADATA}", argument=name) from error
     if mode.lower() == "file":
         raise UnsupportedFormatError("is compressed file by file; unpack it first", argument=name)
+    return storage

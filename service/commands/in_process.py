@@ -32,7 +32,7 @@ from ..work.answers import outline_json
 from ..work.association import Associator
 from ..work.checking import check, check_done, conclude, sample
 from ..work.compiling import is_compiled
-from ..work.importing import answer_import
+from ..work.importing import answer_import, index_import
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
 from ..work.vectorization import answer_vectorization
@@ -89,7 +89,8 @@ class InProcess:
             read = ReadMap(orjson.dumps(document_of(imported.map)), asdict(imported.report))
             watch.lap("read")
             line_map = read_model(InlineMap, read.map, self._limits)
-            return _json(answer_import(self._lookup, line_map, read, self._job(watch)))
+            job = self._job(watch)
+            return _json(answer_import(index_import(self._lookup, line_map, job.deadline), line_map, read, job))
 
     def check(self, on: Json, samples: Json | None) -> Json:
         """Return the answer of ``/v1/maps/{map_id}:check``, also for a map that is not stored."""
