@@ -2,7 +2,7 @@
 
 from registration import Beams
 
-from .errors import AssociationError, InvalidMapError, InvalidSearchError
+from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .map_index import MapIndex
 from .options import (
     PARTS,
@@ -45,6 +45,7 @@ __all__ = [
     "Deadline",
     "HardPrior",
     "Hinge",
+    "IndexingEndedError",
     "InvalidMapError",
     "InvalidSearchError",
     "MapIndex",

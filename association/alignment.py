@@ -16,6 +16,7 @@ from registration.layout import Floats, Records
 
 from .kernels.alignment import pair_lines
 from .layout import POINT, as_records
+from .options import Deadline
 from .scan import Scan, Views
 from .scan_lines import parts_of
 from .tuning import ALIGNED_LINES, ALIGNING_ROUNDS, ALIGNING_SHARE, LEAST_SPREAD, MODEL_ANGLE, ROUGHNESS
@@ -24,14 +25,19 @@ from .views import corrected
 Indices = NDArray[np.intp]
 
 
-def aligned(scan: Scan) -> Scan:
-    """Return a scan with its views laid on one another; one of exact views is returned as it is."""
+def aligned(scan: Scan, deadline: Deadline) -> Scan:
+    """Return a scan with its views laid on one another; one of exact views is returned as it is.
+
+    After the deadline no round begins: the views stay where the rounds before have laid them.
+    """
     views = scan.views
     if views is None or not views.uncertain:
         return scan
     lines = _Lines.of(scan, views)
     found, spread = views.found, views.spread
     for _ in range(ALIGNING_ROUNDS):
+        if deadline.passed:
+            break
         shifts = (views.root @ (found - views.found)).reshape(-1, 3)
         seams = lines.moved(shifts).seams(views.root @ spread @ views.root.T, views.root)
         weighed = seams.jacobian * (ALIGNING_SHARE / seams.variances)[:, None]

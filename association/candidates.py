@@ -217,7 +217,7 @@ def _found(
     exhaustive = stopped == EXHAUSTED and len(context.lines.rows) <= BASE_SEGMENTS
     state = progress[0].item()  # a look at one field takes as long as all
     report = SearchReport(
-        complete=stopped != BUDGET and slid,
+        complete=True,
         exhaustive=exhaustive,
         confidence=1.0 if exhaustive or stopped == PROVEN else 1.0 - state[MISSED],
         bases=state[BASES],
@@ -227,7 +227,7 @@ def _found(
         sampling=context.options.sampling,
         rivals_above=effort.rival_share,
     )
-    return Candidates(found[: state[COUNT]], report)
+    return Candidates(found[: state[COUNT]], report if stopped != BUDGET and slid else report.cut_short())
 
 
 def _leave_bases(

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+import numpy as np
+
+from registration import Segments
+from registration.layout import Floats
 from registration.limits import MAX_LENGTH, MIN_LENGTH
 
 from .candidates import Effort, allowed_by
@@ -15,6 +19,7 @@ from .context import SearchContext
 from .explain import search_and_explain
 from .explanations import Explanations
 from .extents import inner_extent
+from .map_index import MapIndex
 from .scaling import scale_near_one
 from .scan import Scan, mirrored, scaled, turned_round
 from .tuning import (
@@ -24,16 +29,50 @@ from .tuning import (
     CAUSE_RATIO,
     CAUSE_SHARE,
     EXCEEDING,
+    GREATEST_EXTENT,
+    GREATEST_SAME_GATES,
     LEAST_TIME_FOR_CAUSES,
+    MOST_FOR_UNITS,
     RIVAL_SHARE,
     TIMES_FOR_CAUSES,
     USUAL_EXTENT,
+    USUAL_PART,
 )
 from .verdict import Verdict, judge
 
 LEAST_EXTENT = 1.5  # m; what is seen of any room
-# What a scan may have to be multiplied with: units of ten, and feet and inches, either way.
-UNITS = (1e-3, 1e3, 1e-2, 1e2, 0.1, 10.0, 0.3048, 1.0 / 0.3048, 0.0254, 1.0 / 0.0254)
+# What a scan has to be multiplied with where the map's lengths are of one unit and are taken for another, which is the
+# greater one; and the reverse.
+TAKEN_FOR: Mapping[float, tuple[str, str]] = {
+    10.0: ("decimetres", "metres"),
+    100.0: ("centimetres", "metres"),
+    1000.0: ("millimetres", "metres"),
+    1.0 / 0.0254: ("inches", "metres"),
+    1.0 / 0.3048: ("feet", "metres"),
+    25.4: ("millimetres", "inches"),
+    304.8: ("millimetres", "feet"),
+    2.54: ("centimetres", "inches"),
+    30.48: ("centimetres", "feet"),
+    12.0: ("inches", "feet"),
+}
+UNITS = (*TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR))
+SAME_UNIT = 0.003  # of a factor; nearer to one of units it is that
+
+
+def unit_mistake(factor: float) -> str | None:
+    """Return which unit of a map was taken for which other, such as ``millimetres taken for inches``.
+
+    Parameters
+    ----------
+    factor : float
+        Lengths of the map, in units of those of a scan.
+    """
+    for known, (unit, other) in TAKEN_FOR.items():
+        if abs(factor / known - 1.0) < SAME_UNIT:
+            return f"{unit} taken for {other}"
+        if abs(factor * known - 1.0) < SAME_UNIT:
+            return f"{other} taken for {unit}"
+    return None
 
 
 class Mistake(StrEnum):
@@ -99,10 +138,10 @@ def find_causes(
     options = replace(context.options, exhaustive=False, confidence=min(context.options.confidence, CAUSE_CONFIDENCE))
     again = replace(context, prior=None, options=options, deadline=deadline)
     found: dict[Mistake, Cause] = {}
-    for mistake, factor, scan in _undone(again):
+    for mistake, factor, changed in _undone(again):
         if deadline.passed:
             break
-        cause = _tried(again, mistake, factor, scan, _known(explanations, scan))
+        cause = _tried(changed, mistake, factor, _known(explanations, changed.scan))
         if cause is None:
             continue
         if cause.sure:
@@ -119,29 +158,70 @@ def _known(explanations: Explanations, scan: Scan) -> float:
     return max(scores, default=0.0)
 
 
-def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, Scan]]:
-    """Yield the scan without each mistake, the likely ones first; a factor is searched for when its turn comes."""
+def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, SearchContext]]:
+    """Yield the search without each mistake, the likely ones first; a factor is searched for when its turn comes."""
     scan = context.scan
     if context.options.oriented:
-        yield Mistake.REVERSED, 1.0, turned_round(scan)
-    yield Mistake.MIRRORED, 1.0, mirrored(scan)
+        yield Mistake.REVERSED, 1.0, _with_scan(context, turned_round(scan))
+    yield Mistake.MIRRORED, 1.0, _with_scan(context, mirrored(scan))
+    for factor in _likely_map_units(context):
+        yield Mistake.SCALE, factor, _with_smaller_map(context, factor)
     for factor in _likely_units(context):
-        yield Mistake.SCALE, factor, scaled(scan, factor)
+        yield Mistake.SCALE, factor, _with_scan(context, scaled(scan, factor))
     near = scale_near_one(context)
     if near is not None:
-        yield Mistake.SCALE, near, scaled(scan, near)
+        yield Mistake.SCALE, near, _with_scan(context, scaled(scan, near))
 
 
-def _tried(context: SearchContext, mistake: Mistake, factor: float, scan: Scan, known: float) -> Cause | None:
-    """Search the scan without a mistake; None where that fits no better."""
-    changed = SearchContext.of(context.index, scan, None, context.options, context.deadline)
-    effort = Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(context.options), known)
+def _with_scan(context: SearchContext, scan: Scan) -> SearchContext:
+    return SearchContext.of(context.index, scan, None, context.options, context.deadline)
+
+
+def _with_smaller_map(context: SearchContext, factor: float) -> SearchContext:
+    """Divide the map by a factor: where its unit is wrong, what is measured in metres holds for the scan as it is."""
+    index, options = context.index, context.options
+    segments = Segments.derived(index.segments.endpoints[: index.directed] / factor)
+    smaller = MapIndex.build(segments, index.sigma, oriented=options.oriented)
+    return SearchContext.of(smaller, context.scan, None, options, context.deadline)
+
+
+def _tried(changed: SearchContext, mistake: Mistake, factor: float, known: float) -> Cause | None:
+    """Search without a mistake; None where that fits no better."""
+    options = changed.options
+    effort = Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options), known)
     explanations = search_and_explain(changed, effort)
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None
     best, verdict = explanations.answer.best, judge(changed, explanations)
     better = best.score > max(known + CAUSE_GAP, CAUSE_RATIO * known) and best.share >= CAUSE_SHARE
     return Cause(mistake, factor, best.score, verdict.usable) if verdict.usable or better else None
+
+
+def _likely_map_units(context: SearchContext) -> list[float]:
+    """Return the factors by which the map's unit may be wrong where the scan is as large as scans are.
+
+    Scan lines are parts of walls: in the same unit their usual length is a quarter of that of walls to all of it.
+    """
+    scan, walls = context.scan.measured.segments.lengths, context.index.walls.longest
+    extent, usual = inner_extent(context.scan.measured.segments), _usual(walls) / _usual(scan)
+    if not LEAST_EXTENT <= extent <= GREATEST_EXTENT or context.index.directed > MOST_FOR_UNITS:
+        return []
+    likely = [
+        factor
+        for factor in UNITS
+        if abs(math.log(factor)) > math.log(GREATEST_SAME_GATES)
+        and USUAL_PART[0] <= factor / usual <= USUAL_PART[1]
+        and extent * factor <= EXCEEDING * context.index.diagonal
+        and float(walls.min()) / factor >= MIN_LENGTH
+        and float(walls.max()) / factor <= MAX_LENGTH
+    ]
+    return sorted(likely, key=lambda factor: abs(math.log(factor / usual)))
+
+
+def _usual(lengths: Floats) -> float:
+    """Return the length such that half of all length is in longer lines, metres."""
+    ordered = np.sort(lengths)
+    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
 
 
 def _likely_units(context: SearchContext) -> list[float]:

@@ -32,7 +32,17 @@ from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
 from .scan import Scan
 from .scan_lines import ScanLines, gates
 from .tables import KnownWalls, Question, Sights, Workspace
-from .tuning import LATE_CROWD
+from .tuning import (
+    COMPARED_BEAMS,
+    EMPTY_CELL,
+    FAR,
+    FARTHER,
+    LATE_CROWD,
+    MAX_RAYS,
+    MOST_LOOKED_AT,
+    RAY_SPACING,
+    RAYS,
+)
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 NOTHING_KEPT = record(RULES)
@@ -81,9 +91,9 @@ class SearchContext:
     def of(
         cls, index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline
     ) -> SearchContext:
-        """Prepare a search; views that are not exact are laid on one another."""
+        """Prepare a search; views that are not exact are laid on one another, as far as the deadline lets it."""
         place = index if options.oriented else index.undirected
-        scan = aligned(scan)
+        scan = aligned(scan, deadline)
         lines = ScanLines.of(scan, place.sigma, options)
         return cls(place, scan, prior, options, deadline, lines, gates(options))
 
@@ -129,10 +139,38 @@ class SearchContext:
         """The same, without lines of sight."""
         return Sights(self.sights.places, np.zeros(len(self.sights.starts), np.int64), np.zeros(0, SIGHTING))
 
+    @cached_property
+    def looks(self) -> float:
+        """How many walls, of cells that they pass, are looked at for the rays from one pose, at most.
+
+        Of the lines of sight of the scan, of those in all directions, and of the beams that are compared.
+        """
+        grid, views, scan = self.index.grid.shape[0], self.sights.places, self.scan
+        across = float(grid["columns"] + grid["rows"])  # cells that a ray passes at most
+        rays = RAYS * len(views) + MAX_RAYS * len(self.sights.seen) + (COMPARED_BEAMS if self.with_beams else 0)
+        in_a_cell = self.index.most_near + EMPTY_CELL
+        if rays * across * in_a_cell <= MOST_LOOKED_AT:
+            return rays * across * in_a_cell
+        seen, per_cell = self.sights.seen, 2.0 / float(grid["cell"])
+        from_view = views[seen["sensor"]]
+        away = np.hypot(seen["x"] - from_view["x"], seen["y"] - from_view["y"]) + 0.5 * seen["length"]
+        reach = max(FAR, FARTHER * float(away.max(initial=0.0)))
+        to_each = np.minimum(MAX_RAYS, np.ceil(seen["length"] / RAY_SPACING))
+        cells = float(to_each @ np.minimum(across, 1.0 + per_cell * away))
+        cells += RAYS * len(views) * min(across, 1.0 + per_cell * reach)
+        if scan.beams is not None:
+            cells += COMPARED_BEAMS * min(across, 1.0 + per_cell * scan.beams.range_max)
+        return cells * in_a_cell
+
+    @property
+    def can_look(self) -> bool:
+        """Whether rays can be followed: the map has few enough walls along them."""
+        return self.looks <= MOST_LOOKED_AT
+
     @property
     def too_late_to_look(self) -> bool:
-        """Whether the deadline has passed where so many walls lie in one place that to follow rays takes long."""
-        return self.index.crowd > LATE_CROWD and self.deadline.passed
+        """Whether rays cannot be followed, or take long after the deadline: many walls lie in one place."""
+        return not self.can_look or (self.index.crowd > LATE_CROWD and self.deadline.passed)
 
     @cached_property
     def workspace(self) -> Workspace:

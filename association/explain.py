@@ -59,8 +59,9 @@ def explain(context: SearchContext, candidates: Candidates) -> Explanations:
 
 
 def _as_far_as(context: SearchContext, candidates: Candidates) -> SearchReport:
-    """Return how the search went; what the deadline left unranked may have been better."""
-    return replace(candidates.report, complete=False) if context.deadline.passed else candidates.report
+    """Return how the search went; what the deadline left unranked, or rays speak against, may have been worse."""
+    as_far = context.can_look and not context.deadline.passed
+    return candidates.report if as_far else candidates.report.cut_short()
 
 
 def _answer(context: SearchContext, best: Ranked) -> Answer | None:

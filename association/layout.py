@@ -236,6 +236,10 @@ FEATURES = _fields(
     ),
 )
 
+# A scan segment of a consensus set in the map's own pieces: the piece that it lies on most, -1 where it is none of the
+# set, and how many others are named; the share of its length that lies on any.
+PAIR = _fields((_I, "piece rivals"), (_F, "overlap"))
+
 # What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
 # it below the first of them. From `start` on the slope is more by `more`.
 CURVE = _fields((_I, "feature begin end"), (_F, "slope"))

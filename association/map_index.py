@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .errors import InvalidMapError
+from .errors import IndexingEndedError, InvalidMapError
 from .extents import diagonal
 from .grids import crossing_runs, directions_near, near_walls, swept_runs
 from .layout import ENDS, Integers, as_records
+from .options import Deadline
 from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
 from .walls import both_ways, ends_of, link, merge
@@ -69,7 +70,14 @@ class MapIndex:
     raster: Raster
 
     @classmethod
-    def build(cls, segments: Segments, sigma: float | None = None, *, oriented: bool = True) -> MapIndex:
+    def build(
+        cls,
+        segments: Segments,
+        sigma: float | None = None,
+        *,
+        oriented: bool = True,
+        deadline: Deadline | None = None,
+    ) -> MapIndex:
         """Index a map; some 10 microseconds a segment.
 
         Parameters
@@ -81,11 +89,15 @@ class MapIndex:
             each answer estimates it from what its walls leave.
         oriented : bool
             False lists every segment in both directions, for scans whose directions mean nothing.
+        deadline : Deadline, optional
+            Looked at every few tenths of a second.
 
         Raises
         ------
         InvalidMapError
             When the map is empty or too wide, or sigma out of range.
+        IndexingEndedError
+            When the deadline passes, or is cancelled, first.
         """
         if len(segments) == 0:
             raise InvalidMapError("a map has at least one segment", argument="map.segments")
@@ -96,30 +108,53 @@ class MapIndex:
         if (high - low).max() > MAX_EXTENT:
             raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="map.segments")
         origin = np.round(0.5 * (low + high))
-        return cls._of(segments if oriented else both_ways(segments), sigma, origin, len(segments))
+        either = segments if oriented else both_ways(segments)
+        return cls._of(either, sigma, origin, len(segments), deadline)
 
     @classmethod
-    def _of(cls, segments: Segments, sigma: float | None, origin: Floats, directed: int) -> MapIndex:
+    def _of(
+        cls, segments: Segments, sigma: float | None, origin: Floats, directed: int, deadline: Deadline | None
+    ) -> MapIndex:
         local = segments.shifted(-origin)
-        walls, wall_of_piece = merge(local, MERGE_GAP)
-        runs, run_of_wall = merge(Segments.derived(ends_of(walls)), RUN_GAP)
+        walls, wall_of_piece = merge(local, MERGE_GAP, deadline)
+        runs, run_of_wall = merge(Segments.derived(ends_of(walls)), RUN_GAP, deadline)
         link(walls, run_of_wall)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
         pieces = Pieces(order, starts, as_records(ENDS, local.endpoints))
+        _require_time(deadline)
         sweep = swept_runs(runs)
-        grids = near_walls(walls), sweep, crossing_runs(sweep.runs), directions_near(walls, runs)
+        _require_time(deadline)
+        crossings = crossing_runs(sweep.runs)
+        _require_time(deadline)
+        grids = near_walls(walls), sweep, crossings, directions_near(walls, runs)
         index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
-        for name in ("wall_lengths", "crowd", "area", "diagonal", "tables"):
+        for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
             getattr(index, name)  # kept from here on, so that the first search does not wait for them
         return index
 
     @cached_property
     def undirected(self) -> MapIndex:
         """The same map with every segment in both directions; itself where it was built so."""
+        return self._undirected(None)
+
+    def undirected_by(self, deadline: Deadline) -> MapIndex:
+        """Return `undirected`, which is kept, if it is there before a deadline.
+
+        Raises
+        ------
+        IndexingEndedError
+            When the deadline passes, or is cancelled, first.
+        """
+        kept = vars(self)
+        if "undirected" not in kept:
+            kept["undirected"] = self._undirected(deadline)
+        return self.undirected
+
+    def _undirected(self, deadline: Deadline | None) -> MapIndex:
         if len(self.segments) > self.directed:
             return self
-        return MapIndex._of(both_ways(self.segments), self.sigma, self.origin, self.directed)
+        return MapIndex._of(both_ways(self.segments), self.sigma, self.origin, self.directed, deadline)
 
     @cached_property
     def wall_lengths(self) -> WallLengths:
@@ -133,6 +168,11 @@ class MapIndex:
         """How many walls are on the list of a cell, seen from the walls: the mean over all entries of all lists."""
         counts = np.diff(self.grid.starts).astype(np.float64)
         return float((counts * counts).sum() / max(1.0, counts.sum()))
+
+    @cached_property
+    def most_near(self) -> int:
+        """How many walls the longest list of a cell holds."""
+        return int(np.diff(self.grid.starts).max())
 
     def _agreeing_share(self) -> float:
         """Return the chance that two points of walls have the same direction, up to a neighbouring bin."""
@@ -175,3 +215,8 @@ class MapIndex:
         tables.append((self.sweep.runs, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
         return sum(array.nbytes for array in [self.wall_of_piece, *lines, *(a for table in tables for a in table)])
+
+
+def _require_time(deadline: Deadline | None) -> None:
+    if deadline is not None and deadline.over:
+        raise IndexingEndedError

@@ -75,7 +75,12 @@ def null_of(context: SearchContext, best: Ranked, share: float = 0.0) -> Null:
 
 
 def symmetry_of(context: SearchContext, best: Ranked, null: Ranked) -> float:
-    """Return how much of what the map shows from an answer it shows mirrored from there, at the null's pose, 0 to 1."""
+    """Return how much of what the map shows from an answer it shows mirrored from there, at the null's pose, 0 to 1.
+
+    0, as of a map without symmetry, where rays cannot be followed.
+    """
+    if not context.can_look:
+        return 0.0
     seen, places, place = context.lines.sightings, context.sights.places, context.index.tables.place
     poses = best.estimate, null.estimate
     return float(_mirrored_share(places, seen, *poses, context.gates, place, context.workspace))

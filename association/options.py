@@ -207,8 +207,13 @@ class Deadline:
 
     @property
     def passed(self) -> bool:
-        """Whether the search has to end."""
+        """True when the search has to end; reading it may let the search pause."""
         self._may_rest()
+        return self.over
+
+    @property
+    def over(self) -> bool:
+        """The same without a pause: a stage that holds much memory continues, so that only a few hold it at once."""
         return self.cancelled or (self.at is not None and time.monotonic() >= self.at)
 
     @property

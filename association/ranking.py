@@ -34,6 +34,7 @@ from .tuning import (
     LATE_FINALISTS,
     LEAST_DISTINCT,
     MOST_BEAMS,
+    MOST_LOOKED_AT,
     RANKED_AT_ONCE,
     SAME_FAMILY,
 )
@@ -226,7 +227,8 @@ def _score(context: SearchContext, poses: Records) -> _Scored:
     k, place = len(poses), context.index.tables.place
     scored = _Scored(poses, np.zeros(k, MERIT), np.zeros((k, len(context.lines.rows)), MATCH))
     # Between some poses the clock is looked at: of the best first there are usually few enough for one go.
-    step = max(1, int(RANKED_AT_ONCE / (max(1, len(context.lines.rows)) * max(1.0, context.index.crowd))))
+    step = int(RANKED_AT_ONCE / (max(1, len(context.lines.rows)) * max(1.0, context.index.crowd)))
+    step = max(1, min(step, int(MOST_LOOKED_AT / (1.0 + context.looks))))
     for begin in range(0, k, step):
         if context.deadline.cancelled or (begin > 0 and context.deadline.passed):
             break
@@ -274,10 +276,15 @@ def _nats(evidence: Records) -> Floats:
 def beam_evidence_at(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
     """Return what at most `most` of the beams say of each pose, (k,) of `BEAM_EVIDENCE`.
 
-    Moves the first `refined` of the poses.
+    Moves the first `refined` of the poses. What the deadline leaves, and all where rays cannot be followed, is 0.
     """
-    evidence = np.zeros(len(poses), BEAM_EVIDENCE)
-    weigh_beams(rays_of(context, most), poses, context.index.tables.place, refined, context.workspace, evidence)
+    evidence, rays, place = np.zeros(len(poses), BEAM_EVIDENCE), rays_of(context, most), context.index.tables.place
+    step = max(1, int(MOST_LOOKED_AT / (1.0 + context.looks)))
+    for begin in range(0, len(poses) if context.can_look else 0, step):
+        if begin > 0 and context.deadline.passed:
+            break
+        some, moved = slice(begin, begin + step), max(0, refined - begin)
+        weigh_beams(rays, poses[some], place, moved, context.workspace, evidence[some])
     return evidence
 
 

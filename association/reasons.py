@@ -27,6 +27,8 @@ class Standing:
         Whether few walls fix the pose, and one of them alone decides.
     twin : bool
         Whether another explanation alone makes the answer too uncertain.
+    alone : bool
+        Whether no other explanation was found where the prior lets one be.
     mirrored : bool
         Whether the scan fits the map better with left and right exchanged.
     out_of_step : bool
@@ -41,6 +43,7 @@ class Standing:
     elsewhere: bool
     thin: bool = False
     twin: bool = False
+    alone: bool = False
     mirrored: bool = False
     out_of_step: bool = False
     off_scale: bool = False
@@ -48,7 +51,8 @@ class Standing:
 
 SENTENCES: Mapping[str, str] = {
     "prior_contradicted": "The prior and the scan do not agree on where the robot is.",
-    "search_incomplete": "The deadline ended the search; a better pose may have been missed.",
+    "search_incomplete": "The deadline, or too many walls in one place of the map, ended the search; a better pose may "
+    "have been missed.",
     "free_direction": "The walls that were seen leave the position free along one direction.",
     "elsewhere": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
     "twin": "Another pose explains the scan about as well.",
@@ -100,7 +104,7 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
         codes += ["too_little", "one_wall_decides"] if standing.thin else []
         codes += ["unexplained"] if standing.out_of_step or standing.off_scale else []
         codes += ["twin"] if standing.twin else []
-        codes += [code for code in _weighed(features, cautious) if code not in codes]
+        codes += [code for code in _weighed(features, cautious, alone=standing.alone) if code not in codes]
     sentences = dict(SENTENCES)
     if standing.mirrored:
         sentences["elsewhere"] = MIRRORED
@@ -109,10 +113,13 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
     return tuple(Reason(code, sentences[code]) for code in codes)
 
 
-def _weighed(features: Features, cautious: Model) -> list[str]:
-    """Order the reasons by what their features take from the logarithm of the odds; at least the first of them."""
+def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[str]:
+    """Order the reasons by what their features take from the logarithm of the odds; at least the first of them.
+
+    `alone`: whether there is no other explanation; then the lead is the answer's own score.
+    """
     lacking = {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
-    if features.lead > NO_TWIN:
+    if alone or features.lead > NO_TWIN:
         # Many places explain a little of the scan, and none explains it about as well.
         lacking["too_little"] += max(0.0, lacking.pop("twin"))
     ordered = sorted(lacking, key=lambda code: -lacking[code])

@@ -42,8 +42,8 @@ def report(
     factor: Factor | None = None,
 ) -> AssociationResult:
     """Put an answer together; `factor` is what the scan was put to scale by."""
-    if verdict.complete is not explanations.search.complete:
-        explanations = replace(explanations, search=replace(explanations.search, complete=verdict.complete))
+    if not verdict.complete:
+        explanations = replace(explanations, search=explanations.search.cut_short())
     answer = explanations.answer
     if answer is None or verdict.status is Status.NO_MATCH:
         return _no_match(context, explanations, verdict, causes)
@@ -133,6 +133,7 @@ def _alternatives(context: SearchContext, others: Iterable[Ranked], *, usable: b
     if not shown:
         return ()
     settled = settle(context, shown)
+    shown = shown[: len(settled)]
     poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)
     measures = paper_measures(context.lines.rows, matches_of(shown), context.index.walls.rows, poses)
     return tuple(map(partial(_alternative, context), shown, settled, measures.tolist()))

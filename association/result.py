@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -131,18 +131,21 @@ class SearchReport:
     Attributes
     ----------
     complete : bool
-        False when the deadline ended it before the confidence was reached or the bases were used up.
+        False when the deadline ended it before the confidence was reached or the bases were used up, or before all that
+        was found was compared.
     exhaustive : bool
-        Whether every base was gone through.
+        Whether every base was gone through, and the search is complete.
     confidence : float
-        Reached chance of not having missed a better consensus set; below what was asked where a scan of many segments
-        has few that tell enough together.
+        Reached chance of not having missed a better consensus set among the bases; below what was asked where a scan of
+        many segments has few that tell enough together.
     bases, hypotheses, verified : int
         Bases drawn, poses they gave, poses that were scored to the end.
     seed : int
     sampling : "ordered" or "random"
     rivals_above : float
-        Share of the best score, by segments, above which no other pose was missed, with that confidence.
+        Share of the best score, by segments, above which no other pose was missed, with that confidence; 1 where the
+        search is not complete. Of poses whose matches agree with one another within their tolerances: one at which they
+        do not, and which is a compromise between them, may be missed.
     """
 
     complete: bool
@@ -154,6 +157,10 @@ class SearchReport:
     seed: int
     sampling: str
     rivals_above: float
+
+    def cut_short(self) -> SearchReport:
+        """Return the report of the same search where something was left undone: nothing is claimed of the rest."""
+        return replace(self, complete=False, exhaustive=False, rivals_above=1.0)
 
 
 @dataclass(frozen=True, slots=True)

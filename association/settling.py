@@ -89,7 +89,10 @@ class Settled:
 
 
 def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bool = False) -> list[Settled]:
-    """Work out the poses of consensus sets, of one at least; with `hinges` of the first, where the others have none."""
+    """Work out the poses of consensus sets, of one at least; with `hinges` of the first, where the others have none.
+
+    Those of uncertain views are solved one by one: after the deadline no more than the first one is, and returned.
+    """
     found = np.zeros(len(explanations), SETTLED)
     without = np.zeros(len(explanations[0].matches) if hinges else 0, HINGE)
     count = _settle(
@@ -100,7 +103,12 @@ def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bo
     views = context.scan.views
     if views is None or not views.uncertain:
         return settled
-    return [_with_views(context, one, views, alone) for one, alone in zip(explanations, settled, strict=True)]
+    solved: list[Settled] = []
+    for one, alone in zip(explanations, settled, strict=True):
+        if solved and context.deadline.passed:
+            break
+        solved.append(_with_views(context, one, views, alone))
+    return solved
 
 
 def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settled) -> Settled:
@@ -113,7 +121,7 @@ def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settl
     if not len(seen):
         return alone
     shown, sigma = SeenOnWalls.of(views, seen, context.index.walls.rows, on), context.index.sigma
-    found = shown.settle(alone.pose, None if sigma is None else max(sigma**2, LEAST_KNOWN_VARIANCE))
+    found = shown.settle(alone.pose, None if sigma is None else max(sigma**2, LEAST_KNOWN_VARIANCE), context.deadline)
     loose = shown.covariance_with(found, max(found.wall_variance, COMMON_WALL_ERROR**2))
     values, vectors = np.linalg.eigh(loose[:2, :2])
     dx, dy = vectors[:, 1].tolist()

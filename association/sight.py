@@ -50,7 +50,7 @@ _agreement = way_in(agreement_kernels.agreement)
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
     """List the map segments of walls that rays to the consensus set pass through.
 
-    None without a viewpoint, or where the deadline has passed and that would take long.
+    None without a viewpoint, where rays cannot be followed, and where the deadline has passed and that would take long.
     """
     if context.scan.viewpoint is None or context.too_late_to_look:
         return ()
@@ -62,8 +62,11 @@ def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
 
 
 def agreement(context: SearchContext, best: Ranked) -> float:
-    """Return the share of directions in which the scan shows what the map does, 0 to 1."""
-    if context.scan.viewpoint is None:
+    """Return the share of directions in which the scan shows what the map does, 0 to 1.
+
+    `NEUTRAL` without a viewpoint, and where rays cannot be followed.
+    """
+    if context.scan.viewpoint is None or not context.can_look:
         return NEUTRAL
     pose, place = best.estimate, context.index.tables.place
     return float(_agreement(context.sights, pose, place, context.workspace))
@@ -71,7 +74,7 @@ def agreement(context: SearchContext, best: Ranked) -> float:
 
 def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
     """Return how many beams do not read what the map shows from the settled pose."""
-    if not context.with_beams:
+    if not context.with_beams or not context.can_look:
         return NO_BEAMS
     pose, place = settled.pose, context.index.tables.place
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
@@ -84,7 +87,7 @@ def _in_step(context: SearchContext, at: Records) -> float:
     if views is None or beams is None or beams.origins is None or not views.uncertain:
         return 1.0
     exact = ~views.root.reshape(len(views), -1).any(axis=1)
-    if not exact.any():
+    if not exact.any() or context.deadline.passed:
         return 1.0
     reads = []
     for view in range(len(views)):

@@ -127,6 +127,26 @@ class Pieces(NamedTuple):
     ends: Records
 
 
+class PiecesAlong(NamedTuple):
+    """The pieces of a wall, or of a run, along its line.
+
+    Attributes
+    ----------
+    piece : (k,) which they are, wall by wall
+    low, high : (k,) abscissae between which each lies, metres
+    place : (k,) places in these, by where they begin; ties by place
+    farthest : (k,) in that order, the place of the one that reaches farthest of those up to each
+    gaps : (k,) in that order, the length that is on none of them between the first and where each begins, metres
+    """
+
+    piece: Indices
+    low: Floats
+    high: Floats
+    place: Indices
+    farthest: Indices
+    gaps: Floats
+
+
 class MapTables(NamedTuple):
     """All that the search reads of a map."""
 

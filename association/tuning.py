@@ -18,6 +18,7 @@ MERGE_ANGLE = math.radians(2.0)  # tables
 BEGIN_CELL = 1.0  # m, by which begins of pieces are found, at least; measured: little changes near it
 MOST_STEPS = 100  # places along one piece around which others are looked for; geometry: 190 m of wall
 MOST_LOOKS = 600  # begins that one piece is compared with; measured: no fewer walls are found on 443 maps of buildings
+PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadline: 0.2 s where each takes the most
 DIRECTION_BINS = 90  # tables
 SECTOR_BITS = 4
 SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degrees is the middle of one; tables
@@ -80,6 +81,9 @@ LEAST_ANGLE_GATE = math.radians(4.0)  # tables
 GREATEST_ANGLE_GATE = 0.35  # rad, tables
 LEAST_OVERLAP = 1e-3  # rounding, and as much less than all of a segment: its end may lie on a wall's
 BRIDGING = 3.0  # m, tables; only a longer segment may bridge a gap between walls: a short one may well be clutter there
+MOST_BRIDGED = (
+    2000  # neighbours on their runs that the walls under one scan segment have; in 443 maps a run has up to 14
+)
 WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
 
 # --- Consensus: growing and shrinking a set of matches at a pose ------------------------------------------------------
@@ -232,6 +236,10 @@ BLOCKED = 2.0  # nats a metre of wall, tables; against a pose, where rays to the
 BLOCKED_CLUTTER = 2.0  # nats a metre, tables; likewise for rays to clutter
 BLOCKING_LENGTH = 3.0  # m, tables; beyond it a wall speaks no more
 BLOCKING_RAYS = 4.0  # that count fully, tables
+# Walls that are looked at for rays between two looks at the clock, at most: a third of a second. Where one pose takes
+# more no ray is followed, and the search is not complete. Measured: scans in their maps take up to 3 million.
+MOST_LOOKED_AT = 200_000_000
+EMPTY_CELL = 4  # walls, measured; what it takes to go to the next cell
 FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of sight
 
 # --- Null: what the mirrored scan scores ------------------------------------------------------------------------------
@@ -305,6 +313,7 @@ EXTENT_ANGLES = 18  # directions in which a scan's extent is looked for, geometr
 OUTERMOST_SHARE = 0.05  # of a scan's length, measured; at either end it may lie outside of the map
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
 MAX_RIVALS = 8  # map segments named beside the one that a scan segment lies on most
+MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85
 MIN_EXTENT = 1e-9  # m, rounding; what a segment along a wall counts as at least
 
 # --- Causes: a caller's mistakes --------------------------------------------------------------------------------------
@@ -319,6 +328,11 @@ CAUSE_GAP = 30.0  # nats
 CAUSE_RATIO = 1.5
 CAUSE_SHARE = 0.7  # of the length
 USUAL_EXTENT = 12.0  # m, tables; of a scan
+GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
+# Times; a scan that is scaled by more falls out of the gates of the search, which are metres: then the map is scaled.
+GREATEST_SAME_GATES = 5.0
+USUAL_PART = (0.25, 2.0)  # times, tables; usual length of scan lines, once of one unit, over that of walls
+MOST_FOR_UNITS = 2000  # map segments; indexing them anew takes some 20 ms
 LEAST_STRETCH, GREATEST_STRETCH = 0.004, 0.12  # tables; how far a factor near one may be from it
 SCALE_LENGTH = 0.5  # of the scan's length, tables; that has to match where the gates are wide
 SCALE_KEPT = 8  # poses, tables

@@ -15,6 +15,7 @@ from .kernels import odds
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
 from .null import null_of
+from .ranking import Ranked
 from .reasons import Standing, reasons_of
 from .result import Reason, Status
 from .tuning import (
@@ -105,13 +106,20 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
         margin=None if rival is None else best.value - rival.value,
         runner_up=None if rival is None or not best.value > 0.0 else max(0.0, rival.value / best.value),
         contradicted=contradicted,
-        reasons=() if usable else _reasons(answer, chances, status, complete, contradicted, off_scale=off_scale),
+        reasons=() if usable else _reasons(answer, rival, chances, status, complete, contradicted, off_scale=off_scale),
         complete=complete,
     )
 
 
 def _reasons(
-    answer: Answer, chances: _Chances, status: Status, complete: bool, contradicted: bool, *, off_scale: bool
+    answer: Answer,
+    rival: Ranked | None,
+    chances: _Chances,
+    status: Status,
+    complete: bool,
+    contradicted: bool,
+    *,
+    off_scale: bool,
 ) -> tuple[Reason, ...]:
     standing = Standing(
         status,
@@ -120,6 +128,7 @@ def _reasons(
         elsewhere=chances.explained < ELSEWHERE_PROBABILITY,
         thin=chances.thin,
         twin=chances.share < USABLE_PROBABILITY,
+        alone=rival is None,
         mirrored=chances.mirrored,
         out_of_step=_out_of_step(answer),
         off_scale=off_scale,

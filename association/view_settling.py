@@ -20,6 +20,7 @@ from registration.layout import POSE, Floats, Records
 
 from .kernels.view_settling import add_views
 from .layout import POINT, as_records, record
+from .options import Deadline
 from .scan import Views
 from .tables import SeenByViews
 from .tuning import (
@@ -88,10 +89,10 @@ class SeenOnWalls:
         origins = as_records(POINT, np.array([(pose.x, pose.y) for pose in views.poses]))
         return cls(views, seen, walls[on], number, origins)
 
-    def settle(self, start: RigidTransform, known: float | None) -> ViewsSettled:
+    def settle(self, start: RigidTransform, known: float | None, deadline: Deadline) -> ViewsSettled:
         """Solve for the pose and the errors of the views, with the walls' variance or as their residuals show it.
 
-        A pose that would go too far stays, as it does for one view.
+        A pose that would go too far stays, as it does for one view. After the deadline no further round begins.
         """
         begin = np.array([start.x, start.y, start.theta, *self.views.found])
         x, variance = begin, USUAL_WALL_ERROR**2 if known is None else known
@@ -101,7 +102,8 @@ class SeenOnWalls:
             x = x + step
             if known is None:
                 variance = self._shown_variance(x, np.asarray(np.linalg.inv(normal), dtype=np.float64), variance)
-            if np.abs(step).max() < SETTLED_STEP and abs(variance - before) < SETTLED_SHARE * before:
+            still = np.abs(step).max() < SETTLED_STEP and abs(variance - before) < SETTLED_SHARE * before
+            if still or deadline.passed:
                 break
         far = math.hypot(x[0] - start.x, x[1] - start.y) > MAX_STEP or abs(wrap_angle(x[2] - start.theta)) > MAX_TURN
         if far or not np.isfinite(x).all():

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from registration import Segments
 from registration.layout import Records
 
-from .kernels.walls import collinear_groups
+from .errors import IndexingEndedError
+from .kernels.walls import join_collinear, label_groups, list_begins
 from .layout import ENDS, POINT, WALL, Integers, as_records
+from .options import Deadline
 from .tables import Walls
-from .tuning import DIRECTION_BINS, MERGE_ANGLE, MERGE_LATERAL
+from .tuning import BEGIN_CELL, DIRECTION_BINS, MERGE_ANGLE, MERGE_LATERAL, PIECES_A_LOOK
 
 Floats = NDArray[np.float64]
 
@@ -23,16 +25,21 @@ def both_ways(segments: Segments) -> Segments:
     return Segments.derived(np.concatenate([segments.endpoints, segments.endpoints[:, [2, 3, 0, 1]]]))
 
 
-def merge(local: Segments, gap: float) -> tuple[Walls, Integers]:
+def merge(local: Segments, gap: float, deadline: Deadline | None = None) -> tuple[Walls, Integers]:
     """Put one line through each group of collinear pieces up to `gap` apart; a group that is not straight stays apart.
 
     Returns
     -------
     Walls
     (n,) the wall that each piece is part of
+
+    Raises
+    ------
+    IndexingEndedError
+        When the deadline passes first.
     """
     ends, directions = as_records(ENDS, local.endpoints), as_records(POINT, local.directions)
-    labels = collinear_groups(ends, directions, gap, MERGE_LATERAL, math.cos(MERGE_ANGLE))
+    labels = collinear_groups(ends, directions, gap, MERGE_LATERAL, math.cos(MERGE_ANGLE), deadline)
     wall, lines = _lines(local, labels)
     lateral = np.maximum(
         np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, :2]) - lines.offsets[wall]),
@@ -43,6 +50,35 @@ def merge(local: Segments, gap: float) -> tuple[Walls, Integers]:
     if crooked.any():
         wall, lines = _lines(local, np.where(crooked[wall], np.arange(len(labels)) + len(labels), labels))
     return _sorted(local, wall, lines)
+
+
+def collinear_groups(
+    ends: Records,
+    directions: Records,
+    max_gap: float,
+    max_lateral: float,
+    min_cos: float,
+    deadline: Deadline | None = None,
+) -> Integers:
+    """Label pieces that continue or repeat one another, see `join_collinear`: (n,) the lowest index of each group.
+
+    Raises
+    ------
+    IndexingEndedError
+        When the deadline passes first.
+    """
+    labels = np.arange(len(ends))
+    # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
+    cell = max(BEGIN_CELL, 1.01 * math.hypot(max_gap, max_lateral))
+    heads, following = list_begins(ends, cell)
+    gates = (cell, float(max_gap), float(max_lateral), float(min_cos))
+    for first in range(0, len(ends), PIECES_A_LOOK):
+        if deadline is not None and deadline.over:
+            raise IndexingEndedError
+        last = min(first + PIECES_A_LOOK, len(ends))
+        join_collinear(ends, directions, heads, following, gates, labels, first, last)
+    label_groups(labels)
+    return labels
 
 
 class _Lines:

@@ -8,7 +8,7 @@ import numpy as np
 
 from registration import Beams
 
-from .causes import Cause, Mistake
+from .causes import Cause, Mistake, unit_mistake
 from .context import SearchContext
 from .extents import extent, inner_extent
 from .kernels.extents import facing_away
@@ -58,9 +58,7 @@ def warnings_of(
         "prior_contradicted": "A clearly better pose lies where the prior says it should not."
         if verdict.contradicted
         else None,
-        "search_incomplete": None
-        if search.complete
-        else "The deadline ended the search; a better pose may have been missed.",
+        "search_incomplete": None if search.complete else _incomplete(context),
         str(Mistake.SCALE): None if factor is None else _off_scale(factor),
     }
     found |= {str(cause.mistake): _mistaken(cause) for cause in causes}
@@ -70,11 +68,24 @@ def warnings_of(
 def _mistaken(cause: Cause) -> str:
     if cause.mistake is not Mistake.SCALE:
         return SENTENCES[cause.mistake]
-    unit = UNITS.get(cause.factor)
-    what = f"the scan seems to be in {unit}" if unit else "the scan or the map is not to scale"
+    unit, taken = UNITS.get(cause.factor), unit_mistake(cause.factor)
+    what = "the scan or the map is not to scale"
+    if unit is not None:
+        what = f"the scan seems to be in {unit}"
+    elif taken is not None:
+        what = f"the map seems to be in {taken}"
     return (
         f"With all lengths times {cause.factor:.4g} the scan fits much better: {what}. Send both in metres: multiply "
         "the scan by this, or divide the map."
+    )
+
+
+def _incomplete(context: SearchContext) -> str:
+    if context.can_look:
+        return "The deadline ended the search; a better pose may have been missed."
+    return (
+        f"Up to {context.index.most_near} walls lie in one place of the map, too many to follow lines of sight: a "
+        "wrong pose may score too high. Remove segments that repeat or overlap one another from the map."
     )
 
 

@@ -28,8 +28,8 @@ from association import (
     SoftPrior,
     associate,
 )
+from linefix import scan_of
 from registration import RigidTransform
-from vectorization import vectorize
 
 from .collection import Collection, MapKey, Query
 from .outcomes import other_map, progress
@@ -134,8 +134,7 @@ def _of_ranges(collections: list[Collection]) -> Iterator[Request]:
         for log in collections:
             if number < len(log.queries):
                 query = log.queries[number]
-                found = vectorize(raw[log.name].laser(query.number))
-                scan = Scan(found.measured, (0.0, 0.0), found.beams)
+                scan = scan_of(raw[log.name].laser(query.number))
                 yield Request(f"ranges {log.name} {query.number}", log.index(query.map), scan, None, VARIANTS[0])
 
 

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Deadline, MapIndex, Scan
+from association import Deadline, MapIndex
 from association.checking import find_thickness
 from formats import ImportOptions, LineMap, read_map, write_map
+from linefix import scan_of
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
-from vectorization import LaserScan, vectorize
+from vectorization import LaserScan
 
 from .grid_scans import PosedScan
 
@@ -54,8 +55,7 @@ class DrawnPlan:
             }
 
     def _thicker(self, line_map: LineMap) -> float:
-        seen = [vectorize(one.laser) for one in self.samples]
-        scans = [Scan(one.measured, (0.0, 0.0), one.beams) for one in seen]
+        scans = [scan_of(one.laser) for one in self.samples]
         return find_thickness(MapIndex.build(line_map.segments), scans, Deadline(), oriented=True) or 0.0
 
 

@@ -15,6 +15,7 @@ from scipy import ndimage
 from formats import read_log
 from formats.grids.cells import FREE, OCCUPIED, UNKNOWN, Cells, Grid, classify
 from formats.grids.map_server import read_grid
+from formats.options import DEFAULT_OPTIONS
 from formats.report import Notes
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
@@ -47,7 +48,7 @@ def grid_path(name: str) -> Path:
 
 def load_cells(name: str) -> tuple[Grid, Cells]:
     """Read a grid as the importer does: what is free, occupied and not known has no other witness."""
-    grid, _ = read_grid(grid_path(name), Notes())
+    grid, _ = read_grid(grid_path(name), DEFAULT_OPTIONS, Notes())
     return grid, classify(grid, Notes())
 
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from association import AssociationResult, MapIndex, Scan, associate
+from association import AssociationResult, MapIndex, associate
 from formats import ImportOptions, LineMap, read_map, write_map
+from linefix import scan_of
 from registration import RigidTransform, Segments
-from vectorization import vectorize
 
 from .centre_lines import drawn_plans
 from .collection import LEVELS, Collection
@@ -65,11 +65,7 @@ def imports(quick: int) -> list[Row]:
 
 def _answers(line_map: LineMap, scans: list[PosedScan]) -> list[AssociationResult]:
     index = MapIndex.build(line_map.segments, line_map.sigma, oriented=line_map.oriented)
-    answers = []
-    for one in scans:
-        seen = vectorize(one.laser)
-        answers.append(associate(index, Scan(seen.measured, (0.0, 0.0), seen.beams), None, OPTIONS))
-    return answers
+    return [associate(index, scan_of(one.laser), None, OPTIONS) for one in scans]
 
 
 def _found(answer: AssociationResult, truth: RigidTransform, limits: tuple[float, float]) -> Found:

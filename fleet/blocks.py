@@ -12,11 +12,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+import linefix
 from association import Scan
-from registration import MeasuredSegments, Segments
-from vectorization import LaserScan, VectorizationOptions, vectorize
+from registration import MeasuredSegments, RigidTransform, Segments
+from vectorization import LaserScan, Motion
 
 from .errors import UnreadableScansError
+from .tables import MOTION
 
 SIGMA = 0.02  # m, of points behind segments whose sigma nobody says; as over HTTP
 
@@ -49,6 +51,16 @@ class Block:
         middle = (self.start + self.stop) // 2
         first = Block(self.number, self.log, self.path, self.start, middle)
         return first, Block(self.number, self.log, self.path, middle, self.stop)
+
+
+@dataclass(frozen=True, slots=True)
+class RangeScan:
+    """Ranges of a row, as `linefix.view_of` takes them."""
+
+    laser: LaserScan
+    time_increment: float
+    flipped: bool
+    mount: RigidTransform | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +111,17 @@ class Row:
             self.values["ranges"],
             0.0 if nearest is None else nearest,
             math.inf if farthest is None else farthest,
+            self._motion(),
         )
-        found = vectorize(laser, VectorizationOptions(sigma=self._number("sigma")))
-        return Scan(found.measured, (0.0, 0.0), found.beams)
+        seen = RangeScan(laser, self._number("time_increment") or 0.0, bool(self.values.get("flipped")))
+        return linefix.assemble([linefix.view_of(seen, sigma=self._number("sigma"))])
+
+    def _motion(self) -> Motion | None:
+        increment, *twist = (self._number(name) for name in MOTION)
+        vx, vy, omega = twist
+        if not increment or vx is None or vy is None or omega is None:
+            return None
+        return Motion(increment, vx, vy, omega)
 
     def _segments(self) -> Scan:
         try:
@@ -138,6 +158,8 @@ READ = (
     "ranges",
     "range_min",
     "range_max",
+    "flipped",
+    *MOTION,
     "segments",
     "sigma",
     "error",

@@ -14,7 +14,7 @@ from registration import InputError
 
 from .blocks import Block
 from .errors import UnreadableScansError
-from .tables import FORMS, LASER, SCANS
+from .tables import FORMS, LASER, MOTION, SCANS
 
 PARQUET = (".parquet", ".pq")
 WORDS = ("map_id", "error")
@@ -113,15 +113,19 @@ def _scans(log: str) -> Iterator[dict[str, Any]]:
     try:
         opened = read_log(log)
         for scan in opened:
-            laser = scan.laser
-            turn = -1.0 if scan.flipped else 1.0  # y becomes -y: every angle changes its sign
+            laser, motion = scan.laser, scan.laser.motion
             yield {
                 "stamp": scan.stamp_ns,
-                "angle_min": turn * laser.angle_min,
-                "angle_increment": turn * laser.angle_increment,
+                "angle_min": laser.angle_min,
+                "angle_increment": laser.angle_increment,
                 "ranges": laser.ranges,
                 "range_min": laser.range_min,
                 "range_max": laser.range_max,
+                "flipped": scan.flipped,
+                "time_increment": scan.time_increment,
+                "vx": None if motion is None else motion.vx,
+                "vy": None if motion is None else motion.vy,
+                "omega": None if motion is None else motion.omega,
             }
         for note in opened.report.dropped:
             if note.code in UNUSABLE:
@@ -166,7 +170,9 @@ def _faults(schema: pa.Schema) -> Iterator[str]:
             yield f"expected nanoseconds or points in time in stamp, got {kind}"
         elif field.name in WORDS and not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
             yield f"expected text in {field.name}, got {kind}"
-        elif field.name in (*LASER[:2], "range_min", "range_max", "sigma") and not number:
+        elif field.name == "flipped" and not pa.types.is_boolean(kind):
+            yield f"expected true or false in flipped, got {kind}"
+        elif field.name in (*LASER[:2], *MOTION, "range_min", "range_max", "sigma") and not number:
             yield f"expected numbers in {field.name}, got {kind}"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pyarrow as pa
 
 LASER = ("angle_min", "angle_increment", "ranges")
+MOTION = ("time_increment", "vx", "vy", "omega")
 FORMS = ("ranges", "segments")
 
 # A log of another tool, laid out as Parquet.
@@ -16,11 +17,16 @@ SCANS = pa.schema(
         ("ranges", pa.list_(pa.float64())),
         ("range_min", pa.float64()),
         ("range_max", pa.float64()),
+        ("flipped", pa.bool_()),  # y becomes -y in the sensor's data: it is mounted upside down
+        ("time_increment", pa.float64()),  # s, from beam to beam; null or 0: not known
+        ("vx", pa.float64()),  # m/s and rad/s, of the sensor in its own frame; null: not known
+        ("vy", pa.float64()),
+        ("omega", pa.float64()),
         ("error", pa.string()),  # instead of a scan
     ]
 )
 
-# One row a scan. Metres, radians; poses are map_from_scan.
+# One row a scan. Metres, radians; poses are map_from_scan, of the sensor also where a log has its mount.
 POSES = pa.schema(
     [
         ("log", pa.string()),  # as the caller named it

@@ -7,6 +7,7 @@ from .errors import (
     MalformedFileError,
     TooLargeError,
     UnsupportedFormatError,
+    UprightFrameError,
 )
 from .line_map import ImportedMap, LineMap
 from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions
@@ -37,6 +38,7 @@ __all__ = [
     "StampedPose",
     "TooLargeError",
     "UnsupportedFormatError",
+    "UprightFrameError",
     "draw_map",
     "map_of_grid",
     "pose_message",

@@ -7,6 +7,7 @@
     ├── MalformedFileError       the file is not what its name or its beginning says
     ├── TooLargeError            more bytes, cells, entities, messages or levels than are read
     ├── IncompleteFileError      something is missing: the unit of a drawing, the picture of a grid, a topic
+    ├── UprightFrameError        a scanner whose scan plane is not horizontal; `argument` is its frame
     └── InvalidOptionError       an option out of its range
 """
 
@@ -31,6 +32,10 @@ class TooLargeError(FormatError):
 
 class IncompleteFileError(FormatError):
     """The file leaves out something that only its owner knows."""
+
+
+class UprightFrameError(FormatError):
+    """The scan plane of a scanner is not horizontal: its ranges say nothing of where walls are."""
 
 
 class InvalidOptionError(FormatError):

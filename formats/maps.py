@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,11 @@ MAP_SUFFIXES = (".yaml", ".yml", *DRAWINGS, *BAG_SUFFIXES)
 """Of files that `read_map` reads; beside a ``.yaml`` lies its picture."""
 
 
-def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTIONS) -> ImportedMap:
+def read_map(
+    path: str | os.PathLike[str],
+    options: ImportOptions = DEFAULT_OPTIONS,
+    pictures: Mapping[str, Path] | None = None,
+) -> ImportedMap:
     """Read a map of another tool's, or one of our own.
 
     Parameters
@@ -46,6 +50,9 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
         ``.svg`` or ``.geojson``; segments in ``.csv``; a map file of our own in ``.json``.
     options : ImportOptions
         What the file does not say.
+    pictures : mapping of str to Path, optional
+        Paths of the pictures of a ``.yaml``, by the names that it may contain; no other picture is read then. Without
+        it the picture lies in the folder of the ``.yaml``.
 
     Returns
     -------
@@ -59,7 +66,7 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     file = Path(path)
     suffix = file.suffix.lower()
     if suffix in (".yaml", ".yml"):
-        return _read_map_server(file)
+        return _read_map_server(file, options, pictures)
     if is_bag(file):
         return _read_bag(file, options)
     if suffix in DRAWINGS:
@@ -72,9 +79,9 @@ def read_map(path: str | os.PathLike[str], options: ImportOptions = DEFAULT_OPTI
     )
 
 
-def _read_map_server(file: Path) -> ImportedMap:
+def _read_map_server(file: Path, options: ImportOptions, pictures: Mapping[str, Path] | None) -> ImportedMap:
     notes = Notes()
-    grid, files = read_grid(file, notes)
+    grid, files = read_grid(file, options, notes, pictures)
     line_map = _from_grid(grid, notes, files[0], "map")
     return ImportedMap(line_map, notes.report("map_server", files))
 

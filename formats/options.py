@@ -27,7 +27,7 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """What a file does not say; nothing of it is needed for a grid.
+    """What a file does not say; a grid needs nothing of it.
 
     Attributes
     ----------
@@ -49,6 +49,9 @@ class ImportOptions:
         Whether the coordinates of a GeoJSON file are metres; else they are degrees, and are refused.
     topic : str or None
         Of the grid in a bag; None: the only one.
+    unknown : int, "none" or None
+        Grey value of the unknown cells in the picture of a grid, 0 to 255; ``none``: no opaque cell is unknown; None:
+        found from the picture.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class ImportOptions:
     directions: Directions | None = None
     local_metres: bool = False
     topic: str | None = None
+    unknown: int | Literal["none"] | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.units, str) and self.units not in UNITS:
@@ -76,6 +80,10 @@ class ImportOptions:
             raise InvalidOptionError("expected drawn or none", argument="directions")
         if self.thickness is not None and not 0.0 <= self.thickness <= 10.0:
             raise InvalidOptionError(f"expected from 0 to 10 m, got {self.thickness!r}", argument="thickness")
+        if self.unknown not in (None, "none") and not (type(self.unknown) is int and 0 <= self.unknown <= 255):
+            raise InvalidOptionError(
+                f"expected none, or a grey value from 0 to 255, got {self.unknown!r}", argument="unknown"
+            )
         for place in self.inside:
             if not (len(place) == 2 and all(math.isfinite(c) and abs(c) <= MAX_COORDINATE for c in place)):
                 raise InvalidOptionError("expected two numbers, metres", argument="inside")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from .limits import MAX_TEXT
+from .limits import MAX_NAMED, MAX_TEXT
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,3 +89,10 @@ def shown(text: str) -> str:
     """Return text of a file so that it can stand in one line."""
     line = "".join(c if c.isprintable() else "?" for c in text[: MAX_TEXT + 1])
     return line if len(line) <= MAX_TEXT else line[:MAX_TEXT] + "..."
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names of a file in one line, the first few of many."""
+    first, *others = dict.fromkeys(names)
+    named = [shown(name) for name in (first, *others[: MAX_NAMED - 1])]
+    return ", ".join(named) + (" ..." if len(others) >= MAX_NAMED else "")

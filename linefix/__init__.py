@@ -43,6 +43,7 @@ from registration import (
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .locating import index_map, locate, scan_of
+from .mounted import MountedScan, view_of
 
 if TYPE_CHECKING:
     from formats import ImportOptions, LineMap, LogOptions, draw_map, read_log, read_map, write_map
@@ -63,6 +64,7 @@ __all__ = [
     "MapIndex",
     "MeasuredSegments",
     "Motion",
+    "MountedScan",
     "RegistrationOptions",
     "RegistrationResult",
     "RigidTransform",
@@ -84,6 +86,7 @@ __all__ = [
     "scan_of",
     "simulation",
     "vectorize",
+    "view_of",
     "write_map",
 ]
 

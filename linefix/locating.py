@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Prior, Scan, associate
+from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Prior, Scan, assemble, associate
 from registration import InvalidArgumentError, MeasuredSegments, Segments
-from vectorization import LaserScan, vectorize
+from vectorization import LaserScan
+
+from .mounted import MountedScan, ranges_scan, view_of
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 def locate(
     map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike,
-    scan: Scan | LaserScan | Segments | ArrayLike,
+    scan: Scan | MountedScan | LaserScan | Segments | ArrayLike,
     angles: tuple[float, float] | None = None,
     *,
     prior: Prior | None = None,
@@ -32,13 +34,14 @@ def locate(
     map : MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
         Metres in the map frame, free space on the left of every segment. For many scans of one map index it once, by
         `index_map`: that takes longer than a search.
-    scan : Scan, LaserScan, Segments, or array-like
+    scan : Scan, LoggedScan or other MountedScan, LaserScan, Segments, or array-like
         In the sensor's frame, metres: ranges of shape (m,), points of shape (m, 2) in scanning order, or segments of
-        shape (n, 4).
+        shape (n, 4). A scan of a log counts with its mount, its motion, and upside down where it is mounted so.
     angles : (float, float), optional
         For an array of ranges, and needed there: angle of the first beam, and from beam to beam; radians,
         counter-clockwise.
     prior : SoftPrior or HardPrior, optional
+        Of the pose that is returned.
     options : AssociationOptions, optional
         Default: those of the service. Directions count where they do in the map, and `options.oriented` is true.
     deadline : Deadline, optional
@@ -46,7 +49,9 @@ def locate(
     Returns
     -------
     AssociationResult
-        Its `usable` is the one flag to gate on; `pose` is map_from_scan.
+        Its `usable` is the one flag to gate on; `pose` is map_from_scan. Of a `MountedScan` it is that of the robot at
+        the first beam, map_from_base, where the mount is known, else that of the sensor. Where a scan took time and
+        its motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation).
 
     Raises
     ------
@@ -105,14 +110,16 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike) -> M
     return MapIndex.build(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument="map"))
 
 
-def scan_of(scan: Scan | LaserScan | Segments | ArrayLike, angles: tuple[float, float] | None = None) -> Scan:
+def scan_of(
+    scan: Scan | MountedScan | LaserScan | Segments | ArrayLike, angles: tuple[float, float] | None = None
+) -> Scan:
     """Return a scan as the search takes it; ranges stay evidence beside the segments that are found in them.
 
     Parameters
     ----------
-    scan : Scan, LaserScan, Segments, or array-like
+    scan : Scan, MountedScan, LaserScan, Segments, or array-like
         In the sensor's frame, metres: ranges (m,), points (m, 2) in scanning order, or segments (n, 4). A `Scan` is
-        returned as it is.
+        returned as it is; a `MountedScan` comes out in the robot's frame, see `locate`.
     angles : (float, float), optional
         Of an array of ranges: angle of the first beam, and from beam to beam; radians.
 
@@ -133,17 +140,14 @@ def scan_of(scan: Scan | LaserScan | Segments | ArrayLike, angles: tuple[float, 
     if isinstance(scan, Segments):
         return Scan(MeasuredSegments.from_segments(scan))
     if isinstance(scan, LaserScan):
-        return _vectorized(scan)
+        return ranges_scan(scan)
+    if isinstance(scan, MountedScan):
+        return assemble([view_of(scan)])
     shape = np.shape(scan)
     if len(shape) == 1:
         if angles is None:
             raise InvalidArgumentError("an array of ranges needs (angle_min, angle_increment)", argument="angles")
-        return _vectorized(LaserScan(*angles, scan))
+        return ranges_scan(LaserScan(*angles, scan))
     if len(shape) == 2 and shape[1] == 2:
-        return _vectorized(scan)
+        return ranges_scan(scan)
     return Scan(MeasuredSegments.from_segments(Segments.from_array(scan, argument="scan")))
-
-
-def _vectorized(scan: LaserScan | ArrayLike) -> Scan:
-    found = vectorize(scan)
-    return Scan(found.measured, found.viewpoint, found.beams, ordered=found.ordered)

@@ -32,6 +32,8 @@ import llvmlite
 import numba
 import numpy as np
 
+from .trusted_folders import is_trusted_file, is_trusted_folder, why_untrusted
+
 UNKNOWN_NUMBA = (
     f"Numba {numba.__version__} compiles and keeps functions in a way that is not known here; "
     "install one of the versions that linefix names"
@@ -80,11 +82,14 @@ def cache_directory(package: str) -> Path:
     name = f"{package}-{stamp(package)}"
     named = os.environ.get(DIRECTORY) or os.environ.get("NUMBA_CACHE_DIR")
     if named:
-        return Path(named).absolute() / name
+        folder = Path(named).absolute()
+        return (folder if _is_trusted(folder) else _own_directory()) / name
     home = _home(package)
     folder = home / "kernels"
     beside = (folder if folder.is_dir() else home) / "__pycache__"
-    if _can_write(beside if beside.exists() else beside.parent) or _holds_all(beside / name, package):
+    kept = _can_write(beside if beside.exists() else beside.parent) or _holds_all(beside / name, package)
+    # Users who can write to the folders above can write to the source as well.
+    if kept and (not beside.exists() or is_trusted_folder(beside)):
         return beside / name
     return _own_directory() / name
 
@@ -143,7 +148,10 @@ class KernelCache(_Cache):
         target_context.refresh()
         path = self._path(sig)
         try:
-            kept_sig, parts = pickle.loads(path.read_bytes())
+            content = read_trusted(path)
+            if content is None:
+                return None
+            kept_sig, parts = pickle.loads(content)
             return put_together(target_context, self.library, *parts) if kept_sig == sig else None
         except FileNotFoundError:
             return None
@@ -194,6 +202,14 @@ class CalleeCache(KernelCache):
         pass
 
 
+def read_trusted(path: Path) -> bytes | None:
+    """Return what a file holds that is to be run; None, and a warning, where others may write to it."""
+    if is_trusted_file(path):
+        return path.read_bytes()
+    logger.warning("%s is not loaded: other users may write to that file; the kernel is compiled again", path)
+    return None
+
+
 def _package_of(module: str) -> str:
     package, found, _ = f"{module}.".partition(".kernels.")
     parent, _, last = module.rpartition(".")
@@ -220,6 +236,15 @@ def _modules_with_kernels(package: str) -> Iterator[str]:
 def _holds_all(directory: Path, package: str) -> bool:
     names = [path.name for path in directory.glob("*.nbc")]
     return all(any(name.startswith(f"{module}.") for name in names) for module in _modules_with_kernels(package))
+
+
+@cache
+def _is_trusted(folder: Path) -> bool:
+    """Return whether kernels may be stored in a folder; where not, the reason is logged once."""
+    why = why_untrusted(folder)
+    if why is not None:
+        logger.warning("compiled kernels are not kept in %s: %s", folder, why)
+    return why is None
 
 
 def _can_write(directory: Path) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 
@@ -23,11 +23,14 @@ from .admission.origins import Origins
 from .admission.readiness import Readiness
 from .http.bodies import BodyReceiver
 from .http.openapi import Contract, describe
+from .http.plain_paths import PlainPaths
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
 from .http.routes import analyze, associate, batch, check, importing, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
+from .importing.bounds import Bounds
+from .importing.folders import remove_abandoned
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
 from .maps.lookup import MapLookup
@@ -46,6 +49,10 @@ from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
+LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
+FIRST_KEYS_SECONDS = (
+    12.0  # that a start waits for the issuer's keys: as long as a fetch of them may take, and some more
+)
 PROGRESS_SECONDS = 5.0  # between two lines that say how far compiling is
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
@@ -95,6 +102,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
             ),
             expose_headers=("ETag", "Retry-After", "X-Request-Id"),
         )
+    app.add_middleware(PlainPaths)
     app.add_middleware(Reception, services=services)
     return app
 
@@ -142,10 +150,16 @@ def _services(settings: Settings, part: Part) -> Services:
         lookup=lookup,
         documents=_budget(settings, part, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
-        imports=asyncio.Semaphore(1),
+        importing=Gate(1, settings.max_connections, "importing"),
+        import_bounds=Bounds(
+            max(LEAST_IMPORT_BYTES, part.share(settings.max_import_bytes)),
+            settings.max_body_bytes,
+            settings.max_map_segments,
+        ),
         parse_threads=Threads(2, "parse"),
         store_threads=Threads(4, "store"),
         key_threads=Threads(1, "keys"),
+        issuer_threads=Threads(1, "issuer"),
         traces=traces_of_environment(),
     )
 
@@ -170,7 +184,10 @@ def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
 async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterator[dict[str, Services]]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
-    following = asyncio.create_task(_follow_keys(services))
+    following = [
+        asyncio.create_task(_follow(services.key_threads, services.keyring.refresh)),
+        asyncio.create_task(_follow(services.issuer_threads, services.keyring.refresh_tokens)),
+    ]
     if part.opens_late:
         await getting_ready
     try:
@@ -178,12 +195,21 @@ async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterat
     finally:
         getting_ready.cancel()
         refreshing.cancel()
-        following.cancel()
+        for task in following:
+            task.cancel()
         services.close()
 
 
 async def _get_ready(services: Services) -> None:
-    """Open the store and warm the kernels while probes are answered already."""
+    """Open the store and warm the kernels while probes are answered already; a defect in that is logged."""
+    try:
+        await _prepare(services)
+    except Exception:
+        logger.exception("a defect: the service does not become ready")
+        raise
+
+
+async def _prepare(services: Services) -> None:
     try:
         await services.probe.open()
     except StoreError as error:
@@ -191,10 +217,10 @@ async def _get_ready(services: Services) -> None:
         where = services.settings.url.render_as_string(hide_password=True)
         logger.error("the store does not open: %s", error, extra={"store": where})
     threads, parser = services.parse_threads, services.parser
+    await threads.run(remove_abandoned)
     if not is_compiled():
         await _compile(services)
-    keys = services.key_threads.run(services.keyring.refresh)
-    await asyncio.gather(threads.run(warm_up), threads.run(parser.start), keys)
+    await asyncio.gather(threads.run(warm_up), threads.run(parser.start), _fetch_first_keys(services))
     # What was made until now lives as long as the process: the garbage collector need not look through it, ever. It has
     # been off since the process began, which saves a fifth of the start; hardly anything of what it left is garbage.
     gc.freeze()
@@ -202,6 +228,13 @@ async def _get_ready(services: Services) -> None:
     services.readiness.warm = True
     services.metrics.refresh()
     logger.info("ready")
+
+
+async def _fetch_first_keys(services: Services) -> None:
+    """Wait for the keys of the issuer, but not longer than a fetch may take: other keys are checked without them."""
+    with suppress(Exception):  # `_follow` tries again, and logs
+        async with asyncio.timeout(FIRST_KEYS_SECONDS):
+            await services.issuer_threads.run(services.keyring.refresh_tokens)
 
 
 async def _compile(services: Services) -> None:
@@ -224,11 +257,11 @@ async def _tell_progress() -> None:
         logger.info("compiling", extra={"share": round(compiled_share(), 2)})
 
 
-async def _follow_keys(services: Services) -> None:
+async def _follow(threads: Threads, refresh: Callable[[], None]) -> None:
     """Take up keys that come, and forget those that go, without a restart."""
     while True:
-        await asyncio.sleep(KEYS_SECONDS)
         try:
-            await services.key_threads.run(services.keyring.refresh)
+            await threads.run(refresh)
         except Exception:
             logger.exception("a defect")  # the keys stay as they were
+        await asyncio.sleep(KEYS_SECONDS)

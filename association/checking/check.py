@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..map_index import MapIndex
 from ..options import CancelledError, Deadline
 from .likeness import find_look_alikes, likeness_findings
-from .pieces import beside, drawing_findings, drawn_sigma
+from .pieces import drawing_findings, drawn_sigma, find_near_walls
 from .result import Advice, Finding, MapCheck, Size
 from .sides import Sides, direction_findings, look_from_walls
 from .tuning import LARGEST, SMALLEST
@@ -37,12 +37,12 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
     until = deadline or Deadline()
     size = Size(index.directed, len(index.walls.rows), float(index.walls.longest.sum()), index.diagonal)
     findings = list(_size_findings(size))
-    advice, pairs = Advice(drawn_sigma(index)), beside(index)
+    advice, near = Advice(drawn_sigma(index)), find_near_walls(index, until)
     if oriented and not findings:  # of another unit walls are too far apart to see one another
-        sides = look_from_walls(index, pairs.both_ways(size.walls), until)
+        sides = look_from_walls(index, near.opposite, until)
         findings += direction_findings(index, sides)
         advice = Advice(advice.sigma, _directed(sides, findings))
-    for found in () if until.passed else drawing_findings(index, pairs):
+    for found in () if until.passed else drawing_findings(index, near, until):
         findings.append(found)
         if until.passed:
             break

@@ -9,7 +9,7 @@ import numpy as np
 
 from registration import wrap_angle
 
-from ..causes import Mistake
+from ..causes import Mistake, unit_mistake
 from .result import Advice, Finding, SampleReport
 from .samples import Sample, Way
 from .tuning import (
@@ -127,10 +127,12 @@ def _scaled(samples: Sequence[Sample], least: float) -> Finding | None:
     agreeing = int((np.abs(factors / middle - 1.0) < SAME_FACTOR).sum())
     if agreeing < min(2, len(samples)) or agreeing <= MANY * telling or abs(middle - 1.0) < least:
         return None
+    unit = unit_mistake(middle)
+    said = f" The map seems to be in {unit}." if unit is not None else ""
     return Finding(
         "scale",
         f"{agreeing} of {len(samples)} scans fit better at another scale: divide the map by {middle:.4g}, or multiply "
-        "the scans by it.",
+        f"the scans by it.{said}",
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from registration import MeasuredSegments, RigidTransform, Segments, wrap_angle
 
+from ..errors import IndexingEndedError
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
 from ..result import AssociationResult
@@ -49,8 +50,14 @@ class Likeness:
 
 
 def find_look_alikes(index: MapIndex, deadline: Deadline, *, oriented: bool) -> Likeness:
-    """Look about from some places, spread over the length of the walls, and search each view in the map."""
-    place = index if oriented else index.undirected
+    """Look about from some places, spread over the length of the walls, and search each view in the map.
+
+    From no more places than the deadline leaves time for.
+    """
+    try:
+        place = index if oriented else index.undirected_by(deadline)
+    except IndexingEndedError:
+        return Likeness(0, (), ())
     options = AssociationOptions(oriented=oriented)
     looked, found, walls = 0, [], set[int]()
     for view in _views(index, deadline):
@@ -84,7 +91,7 @@ def _views(index: MapIndex, deadline: Deadline) -> Iterator[View]:
         if deadline.passed:
             return
         pose = _free_place(looker, wall)
-        view = None if pose is None else look_about(looker, pose)
+        view = None if pose is None else look_about(looker, pose, deadline)
         if view is not None and len(view.segments) >= 3:
             yield view
 
@@ -104,10 +111,14 @@ def _free_place(looker: Looker, wall: int) -> RigidTransform | None:
     return None
 
 
-def look_about(looker: Looker, pose: RigidTransform) -> View:
-    """Return what is seen from a pose: of each wall the stretches that neighbouring rays meet."""
+def look_about(looker: Looker, pose: RigidTransform, deadline: Deadline | None = None) -> View | None:
+    """Return what is seen from a pose: of each wall the stretches that neighbouring rays meet; None at the deadline."""
     angles = [math.tau * k / RAYS for k in range(RAYS)]
-    hits = [looker.first(pose.x, pose.y, angle + pose.theta, REACH) for angle in angles]
+    hits = []
+    for angle in angles:
+        if deadline is not None and deadline.passed:
+            return None
+        hits.append(looker.first(pose.x, pose.y, angle + pose.theta, REACH))
     begin = next((k for k in range(RAYS) if hits[k][1] != hits[k - 1][1]), 0)
     segments, walls, first = [], [], begin
     for step in range(1, RAYS + 1):

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.layout import Floats
+from registration.layout import Floats, Records
 
 from ..map_index import MapIndex
+from ..options import Deadline
 from ..tables import Grid
 from .looking import segments_of
 from .result import Finding
@@ -18,6 +20,7 @@ from .tuning import (
     DOUBLE,
     DOUBLE_LENGTH,
     DOUBLE_SHARE,
+    ENDS_AT_A_TIME,
     GREATEST_GAP,
     LARGEST_PIXEL,
     LEAST_GAP,
@@ -27,6 +30,7 @@ from .tuning import (
     MOST_PAIRS,
     ON_STEP,
     OVERLAP,
+    PAIRS_AT_A_TIME,
     PARALLEL,
     SAME_LINE,
     SHORT,
@@ -37,64 +41,63 @@ Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
 
-def drawing_findings(index: MapIndex, pairs: Beside) -> Iterator[Finding]:
-    """Tell what is doubtful in how the lines of a directed map were drawn; `pairs` are its walls beside each other."""
+def drawing_findings(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
+    """Tell what is doubtful in how the lines of a directed map were drawn; `near` are its walls beside others."""
     yield from _short(index)
-    yield from _doubled(index, pairs)
-    yield from _overlapping(index, pairs)
-    yield from _gaping(index)
+    yield from _doubled(index, near)
+    yield from _overlapping(index, near, deadline)
+    yield from _gaping(index, deadline)
 
 
-def near_pairs(grid: Grid, count: int) -> Indices:
-    """Return the pairs of walls that one cell lists, (p, 2), the lower index first, each once."""
-    sizes = np.diff(grid.starts)
-    keys = [np.zeros(0, dtype=np.int64)]
-    held = 0
+@dataclass(frozen=True, slots=True)
+class NearWalls:
+    """Which walls of a map run beside another one: (walls,) flags each.
+
+    Attributes
+    ----------
+    opposite : of two that lie on one another and run in opposite ways: a wall without thickness
+    doubled : of two that are nearer to each other than two faces of a building, and look one way, or at each other
+    overlapping : of two that lie on one another and run the same way
+    """
+
+    opposite: Flags
+    doubled: Flags
+    overlapping: Flags
+
+
+def find_near_walls(index: MapIndex, deadline: Deadline) -> NearWalls:
+    """Compare the walls of a directed map that are near to each other, as many as the deadline allows."""
+    walls = index.walls.rows
+    near = NearWalls(*(np.zeros(len(walls), dtype=bool) for _ in range(3)))
+    for pairs in near_pairs(index.grid):
+        if deadline.passed:
+            break
+        _compare(walls, pairs, near)
+    return near
+
+
+def near_pairs(grid: Grid) -> Iterator[Indices]:
+    """Yield the pairs of walls that one cell lists, (p, 2), the lower index first, up to `PAIRS_AT_A_TIME` together.
+
+    Those of cells with few walls come first. A pair comes once for each cell that lists both.
+    """
+    sizes, left = np.diff(grid.starts), MOST_PAIRS
     for size in range(2, MOST_IN_CELL + 1):
         cells = np.flatnonzero(sizes == size if size < MOST_IN_CELL else sizes >= size)
         first, second = np.triu_indices(size, 1)
-        cells = cells[: max(0, (MOST_PAIRS - held) // len(first))]
-        if len(cells):
-            listed = grid.items[grid.starts[cells][:, None] + np.arange(size)].astype(np.int64)
-            keys.append(np.unique(listed[:, first] * count + listed[:, second]))
-            held += len(keys[-1])
-    every = np.unique(np.concatenate(keys))
-    return np.stack([every // count, every % count], axis=1)
+        cells = cells[: left // len(first)]
+        left -= len(cells) * len(first)
+        step = PAIRS_AT_A_TIME // len(first)
+        for begin in range(0, len(cells), step):
+            listed = grid.items[grid.starts[cells[begin : begin + step]][:, None] + np.arange(size)]
+            yield np.stack([listed[:, first].reshape(-1), listed[:, second].reshape(-1)], axis=1)
 
 
-class Beside:
-    """How the second wall of each of the `pairs`, (p, 2), runs beside the first: (p,) each, metres.
-
-    `shared` is the length that they run beside each other, `off` how far the second lies to the left of the first
-    there, `along` whether both run the same way; of pairs that are not parallel `shared` is 0.
-    """
-
-    def __init__(self, pairs: Indices, shared: Floats, off: Floats, along: Flags, shorter: Floats) -> None:
-        self.pairs, self.shared, self.off, self.along, self.shorter = pairs, shared, off, along, shorter
-
-    @property
-    def for_long(self) -> Flags:
-        """Whether they run beside each other over a good part of the shorter one."""
-        return (self.shared > DOUBLE_LENGTH) & (self.shared > DOUBLE_SHARE * self.shorter)
-
-    @property
-    def opposite(self) -> Flags:
-        """Whether they lie on one another and run in opposite ways."""
-        return self.for_long & (np.abs(self.off) < SAME_LINE) & ~self.along
-
-    def both_ways(self, count: int) -> Flags:
-        """Tell of each of `count` walls whether another lies on it that runs the other way: it has no thickness."""
-        found = np.zeros(count, dtype=bool)
-        found[self.pairs[self.opposite]] = True
-        return found
-
-
-def beside(index: MapIndex) -> Beside:
-    """Compare the walls of a directed map that are near to each other."""
-    walls = index.walls.rows
-    pairs = near_pairs(index.grid, len(walls))
+def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
+    """Note how the second wall of each pair, (p, 2), runs beside the first."""
+    one, other = walls["dx"][pairs], walls["dy"][pairs]
+    pairs = pairs[np.abs(one[:, 0] * other[:, 1] - other[:, 0] * one[:, 1]) < PARALLEL]
     a, b = walls[pairs[:, 0]], walls[pairs[:, 1]]
-    parallel = np.abs(a["dx"] * b["dy"] - a["dy"] * b["dx"]) < PARALLEL
     along = a["dx"] * b["dx"] + a["dy"] * b["dy"] > 0.0
     places = []
     for name in ("begin", "end"):
@@ -103,10 +106,16 @@ def beside(index: MapIndex) -> Beside:
         places.append((a["dx"] * x + a["dy"] * y, a["dx"] * y - a["dy"] * x - a["offset"]))
     (s1, o1), (s2, o2) = places
     low, high = np.maximum(a["begin"], np.minimum(s1, s2)), np.minimum(a["end"], np.maximum(s1, s2))
-    middle = 0.5 * (low + high)
     slope = (o2 - o1) / np.where(np.abs(s2 - s1) > 1e-9, s2 - s1, 1.0)
+    # The length that both run beside each other, and how far the second lies to the left of the first there, metres.
+    shared, off = high - low, o1 + slope * (0.5 * (low + high) - s1)
     shorter = np.minimum(a["end"] - a["begin"], b["end"] - b["begin"])
-    return Beside(pairs, np.where(parallel, high - low, 0.0), o1 + slope * (middle - s1), along, shorter)
+    for_long = (shared > DOUBLE_LENGTH) & (shared > DOUBLE_SHARE * shorter)
+    on_it, apart = np.abs(off) < SAME_LINE, np.abs(off)
+    near.opposite[pairs[for_long & on_it & ~along]] = True
+    # Back to back they are the two faces of one wall, as they should be.
+    near.doubled[pairs[for_long & ~on_it & (apart < DOUBLE) & (along | (off > 0.0))]] = True
+    near.overlapping[pairs[along & on_it & (shared > OVERLAP)]] = True
 
 
 def _short(index: MapIndex) -> Iterator[Finding]:
@@ -123,13 +132,9 @@ def _short(index: MapIndex) -> Iterator[Finding]:
         )
 
 
-def _doubled(index: MapIndex, sides: Beside) -> Iterator[Finding]:
-    apart = np.abs(sides.off)
-    near = sides.for_long & (apart >= SAME_LINE) & (apart < DOUBLE)
-    # Back to back they are the two faces of one wall, as they should be.
-    doubled = near & (sides.along | (sides.off > 0.0))
-    if doubled.any():
-        found = segments_of(index, np.unique(sides.pairs[doubled]))
+def _doubled(index: MapIndex, near: NearWalls) -> Iterator[Finding]:
+    if near.doubled.any():
+        found = segments_of(index, near.doubled)
         yield Finding(
             "doubled_faces",
             f"{len(found)} segments run beside another that looks the same way, or at it, less than {100.0 * DOUBLE:g} "
@@ -137,8 +142,8 @@ def _doubled(index: MapIndex, sides: Beside) -> Iterator[Finding]:
             "sees of it may be laid on either.",
             found,
         )
-    if sides.opposite.any():
-        found = segments_of(index, np.unique(sides.pairs[sides.opposite]))
+    if near.opposite.any():
+        found = segments_of(index, near.opposite)
         yield Finding(
             "both_ways",
             f"{len(found)} segments lie on another that runs the other way: walls without thickness. Two faces drawn "
@@ -147,10 +152,8 @@ def _doubled(index: MapIndex, sides: Beside) -> Iterator[Finding]:
         )
 
 
-def _overlapping(index: MapIndex, sides: Beside) -> Iterator[Finding]:
-    on_it = sides.along & (np.abs(sides.off) < SAME_LINE) & (sides.shared > OVERLAP)
-    found = set(segments_of(index, np.unique(sides.pairs[on_it])))
-    found |= {piece for one, other, room in _neighbours(index) if room < -OVERLAP for piece in (one, other)}
+def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
+    found = set(segments_of(index, near.overlapping)) | _lapping(index, deadline)
     if found:
         yield Finding(
             "overlaps",
@@ -159,24 +162,20 @@ def _overlapping(index: MapIndex, sides: Beside) -> Iterator[Finding]:
         )
 
 
-def _gaping(index: MapIndex) -> Iterator[Finding]:
+def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     """Tell where an end nearly meets another segment: at no other end, on no other line, and yet near one."""
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
-    _, place, there = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     # What is as near as this to its own begin is too short to tell.
-    alone = (there[place.reshape(-1)] == 1) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
-    if not alone.any():
+    alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
+    if not alone.any() or deadline.passed:
         return
-    from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
-
-    loose = np.flatnonzero(alone)
-    nearest = np.asarray(cKDTree(ends).query(ends[loose], k=2)[0])[:, 1]  # after the end itself
-    free = nearest > LEAST_GAP
     found = set()
-    for end, gap in zip(loose[free][:MOST_ENDS], nearest[free][:MOST_ENDS], strict=True):
+    for end, gap in _loose_ends(ends, np.flatnonzero(alone), deadline):
+        if deadline.passed:
+            break
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
         if apart > LEAST_GAP + SAME_LINE and min(apart, gap) <= GREATEST_GAP:
-            found.add(int(end) // 2)
+            found.add(end // 2)
     if found:
         yield Finding(
             "gaps",
@@ -184,6 +183,33 @@ def _gaping(index: MapIndex) -> Iterator[Finding]:
             "passes: walls that do not meet. Rays go between them.",
             tuple(sorted(found)),
         )
+
+
+def _alone(ends: Floats) -> Flags:
+    """Tell of each end, (n, 2) metres, whether no other is at the same place."""
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    same = (np.diff(ends[order], axis=0) == 0.0).all(axis=1)
+    alone = np.empty(len(ends), dtype=bool)
+    alone[order] = ~(np.append(same, False) | np.append(False, same))
+    return alone
+
+
+def _loose_ends(ends: Floats, chosen: Indices, deadline: Deadline) -> Iterator[tuple[int, float]]:
+    """Yield those of the chosen ends (k,) that touch no other, `MOST_ENDS` at most, and how far the nearest is, metres.
+
+    It is infinitely far where none is within `GREATEST_GAP`.
+    """
+    from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
+
+    tree, left = cKDTree(ends), MOST_ENDS
+    for begin in range(0, len(chosen), ENDS_AT_A_TIME):
+        some = chosen[begin : begin + ENDS_AT_A_TIME]
+        if left <= 0 or deadline.passed:
+            return
+        nearest = np.asarray(tree.query(ends[some], k=2, distance_upper_bound=GREATEST_GAP)[0])[:, 1]
+        free = np.flatnonzero(nearest > LEAST_GAP)[:left]  # after the end itself
+        left -= len(free)
+        yield from zip(some[free].tolist(), nearest[free].tolist(), strict=True)
 
 
 def _distance_to_others(index: MapIndex, end: Floats, own: int) -> float:
@@ -202,21 +228,25 @@ def _distance_to_others(index: MapIndex, end: Floats, own: int) -> float:
     return float(np.hypot(x, y).min(initial=np.inf))
 
 
-def _neighbours(index: MapIndex) -> list[tuple[int, int, float]]:
-    """List the pieces of one wall that follow one another, and the room between them, metres; negative on overlaps."""
+def _lapping(index: MapIndex, deadline: Deadline) -> set[int]:
+    """Return the segments of one wall that begin before another of it ends, and those others."""
     starts, order = index.pieces.starts, index.pieces.items
     ends = index.segments.shifted(-index.origin).endpoints
-    found: list[tuple[int, int, float]] = []
+    found: set[int] = set()
     for wall in np.flatnonzero(np.diff(starts) > 1):
+        if deadline.passed:
+            break
         row, pieces = index.walls.rows[wall], order[starts[wall] : starts[wall + 1]]
         d = np.array([row["dx"], row["dy"]])
         begins, stops = ends[pieces, :2] @ d, ends[pieces, 2:] @ d
         by = np.argsort(begins, kind="stable")
-        reach, last = stops[by[0]], by[0]
-        for k in by[1:]:
-            found.append((int(pieces[last]), int(pieces[k]), float(begins[k] - reach)))
-            if stops[k] > reach:
-                reach, last = stops[k], k
+        pieces, begins, stops = pieces[by], begins[by], stops[by]
+        reach = np.maximum.accumulate(stops)
+        # Which piece reaches so far: the last that reached farther than all before it.
+        farther = np.append(True, stops[1:] > reach[:-1])
+        last = np.maximum.accumulate(np.where(farther, np.arange(len(by)), 0))
+        lapping = np.flatnonzero(begins[1:] - reach[:-1] < -OVERLAP)
+        found.update(pieces[last[lapping]].tolist(), pieces[lapping + 1].tolist())
     return found
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from registration import RigidTransform
 
 from ..causes import Cause, Mistake, find_causes
 from ..context import SearchContext
+from ..errors import IndexingEndedError
 from ..explain import search_and_explain
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
@@ -101,7 +103,11 @@ def try_sample(
     ------
     CancelledError
         When the deadline was cancelled.
+    IndexingEndedError
+        When it passed before the map was indexed without its directions.
     """
+    if not oriented:
+        index.undirected_by(deadline)  # the search takes it from there
     began, present = time.monotonic(), (oriented, index.sigma)
     context = SearchContext.of(index, scan, None, AssociationOptions(oriented=oriented, causes=True), deadline)
     found = _searched(context)
@@ -109,7 +115,8 @@ def try_sample(
     trials = {present: trial}
     for way in _other_ways(present):
         if not deadline.passed:
-            trials[way] = _tried(index, scan, way, deadline)
+            with suppress(IndexingEndedError):
+                trials[way] = _tried(index, scan, way, deadline)
     other = None if deadline.passed else _tried(index, mirrored(scan), present, deadline)
     # As much time as all of this took may go into mistakes.
     causes = find_causes(context, found.as_sent, verdict, began)
@@ -136,7 +143,7 @@ def _other_ways(present: Way) -> Iterator[Way]:
 
 def _tried(index: MapIndex, scan: Scan, way: Way, deadline: Deadline) -> Trial:
     directed, sigma = way
-    place = replace(index if directed else index.undirected, sigma=sigma)
+    place = replace(index if directed else index.undirected_by(deadline), sigma=sigma)
     context = SearchContext.of(place, scan, None, AssociationOptions(oriented=directed), deadline)
     return _judged(context, _searched(context))[1]
 

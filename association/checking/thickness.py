@@ -9,6 +9,7 @@ import numpy as np
 from registration import Segments
 
 from ..context import SearchContext
+from ..errors import IndexingEndedError
 from ..explain import search_and_explain
 from ..map_index import MapIndex
 from ..options import AssociationOptions, Deadline
@@ -68,7 +69,10 @@ def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, orien
         for change in changes:
             if deadline.passed:
                 return False
-            scores[change] = _score(faces.moved_left(0.5 * change), some, deadline)
+            try:
+                scores[change] = _score(faces.moved_left(0.5 * change), some, deadline)
+            except IndexingEndedError:
+                return False
         return not deadline.passed
 
     first = [one for one in THICKER if oriented or one >= 0.0]
@@ -104,7 +108,8 @@ def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
 
 
 def _score(faces: Segments, scans: Sequence[Scan], deadline: Deadline) -> float:
-    index, options = MapIndex.build(faces, THICKNESS_SIGMA), AssociationOptions()
+    index = MapIndex.build(faces, THICKNESS_SIGMA, deadline=deadline)
+    options = AssociationOptions()
     # As they were sent: a scan that may be put to scale fits a room of walls too thick as well.
     found = (search_and_explain(SearchContext.of(index, scan, None, options, deadline)).answer for scan in scans)
     return sum(max(0.0, one.best.score) for one in found if one is not None)

@@ -11,6 +11,7 @@ import math
 SHORT = 0.1  # m, tables; a wall shorter than that tells a search nothing
 LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between what meets and what is a slit that somebody drew
 MOST_ENDS = 20_000  # that are looked about from, some 10 microseconds each
+ENDS_AT_A_TIME = 5_000  # whose nearest other is sought between two looks at the deadline
 OVERLAP = 0.05  # m, tables; pieces of one line share less than that where they are cut
 PARALLEL = math.sin(math.radians(3.0))  # tables
 SAME_LINE = 0.03  # m, as `MERGE_LATERAL`; lines nearer to each other than that are one
@@ -18,7 +19,8 @@ DOUBLE = 0.3  # m, tables; two faces that look one way, or at each other, are no
 DOUBLE_LENGTH = 0.3  # m, and this share of the shorter, tables; that they run beside each other
 DOUBLE_SHARE = 0.5
 MOST_IN_CELL = 64  # walls of one cell that are compared with each other
-MOST_PAIRS = 4_000_000  # memory
+MOST_PAIRS = 16_000_000  # time, some 0.1 microseconds each; a pair counts once for each cell that lists it
+PAIRS_AT_A_TIME = 100_000  # memory, some 20 MB; and time, between two looks at the deadline
 ON_STEP = 1e-6  # m, rounding
 LARGEST_PIXEL, MANY_ENDS = 0.1, 50  # m, and segments, tables; of a map that was traced from a picture
 STEPS = (0.5, 0.25, 0.2, 0.1, 0.05, 0.04, 0.025, 0.02)  # m; rasters that are looked for; finer ones do no harm

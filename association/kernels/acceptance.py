@@ -6,36 +6,146 @@ import numpy as np
 
 from registration.allocating import empty, zeros
 from registration.compiling import inlined, internal, kernel
-from registration.layout import Floats, Records
+from registration.layout import Floats, Record, Records
 
-from ..layout import BLOCKER, Indices
-from ..tables import Blockers, Lines, Pieces, Place, Sights, Workspace
-from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT
+from ..layout import BLOCKER, PAIR, Indices, Integers
+from ..tables import Blockers, Lines, Pieces, PiecesAlong, Place, Sights, Workspace
+from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT, MOST_UNDER
 from .ordering import ascending
 from .sight import count_blockers
 
 
 @kernel
-def union_length(lows: Floats, highs: Floats, count: int) -> float:
-    """Return the length of the union of the first `count` intervals."""
-    if count == 1:
-        return highs[0] - lows[0]
-    total = 0.0
-    reach = -math.inf
-    for k in ascending(lows[:count]):
-        start = max(lows[k], reach)
-        if highs[k] > start:
-            total += highs[k] - start
-            reach = highs[k]
-    return total
+def first_of_run(walls: Records, w: int, known: Integers) -> int:
+    """Return the first wall of the run that wall `w` is on; `known` (m,) keeps 1 + it of every wall that was passed."""
+    first = w
+    while walls[first].before >= 0 and known[first] == 0:
+        first = walls[first].before
+    if known[first] > 0:
+        first = known[first] - 1
+    while w != first and known[w] == 0:
+        known[w] = 1 + first
+        w = walls[w].before
+    return first
+
+
+@kernel
+def pieces_along(w: int, bridging: bool, walls: Records, pieces: Pieces) -> PiecesAlong:
+    """Order the pieces of wall `w`, or of its run from there on where it may bridge doorways, by where they begin."""
+    dx = walls[w].dx
+    dy = walls[w].dy
+    count = 0
+    v = w
+    while v >= 0:
+        count += pieces.starts[v + 1] - pieces.starts[v]
+        v = walls[v].after if bridging else -1
+    piece = empty(count, np.intp)
+    low = empty(count, np.float64)
+    high = empty(count, np.float64)
+    count = 0
+    v = w
+    while v >= 0:
+        for k in range(pieces.starts[v], pieces.starts[v + 1]):
+            p = pieces.items[k]
+            one = pieces.ends[p].x1 * dx + pieces.ends[p].y1 * dy
+            other = pieces.ends[p].x2 * dx + pieces.ends[p].y2 * dy
+            piece[count] = p
+            low[count] = min(one, other)
+            high[count] = max(one, other)
+            count += 1
+        v = walls[v].after if bridging else -1
+    place = ascending(low)
+    farthest = empty(count, np.intp)
+    gaps = zeros(count, np.float64)
+    for k in range(count):
+        farthest[k] = place[k]
+        if k > 0:
+            reach = farthest[k - 1]
+            gaps[k] = gaps[k - 1] + max(0.0, low[place[k]] - high[reach])
+            if high[place[k]] <= high[reach]:
+                farthest[k] = reach
+    return PiecesAlong(piece, low, high, place, farthest, gaps)
+
+
+@kernel
+def begun(along: PiecesAlong, x: float) -> int:
+    """Return how many pieces begin up to an abscissa."""
+    first = 0
+    last = len(along.place)
+    while first < last:
+        middle = (first + last) // 2
+        if along.low[along.place[middle]] <= x:
+            first = middle + 1
+        else:
+            last = middle
+    return first
+
+
+@kernel
+def bare_up_to(along: PiecesAlong, x: float) -> float:
+    """Return the length without pieces from the first of them to an abscissa, negative before it, metres."""
+    k = begun(along, x)
+    if k == 0:
+        return x - along.low[along.place[0]]
+    return along.gaps[k - 1] + max(0.0, x - along.high[along.farthest[k - 1]])
+
+
+@kernel
+def pieces_under(along: PiecesAlong, low: float, high: float, named: Indices) -> tuple[int, int]:
+    """Find the pieces between two abscissae, and the one of them with the greatest overlap, of equal ones the first.
+
+    Writes the first of them to `named` (`MAX_RIVALS` + 1,). Returns the place of the one with the greatest overlap, or
+    of the nearest one where none overlaps, and how many are named. At most `MOST_UNDER` pieces are compared, and of
+    those that begin before always the one that reaches farthest.
+    """
+    after = begun(along, high)
+    before = begun(along, low)
+    most = along.farthest[before - 1] if before > 0 else along.place[0]
+    best = min(along.high[most], high) - max(along.low[most], low)
+    if best < 0.0 and after < len(along.place) and high - along.low[along.place[after]] > best:
+        most = along.place[after]
+        best = high - along.low[most]
+    count = 0
+    # Backwards, as long as something before reaches so far.
+    k = after - 1
+    while k >= max(0, after - MOST_UNDER) and along.high[along.farthest[k]] > low:
+        place = along.place[k]
+        k -= 1
+        overlap = min(along.high[place], high) - max(along.low[place], low)
+        if overlap > best or (overlap == best and along.piece[place] < along.piece[most]):
+            best = overlap
+            most = place
+        if overlap > 0.0:
+            count = insert(named, count, place)
+    return most, count
 
 
 @inlined
-def first_wall(walls: Records, w: int, bridging: bool) -> int:
-    """Return the first wall of the run that wall `w` is on, or itself where nothing may bridge a doorway."""
-    while bridging and walls[w].before >= 0:
-        w = walls[w].before
-    return w
+def insert(ascending_places: Indices, count: int, place: int) -> int:
+    """Insert a place among the first `count` of some, in order; the last one is left out where there is no room."""
+    if count == len(ascending_places):
+        if place > ascending_places[count - 1]:
+            return count
+        count -= 1
+    k = count
+    while k > 0 and ascending_places[k - 1] > place:
+        ascending_places[k] = ascending_places[k - 1]
+        k -= 1
+    ascending_places[k] = place
+    return count + 1
+
+
+@kernel
+def wall_keys(matches: Records, lines: Lines, walls: Records) -> Floats:
+    """Return (n,) for each scan segment twice the wall that it lies on, -1 for none; of a run 1 + twice its first."""
+    known = zeros(len(walls), np.int64)
+    keys = empty(len(lines.row_of), np.float64)
+    for i in range(len(keys)):
+        w = matches[lines.row_of[i]].wall
+        keys[i] = 2.0 * w if w >= 0 else -1.0
+        if w >= 0 and lines.rows[lines.row_of[i]].length > BRIDGING:
+            keys[i] = 2.0 * first_of_run(walls, w, known) + 1.0
+    return keys
 
 
 @internal
@@ -49,88 +159,86 @@ def accept_matches(
     pairs (k, 2) of scan index and piece; the share of each segment that lies on pieces of its wall, or of its run where
     it may bridge doorways (k,); and the other pieces that it lies on: of pair i
     ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
+
+    The pieces of each wall are ordered once, so that the time grows with their number and that of the segments, not
+    with the product of both.
     """
-    items = pieces.items
-    piece_starts = pieces.starts
-    ends = pieces.ends
-    at = pose[0]
     row_of = lines.row_of
     n = len(row_of)
     members = zeros(len(matches), np.int64)
-    wall_of = np.full(n, -1)
-    bridging = zeros(n, np.bool_)
-    most_pieces = 0
-    found = 0
+    found = empty(n, PAIR)
+    rivals_of = empty((n, MAX_RIVALS), np.intp)
     for i in range(n):
         members[row_of[i]] += 1
-        w = matches[row_of[i]].wall
-        if w >= 0:
-            bridging[i] = lines.rows[row_of[i]].length > BRIDGING
-            w = first_wall(walls, w, bridging[i])
-            wall_of[i] = w
-            under = 0
-            while w >= 0:
-                under += piece_starts[w + 1] - piece_starts[w]
-                w = walls[w].after if bridging[i] else -1
-            most_pieces = max(most_pieces, under)
-            found += 1
-    pairs = empty((found, 2), np.intp)
-    overlaps = empty(found, np.float64)
-    rivals = empty(found * MAX_RIVALS, np.intp)
-    rival_starts = zeros(found + 1, np.intp)
-    lows = empty(most_pieces, np.float64)
-    highs = empty(most_pieces, np.float64)
-    covering = empty(most_pieces, np.intp)
-    c = math.cos(at.theta)
-    s = math.sin(at.theta)
+        found[i].piece = -1
+    keys = wall_keys(matches, lines, walls)
+    order = ascending(keys)
+    k = 0
+    while k < n and keys[order[k]] < 0.0:
+        k += 1
+    while k < n:
+        key = int(keys[order[k]])
+        w = key // 2
+        along = pieces_along(w, key % 2 == 1, walls, pieces)
+        while k < n and keys[order[k]] == key:
+            i = order[k]
+            lay_on(scan_ends[i], pose[0], walls[w], along, found[i], rivals_of[i])
+            if found[i].overlap < lines.least_overlap and members[row_of[i]] > 1:
+                found[i].piece = -1
+            k += 1
+    return by_scan_index(found, rivals_of)
+
+
+@kernel
+def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out: Record, rivals: Indices) -> None:
+    """Write to `out`, of `PAIR`, and `rivals` (`MAX_RIVALS`,) on which pieces a scan segment lies at a pose."""
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    begin = (c * segment.x1 - s * segment.y1 + pose.x) * wall.dx
+    begin += (s * segment.x1 + c * segment.y1 + pose.y) * wall.dy
+    end = (c * segment.x2 - s * segment.y2 + pose.x) * wall.dx
+    end += (s * segment.x2 + c * segment.y2 + pose.y) * wall.dy
+    low = min(begin, end)
+    high = max(begin, end)
+    named = empty(MAX_RIVALS + 1, np.intp)
+    most, count = pieces_under(along, low, high, named)
+    out.piece = along.piece[most]
+    out.overlap = 0.0
+    if min(along.high[most], high) > max(along.low[most], low):
+        bare = bare_up_to(along, high) - bare_up_to(along, low)
+        out.overlap = max(0.0, 1.0 - bare / max(high - low, MIN_EXTENT))
+    out.rivals = 0
+    for k in range(count):
+        if named[k] != most and out.rivals < MAX_RIVALS:
+            rivals[out.rivals] = along.piece[named[k]]
+            out.rivals += 1
+
+
+@kernel
+def by_scan_index(found: Records, rivals_of: Indices) -> tuple[Indices, Floats, Indices, Indices]:
+    """Put pairs (n,) of `PAIR`, with the other pieces of each, into arrays, as `accept_matches` returns them."""
+    count = 0
+    others = 0
+    for i in range(len(found)):
+        if found[i].piece >= 0:
+            count += 1
+            others += found[i].rivals
+    pairs = empty((count, 2), np.intp)
+    overlaps = empty(count, np.float64)
+    rivals = empty(others, np.intp)
+    rival_starts = zeros(count + 1, np.intp)
     pair = 0
-    for i in range(n):
-        w = wall_of[i]
-        if w < 0:
-            continue
-        dx = walls[w].dx
-        dy = walls[w].dy
-        begin = (c * scan_ends[i].x1 - s * scan_ends[i].y1 + at.x) * dx
-        begin += (s * scan_ends[i].x1 + c * scan_ends[i].y1 + at.y) * dy
-        end = (c * scan_ends[i].x2 - s * scan_ends[i].y2 + at.x) * dx
-        end += (s * scan_ends[i].x2 + c * scan_ends[i].y2 + at.y) * dy
-        low = min(begin, end)
-        high = max(begin, end)
-        best = -math.inf
-        most = -1
-        count = 0
-        while w >= 0:
-            for k in range(piece_starts[w], piece_starts[w + 1]):
-                p = items[k]
-                first = ends[p].x1 * dx + ends[p].y1 * dy
-                last = ends[p].x2 * dx + ends[p].y2 * dy
-                start = max(min(first, last), low)
-                stop = min(max(first, last), high)
-                if stop - start > best or (stop - start == best and p < most):
-                    best = stop - start
-                    most = p
-                if stop > start:
-                    lows[count] = start
-                    highs[count] = stop
-                    covering[count] = p
-                    count += 1
-            w = walls[w].after if bridging[i] else -1
-        overlap = 0.0
-        if count > 0:
-            overlap = min(1.0, union_length(lows, highs, count) / max(high - low, MIN_EXTENT))
-        if overlap < lines.least_overlap and members[row_of[i]] > 1:
-            continue
-        pairs[pair, 0] = i
-        pairs[pair, 1] = most
-        overlaps[pair] = overlap
-        stop_at = rival_starts[pair]
-        for k in range(count):
-            if covering[k] != most and stop_at < rival_starts[pair] + MAX_RIVALS:
-                rivals[stop_at] = covering[k]
-                stop_at += 1
-        rival_starts[pair + 1] = stop_at
-        pair += 1
-    return pairs[:pair], overlaps[:pair], rivals[: rival_starts[pair]], rival_starts[: pair + 1]
+    for i in range(len(found)):
+        one = found[i]
+        if one.piece >= 0:
+            pairs[pair, 0] = i
+            pairs[pair, 1] = one.piece
+            overlaps[pair] = one.overlap
+            for k in range(one.rivals):
+                rivals[rival_starts[pair] + k] = rivals_of[i, k]
+            rival_starts[pair + 1] = rival_starts[pair] + one.rivals
+            pair += 1
+    return pairs, overlaps, rivals, rival_starts
 
 
 @internal

@@ -10,7 +10,7 @@ from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
 from ..tables import Place, Raster
-from ..tuning import BRIDGING, DIRECTION_BINS, NARROW_REACH, SECTORS
+from ..tuning import BRIDGING, DIRECTION_BINS, MOST_BRIDGED, NARROW_REACH, SECTORS
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)
 BINS_PER_RADIAN = DIRECTION_BINS / (2.0 * math.pi)
@@ -33,7 +33,8 @@ def match_scan(
     Gated by the innovation: ``offset^2`` against ``sigma^2 + g' C g`` with the pose's covariance C. Best is least in
     offset over gate plus what the overlap lacks. `possible` (n,) is what each segment can add at most, nats, as of
     `may_score` or `allow_all`; those below 0 lie on no wall. Writes wall or -1, offset, sine and overlap to `matches`
-    and returns the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach.
+    and returns the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach. Of the neighbours
+    on their runs that the walls of a segment have, `MOST_BRIDGED` are looked at.
 
     One loop without calls: handing arrays on costs more than the work, Numba counts references to each.
     """
@@ -96,6 +97,7 @@ def match_scan(
             span = bin_starts[highest + 1] - first
             if highest < lowest:
                 span += len(walls)
+            bridged = 0
             for k in range(begin, end):
                 w = items[k]
                 place_in_row = w - first
@@ -115,7 +117,8 @@ def match_scan(
                 # What bridges a doorway lies on the walls on both sides of it; the gap between speaks against that.
                 bridging = length > BRIDGING and covered > 0.0
                 v = walls[w].before if low > -half and bridging else -1
-                while v >= 0:
+                while v >= 0 and bridged < MOST_BRIDGED:
+                    bridged += 1
                     along = walls[v].dx * x + walls[v].dy * y
                     edge = walls[v].end - along
                     if edge <= -half:
@@ -125,7 +128,8 @@ def match_scan(
                     covered += edge - low
                     v = walls[v].before if low > -half else -1
                 v = walls[w].after if high < half and bridging else -1
-                while v >= 0:
+                while v >= 0 and bridged < MOST_BRIDGED:
+                    bridged += 1
                     along = walls[v].dx * x + walls[v].dy * y
                     edge = walls[v].begin - along
                     if edge >= half:

@@ -26,7 +26,6 @@ from ..tuning import (
     MODEL_OFFSET,
     ROUGHNESS,
 )
-from .acceptance import union_length
 from .consensus import freedom_taken
 from .ordering import ascending
 
@@ -154,6 +153,21 @@ def join_labelled(given: Records, order: Integers, labels: Integers, counted: bo
             line.variance *= line.points / LEAST_POINTS
         line.sigma = math.sqrt(line.variance * line.points)
     return lines
+
+
+@kernel
+def union_length(lows: Floats, highs: Floats, count: int) -> float:
+    """Return the length of the union of the first `count` intervals."""
+    if count == 1:
+        return highs[0] - lows[0]
+    total = 0.0
+    reach = -math.inf
+    for k in ascending(lows[:count]):
+        start = max(lows[k], reach)
+        if highs[k] > start:
+            total += highs[k] - start
+            reach = highs[k]
+    return total
 
 
 @kernel

@@ -9,7 +9,7 @@ from registration.compiling import kernel
 from registration.layout import Records
 
 from ..layout import Integers
-from ..tuning import BEGIN_CELL, MOST_LOOKS, MOST_STEPS
+from ..tuning import MOST_LOOKS, MOST_STEPS
 
 
 @kernel
@@ -21,23 +21,13 @@ def _find(parent: Integers, i: int) -> int:
 
 
 @kernel
-def collinear_groups(
-    ends: Records, directions: Records, max_gap: float, max_lateral: float, min_cos: float
-) -> Integers:
-    """Label pieces that continue or repeat one another: one begins along the other, or within `max_gap` of its end.
+def list_begins(ends: Records, cell: float) -> tuple[Integers, Integers]:
+    """List where pieces begin, by a hash of their cell: memory does not grow with the extent.
 
-    What begins along another one has to end beside its line, too. Where more than `MOST_LOOKS` begin about one piece,
-    and beyond `MOST_STEPS` places before its end, as on no map of a building, some are not merged. `ends` (n,) of
-    `ENDS`, `directions` (n,) of `POINT`. Returns (n,) labels, the lowest index of each group.
+    `ends` (n,) of `ENDS`, `cell` metres. Returns (buckets,) the last piece of each hash, and (n,) the one before each
+    piece in the same list; -1 where there is none.
     """
     n = len(ends)
-    parent = np.arange(n)
-    if n == 0:
-        return parent
-    # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
-    cell = max(BEGIN_CELL, 1.01 * math.hypot(max_gap, max_lateral))
-    spacing = 1.98 * (cell - max_lateral)
-    # Begins sorted by a hash of their cell, so that memory does not grow with the extent.
     buckets = 1
     while buckets < 2 * n:
         buckets *= 2
@@ -47,7 +37,31 @@ def collinear_groups(
         key = _cell_hash(math.floor(ends[i].x1 / cell), math.floor(ends[i].y1 / cell), buckets)
         following[i] = heads[key]
         heads[key] = i
-    for i in range(n):
+    return heads, following
+
+
+@kernel
+def join_collinear(
+    ends: Records,
+    directions: Records,
+    heads: Integers,
+    following: Integers,
+    gates: tuple[float, float, float, float],
+    parent: Integers,
+    first: int,
+    last: int,
+) -> None:
+    """Join pieces `first` to `last` with those that they continue or repeat, in `parent` (n,), a union-find forest.
+
+    One begins along the other, or within `max_gap` of its end. What begins along another one has to end beside its
+    line, too. Where more than `MOST_LOOKS` begin about one piece, and beyond `MOST_STEPS` places before its end, as on
+    no map of a building, some are not merged. `ends` (n,) of `ENDS`, `directions` (n,) of `POINT`; `heads` and
+    `following` of `list_begins`; `gates` are ``(cell, max_gap, max_lateral, min_cos)``, metres but for the last.
+    """
+    cell, max_gap, max_lateral, min_cos = gates
+    buckets = len(heads)
+    spacing = 1.98 * (cell - max_lateral)
+    for i in range(first, last):
         x = ends[i].x2
         y = ends[i].y2
         dx = directions[i].x
@@ -85,9 +99,13 @@ def collinear_groups(
                             else:
                                 parent[one] = other
                         j = following[j]
-    for i in range(n):
+
+
+@kernel
+def label_groups(parent: Integers) -> None:
+    """Turn a union-find forest (n,) into labels, the lowest index of each group."""
+    for i in range(len(parent)):
         parent[i] = _find(parent, i)
-    return parent
 
 
 @kernel

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import Scan, View, assemble
+from linefix.mounted import ranges_scan
 from registration import RigidTransform, Segments
 from simulation import CONDITIONS, Case, Scanner, scan
 from simulation.conditions import Stranger
 from simulation.places import is_free
-from vectorization import LaserScan, VectorizationOptions, vectorize
+from vectorization import LaserScan
 
 from ..collection import Query
 from ..ranges import Log
@@ -70,12 +71,6 @@ def drive(looks: Sequence[Look], rng: np.random.Generator) -> Scan:
     return assemble(views)
 
 
-def seen_by(laser: LaserScan, sigma: float | None = None) -> Scan:
-    """Return ranges as the service takes them."""
-    found = vectorize(laser, VectorizationOptions(sigma=sigma))
-    return Scan(found.measured, found.viewpoint, found.beams)
-
-
 def before(log: Log, number: int, length: float) -> list[int]:
     """Return the scans of a log to look at, the latest first, over so many metres before it.
 
@@ -95,7 +90,7 @@ def before(log: Log, number: int, length: float) -> list[int]:
 
 def looks_of(log: Log, numbers: Sequence[int]) -> list[Look]:
     """Return scans of a log, and their poses."""
-    return [Look(seen_by(log.laser(k)), RigidTransform(*(float(v) for v in log.poses[k]))) for k in numbers]
+    return [Look(ranges_scan(log.laser(k)), RigidTransform(*(float(v) for v in log.poses[k]))) for k in numbers]
 
 
 def log_drive(log: Log, query: Query, length: float) -> Scan:
@@ -135,7 +130,7 @@ def world_looks(case: Case, length: float) -> list[Look]:
 
 def look(scanner: Scanner, ranges: np.ndarray, at: RigidTransform) -> Look:
     """Return what a scanner reports as a look."""
-    return Look(seen_by(laser_of(scanner, ranges), scanner.sigma), at, ranges)
+    return Look(ranges_scan(laser_of(scanner, ranges), scanner.sigma), at, ranges)
 
 
 def _sees(case: Case, at: RigidTransform) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from association import MapIndex, Scan, View, assemble
+from linefix.mounted import ranges_scan
 from registration import RigidTransform, Segments
 from simulation import Scanner, free_place, scan
 from simulation.changes import clutter
@@ -16,7 +17,6 @@ from vectorization import LaserScan, Motion
 
 from ..queries import floor_plans
 from ..table import Row, at_least, mean, quantile
-from .drives import seen_by
 from .trials import NEAR, TURNED, Trial, tried, usable_share, wrong_share
 
 PLAN_NEAR, PLAN_TURNED = 0.1, 1.0
@@ -60,7 +60,7 @@ def two_scanners(quick: int) -> list[Row]:
 
 def _looked(scene: Segments, pose: RigidTransform, scanner: Scanner, rng: np.random.Generator) -> Scan:
     ranges = scan(scene, pose, scanner, rng).ranges
-    return seen_by(LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max))
+    return ranges_scan(LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max))
 
 
 def turning(quick: int) -> list[Row]:
@@ -83,7 +83,7 @@ def turning(quick: int) -> list[Row]:
             continue
         ranges = _moving_ranges(walls, pose, scanner, motion, rng)
         with_twist, without = (
-            seen_by(LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max, by))
+            ranges_scan(LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max, by))
             for by in (motion, None)
         )
         told.append(tried(index, with_twist, pose, PLAN_NEAR, PLAN_TURNED))

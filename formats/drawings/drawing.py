@@ -37,6 +37,8 @@ class Drawing:
         What was drawn so far, units of the drawing.
     widths : list of float
         Of each polyline, units of the drawing; 0 where it has none.
+    layer_names : list of str
+        Of each polyline; empty where it has none.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Drawing:
     meta: dict[str, str] = field(default_factory=dict)
     segments: list[Floats] = field(default_factory=list)
     widths: list[float] = field(default_factory=list)
+    layer_names: list[str] = field(default_factory=list)
     _count: int = 0
 
     def wants(self, *layers: str) -> bool:
@@ -59,7 +62,7 @@ class Drawing:
         names = [layer.casefold() for layer in layers]
         return any(fnmatch.fnmatchcase(n, pattern.casefold()) for n in names for pattern in self.layers)
 
-    def add(self, points: ArrayLike, *, closed: bool = False, width: float = 0.0) -> None:
+    def add(self, points: ArrayLike, *, closed: bool = False, width: float = 0.0, layer: str = "") -> None:
         """Add a polyline.
 
         Parameters
@@ -70,6 +73,8 @@ class Drawing:
             Whether a line runs from the last point to the first.
         width : float
             Units of the drawing.
+        layer : str
+            That it is on, for messages.
 
         Raises
         ------
@@ -82,19 +87,20 @@ class Drawing:
         if closed and len(p) > 2 and not np.array_equal(p[0], p[-1]):
             p = np.vstack([p, p[:1]])
         if len(p) >= 2:
-            self._keep(np.hstack([p[:-1], p[1:]]), width)
+            self._keep(np.hstack([p[:-1], p[1:]]), width, layer)
 
     def add_segments(self, endpoints: ArrayLike) -> None:
         """Add lines of their own, ``(n, 4)`` units of the drawing; raises as `add` does."""
-        self._keep(self._checked(endpoints, 4), 0.0)
+        self._keep(self._checked(endpoints, 4), 0.0, "")
 
-    def _keep(self, endpoints: Floats, width: float) -> None:
+    def _keep(self, endpoints: Floats, width: float, layer: str) -> None:
         self._count += len(endpoints)
         if self._count > MAX_SEGMENTS:
             raise TooLargeError(f"expected at most {MAX_SEGMENTS} lines", argument=self.name)
         if len(endpoints):
             self.segments.append(endpoints)
             self.widths.append(width)
+            self.layer_names.append(layer)
 
     def _checked(self, values: ArrayLike, columns: int) -> Floats:
         try:
@@ -107,6 +113,23 @@ class Drawing:
             raise MalformedFileError(f"has a coordinate that is no number up to {MAX_UNITS:g}", argument=self.name)
         return array
 
-    def drop(self, kind: str, count: int = 1) -> None:
-        """Note what is no wall or cannot be read."""
-        self.notes.add_dropped(f"entity_{shown(kind).lower()}", f"{shown(kind)} is not read", count)
+    @property
+    def extent(self) -> str:
+        """Where the lines are, for messages, units of the drawing; empty where there are none."""
+        if not self.segments:
+            return ""
+        corners = np.vstack(self.segments).reshape(-1, 2)
+        (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
+        return f" from ({left:g}, {bottom:g}) to ({right:g}, {top:g})"
+
+    def drop(self, kind: str, count: int = 1, *, hint: str = "") -> None:
+        """Note what is no wall or cannot be read, and what to do about it."""
+        name = shown(kind)
+        said = f"{name} is not read" + (f": it {hint}" if hint else "")
+        self.notes.add_dropped(f"entity_{name.lower().replace(' ', '_')}", said, count)
+
+    def without_lines(self) -> MalformedFileError:
+        """Return the error for a drawing without lines: it names what is there instead."""
+        found = [f"{note.message} ({note.count})" for note in self.notes.dropped.values()]
+        what = f"; the file has: {'; '.join(found)}" if found else ""
+        return MalformedFileError(f"has no lines that could be walls{what}", argument=self.name)

@@ -1,33 +1,37 @@
-"""Drawings in DXF, read and written by ezdxf."""
+"""Drawings in DXF, text or binary, read and written by ezdxf."""
 
 from __future__ import annotations
 
 import fnmatch
 import io
 import logging
-from collections.abc import Iterable, Iterator
+import re
+import struct
+from collections import Counter
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ezdxf import path as ezpath
 from ezdxf import recover
 from ezdxf.entities.dxfentity import DXFEntity
-from ezdxf.entities.insert import Insert
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.entities.polyline import Polyline
 from ezdxf.enums import InsertUnits
+from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
 from ezdxf.units import conversion_factor
 
 from ..errors import FormatError, MalformedFileError, TooLargeError, UnsupportedFormatError
 from ..files import name_of, read_bounded
-from ..limits import MAX_BLOCK_DEPTH, MAX_CURVE_POINTS, MAX_ENTITIES, MAX_MAP_BYTES
+from ..limits import MAX_CURVE_POINTS, MAX_DXF_OBJECTS, MAX_MAP_BYTES
 from ..options import ImportOptions
-from ..report import Notes, shown
+from ..report import Notes, listed, shown
+from .blocks import Expansion
 from .drawing import Drawing
 
 if TYPE_CHECKING:
+    from ezdxf.audit import Auditor
     from ezdxf.document import Drawing as Document
 
 # It would print every repair of a broken file; they are counted in the report.
@@ -38,10 +42,14 @@ FREE_LEFT = "FREE_LEFT"
 
 # Of layers, in some languages of drawings.
 NAMES_OF_WALLS = ("*wall*", "*wand*", "*mauer*", "*muro*", "*pared*", "*mur", "*murs*")
-MOST_NAMED = 10  # layers
 
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
 SAGITTA = 0.01  # m; how far a chord may lie from its arc
+
+BINARY = b"AutoCAD Binary DXF\r\n\x1a\x00"
+_OBJECT = re.compile(rb"\n[ \t]*0\r?\n")  # group code 0 begins an entity, an object or a section
+BROKEN = (DXFError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError, RecursionError, struct.error)
+PROXIES = ("ACAD_PROXY", "AEC_", "ACDBZOMBIE")  # beginnings of the kinds of entities of other programs
 
 
 def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
@@ -59,60 +67,69 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
         When it is no DXF, or expands to too much.
     """
     name = name_of(path)
-    document = _document(read_bounded(path, MAX_MAP_BYTES), name, notes)
-    hidden = {layer.dxf.name.casefold() for layer in document.layers if layer.is_off() or layer.is_frozen()}
-    layers = options.layers or _layers_of_walls(document, hidden, notes)
-    drawing = Drawing(name, "dxf", layers, notes, _metres(document))
+    document = _document(path, notes)
+    drawing = Drawing(name, "dxf", options.layers, notes, _metres(document))
+    expansion = Expansion.of(document, drawing)
+    drawing.layers = options.layers or _layers_of_walls(document, expansion, notes)
     metres = options.metres or drawing.metres or 1.0
-    directed = 0
+    directed, others = 0, Counter[str]()
     try:
-        for count, (entity, layers) in enumerate(_expanded(document.modelspace(), (), 0, drawing)):
-            if count >= MAX_ENTITIES:
-                raise TooLargeError(f"expected at most {MAX_ENTITIES} entities, blocks expanded", argument=name)
-            if layers[-1].casefold() in hidden:
-                notes.add_dropped("hidden_layer", "lines on layers that are off or frozen", 1)
-            elif not drawing.wants(*layers):
-                notes.add_dropped("other_layer", "entities on layers that were not asked for", 1)
-            else:
-                before = len(drawing.segments)
-                _add(entity, drawing, SAGITTA / metres)
-                directed += (len(drawing.segments) - before) * (layers[-1] == FREE_LEFT)
+        for entity, layers in expansion.visible(document.modelspace()):
+            if not drawing.wants(*layers):
+                others[layers[-1]] += 1
+                continue
+            before = len(drawing.segments)
+            _add(entity, drawing, layers[-1], SAGITTA / metres)
+            directed += (len(drawing.segments) - before) * (layers[-1] == FREE_LEFT)
     except FormatError:
         raise
-    except (DXFError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
-        raise MalformedFileError("has a broken entity", argument=name) from error
+    except BROKEN as error:
+        raise MalformedFileError("has a block that cannot be read", argument=name) from error
+    if others:
+        what = f"entities on layers that were not asked for: {listed(others)}"
+        notes.add_dropped("other_layer", what, others.total())
+    _note_paper_space(document, drawing)
     drawing.oriented = 0 < directed == len(drawing.segments)
     return drawing
 
 
-def _document(content: bytes, name: str, notes: Notes) -> Document:
+def _document(path: Path, notes: Notes) -> Document:
+    name, content = name_of(path), read_bounded(path, MAX_MAP_BYTES)
     if content[:4] == b"AC10":
         raise UnsupportedFormatError("is a DWG; save it as DXF", argument=name)
     if not content.strip():
         raise MalformedFileError("is empty", argument=name)
+    if sum(1 for _ in islice(_OBJECT.finditer(content), MAX_DXF_OBJECTS + 1)) > MAX_DXF_OBJECTS:
+        raise TooLargeError(f"expected at most {MAX_DXF_OBJECTS} entities and objects", argument=name)
     try:
-        document, auditor = recover.read(io.BytesIO(content))
-    except (DXFError, OSError, ArithmeticError, ValueError, TypeError, AttributeError, LookupError) as error:
+        document, auditor = _parsed(path, content)
+    except (OSError, *BROKEN) as error:
         raise MalformedFileError("is no DXF", argument=name) from error
     if auditor.fixes or auditor.errors:
         notes.add_assumed("repairs", "broken places that were repaired", len(auditor.fixes) + len(auditor.errors))
     return document
 
 
-def _layers_of_walls(document: Document, hidden: set[str], notes: Notes) -> tuple[str, ...]:
+def _parsed(path: Path, content: bytes) -> tuple[Document, Auditor]:
+    if content.startswith(BINARY):
+        document = readfile(path)  # the recovering reader knows text alone
+        return document, document.audit()
+    return recover.read(io.BytesIO(content))
+
+
+def _layers_of_walls(document: Document, expansion: Expansion, notes: Notes) -> tuple[str, ...]:
     """Return patterns of the layers that hold walls by their names, where there are others; else none."""
     names = {str(entity.dxf.get("layer", "0")) for entity in document.modelspace()}
-    shown_names = sorted(name for name in names if name.casefold() not in hidden)
+    shown_names = sorted(name for name in names if not expansion.hides(name))
     walls = [n for n in shown_names if any(fnmatch.fnmatchcase(n.casefold(), pattern) for pattern in NAMES_OF_WALLS)]
     others = [name for name in shown_names if name not in walls]
     if len(shown_names) < 2 or not others:
         return ()
-    listed = ", ".join(shown(name) for name in others[:MOST_NAMED]) + (" ..." if len(others) > MOST_NAMED else "")
     if not walls:
-        notes.add_assumed("layers", f"lines of all layers are walls: {listed}; say layers where some are not")
+        notes.add_assumed("layers", f"lines of all layers are walls: {listed(others)}; say layers where some are not")
         return ()
-    taken = ", ".join(shown(name) for name in walls[:MOST_NAMED])
-    notes.add_assumed("layers", f"walls are on {taken}, by the name, and not on {listed}; say layers for others")
+    what = f"walls are on {listed(walls)}, by the name, and not on {listed(others)}; say layers for others"
+    notes.add_assumed("layers", what)
     return NAMES_OF_WALLS
 
 
@@ -126,25 +143,6 @@ def _metres(document: Document) -> float | None:
         return None
 
 
-def _expanded(
-    entities: Iterable[Any], layers: tuple[str, ...], depth: int, drawing: Drawing
-) -> Iterator[tuple[DXFEntity, tuple[str, ...]]]:
-    """Yield entities with their layers, outermost first; blocks are taken apart."""
-    for entity in entities:
-        within = (*layers, str(entity.dxf.get("layer", "0")))
-        if not isinstance(entity, Insert):
-            yield entity, within
-            continue
-        if depth >= MAX_BLOCK_DEPTH:
-            raise TooLargeError(f"expected at most {MAX_BLOCK_DEPTH} blocks in one another", argument=drawing.name)
-        if entity.mcount > MAX_ENTITIES:
-            raise TooLargeError(f"expected at most {MAX_ENTITIES} copies of a block", argument=drawing.name)
-        drawing.notes.add_merged("blocks", "blocks taken apart", entity.mcount)
-        yield entity, within  # counts, so that empty blocks cannot be repeated without end
-        for one in entity.multi_insert() if entity.mcount > 1 else (entity,):
-            yield from _expanded(one.virtual_entities(), within, depth + 1, drawing)
-
-
 def _width(entity: DXFEntity) -> float:
     """Return how wide a polyline is drawn, where it begins; units of the drawing."""
     if isinstance(entity, LWPolyline):
@@ -153,16 +151,53 @@ def _width(entity: DXFEntity) -> float:
     return float(entity.dxf.default_start_width) if isinstance(entity, Polyline) else 0.0
 
 
-def _add(entity: DXFEntity, drawing: Drawing, sagitta: float) -> None:
+def _add(entity: DXFEntity, drawing: Drawing, layer: str, sagitta: float) -> None:
     kind = entity.dxftype()
-    if kind == "INSERT":
+    mesh = isinstance(entity, Polyline) and not (entity.is_2d_polyline or entity.is_3d_polyline)
+    if kind not in LINES or mesh:
+        drawing.drop("POLYLINE of a mesh" if mesh else kind, hint=_hint(kind))
         return
-    if kind not in LINES:
-        drawing.drop(kind)
-        return
-    curve = ezpath.make_path(entity)
-    points = [(p.x, p.y) for p in islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1)]
+    try:
+        curve = ezpath.make_path(entity)
+        points = [(p.x, p.y) for p in islice(curve.flattening(sagitta, segments=2), MAX_CURVE_POINTS + 1)]
+        width = max(0.0, _width(entity))
+    except BROKEN as error:
+        handle = shown(str(entity.dxf.get("handle", None) or "of a block"))
+        raise MalformedFileError(
+            f"has a broken {kind} on layer {shown(layer)}, handle {handle}; delete it, or repair the drawing (AUDIT)",
+            argument=drawing.name,
+        ) from error
     if len(points) > MAX_CURVE_POINTS:
         raise TooLargeError(f"expected at most {MAX_CURVE_POINTS} points of a curve", argument=drawing.name)
-    drawing.add(points, width=max(0.0, _width(entity)))
+    drawing.add(points, width=width, layer=layer)
     drawing.notes.add_read(f"entity_{kind.lower()}", f"{kind} entities", 1)
+
+
+def _hint(kind: str) -> str:
+    """Return what to do about entities of a kind that is not read."""
+    if kind.startswith(PROXIES):
+        return "is an object of another program; export the drawing with standard objects (EXPORTTOAUTOCAD)"
+    return ""
+
+
+def _note_paper_space(document: Document, drawing: Drawing) -> None:
+    """Note what is in paper space, and where on its sheets."""
+    for layout in document.layouts:
+        if layout.is_modelspace:
+            continue
+        kinds = Counter(entity.dxftype() for entity in layout if entity.dxftype() != "VIEWPORT")
+        if not kinds:
+            continue
+        sheet = Drawing(drawing.name, "dxf", (), Notes())
+        for entity in islice(layout, MAX_CURVE_POINTS):
+            try:
+                _add(entity, sheet, "", SAGITTA)
+            except FormatError:
+                continue
+        drawing.notes.add_dropped(
+            f"paper_space_{shown(layout.name)}",
+            f"entities in paper space, layout {shown(layout.name)}: "
+            f"{', '.join(f'{count} {shown(kind)}' for kind, count in kinds.most_common(3))}{sheet.extent}; move walls "
+            "to the model space (CHSPACE)",
+            kinds.total(),
+        )

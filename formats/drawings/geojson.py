@@ -8,9 +8,9 @@ from typing import Any
 
 import orjson
 
-from ..errors import IncompleteFileError, MalformedFileError
+from ..errors import IncompleteFileError, MalformedFileError, TooLargeError
 from ..files import name_of, read_bounded, text_of
-from ..limits import MAX_MAP_BYTES
+from ..limits import MAX_ENTITIES, MAX_JSON_VALUES, MAX_MAP_BYTES, MAX_UNITS
 from ..options import ImportOptions
 from ..report import Notes
 from .drawing import Drawing
@@ -48,6 +48,8 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
         raise MalformedFileError("expected features to be a list", argument=name)
+    if len(features) > MAX_ENTITIES:
+        raise TooLargeError(f"expected at most {MAX_ENTITIES} features, found {len(features)}", argument=name)
     for feature in features:
         if not isinstance(feature, dict):
             raise MalformedFileError("expected every feature to be an object", argument=name)
@@ -62,7 +64,11 @@ def load_json(content: bytes, name: str) -> Any:
     ------
     MalformedFileError
         When it is none; orjson goes 1,024 levels deep at most.
+    TooLargeError
+        When it has so many values that they take much more memory than the file.
     """
+    if sum(content.count(sign) for sign in (b",", b"[", b"{")) > MAX_JSON_VALUES:
+        raise TooLargeError(f"expected at most {MAX_JSON_VALUES} values, lists and objects", argument=name)
     try:
         return orjson.loads(text_of(content, name))
     except orjson.JSONDecodeError as error:
@@ -81,7 +87,7 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
         drawing.drop("feature without geometry")
         return
     widths = (named.get(key) for key in ("thickness", "width"))
-    width = next((float(told) for told in widths if isinstance(told, int | float)), 0.0)
+    width = next((told for told in map(_width, widths) if told is not None), 0.0)
     for points, closed in _lines(geometry, drawing):
         try:
             pairs = [(p[0], p[1]) for p in points]
@@ -89,7 +95,11 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
             raise MalformedFileError("has a position that is no [x, y]", argument=drawing.name) from error
         if not all(type(c) in (int, float) for pair in pairs for c in pair):
             raise MalformedFileError("has a coordinate that is no number", argument=drawing.name)
-        drawing.add(pairs, closed=closed, width=width)
+        drawing.add(pairs, closed=closed, width=width, layer=layers[0] if layers else "")
+
+
+def _width(value: Any) -> float | None:
+    return float(value) if type(value) in (int, float) and 0.0 <= value <= MAX_UNITS else None
 
 
 def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:

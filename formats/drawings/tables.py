@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MalformedFileError
+from ..errors import MalformedFileError, TooLargeError
 from ..files import name_of, read_bounded, text_of
-from ..limits import MAX_MAP_BYTES
+from ..limits import MAX_CSV_LINE, MAX_LINES, MAX_MAP_BYTES
 from ..options import ImportOptions
 from ..report import Notes, shown
 from .drawing import Drawing
@@ -72,9 +72,13 @@ def read_csv(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     """
     name = name_of(path)
     text = text_of(read_bounded(path, MAX_MAP_BYTES), name)
-    lines = text.splitlines()
+    if sum(text.count(end) for end in ("\n", "\r")) > 2 * MAX_LINES:
+        raise TooLargeError(f"expected at most {MAX_LINES} lines", argument=name)
+    lines = list(io.StringIO(text, newline=None))
+    if len(lines) > MAX_LINES or any(len(line) > MAX_CSV_LINE for line in lines):
+        raise TooLargeError(f"expected at most {MAX_LINES} lines of {MAX_CSV_LINE} characters", argument=name)
     comments = {line[1:].strip() for line in lines if line.startswith("#")}
-    body = "\n".join(line for line in lines if line.strip() and not line.startswith("#"))
+    body = "".join(line for line in lines if line.strip() and not line.startswith("#"))
     first = body.partition("\n")[0]
     delimiter = max(",;\t ", key=first.count) if first else ","
     drawing = Drawing(name, "csv", options.layers, notes, 1.0, "oriented=true" in comments)

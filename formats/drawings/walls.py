@@ -12,8 +12,10 @@ from ..line_map import LineMap
 from ..options import ImportOptions
 from .centres import are_centres, walls_of
 from .drawing import Drawing
+from .far import near_lines
 from .inside import Sides, sides_seen
 from .solid import outline
+from .units import note_unit
 
 Floats = NDArray[np.float64]
 
@@ -43,11 +45,16 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if metres is None:
         raise IncompleteFileError("does not say its unit; say units, such as mm or m", argument=drawing.name)
     if not drawing.segments:
-        raise MalformedFileError("has no lines that could be walls", argument=drawing.name)
+        raise drawing.without_lines()
     endpoints = np.vstack(drawing.segments) * metres
-    widths = np.repeat(np.asarray(drawing.widths), [len(s) for s in drawing.segments]) * metres
+    lengths = [len(s) for s in drawing.segments]
+    widths = np.repeat(np.asarray(drawing.widths), lengths) * metres
     oriented = _means_directions(drawing, options)
     if drawing.format != "json":  # a map of our own stays as it is: others count its segments
+        near = near_lines(endpoints, np.repeat(np.arange(len(lengths)), lengths), drawing)
+        endpoints, widths = endpoints[near], widths[near]
+        if drawing.format in ("dxf", "svg"):
+            note_unit(endpoints, metres, drawing, options)
         endpoints, widths = _without_doubles(endpoints, widths, oriented, drawing)
     if are_centres(endpoints, drawing, options):
         endpoints, oriented = _with_faces(endpoints, widths, drawing, options), True
@@ -77,7 +84,9 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
         drawing.notes.add_dropped("short", f"lines shorter than {LEAST_LENGTH:g} m", int((~long).sum()))
     endpoints, widths = endpoints[long], widths[long]
     if len(endpoints) == 0:
-        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: is the unit right?", argument=drawing.name)
+        doubt = drawing.notes.assumed.get("unlikely_unit")
+        why = doubt.message if doubt is not None else "is the unit right?"
+        raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: {why}", argument=drawing.name)
     keys = np.rint(endpoints / SAME)
     if not oriented:
         backward = (keys[:, 0] > keys[:, 2]) | ((keys[:, 0] == keys[:, 2]) & (keys[:, 1] > keys[:, 3]))

@@ -1,4 +1,4 @@
-"""What each cell of a grid is: free, occupied or not known."""
+"""Classify each cell of a grid as free, occupied or unknown."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from registration import RigidTransform
 
 from ..report import Notes
-from .tuning import BELIEVED, DARKER_SHARE, DARKEST_UNKNOWN, LEVELS, SPIKE_RATIO, SPIKE_SHARE
+from .tuning import BELIEVED, EDGE_REACH, LEVELS
+from .unknown import Counts, Flags, UnknownLevels, find_unknown_levels, free_end, given_levels
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, -1
 
 Cells = NDArray[np.int8]
-Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,12 @@ class Grid:
         map_from_grid: where the lower left corner of cell (0, 0) lies, and how the grid is turned.
     occupied_above, free_below : float
         Thresholds of the file, occupancy.
+    shades : tuple of int
+        Levels of occupancy, 0 to 255, that tools write for unknown cells.
+    unknown : tuple of int or None
+        Levels of occupancy that the caller says stand for unknown cells; empty: none does; None: found.
+    greys : tuple of int
+        Grey value of the picture at levels 0 and 255; empty where the grid is no picture.
     """
 
     occupancy: NDArray[np.float32]
@@ -39,14 +46,23 @@ class Grid:
     origin: RigidTransform
     occupied_above: float = 0.65
     free_below: float = 0.196
+    shades: tuple[int, ...] = ()
+    unknown: tuple[int, ...] | None = None
+    greys: tuple[int, ...] = ()
+
+    def named(self, level: int) -> str:
+        """Return what a report calls a level of occupancy."""
+        if not self.greys:
+            return f"occupancy {level / (LEVELS - 1):.2f}"
+        return f"grey value {abs(self.greys[0] - level)}"
 
 
 def classify(grid: Grid, notes: Notes) -> Cells:
     """Tell free, occupied and unknown cells apart.
 
-    The thresholds of the file are believed where they agree with the picture. Where they leave most of the dark cells
-    out, the picture decides: a level that many cells have exactly, between light and dark, is what is not known, and
-    Otsu's threshold parts the rest.
+    Unknown cells are found first, from the levels of the picture: no threshold makes them free or occupied. The others
+    follow the thresholds of the file where these agree with the picture. Where the thresholds leave most of the dark or
+    of the light cells out, Otsu's threshold parts them.
 
     Parameters
     ----------
@@ -63,56 +79,93 @@ def classify(grid: Grid, notes: Notes) -> Cells:
     levels = np.full(grid.occupancy.shape, -1, dtype=np.int16)
     levels[told] = np.rint(np.clip(grid.occupancy[told], 0.0, 1.0) * (LEVELS - 1)).astype(np.int16)
     counts = np.bincount(levels[told].ravel(), minlength=LEVELS)
-    unknown_level = find_unknown_level(counts)
-    known = counts.copy()
-    if unknown_level is not None:
-        known[unknown_level] = 0
+    found = _unknown_levels(grid, counts)
+    known = np.where(found.taken, 0, counts)
     parted = otsu(known)
-    dark = int(known[parted + 1 :].sum())
-    occupied = told & (grid.occupancy > grid.occupied_above)
-    if int(occupied.sum()) >= BELIEVED * dark:
-        free = told & (grid.occupancy < grid.free_below)
-    else:
-        occupied = levels > parted
-        free = (levels >= 0) & ~occupied
-        if unknown_level is not None:
-            occupied &= levels != unknown_level
-            free &= levels != unknown_level
+    kept = told & ~found.taken[levels]  # where levels is -1, told is False
+    free, occupied = _by_thresholds(grid, kept, levels, found, counts)
+    dark, light = int(known[parted + 1 :].sum()), int(known[: parted + 1].sum())
+    few_occupied = int(occupied.sum()) < BELIEVED * dark
+    # Of a gradient few cells may be free; of one light level all are.
+    few_free = int(free.sum()) < BELIEVED * light < int(known[: parted + 1].max(initial=0))
+    if grid.unknown != () and (few_occupied or few_free):
+        occupied, free = kept & (levels > parted), kept & (levels <= parted)
         above = (parted + 0.5) / (LEVELS - 1)
         notes.add_assumed(
             "thresholds",
-            f"the file's thresholds leave most dark cells out; occupied is taken above {above:.3f} instead",
-            dark,
+            f"the thresholds of the file leave out most {'dark' if few_occupied else 'light'} cells; cells are "
+            f"occupied above an occupancy of {above:.3f} instead",
+            dark if few_occupied else light,
         )
+    _note_unknown(grid, found, counts, parted, notes)
     cells = np.full(grid.occupancy.shape, UNKNOWN, dtype=np.int8)
     cells[free] = FREE
     cells[occupied] = OCCUPIED
-    return cells
+    return _edges_decided(cells, kept, grid)
 
 
-def find_unknown_level(counts: Counts) -> int | None:
-    """Find the level of the cells of which nothing is known.
+def _unknown_levels(grid: Grid, counts: Counts) -> UnknownLevels:
+    if grid.unknown is not None:
+        return given_levels(grid.unknown)
+    first, last = np.ceil(grid.free_below * (LEVELS - 1)), np.floor(grid.occupied_above * (LEVELS - 1))
+    return find_unknown_levels(counts, grid.shades, (int(first), int(last)))
 
-    Parameters
-    ----------
-    counts : (256,)
-        Cells of each level of occupancy, light first.
 
-    Returns
-    -------
-    int or None
-        None where no level between light and dark stands out.
+def _by_thresholds(
+    grid: Grid, kept: Flags, levels: NDArray[np.int16], found: UnknownLevels, counts: Counts
+) -> tuple[Flags, Flags]:
+    """Return the free and the occupied cells by the file's thresholds; free ones are lighter than all unknown ones."""
+    free, occupied = kept & (grid.occupancy < grid.free_below), kept & (grid.occupancy > grid.occupied_above)
+    if grid.unknown is None and found.spikes:
+        lightest = min(found.spikes)
+        free &= levels < free_end(counts, lightest)
+        occupied &= levels > lightest
+    if grid.unknown == ():  # no cell is unknown: what lies between the thresholds is one or the other
+        middle = 0.5 * (grid.free_below + grid.occupied_above)
+        occupied |= kept & (grid.occupancy > middle)
+        free |= kept & ~occupied
+    return free & ~occupied, occupied
+
+
+def _note_unknown(grid: Grid, found: UnknownLevels, counts: Counts, parted: int, notes: Notes) -> None:
+    """Note which levels are taken as unknown against the thresholds of the file, and which might be and are not."""
+    option = "set the option unknown to none, or to the grey value of unknown cells, where this is wrong"
+    for spike in found.spikes if grid.unknown is None else ():
+        occupancy = spike / (LEVELS - 1)
+        kind = "free" if occupancy < grid.free_below else "occupied" if occupancy > grid.occupied_above else None
+        if kind is not None:
+            notes.add_assumed(
+                "unknown_grey",
+                f"cells of {grid.named(spike)} are unknown, although the thresholds of the file make them {kind}; "
+                f"{option}",
+                int(counts[spike]),
+            )
+    for level in found.refused:
+        kind = "occupied" if level > parted else "free"
+        notes.add_assumed(
+            "unknown_grey",
+            f"cells of {grid.named(level)} are {kind}, as no others are, although many tools write this value for "
+            f"unknown cells; {option}",
+            int(counts[level]),
+        )
+
+
+def _edges_decided(cells: Cells, kept: Flags, grid: Grid) -> Cells:
+    """Decide the cells between a free and an occupied one that are neither: pictures that were resized have such edges.
+
+    Left unknown they would part the walls from the free cells.
     """
-    total = int(counts.sum())
-    beside = np.maximum(np.r_[0, counts[:-1]], np.r_[counts[1:], 0])
-    stands_out = (counts > SPIKE_SHARE * total) & (counts > SPIKE_RATIO * beside)
-    spikes = np.flatnonzero(stands_out)
-    if len(spikes) < 2:
-        return None
-    free = int(counts[spikes[0]])
-    darker = total - np.cumsum(counts)
-    fit = [k for k in spikes[1:] if k <= DARKEST_UNKNOWN * (LEVELS - 1) and darker[k] >= DARKER_SHARE * free]
-    return int(max(fit, key=lambda k: counts[k])) if fit else None
+    between = kept & (cells == UNKNOWN)
+    if not between.any():
+        return cells
+    edge = between.copy()
+    beside = np.ones((3, 3), dtype=np.bool_)
+    for kind in (FREE, OCCUPIED):  # through other such cells, not through a wall
+        own = cells == kind
+        edge &= ndimage.binary_dilation(own, beside, EDGE_REACH, mask=between | own)
+    middle = np.float32(0.5 * (grid.free_below + grid.occupied_above))
+    decided = np.where(grid.occupancy > middle, OCCUPIED, FREE)
+    return np.where(edge, decided, cells).astype(np.int8)
 
 
 def otsu(counts: Counts) -> int:

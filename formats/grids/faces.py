@@ -26,6 +26,8 @@ from .tuning import (
     LONGEST_CONTOUR,
 )
 
+DECIDED = ("thresholds", "unknown_grey")  # notes on how cells were told apart
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -56,8 +58,9 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
         When there are too many segments.
     """
     cells = classify(grid, notes)
-    for code, kind in (("free_cells", FREE), ("occupied_cells", OCCUPIED), ("unknown_cells", UNKNOWN)):
-        notes.add_read(code, f"{code.replace('_', ' ')}", int((cells == kind).sum()))
+    for name_of_kind, kind in (("free", FREE), ("occupied", OCCUPIED), ("unknown", UNKNOWN)):
+        count = int((cells == kind).sum())
+        notes.add_read(f"{name_of_kind}_cells", f"{name_of_kind} cells" if count else f"no {name_of_kind} cell", count)
     depth = surface_depth(cells)
     options = VectorizationOptions(
         sigma=CONTOUR_SIGMA * grid.resolution, min_length=max(1e-3, LEAST_LENGTH * grid.resolution)
@@ -72,10 +75,19 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
         if sum(map(len, found)) > MAX_SEGMENTS:
             raise TooLargeError(f"expected a grid of at most {MAX_SEGMENTS} segments", argument=name)
     if not found:
-        raise MalformedFileError("no wall found: no straight border between free and occupied cells", argument=name)
-    notes.add_dropped(
-        "short_pieces", f"cell borders on no straight line of {LEAST_LENGTH:g} cells at least", max(0, points)
-    )
+        counts = ", ".join(
+            f"{int((cells == kind).sum())} {word}"
+            for word, kind in (("free", FREE), ("occupied", OCCUPIED), ("unknown", UNKNOWN))
+        )
+        said = "".join(f"; {note.message}" for code, note in notes.assumed.items() if code in DECIDED)
+        raise MalformedFileError(
+            f"no wall found: expected a straight border between free and occupied cells, found {counts} cells{said}",
+            argument=name,
+        )
+    if points > 0:
+        notes.add_dropped(
+            "short_pieces", f"cell borders on no straight line of {LEAST_LENGTH:g} cells at least", points
+        )
     notes.add_assumed("surface", f"walls are taken to lie {depth:.2f} cells behind the border of the free cells")
     return Segments.from_array(_placed(np.vstack(found), grid))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -25,11 +26,13 @@ from ..limits import (
     MAX_YAML_BYTES,
     MIN_RESOLUTION,
 )
+from ..options import ImportOptions
 from ..report import Notes, shown
 from ..yaml import yaml_of
 from .cells import Grid
+from .tuning import UNKNOWN_GREYS
 
-PICTURES = ("PPM", "PNG", "BMP")  # what Pillow may take a picture for
+PICTURES = ("PPM", "PNG", "BMP", "JPEG")  # what Pillow may take a picture for
 MODES = ("trinary", "scale", "raw")
 RAW_UNKNOWN = 100  # in mode raw: the greatest value that is an occupancy in percent
 
@@ -61,14 +64,20 @@ class Description:
     mode: str
 
 
-def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
+def read_grid(
+    path: Path, options: ImportOptions, notes: Notes, pictures: Mapping[str, Path] | None = None
+) -> tuple[Grid, tuple[str, ...]]:
     """Read a grid and tell the names of its files.
 
     Parameters
     ----------
     path : Path
         Of the YAML; the picture is looked for beside it, whatever folder the YAML names.
+    options : ImportOptions
+        Which grey value unknown cells have.
     notes : Notes
+    pictures : mapping of str to Path, optional
+        Paths of pictures, by the names that a YAML may contain; no other picture is read then.
 
     Raises
     ------
@@ -76,7 +85,9 @@ def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
         When either file is missing, too large or not what it should be.
     """
     told = read_description(path, notes)
-    picture = path.parent / told.image
+    picture = path.parent / told.image if pictures is None else pictures.get(told.image)
+    if picture is None:
+        raise IncompleteFileError("there is no such file", argument=shown(told.image))
     pixels, alpha = read_picture(picture)
     grid = Grid(
         _occupancy(pixels, alpha, told)[::-1],  # rows run down in a picture, y points up in a map
@@ -84,6 +95,9 @@ def read_grid(path: Path, notes: Notes) -> tuple[Grid, tuple[str, ...]]:
         told.origin,
         told.occupied_thresh,
         told.free_thresh,
+        _shades(told),
+        _given(options, told),
+        () if told.mode == "raw" else (0, 255) if told.negate else (255, 0),
     )
     return grid, (name_of(path), name_of(picture))
 
@@ -177,19 +191,25 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name) from error
     except UnidentifiedImageError as error:
-        raise MalformedFileError("is no picture in PGM, PNG or BMP", argument=name) from error
+        raise MalformedFileError("is no picture: expected PGM, PNG, BMP or JPEG", argument=name) from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
         raise MalformedFileError(f"is a broken picture: {shown(str(error))}", argument=name) from error
 
 
 def _pixels(picture: Image.Image) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     if picture.mode in ("I", "I;16", "I;16B"):
-        return np.asarray(picture, dtype=np.float32) / np.float32(65535), None
+        values = np.asarray(picture, dtype=np.float32)
+        hidden = picture.info.get("transparency")
+        alpha = np.where(values == hidden, np.float32(0), np.float32(1)) if isinstance(hidden, int) else None
+        return values / np.float32(65535), alpha
+    if picture.has_transparency_data:
+        colours = np.asarray(picture.convert("RGBA"), dtype=np.float32) / np.float32(255)
+        opaque = bool((colours[..., 3] == 1.0).all())
+        return colours[..., :3].mean(axis=2, dtype=np.float32), None if opaque else colours[..., 3]
     if picture.mode in ("1", "L"):
         return np.asarray(picture.convert("L"), dtype=np.float32) / np.float32(255), None
-    values = np.asarray(picture.convert("RGBA"), dtype=np.float32) / np.float32(255)
-    opaque = bool((values[..., 3] == 1.0).all())
-    return values[..., :3].mean(axis=2, dtype=np.float32), None if opaque else values[..., 3]
+    colours = np.asarray(picture.convert("RGB"), dtype=np.float32) / np.float32(255)
+    return colours.mean(axis=2, dtype=np.float32), None
 
 
 def _occupancy(
@@ -197,6 +217,26 @@ def _occupancy(
 ) -> NDArray[np.float32]:
     if told.mode == "raw":
         value = np.rint(pixels * 255)
-        return np.where(value <= RAW_UNKNOWN, value / np.float32(RAW_UNKNOWN), np.float32(np.nan))
-    occupancy = pixels if told.negate else np.float32(1) - pixels
+        occupancy = np.where(value <= RAW_UNKNOWN, value / np.float32(RAW_UNKNOWN), np.float32(np.nan))
+    else:
+        occupancy = pixels if told.negate else np.float32(1) - pixels
     return occupancy if alpha is None else np.where(alpha == 1.0, occupancy, np.float32(np.nan))
+
+
+def _shades(told: Description) -> tuple[int, ...]:
+    """Return the levels of occupancy that tools write for unknown cells; in mode raw these have no occupancy."""
+    if told.mode == "raw":
+        return ()
+    inverted = tuple(255 - grey for grey in UNKNOWN_GREYS)
+    # A picture with negate is inverted as a whole, or its unknown cells are left as they were.
+    return tuple(dict.fromkeys((*inverted, *UNKNOWN_GREYS))) if told.negate else inverted
+
+
+def _given(options: ImportOptions, told: Description) -> tuple[int, ...] | None:
+    """Return the levels of occupancy that the caller says stand for unknown cells; None where nothing is said."""
+    if options.unknown is None or options.unknown == "none":
+        return None if options.unknown is None else ()
+    grey = int(options.unknown)
+    if told.mode == "raw":
+        return (round(grey / RAW_UNKNOWN * 255),) if grey <= RAW_UNKNOWN else None
+    return (grey if told.negate else 255 - grey,)

@@ -12,7 +12,30 @@ SPIKE_RATIO = 3.0
 DARKEST_UNKNOWN = 0.8
 DARKER_SHARE = 0.02
 
-# Share of the dark cells that the thresholds of the file must call occupied, for these to be believed.
+# Cells darker than it may be fewer in large halls: this many times the side of a square of the free cells.
+DARKER_SIDES = 1.0
+
+# Grey values, of 255, that tools write for unknown cells: map_saver 205; others 127, 128 and 200.
+UNKNOWN_GREYS = (205, 200, 127, 128)
+
+# Levels: how far a picture that was compressed may move such a grey value, and how far around it no level has as many
+# cells. JPEG of quality 50 moves 205 to 206.
+SHADE_REACH = 2
+SPIKE_WINDOW = 8
+
+# Levels: how far a compression spreads most cells of a grey value; and how many times as many cells as in the levels
+# around that. JPEG of quality 50 to 90: 5 to 20 times; the gradients of willow and intel: 0.5 and 1.1 times.
+NOISE_REACH = 3
+NOISE_RATIO = 3
+
+# Cells: fewer of a level are no class of their own.
+LEAST_CELLS = 10
+
+# Cells between a free and an occupied one in a picture that was resized: how far either may lie.
+EDGE_REACH = 3
+
+# Share of the dark cells that the thresholds of the file must call occupied, and of the light cells that they must call
+# free, for these to be used.
 BELIEVED = 0.5
 
 # Where the wall is ----------------------------------------------------------------------------------------------------

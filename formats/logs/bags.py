@@ -6,6 +6,7 @@ by the definitions that ROS itself has, and only the few kinds that are wanted.
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from collections.abc import Collection, Iterator
@@ -72,6 +73,7 @@ class Bag:
     format: str
     _files: tuple[RecordedFile, ...]
     _notes: Notes
+    _folder: Path
 
     def connections(self, *kinds: str) -> list[Connection]:
         """Return the connections that carry messages of some kinds in an encoding that is read; all without kinds."""
@@ -97,7 +99,7 @@ class Bag:
             wanted = [one for one in connections if any(one is held for held in file.connections)]
             if not wanted:
                 continue
-            with refusing(file.name, _mended_by(file.name)):
+            with refusing(file.name, _mended_by(file.name), self._folder):
                 for raw in file.messages(wanted):
                     message = self._decoded(raw)
                     if message is not None:
@@ -156,7 +158,7 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
         files: list[RecordedFile] = []
         for one in paths:
             try:
-                with refusing(name if len(paths) == 1 else one.name, _mended_by(one.name)):
+                with refusing(name if len(paths) == 1 else one.name, _mended_by(one.name), one.parent):
                     files.append(McapFile(one) if one.suffix.lower() == ".mcap" else RosbagFile(one))
             except FormatError as error:
                 if one is paths[-1] and not files:  # nothing else is left
@@ -164,7 +166,7 @@ def opened(path: Path, notes: Notes | None = None) -> Iterator[Bag]:
                 notes.add_dropped("broken_files", f"files that cannot be read, such as {error}", 1)
                 continue
             stack.callback(files[-1].close)
-        bag = Bag(name, _format_of(path), tuple(sorted(files, key=lambda file: file.start)), notes)
+        bag = Bag(name, _format_of(path), tuple(sorted(files, key=lambda file: file.start)), notes, paths[0].parent)
         _note_left_out(bag, notes)
         yield bag
         for code, said, count in (remark for file in files for remark in file.remarks):
@@ -215,12 +217,15 @@ def _mended_by(name: str) -> str:
 
 
 @contextmanager
-def refusing(name: str, mended_by: str = "") -> Iterator[None]:
-    """Turn what a broken bag brings about into an error of this package."""
+def refusing(name: str, mended_by: str = "", folder: Path | None = None) -> Iterator[None]:
+    """Turn what a broken bag brings about into an error of this package; the `folder` that it is in is left out."""
     try:
         yield
     except FormatError:
         raise
     except BROKEN as error:
-        lines = str(error).splitlines() or [type(error).__name__]
+        text = str(error)
+        for place in () if folder is None else (str(folder.resolve()), str(folder)):
+            text = text.replace(place.rstrip(os.sep) + os.sep, "")
+        lines = text.splitlines() or [type(error).__name__]
         raise MalformedFileError(f"is a broken bag: {shown(lines[0])}{mended_by}", argument=name) from error

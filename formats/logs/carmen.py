@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -48,6 +48,7 @@ def read_carmen(path: Path, options: LogOptions) -> Log:
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
     name = name_of(path)
     wanted, stamps, first = options.topic, Stamps(notes), ""
+    moves: bool | None = None
     for number, words in _messages(path, notes):
         kind = words[0]
         if kind not in KINDS or (wanted is not None and kind != wanted):
@@ -69,11 +70,29 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             continue
         stamps.of(scan.stamp_ns)
         notes.add_read("scans", f"{kind} scans", 1)
+        moves = _moves(path, kind) if moves is None else moves
+        if scan.pose is not None and not moves:
+            notes.add_assumed("no_odometry", "no odometry was found: in all scans the robot is at 0, 0, 0")
+            scan = replace(scan, pose=None, pose_frame="")
         yield scan
     if "scans" not in notes.read and first:
         raise none_usable(name, notes, first)
     if "scans" not in notes.read:
         raise IncompleteFileError(f"has no {wanted or 'scan'} of CARMEN", argument=name)
+
+
+def _moves(path: Path, kind: str) -> bool:
+    """Tell whether the robot is anywhere but at 0, 0, 0 in the scans of a kind, up to the first such scan."""
+    for _, words in _messages(path, Notes()):
+        if words[0] != kind:
+            continue
+        try:
+            scan = READERS[kind](words, kind)
+        except (InputError, ValueError, LookupError, OverflowError):
+            continue
+        if scan.pose is None or scan.pose != scan.mount:
+            return True
+    return False
 
 
 def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from registration import InputError
 from vectorization import LaserScan
 
+from ..errors import UprightFrameError
 from ..files import name_of
 from ..report import Notes, shown
-from .bags import ODOMETRY, OLD_TRANSFORMS, TRANSFORMS, Bag, opened
+from .bags import opened
 from .lasers import laser_of
 from .scan import Log, LoggedScan, LogOptions, none_usable
+from .sensors import Sensor, Sensors, note_tilt, time_increment_of
 from .stamps import Stamps
 from .topics import scan_connections
-from .transforms import Transforms, matrix_of, planar, stamp_of
-
-STATIC = "tf_static"
-BASES = ("base_link", "base_footprint")
-ODOM = "odom"
+from .transforms import stamp_of
+from .trees import read_frames
 
 
 def read_bag(path: Path, options: LogOptions) -> Log:
@@ -41,19 +40,23 @@ def read_bag(path: Path, options: LogOptions) -> Log:
 def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan]:
     with opened(path, notes) as bag:
         wanted = scan_connections(bag, options.topic, notes)
-        frames = _transforms(bag, notes)
+        sensors = Sensors(read_frames(bag, notes), options, notes)
         stamps, first = Stamps(notes), ""
         for connection, received, message in bag.received(wanted):
+            sensor = sensors.of(connection.topic, str(message.header.frame_id))
             try:
                 laser = laser_of(message, notes)
+                stamp = stamps.of(stamp_of(message.header), received)
+                scan = _placed(connection.topic, laser, time_increment_of(message, notes), stamp, sensor, notes)
+            except UprightFrameError as error:
+                first = first or str(error)
+                notes.add_dropped("upright_frame", f"scans in the frame {error}", 1)
+                continue
             except InputError as error:
                 first = first or error.message
                 notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
                 continue
-            scan = _scan(
-                connection.topic, message, laser, stamps.of(stamp_of(message.header), received), frames, options
-            )
-            if scan.pose is None:
+            if scan.pose is None and sensor.odometry is not None:
                 notes.add_dropped("no_pose", "scans whose pose the log does not say (they are kept)", 1)
             notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
             yield scan
@@ -61,38 +64,16 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             raise none_usable(bag.name, notes, first)
 
 
-def _transforms(bag: Bag, notes: Notes) -> Transforms:
-    frames = Transforms(bag.name)
-    moving = set()
-    for connection, message in bag.messages(bag.connections(TRANSFORMS, OLD_TRANSFORMS)):
-        static = connection.topic.strip("/") == STATIC
-        for one in message.transforms:
-            matrix = matrix_of(one.transform.translation, one.transform.rotation)
-            frames.add(one.header.frame_id, one.child_frame_id, stamp_of(one.header), matrix, static=static)
-            moving.add(one.child_frame_id.strip("/"))
-        notes.add_read("transforms", "messages of tf", 1)
-    for _connection, message in bag.messages(bag.connections(ODOMETRY)):
-        child = message.child_frame_id.strip("/") or BASES[0]
-        if child not in moving:
-            pose = message.pose.pose
-            matrix = matrix_of(pose.position, pose.orientation)
-            frames.add(message.header.frame_id or ODOM, child, stamp_of(message.header), matrix, static=False)
-            notes.add_read("odometry", "messages of odometry", 1)
-    return frames
-
-
-def _scan(
-    topic: str, message: Any, laser: LaserScan, stamp: int, frames: Transforms, options: LogOptions
+def _placed(
+    topic: str, laser: LaserScan, time_increment: float, stamp: int, sensor: Sensor, notes: Notes
 ) -> LoggedScan:
-    frame = str(message.header.frame_id)
-    above = frames.above(frame)
-    outer = (options.pose_frame or (ODOM if ODOM in above else above[-1])).strip("/")
-    base = next((b for b in BASES if b in above), None)
-    known = frames.lookup(outer, frame, stamp) if len(above) > 1 else None
-    mounted = frames.lookup(base, frame, stamp) if base else None
-    pose, flipped = planar(known) if known is not None else (None, False)
-    mount, upside_down = planar(mounted) if mounted is not None else (None, flipped)
+    """Return a scan with where its sensor was, and how it moved."""
+    place = sensor.place(stamp)
+    note_tilt(sensor, place, notes)
+    motion = sensor.motion(time_increment, len(laser.ranges), stamp, notes)
+    outer = sensor.odometry.outer if place.pose is not None and sensor.odometry is not None else ""
+    base = sensor.base if place.mount is not None else ""
+    moved = replace(laser, motion=motion)
     return LoggedScan(
-        stamp, topic, shown(frame), laser, float(message.time_increment), pose, outer if pose else "", mount,
-        flipped or upside_down, base if base and mount else "",
-    )  # fmt: skip
+        stamp, topic, shown(sensor.frame), moved, time_increment, place.pose, outer, place.mount, place.flipped, base
+    )

@@ -11,7 +11,7 @@ from vectorization import LaserScan
 from ..errors import MalformedFileError
 from ..report import ImportReport, Notes
 
-UNUSABLE = ("broken_scan", "broken_line", "broken_laserscan", "long_laserscan")
+UNUSABLE = ("broken_scan", "broken_line", "broken_laserscan", "long_laserscan", "upright_frame")
 """Codes of the notes that count scans which cannot be used."""
 
 
@@ -24,11 +24,17 @@ class LogOptions:
     topic : str or None
         Of the scans; None: the one with most of them. In a CARMEN log the kind of message, such as ``FLASER``.
     pose_frame : str or None
-        Frame that the poses are wanted in; None: ``odom`` where the log has it, else the outermost.
+        Frame that the poses are wanted in; None: ``odom`` where the log has it, else the outermost that moves.
+    tf_namespace : str or None
+        Of a bag of several robots, the namespace of the transforms, such as ``/robot1``; None: that of the scans.
+    mount : RigidTransform or None
+        base_from_sensor; None: as the log says.
     """
 
     topic: str | None = None
     pose_frame: str | None = None
+    tf_namespace: str | None = None
+    mount: RigidTransform | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,11 +47,12 @@ class LoggedScan:
         Of the first beam, nanoseconds since the log's epoch.
     topic, frame_id : str
     laser : LaserScan
-        In the sensor's frame; seen from below where `flipped`.
+        In the sensor's frame; seen from below where `flipped`. Its `motion` is that of the sensor during the scan, by
+        odometry; None: not known, or the log does not state the time from beam to beam.
     time_increment : float
-        From beam to beam, seconds; 0 where nobody says.
+        From beam to beam, seconds; 0: not known.
     pose : RigidTransform or None
-        pose_frame_from_sensor at that time as odometry has it; None: not known.
+        pose_frame_from_sensor at that time by odometry; None: not known.
     pose_frame : str
     mount : RigidTransform or None
         base_from_sensor; None: not known.

@@ -16,7 +16,14 @@ from ..layout import INFORMATION, PAIR, Floats, Record, Records
 from .joint import joint_information, joint_solve, joint_sums_compensated
 from .matrices import carried, invert3_scaled, sandwich
 from .observability import FIXED, FREE, PARALLEL, freedom
-from .one_step import determinant_and_reliability, one_step_costs, one_step_solve, one_step_sums, wahba_angle
+from .one_step import (
+    determinant_and_reliability,
+    one_step_costs,
+    one_step_solve,
+    one_step_sums,
+    translation_cost,
+    wahba_angle,
+)
 from .orientation import choose_rotation, turn_against
 from .pairs import angle_chi_square, middles, move_origins, residuals
 from .records import keep_alive
@@ -205,25 +212,22 @@ def measure(
     """Write the paper's measures at the transform that was found, at T = 0, and where else they are asked."""
     pose = out.pose
     map_x, map_y = middle
-    sums = one_step_sums(local, pose.x, pose.y, reference, used)
     wahba = how.wahba != 0
-    out.translation, out.rotation = paper_costs(sums, 0.0, 0.0, pose.theta - reference, wahba)
-    out.translation_before, out.rotation_before = paper_costs(
-        sums, -map_x - pose.x, -map_y - pose.y, 0.0 - reference, wahba
-    )
+    sums = one_step_sums(local, pose.x, pose.y, reference, used)
+    out.translation = translation_cost(local, used, pose.x, pose.y)
+    out.rotation = rotation_cost(sums, pose.theta - reference, wahba)
+    out.translation_before = translation_cost(local, used, -map_x, -map_y)
+    out.rotation_before = rotation_cost(sums, 0.0 - reference, wahba)
     if how.elsewhere:
-        x = how.other.x - map_x
-        y = how.other.y - map_y
-        out.translation_elsewhere, out.rotation_elsewhere = paper_costs(
-            sums, x - pose.x, y - pose.y, how.other.theta - reference, wahba
-        )
+        out.translation_elsewhere = translation_cost(local, used, how.other.x - map_x, how.other.y - map_y)
+        out.rotation_elsewhere = rotation_cost(sums, how.other.theta - reference, wahba)
     out.determinant, out.reliability = determinant_and_reliability(sums[0])
     keep_alive(sums)
 
 
 @kernel
-def paper_costs(sums: Records, dx: float, dy: float, turn: float, wahba: bool) -> tuple[float, float]:
-    """Return both costs of the paper where the reference of its sums is moved so, the rotation's by one of its ways."""
+def rotation_cost(sums: Records, turn: float, wahba: bool) -> float:
+    """Return the paper's cost of a rotation by `turn` from the reference of its sums, radians, by one of its ways."""
     wrapped = turn - 2.0 * math.pi * math.ceil(turn / (2.0 * math.pi) - 0.5)
-    translation, mitsuta, by_wahba = one_step_costs(sums, dx, dy, wrapped)
-    return translation, by_wahba if wahba else mitsuta
+    _, mitsuta, by_wahba = one_step_costs(sums, 0.0, 0.0, wrapped)
+    return by_wahba if wahba else mitsuta

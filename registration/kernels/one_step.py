@@ -60,6 +60,30 @@ def one_step_add(
 
 
 @kernel
+def gap_at(line: Record, seen: Record, x: float, y: float) -> float:
+    """Return ``r`` of a pair about a translation, metres.
+
+    Eq. (1), sign corrected: p_S - p_D; the printed p_D - p_S returns exactly -T.
+    """
+    return line.dx * (line.y - y) - line.dy * (line.x - x) - (seen.dx * seen.y - seen.dy * seen.x)
+
+
+@kernel
+def translation_cost(pairs: Records, weights: Floats, x: float, y: float) -> float:
+    """Return the paper's cost of a translation, ``sum w r^2``, from the pairs; those of weight 0 do not count.
+
+    Sums about a translation that is far away lose the digits of what cancels: parallel lines fit far along them, too.
+    """
+    total = 0.0
+    error = 0.0
+    for i in range(len(pairs)):
+        if weights[i] > 0.0:
+            gap = gap_at(pairs[i].map, pairs[i].scan, x, y)
+            total, error = accumulated(total, error, weights[i] * gap * gap, 0.0)
+    return total + error
+
+
+@kernel
 def one_step_sums(pairs: Records, x: float, y: float, alpha_ref: float, weights: Floats) -> Records:
     """Return the compensated sums of pairs about a reference; those of weight 0 do not count."""
     sums = zeros(2, ONE_STEP_SUMS)
@@ -67,10 +91,7 @@ def one_step_sums(pairs: Records, x: float, y: float, alpha_ref: float, weights:
         if weights[i] > 0.0:
             line = pairs[i].map
             seen = pairs[i].scan
-            # Eq. (1), sign corrected: p_S - p_D; the printed p_D - p_S returns exactly -T.
-            p_map = line.dx * (line.y - y) - line.dy * (line.x - x)
-            p_scan = seen.dx * seen.y - seen.dy * seen.x
-            one_step_add(sums, line, seen, p_map - p_scan, alpha_ref, weights[i], 1.0)
+            one_step_add(sums, line, seen, gap_at(line, seen, x, y), alpha_ref, weights[i], 1.0)
     return sums
 
 

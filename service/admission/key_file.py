@@ -128,4 +128,4 @@ def _state(path: Path) -> object:
         stats = [file.stat() for file in _files(path)]
     except (KeyFileError, OSError):
         return None
-    return [(stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in stats]
+    return [(stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for stat in stats]

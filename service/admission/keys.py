@@ -97,10 +97,14 @@ class Keyring:
         raise UnknownKeyError
 
     def refresh(self) -> None:
-        """Look for keys that came or went; off the event loop."""
-        for source in (self._file, self._tokens):
-            if source is not None:
-                source.refresh()
+        """Look for keys of the file that came or went; off the event loop."""
+        if self._file is not None:
+            self._file.refresh()
+
+    def refresh_tokens(self) -> None:
+        """Look for new keys of the issuer, in another thread than `refresh`: a slow server holds up this alone."""
+        if self._tokens is not None:
+            self._tokens.refresh()
 
 
 def digest_of(key: bytes) -> bytes:

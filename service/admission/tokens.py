@@ -11,8 +11,6 @@ import hashlib
 import logging
 import re
 import time
-import urllib.request
-from pathlib import Path
 from typing import Any
 
 import jwt
@@ -20,12 +18,13 @@ import jwt
 from .errors import UnknownKeyError
 from .grants import Grant, Role
 from .issuer import Issuer
+from .key_set import Keys, KeySetError, read_key_set
 
 SCOPE = "linefix:"
 MAPS = "linefix_maps"
 REQUIRED = ["exp", "iss", "aud", "sub"]
-FETCH_SECONDS, REFRESH_SECONDS, SOON_SECONDS = 5.0, 300.0, 10.0
-MOST_BYTES = 1_000_000
+REFRESH_SECONDS, SOON_SECONDS = 300.0, 10.0
+LONGEST_SECONDS = 86_400.0  # s that keys are used while their issuer cannot be reached: it may have taken one back
 _PREFIX = re.compile("[A-Za-z0-9._-]{0,128}")
 logger = logging.getLogger("linefix")
 
@@ -40,9 +39,10 @@ class Tokens:
 
     def __init__(self, issuer: Issuer) -> None:
         self._issuer = issuer
-        self._keys: dict[str | None, jwt.PyJWK] = {}
+        self._keys: Keys = {}
         self._next_fetch = 0.0
         self._last_fetch = -SOON_SECONDS
+        self._fetched = 0.0
 
     def grant(self, token: bytes) -> Grant:
         """Return what a token may do.
@@ -69,16 +69,26 @@ class Tokens:
             raise UnknownKeyError from error
 
     def refresh(self) -> None:
-        """Fetch the keys where that is due, off the event loop; what cannot be had leaves them as they were."""
+        """Fetch the keys where that is due, off the event loop.
+
+        While the set cannot be fetched the keys stay for `LONGEST_SECONDS`; a set without keys removes them all.
+        """
         now = time.monotonic()
         if now < self._next_fetch:
             return
         self._last_fetch, self._next_fetch = now, now + REFRESH_SECONDS
         try:
-            self._keys = {key.key_id: key for key in jwt.PyJWKSet.from_json(_fetched(self._issuer.keys)).keys}
-        except (OSError, ValueError, jwt.PyJWTError) as error:
-            self._next_fetch = now + SOON_SECONDS
-            logger.error("the issuer's keys cannot be had: %s", type(error).__name__)
+            self._keys = read_key_set(self._issuer.keys)
+        except KeySetError as error:
+            self._next_fetch = time.monotonic() + SOON_SECONDS
+            if self._keys and now - self._fetched > LONGEST_SECONDS:
+                self._keys = {}
+                logger.error("tokens are refused from now on: the issuer's keys are %g h old", LONGEST_SECONDS / 3600.0)
+            logger.error("the issuer's keys cannot be had: %s", error)
+            return
+        self._fetched = now
+        if not self._keys:
+            logger.error("the issuer has no key that verifies signatures: its tokens are refused")
 
     def _key(self, key_id: object) -> jwt.PyJWK:
         if key_id is None and len(self._keys) == 1:
@@ -89,15 +99,6 @@ class Tokens:
             self._next_fetch = min(self._next_fetch, self._last_fetch + SOON_SECONDS)
             raise UnknownKeyError
         return found
-
-
-def _fetched(where: str) -> str:
-    if "://" not in where:
-        return Path(where).read_text()
-    with urllib.request.urlopen(where, timeout=FETCH_SECONDS) as answer:
-        if answer.geturl() != where:
-            raise OSError("sent elsewhere")
-        return bytes(answer.read(MOST_BYTES)).decode()
 
 
 def _grant_of(claims: dict[str, Any]) -> Grant:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from registration import RigidTransform
 
-from .errors import RefusedError, WrongUseError
-from .logs import ReplayedScan
-from .service import Json
+from .errors import RefusedError
+
+if TYPE_CHECKING:
+    from formats import LoggedScan
 
 ROBOT = "base_link"  # what a robot is called whose mount is given
 
 
 @dataclass(slots=True)
 class Frames:
-    """Takes poses from the laser to the robot.
+    """Decides whose poses are located.
 
     Attributes
     ----------
@@ -35,45 +37,40 @@ class Frames:
     of_laser: bool = False
     told: str = "none"
 
-    @classmethod
-    def of(cls, mount: tuple[float, float, float] | None) -> Frames:
-        """Read the option ``--mount``; raises `WrongUseError` where it is no pose."""
-        if mount is None:
-            return cls(None)
-        if not all(math.isfinite(value) for value in mount):
-            raise WrongUseError("--mount: expected x and y in metres, and theta in radians")
-        return cls(RigidTransform(*mount))
+    def taken(self, one: LoggedScan) -> LoggedScan:
+        """Return a scan with the mount that counts; none where poses are those of the laser.
 
-    def answer(self, one: ReplayedScan, answer: Json) -> Json | RefusedError:
-        """Return an answer with the pose and the covariance of the robot, of the laser where its mount is not known.
+        The first scan decides for all.
 
-        What the first scan says holds for all: one without a mount among others is not taken.
+        Raises
+        ------
+        RefusedError
+            When it has no mount, though others do.
         """
-        mount = self.given or one.mount
+        if self.given is not None:
+            one = replace(one, mount=self.given, base_frame=ROBOT)
         if not self.name:
-            self._decide(one, mount)
+            self._decide(one)
         if self.of_laser:
-            return answer
-        if mount is None:
-            return RefusedError(f"the log does not say where {one.frame} was on the robot then")
-        found = answer["pose"]
-        if found is None:
-            return answer
-        laser, by = RigidTransform(found["x"], found["y"], found["theta"]), mount.inverse()
-        robot = laser.compose(by)
-        covariance = answer["covariance"]
-        return {
-            **answer,
-            "pose": {"x": robot.x, "y": robot.y, "theta": robot.theta},
-            "covariance": None if covariance is None else laser.carry(covariance, by).tolist(),
-        }
+            return replace(one, mount=None)
+        if one.mount is None:
+            raise RefusedError(f"the log does not say where {one.frame_id} was on the robot then")
+        return one
 
-    def _decide(self, one: ReplayedScan, mount: RigidTransform | None) -> None:
+    def _decide(self, one: LoggedScan) -> None:
+        mount = one.mount
         if mount is None:
-            self.name, self.of_laser = one.frame or "laser", True
+            self.name, self.of_laser = one.frame_id or "laser", True
             self.told = f"of {self.name}, the laser; --mount X Y THETA would give those of the robot"
             return
-        self.name = ROBOT if self.given is not None else one.base
+        self.name = one.base_frame
         by = "as --mount says" if self.given is not None else "as the log says"
         where = f"({mount.x:.3f}, {mount.y:.3f}) m, {math.degrees(mount.theta):.1f} degrees"
-        self.told = f"of {self.name}, the robot, with {one.frame} mounted at {where}, {by}"
+        self.told = f"of {self.name}, the robot, with {one.frame_id} mounted at {where}, {by}"
+
+
+def odometry_of(one: LoggedScan) -> RigidTransform | None:
+    """Return where odometry has the frame whose pose is located; None where it is not known."""
+    if one.pose is None or one.mount is None:
+        return one.pose
+    return one.pose.compose(one.mount.inverse())

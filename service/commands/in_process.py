@@ -12,7 +12,7 @@ from pathlib import Path
 import orjson
 from pydantic import ValidationError
 
-from association import Deadline
+from association import Deadline, MapIndex
 
 from ..http.problems import problem_of
 from ..importing.bounded import ReadMap
@@ -32,7 +32,7 @@ from ..work.answers import outline_json
 from ..work.association import Associator
 from ..work.checking import check, check_done, conclude, sample
 from ..work.compiling import is_compiled
-from ..work.importing import answer_import
+from ..work.importing import answer_import, index_import
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
 from ..work.vectorization import answer_vectorization
@@ -89,7 +89,8 @@ class InProcess:
             read = ReadMap(orjson.dumps(document_of(imported.map)), asdict(imported.report))
             watch.lap("read")
             line_map = read_model(InlineMap, read.map, self._limits)
-            return _json(answer_import(self._lookup, line_map, read, self._job(watch)))
+            job = self._job(watch)
+            return _json(answer_import(index_import(self._lookup, line_map, job.deadline), line_map, read, job))
 
     def check(self, on: Json, samples: Json | None) -> Json:
         """Return the answer of ``/v1/maps/{map_id}:check``, also for a map that is not stored."""
@@ -106,6 +107,20 @@ class InProcess:
                 tried = [sample(checked, asked, number, job) for number in range(len(asked.scans))]
                 judged = conclude(checked, tried, job)
             return _json(check_done(checked, judged, asked, job))
+
+    def indexed(self, on: Json) -> MapIndex:
+        """Return the map of a request, inline or stored, ready to be searched."""
+        self._compile()
+        map_id = id_of(on)
+        with _refusing(Asked(map_id)):
+            line_map = None if map_id else read_model(InlineMap, orjson.dumps(on), self._limits)
+            found = line_map or self._lookup.find(str(map_id), oriented=None)
+            return self._lookup.indexed(found, oriented=None, deadline=Deadline()).index
+
+    @property
+    def longest_search(self) -> float:
+        """Seconds that a search may take."""
+        return 1e-3 * self._settings.max_deadline_ms
 
     def put(self, map_id: str, document: Json) -> Json:
         """Store a map where a service with these settings would."""

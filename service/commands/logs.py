@@ -1,17 +1,16 @@
-"""Logs of other tools to scans of requests."""
+"""Logs of other tools: their scans, what was made of them, and how they are sent to a server."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, TextIO, TypeVar
 
 import typer
 
-from registration import RigidTransform
+from linefix.mounted import HERE, motion_covariance
 
 from .errors import WrongUseError
 from .inputs import needing_formats
@@ -19,7 +18,7 @@ from .printing import noted, plain
 from .service import Json
 
 if TYPE_CHECKING:
-    from formats import Log, LoggedScan
+    from formats import Log, LoggedScan, LogOptions
     from vectorization import LaserScan
 
 T = TypeVar("T")
@@ -27,37 +26,16 @@ FARTHEST = 1e4  # m; where a log names no greatest range
 Topic = Annotated[
     str | None, typer.Option(help="Of the scans; the one with most of them where not given. Of CARMEN FLASER or so.")
 ]
+TfNamespace = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAMESPACE",
+        help="Of a bag of several robots: where their transforms are, such as /robot1 (/robot1/tf).",
+    ),
+]
 
 
-@dataclass(frozen=True, slots=True)
-class ReplayedScan:
-    """A scan of a log as it is asked for.
-
-    Attributes
-    ----------
-    stamp_ns : int
-        Nanoseconds.
-    scan : dict
-        As in a request.
-    odometry : RigidTransform or None
-        odom_from_sensor; None where the log does not say.
-    frame : str
-        The sensor's.
-    mount : RigidTransform or None
-        base_from_sensor; None where the log does not say.
-    base : str
-        The robot's own frame, which `mount` is in.
-    """
-
-    stamp_ns: int
-    scan: Json
-    odometry: RigidTransform | None
-    frame: str
-    mount: RigidTransform | None
-    base: str
-
-
-def opened(path: Path, topic: str | None) -> Log:
+def opened(path: Path, options: LogOptions) -> Log:
     """Open a log.
 
     Raises
@@ -70,23 +48,29 @@ def opened(path: Path, topic: str | None) -> Log:
     if not path.exists():
         raise WrongUseError(f"{path}: there is no such file")
     with needing_formats(f"reading {path.name}"):
-        from formats import LogOptions, read_log
+        from formats import read_log
 
-        return read_log(path, LogOptions(topic=topic))
+        return read_log(path, options)
 
 
-def scans_of(log: Log) -> Iterator[ReplayedScan]:
+def options_of(
+    topic: str | None, tf_namespace: str | None, mount: tuple[float, float, float] | None = None
+) -> LogOptions:
+    """Return what to take of a log; raises `WrongUseError` where the mount is no pose."""
+    from registration import RigidTransform
+
+    if mount is not None and not all(map(math.isfinite, mount)):
+        raise WrongUseError("--mount: expected x and y in metres, and theta in radians")
+    with needing_formats("reading a log"):
+        from formats import LogOptions
+
+        return LogOptions(topic, None, tf_namespace, None if mount is None else RigidTransform(*mount))
+
+
+def scans_of(log: Log) -> Iterator[LoggedScan]:
     """Give the scans of a log one by one; raises `RefusedError` where it is broken."""
     with needing_formats(f"reading {log.name}"):
-        for one in log:
-            yield ReplayedScan(one.stamp_ns, _scan(one), one.pose, one.frame_id, one.mount, one.base_frame)
-
-
-def print_notes(log: Log) -> None:
-    """Print the assumptions and omissions of a log on stderr; stdout holds the answer alone."""
-    for kind in ("assumed", "dropped"):
-        for note in getattr(log.report, kind):
-            print(f"{kind:10}{plain(noted(asdict(note)))}", file=sys.stderr)
+        yield from log
 
 
 def spread(found: Sequence[T], most: int) -> list[T]:
@@ -95,20 +79,33 @@ def spread(found: Sequence[T], most: int) -> list[T]:
     return list(found[::step])
 
 
-def _scan(one: LoggedScan) -> Json:
-    laser = one.laser
-    # What is mounted upside down turns the other way round; its y axis is exchanged by that.
-    sign = -1.0 if one.flipped else 1.0
+def print_notes(log: Log, where: TextIO) -> None:
+    """Print what was assumed of a log, and what was left out."""
+    for kind in ("assumed", "dropped"):
+        for note in getattr(log.report, kind):
+            print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)
+
+
+def sent(one: LoggedScan) -> Json:
+    """Return a scan of a log as a request has it: one view, with the mount, the motion and what is not known of it."""
+    laser, mount, covariance = one.laser, one.mount or HERE, motion_covariance(one)
     most = laser.range_max if math.isfinite(laser.range_max) else FARTHEST
-    return {
+    view: Json = {
         "laser": {
-            "angle_min": sign * laser.angle_min,
-            "angle_increment": sign * laser.angle_increment,
+            "angle_min": laser.angle_min,
+            "angle_increment": laser.angle_increment,
             "ranges": _ranges(laser, most),
             "range_max": most,
         },
-        "stamp": one.stamp,
+        "pose": {"x": mount.x, "y": mount.y, "theta": mount.theta},
+        "flipped": one.flipped,
     }
+    if covariance is not None:
+        view["covariance"] = covariance.tolist()
+    if laser.motion is not None:
+        view["laser"]["time_increment"] = laser.motion.time_increment
+        view["twist"] = {"vx": laser.motion.vx, "vy": laser.motion.vy, "omega": laser.motion.omega}
+    return {"views": [view], "stamp": one.stamp}
 
 
 def _ranges(laser: LaserScan, most: float) -> list[float | None]:

@@ -5,42 +5,33 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import islice
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated, TextIO
 
-import orjson
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import track
 
+from linefix.mounted import SPEED, TURN
 from registration import RigidTransform
 
 from .errors import CommandError, NoSuchMapError, RefusedError
-from .frames import Frames
+from .frames import Frames, odometry_of
 from .inputs import document_at, line_map_of, needing_formats, read_map_or_id
-from .logs import ReplayedScan, Topic, opened, scans_of
+from .locators import Found, Locator, locating
+from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
 from .options import AsJson, Server
-from .printing import noted, plain, print_json, print_rows, print_table
-from .service import Json, Service, answering
+from .printing import plain, print_json, print_rows, print_table
+from .service import Json
 from .tracking import Tracker
 
 if TYPE_CHECKING:
-    from formats import Log, StampedPose
-
-
-# What is told of a scan, and of one that is not taken.
-REFUSED: Json = {
-    "status": None,
-    "usable": False,
-    "probability": None,
-    "pose": None,
-    "reasons": [],
-    "timing_ms": None,
-}
+    from formats import Log, LoggedScan, StampedPose
 
 
 HOPELESS = 20  # scans from the first on
@@ -72,31 +63,30 @@ class Tally:
         """How many scans there were."""
         return sum(self.verdicts.values())
 
-    def take(self, stamp_ns: int, answer: Json | CommandError) -> None:
+    def take(self, stamp_ns: int, found: Found | CommandError) -> None:
         """Count an answer, and keep its pose."""
         from formats import StampedPose
 
-        if isinstance(answer, CommandError):
+        if isinstance(found, CommandError):
             self.verdicts["refused"] += 1
-            self.refused = answer
+            self.refused = found
             return
-        self.verdicts[answer["status"] + (", usable" if answer["usable"] else ", not usable")] += 1
-        self.reasons.update(one["code"] for one in answer["reasons"][:1])
-        self.warnings.update(one["code"] for one in answer["warnings"])
-        self.times.append(answer["timing_ms"]["total"])
-        found = answer["pose"]
-        if found is not None:
-            pose = RigidTransform(found["x"], found["y"], found["theta"])
-            if answer["usable"]:
-                self.usable.append(StampedPose(stamp_ns, pose, answer["covariance"]))
-            else:
-                self.others.append(pose)
+        self.verdicts[found.status + (", usable" if found.usable else ", not usable")] += 1
+        self.reasons.update(one["code"] for one in found.reasons[:1])
+        self.warnings.update(found.warnings)
+        self.times.append(found.timing_ms["total"])
+        if found.pose is not None and found.usable:
+            covariance = None if found.covariance is None else np.array(found.covariance)
+            self.usable.append(StampedPose(stamp_ns, found.pose, covariance))
+        elif found.pose is not None:
+            self.others.append(found.pose)
 
 
 def replay(
     log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or 2, an mcap, or a log of CARMEN.")],
     on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
     topic: Topic = None,
+    tf_namespace: TfNamespace = None,
     mode: Annotated[
         Mode, typer.Option(help="track: by odometry from the last usable pose, once there is one; global: each anew.")
     ] = Mode.TRACK,
@@ -117,14 +107,14 @@ def replay(
 
     Poses are those of the robot where --mount or the log says how the laser is mounted, else those of the laser.
     """
-    told, source = read_map_or_id(on), opened(log, topic)
-    tally, frames = Tally(), Frames.of(mount)
+    options = options_of(topic, tf_namespace, mount)
+    told, source = read_map_or_id(on), opened(log, options)
+    tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
-    with answering(server) as service:
+    with locating(told, server) as locator:
         scans = _shown(islice(scans_of(source), 0, None, every), source, every)
         try:
-            for one, answer in located(service, told, scans, mode):
-                found = answer if isinstance(answer, CommandError) else frames.answer(one, answer)
+            for one, found in located(locator, scans, frames, mode):
                 tally.take(one.stamp_ns, found)
                 if as_json:
                     print_json(_line(one, found, frames))
@@ -148,22 +138,24 @@ def replay(
 
 
 def located(
-    service: Service, on: Json, scans: Iterator[ReplayedScan], mode: Mode
-) -> Iterator[tuple[ReplayedScan, Json | RefusedError]]:
-    """Give each scan with the answer to it, or why it is not taken.
+    locator: Locator, scans: Iterator[LoggedScan], frames: Frames, mode: Mode
+) -> Iterator[tuple[LoggedScan, Found | RefusedError]]:
+    """Give each scan with where it was taken, or why it is refused.
 
     In mode track the prior comes from the answers before and odometry.
     """
     tracker = Tracker() if mode is Mode.TRACK else None
     refusals: list[str] | None = []  # None: one was taken
-    packed = orjson.Fragment(orjson.dumps(on)) if "map_id" not in on else on
-    for one in scans:
-        body: Json = {"map": packed, "scan": one.scan, "options": {"include": [], "max_alternatives": 0}}
-        prior = None if tracker is None else tracker.prior(one.odometry)
-        if prior is not None:
-            body["prior"] = prior
+    for logged in scans:
         try:
-            answer = service.ask("associate", body)
+            one = frames.taken(logged)
+        except RefusedError as error:
+            yield logged, error
+            continue
+        odometry = odometry_of(one)
+        prior = None if tracker is None else tracker.prior(odometry)
+        try:
+            found = locator.locate(one, prior)
         except RefusedError as error:
             refusals = None if refusals is None else [*refusals, str(error)]
             if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or _hopeless(refusals):
@@ -172,8 +164,8 @@ def located(
             continue
         refusals = None
         if tracker is not None:
-            tracker.learn(answer, one.odometry)
-        yield one, answer
+            tracker.learn(found, odometry)
+        yield one, found
 
 
 def _hopeless(refusals: list[str] | None) -> bool:
@@ -181,18 +173,27 @@ def _hopeless(refusals: list[str] | None) -> bool:
     return refusals is not None and len(refusals) == HOPELESS and len(set(refusals)) == 1
 
 
-def _shown(scans: Iterator[ReplayedScan], log: Log, every: int) -> Iterator[ReplayedScan]:
+def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
     """Give the scans on, and show how far it is, on a terminal."""
     total = None if log.count is None else -(-log.count // every)
     where = Console(stderr=True)
     yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
 
 
-def _line(one: ReplayedScan, answer: Json | CommandError, frames: Frames) -> Json:
-    refused = answer if isinstance(answer, CommandError) else None
-    told = REFUSED if isinstance(answer, CommandError) else answer
-    line = {"stamp": one.scan["stamp"], **{name: told[name] for name in REFUSED}}
-    return {**line, "child_frame_id": frames.name, "error": None if refused is None else str(refused)}
+def _line(one: LoggedScan, found: Found | CommandError, frames: Frames) -> Json:
+    taken = None if isinstance(found, CommandError) else found
+    pose = taken and taken.pose
+    return {
+        "stamp": one.stamp,
+        "status": taken and taken.status,
+        "usable": bool(taken and taken.usable),
+        "probability": taken and taken.probability,
+        "pose": pose and {"x": pose.x, "y": pose.y, "theta": pose.theta},
+        "reasons": taken.reasons if taken else [],
+        "timing_ms": taken and taken.timing_ms,
+        "child_frame_id": frames.name,
+        "error": None if taken else str(found),
+    }
 
 
 def _draw(document: Json, tally: Tally, picture: Path) -> None:
@@ -204,9 +205,13 @@ def _draw(document: Json, tally: Tally, picture: Path) -> None:
 
 def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
     """Say what was taken of the log and what was not, and whose poses are told."""
-    for kind in ("assumed", "dropped"):
-        for note in getattr(log.report, kind):
-            print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)
+    print_notes(log, where)
+    codes = {note.code for note in log.report.assumed}
+    if "no_odometry" in codes:
+        print(f"{'prior':10}none without odometry: each scan is searched on the whole map", file=where)
+    if "motion" in codes:
+        wider = f"{SPEED:.1f} m/s and {TURN:.1f} rad/s"
+        print(f"{'poses':10}covariances allow for a motion of {wider} where it is not known", file=where)
     print(f"{'poses':10}{plain(frames.told)}", file=where)
 
 

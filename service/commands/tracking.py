@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from linefix import SoftPrior
 from registration import RigidTransform
 
-from .service import Json
+from .locators import Found
 
 # What odometry is trusted with, as standard deviations: at rest, for each metre driven, for each radian turned.
 METRES, METRES_A_METRE = 0.1, 0.1
@@ -29,13 +32,13 @@ class Tracker:
     _driven: float = 0.0
     _turned: float = 0.0
 
-    def prior(self, odometry: RigidTransform | None) -> Json | None:
+    def prior(self, odometry: RigidTransform | None) -> SoftPrior | None:
         """Return what is known of the pose of the next scan, None where nothing is.
 
         Parameters
         ----------
         odometry : RigidTransform or None
-            odom_from_sensor at its time.
+            odom_from_base at its time; of the sensor where its poses are located.
         """
         if odometry is None or self._last is None:
             self._pose = None if odometry is None else self._pose
@@ -51,14 +54,12 @@ class Tracker:
         if sigma > LOST:
             return None
         here = self._pose.compose(self._odometry.inverse().compose(odometry))
-        covariance = [[sigma**2, 0.0, 0.0], [0.0, sigma**2, 0.0], [0.0, 0.0, angle**2]]
-        return {"x": here.x, "y": here.y, "theta": here.theta, "covariance": covariance}
+        return SoftPrior(here, np.diag([sigma**2, sigma**2, angle**2]))
 
-    def learn(self, answer: Json, odometry: RigidTransform | None) -> None:
+    def learn(self, found: Found, odometry: RigidTransform | None) -> None:
         """Take up what came of that scan."""
-        if any(one["code"] == "prior_contradicted" for one in answer["warnings"]):
+        if "prior_contradicted" in found.warnings:
             self._pose = None
-        elif answer["usable"]:
-            pose = answer["pose"]
-            self._pose, self._odometry = RigidTransform(pose["x"], pose["y"], pose["theta"]), odometry
+        elif found.usable:
+            self._pose, self._odometry = found.pose, odometry
             self._driven = self._turned = 0.0

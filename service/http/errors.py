@@ -4,6 +4,7 @@
 
     HttpError
     ├── NotHttpError           not HTTP at all
+    ├── ControlCharacterError  a control character in the path
     ├── NotFoundError          no such path
     ├── MethodNotAllowedError  the path takes other methods
     ├── MediaTypeError         the body is not of the media type that is taken
@@ -26,6 +27,18 @@ class NotHttpError(HttpError):
 
     def __init__(self) -> None:
         super().__init__("this is not HTTP/1.1 as RFC 9112 has it, or no method of HTTP")
+
+
+class ControlCharacterError(HttpError):
+    """A control character in the path.
+
+    Parameters
+    ----------
+    character : str
+    """
+
+    def __init__(self, character: str) -> None:
+        super().__init__(f"the path has the control character U+{ord(character):04X}; expected none: leave it out")
 
 
 class NotFoundError(HttpError):

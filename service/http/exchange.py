@@ -91,11 +91,13 @@ class Exchange:
         """
         services = self.services
         if len(data) <= LARGE:
-            return await self._parsing(services.parsing, partial(reader, data, services.settings.limits()), deadline)
-        call = partial(services.parser.call, reader, data, services.settings.limits())
-        return await self._parsing(services.parsing_apart, call, deadline)
+            call = partial(reader, data, services.settings.limits())
+            return await self.take_other_turn(services.parsing, call, deadline)
+        apart = partial(services.parser.call, reader, data, services.settings.limits())
+        return await self.take_other_turn(services.parsing_apart, apart, deadline)
 
-    async def _parsing(self, gate: Gate, call: Callable[[], T], deadline: Deadline) -> T:
+    async def take_other_turn(self, gate: Gate, call: Callable[[], T], deadline: Deadline) -> T:
+        """Run a part of this request, which is short or heeds the deadline, in a turn of another kind."""
         # By a ticket of its own: the request is still on its way to its search.
         return await gate.run(call, deadline, Ticket(self._ticket.holder), lambda: True)
 
@@ -110,7 +112,7 @@ class Exchange:
             if body.gzipped:
                 packed, max_bytes = len(data), services.settings.max_body_bytes
                 call = partial(unpack, data, max_bytes, body.account.take)
-                data = await self._parsing(services.parsing_apart, call, self.job().deadline)
+                data = await self.take_other_turn(services.parsing_apart, call, self.job().deadline)
                 body.data.clear()
                 body.account.give_back(packed)
             yield data

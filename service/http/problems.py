@@ -54,7 +54,7 @@ class Kind:
 
 TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (parsing.NotJsonError,)),
-    Kind("invalid_http", 400, "The request is not HTTP", (http.NotHttpError,)),
+    Kind("invalid_http", 400, "The request is not HTTP", (http.NotHttpError, http.ControlCharacterError)),
     Kind("unauthorized", 401, "A key is needed", (admission.MissingKeyError,)),
     Kind(
         "forbidden",

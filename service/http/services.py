@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from asyncio import Semaphore
 from dataclasses import dataclass
 
 from starlette.types import Scope
@@ -13,6 +12,7 @@ from ..admission.entrance import Entrance
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
 from ..admission.readiness import Readiness
+from ..importing.bounds import Bounds
 from ..maps import MapStore
 from ..maps.lookup import MapLookup
 from ..parsing.parser_process import ParserProcess
@@ -56,9 +56,11 @@ class Services:
     documents : ByteBudget
         Bytes of stored maps that wait to be indexed.
     associator : Associator
-    imports : Semaphore
-        Of which one is free as long as no map of another tool is read.
-    parse_threads, store_threads, key_threads : Threads
+    importing : Gate
+        Slot in which maps of other tools are read, one at a time: each may take much memory.
+    import_bounds : Bounds
+        That reading one is held to.
+    parse_threads, store_threads, key_threads, issuer_threads : Threads
     traces : Traces, or None
         Where they are asked for.
     """
@@ -82,10 +84,12 @@ class Services:
     lookup: MapLookup
     documents: ByteBudget
     associator: Associator
-    imports: Semaphore
+    importing: Gate
+    import_bounds: Bounds
     parse_threads: Threads
     store_threads: Threads
     key_threads: Threads
+    issuer_threads: Threads
     traces: Traces | None = None
 
     @property
@@ -95,7 +99,7 @@ class Services:
 
     @property
     def _gates(self) -> tuple[Gate, ...]:
-        return self.gate, self.parsing, self.parsing_apart, self.indexing
+        return self.gate, self.parsing, self.parsing_apart, self.indexing, self.importing
 
     def give_up(self) -> None:
         """Tell everything that runs to end, and wait no longer for what does not hear."""
@@ -109,7 +113,7 @@ class Services:
         for gate in self._gates:
             gate.close()
         self.parser.close()
-        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.probe):
+        for threads in (self.parse_threads, self.store_threads, self.key_threads, self.issuer_threads, self.probe):
             threads.close()
         self.store.close()
         if self.traces is not None:

@@ -3,6 +3,7 @@
 ::
 
     bounded    starts that process, waits for it, and ends it when the time is over
+    folders    where the files of one import are put, and when they go
     reader     what runs in it: from a form to a map and a report
     form       multipart/form-data to files and fields
     fields     fields to what `formats` may be told of a file

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -19,15 +18,16 @@ from association import CancelledError, Deadline
 
 from ..parsing.own_modules import command_of
 from ..schemas.errors import Fault, InvalidRequestError
-from .bounds import Bounds
+from .bounds import NO_ROOM, Bounds
 from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
+from .folders import own_folder
 
 READER = "service.importing.reader"
 LOOK_SECONDS = 0.05  # how often it is looked whether somebody still waits
 # What the environment says to the service alone: keys, where they lie, passwords of databases and of collectors.
 PRIVATE = ("LINEFIX_", "PG", "OTEL_")
 SHARED = ("LINEFIX_KERNELS",)
-SHARED_MEMORY = Path("/dev/shm")  # may be written to in a container whose root may not
+ANSWER, FAILURE = "answer", "failure"  # files in the folder of one import
 
 
 class ReaderFailedError(Exception):
@@ -71,9 +71,13 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
     """
     told = orjson.dumps({"bounds": asdict(bounds), "content_type": content_type}).decode()
     with _folder() as folder:
-        status, said, failure = _ended(command_of(READER, told, folder), content, deadline)
+        status = _ended(command_of(READER, told, str(folder), str(os.getpid())), folder, content, deadline)
+        with (folder / ANSWER).open("rb") as answer, (folder / FAILURE).open("rb") as failures:
+            said, failure = answer.read(bounds.file_bytes), failures.read(100)
+    if status == NO_ROOM:
+        raise NoRoomError
     if status == 1:
-        raise ReaderFailedError(failure.decode("ascii", "replace")[:100])
+        raise ReaderFailedError(failure.decode("ascii", "replace"))
     if status in (-signal.SIGXCPU, -signal.SIGKILL):
         raise FileTooLargeError(f"reading it takes more than {bounds.cpu_seconds} s of a processor, or too much memory")
     if status != 0:
@@ -97,25 +101,34 @@ def _report(told: dict[str, Any]) -> dict[str, Any]:
     raise ReaderFailedError("an answer that is none")
 
 
-def _ended(command: list[str], content: bytearray, deadline: Deadline) -> tuple[int, bytes, bytes]:
-    """Run a process to its end; return its status and what it wrote."""
+def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadline) -> int:
+    """Run a process to its end and return its status; what it writes is put into `ANSWER` and `FAILURE`.
+
+    They are files, which may not grow beyond what one file may: the process is not relied on to write little.
+    """
     told = {name for name in os.environ if name in SHARED or not name.upper().startswith(PRIVATE)}
-    clean = {name: os.environ[name] for name in told}
-    pipe = subprocess.PIPE
-    # In a group of its own, so that Ctrl-C is for the service, which then ends this.
-    with subprocess.Popen(command, env=clean, process_group=0, stdin=pipe, stdout=pipe, stderr=pipe) as process:
-        # Written by a thread of its own: `communicate` does not go on with what it was given after a timeout.
-        feeding = threading.Thread(target=_feed, args=(process.stdin, content))
-        process.stdin = None
+    # Libraries that it uses put their own temporary files where those go that were sent.
+    clean = {**{name: os.environ[name] for name in told}, "TMPDIR": str(folder)}
+    with (
+        (folder / ANSWER).open("wb") as answer,
+        (folder / FAILURE).open("wb") as failure,
+        # In a group of its own, so that Ctrl-C is for the service, which then ends this.
+        subprocess.Popen(
+            command, env=clean, process_group=0, stdin=subprocess.PIPE, stdout=answer, stderr=failure
+        ) as process,
+    ):
+        # A thread of its own writes the form: this one checks the deadline.
+        pipe, process.stdin = process.stdin, None
+        assert pipe is not None
+        feeding = threading.Thread(target=_feed, args=(pipe, content))
         feeding.start()
         try:
             while True:
                 with suppress(subprocess.TimeoutExpired):
-                    said, failure = process.communicate(timeout=LOOK_SECONDS)
-                    return process.returncode, said, failure
+                    return process.wait(LOOK_SECONDS)
                 if deadline.cancelled:
                     raise CancelledError
-                if deadline.passed:
+                if deadline.over:
                     raise TooLateError
         finally:
             process.kill()
@@ -128,14 +141,10 @@ def _feed(pipe: IO[bytes], content: bytearray) -> None:
 
 
 @contextmanager
-def _folder() -> Iterator[str]:
+def _folder() -> Iterator[Path]:
     """Give a folder for the files, which goes with all that is in it."""
     try:
-        place = tempfile.gettempdir()
-    except FileNotFoundError:  # none can be written to
-        place = str(SHARED_MEMORY)
-    try:
-        with tempfile.TemporaryDirectory(prefix="linefix-", dir=place, ignore_cleanup_errors=True) as folder:
+        with own_folder() as folder:
             yield folder
     except OSError as error:
         raise NoRoomError from error

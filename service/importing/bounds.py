@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 CPU_SECONDS = 20  # of a processor
+NO_ROOM = 3  # status of the process that reads where its files cannot be written
 
 
 @dataclass(frozen=True, slots=True)

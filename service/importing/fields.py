@@ -58,6 +58,11 @@ def _number(values: Sequence[str]) -> float:
     return _numbers(_text(values), 1)[0]
 
 
+def _unknown(values: Sequence[str]) -> int | str:
+    text = _text(values)
+    return int(text) if text.isdecimal() and len(text) < 10 else text
+
+
 def _units(values: Sequence[str]) -> str | float:
     try:
         return _number(values)
@@ -100,4 +105,5 @@ KNOWN: dict[str, Callable[[Sequence[str]], Any]] = {
     "directions": _text,
     "local_metres": _truth,
     "topic": _text,
+    "unknown": _unknown,
 }

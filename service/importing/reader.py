@@ -6,24 +6,33 @@ memory and time than it was given and no keys in its environment, and what it sa
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import resource
+import shutil
 import sys
 from contextlib import suppress
-from dataclasses import asdict
-from pathlib import Path
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import orjson
 
 from ..schemas.errors import Fault, InvalidRequestError
-from .bounds import Bounds
+from .bounds import NO_ROOM, Bounds
 
 if TYPE_CHECKING:
     from formats import FormatError, ImportedMap
 
 MAPPED_BYTES = 1_000_000_000  # of address space beside the memory: libraries, and room that is never used
 MOST_OPEN = 64  # files
+NICE = 5  # searches go before it, at three times as much of a core that both want
+FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
+METADATA, BAG = "metadata.yaml", "bag"
+PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9 ._()+=@-]*")
+PLAIN_NAMES = "expected the name of a file of a bag to be letters, digits, spaces and any of ._()+=@- only; rename it"
+ENDING = re.compile(r"\.[a-z0-9]{1,8}")
 OOM_SCORE = "1000"  # the first to go where the machine's memory ends
 
 
@@ -40,9 +49,17 @@ def main(told: str, folder: str) -> None:
         lines = [{"missing": True}]
     except (MemoryError, RecursionError):
         lines = [{"too_large": "reading it takes more memory than it may have"}]
-    for line in lines:
-        sys.stdout.buffer.write(orjson.dumps(line, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE))
+    sys.stdout.buffer.write(_printed(lines, bounds.file_bytes))
     sys.stdout.flush()
+
+
+def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
+    """Return lines as JSON, or one line with an error where they are too long: such a map could not be put either."""
+    option = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_APPEND_NEWLINE
+    printed = b"".join(orjson.dumps(line, option=option) for line in lines)
+    if len(printed) <= most:
+        return printed
+    return orjson.dumps({"too_large": f"the map, or its report, takes more than {most} bytes"}, option=option)
 
 
 def _bind(bounds: Bounds) -> None:
@@ -58,6 +75,8 @@ def _bind(bounds: Bounds) -> None:
     ):
         with suppress(ValueError, OSError):  # less is allowed already, or the system knows no such limit
             resource.setrlimit(what, (limit, limit))
+    with suppress(OSError):
+        os.nice(NICE)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(OOM_SCORE)
 
@@ -79,28 +98,73 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
     options = options_of(form.fields)
     names = list(form.files)
     try:
-        path = _map_among(names, folder)
+        files = own_files(names, _map_among(names), folder)
         for name, data in form.files.items():
-            (folder / name).write_bytes(data)
+            files.paths[name].write_bytes(data)
         form.files.clear()
-        imported = read_map(path, options)
+        imported = read_map(files.map, options, files.paths)
     except TooLargeError as error:
         return [{"too_large": error.message}]
     except UnsupportedFormatError as error:
         return [{"unknown": error.message}]
     except FormatError as error:
-        raise InvalidRequestError([_fault(error, names)]) from None
-    except OSError as error:
-        if error.filename is None or Path(error.filename).parent != folder:
-            raise
-        raise InvalidRequestError([Fault("/files", "a file cannot have this name")]) from None
+        raise InvalidRequestError([_fault(error, files)]) from None
     if len(imported.map.segments) > bounds.segments:
         return [{"too_large": f"at most {bounds.segments} segments are taken"}]
-    return _answer(imported)
+    return _answer(imported, files)
 
 
-def _map_among(names: list[str], folder: Path) -> Path:
-    """Return the file that is the map; the others are those that it names.
+@dataclass(frozen=True, slots=True)
+class OwnFiles:
+    """Uploaded files under names of our own: no path is made of an uploaded name.
+
+    Attributes
+    ----------
+    map : Path
+        Of the file that is the map, or the folder of a bag of ROS 2.
+    paths : dict of str to Path
+        By the names that were sent.
+    """
+
+    map: Path
+    paths: dict[str, Path]
+
+    def number_of(self, own: str) -> int | None:
+        """Return which of the files has a name of our own; None where none has."""
+        return next((k for k, path in enumerate(self.paths.values()) if path.name == own), None)
+
+    def as_sent(self, own: str) -> str:
+        """Return the name that was sent of what has a name of our own, fit to be printed; anything else as it is."""
+        number = self.number_of(own)
+        return own if number is None else "".join(c if c.isprintable() else "?" for c in list(self.paths)[number])
+
+
+def own_files(names: list[str], map_name: str, folder: Path) -> OwnFiles:
+    """Return where files are put that were sent; of their names an ending stays.
+
+    A bag of several files names them in its metadata: these keep names that are letters, digits and a few signs.
+
+    Raises
+    ------
+    InvalidRequestError
+        When a file of such a bag has another name.
+    """
+    if map_name == METADATA:
+        bag = folder / BAG
+        bag.mkdir()
+        for number, name in enumerate(names):
+            if not PLAIN.fullmatch(name):
+                raise InvalidRequestError([Fault(f"/files/{number}", PLAIN_NAMES)])
+        return OwnFiles(bag, {name: bag / name for name in names})
+    paths = {}
+    for number, name in enumerate(names):
+        ending = PurePosixPath(name).suffix.lower()
+        paths[name] = folder / f"file-{number}{ending if ENDING.fullmatch(ending) else ''}"
+    return OwnFiles(paths[map_name], paths)
+
+
+def _map_among(names: list[str]) -> str:
+    """Return which file is the map; the others are those that it names. Of a bag of ROS 2 it is the metadata.
 
     Raises
     ------
@@ -109,9 +173,9 @@ def _map_among(names: list[str], folder: Path) -> Path:
     """
     from formats import MAP_SUFFIXES, UnsupportedFormatError
 
-    if "metadata.yaml" in names:
-        return folder  # that of a bag of ROS 2
-    maps = [name for name in names if Path(name).suffix.lower() in MAP_SUFFIXES]
+    if METADATA in names:
+        return METADATA
+    maps = [name for name in names if PurePosixPath(name).suffix.lower() in MAP_SUFFIXES]
     if len(maps) > 1:
         raise InvalidRequestError([Fault("/files", "expected one map, and beside it what it names, such as a picture")])
     if not names:
@@ -119,40 +183,45 @@ def _map_among(names: list[str], folder: Path) -> Path:
     if not maps:
         known = ", ".join(MAP_SUFFIXES)
         raise UnsupportedFormatError(f"expected a file that ends in one of {known}", argument="files")
-    return folder / maps[0]
+    return maps[0]
 
 
-def _fault(error: FormatError, names: list[str]) -> Fault:
+def _fault(error: FormatError, files: OwnFiles) -> Fault:
     """Say where in the form something is wrong: a file by its number, for what was sent is not repeated."""
     from formats import IncompleteFileError
 
     from .fields import KNOWN, pointer_of
 
-    pointer = pointer_of(error.argument)
-    if isinstance(error, IncompleteFileError) and error.argument not in names:
+    pointer, number = pointer_of(error.argument), files.number_of(error.argument)
+    if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in KNOWN:
         return Fault("/files", "the file that the map names, such as its picture, was not sent")
     if pointer[1:] not in KNOWN:
-        pointer = f"/files/{names.index(error.argument)}" if error.argument in names else "/files"
+        pointer = "/files" if number is None else f"/files/{number}"
     elif error.index is not None:
         pointer += f"/{error.index}"
     return Fault(pointer, error.message)
 
 
-def _answer(imported: ImportedMap) -> list[dict[str, Any]]:
-    line_map = imported.map
+def _answer(imported: ImportedMap, files: OwnFiles) -> list[dict[str, Any]]:
+    line_map, report = imported.map, asdict(imported.report)
     document = {
         "segments": line_map.segments.endpoints,
         "sigma": line_map.sigma,
         "oriented": line_map.oriented,
         "frame_id": line_map.frame_id,
-        "meta": line_map.meta,
+        "meta": {key: files.as_sent(value) for key, value in line_map.meta.items()},
     }
-    return [{"report": asdict(imported.report)}, document]
+    report["files"] = tuple(map(files.as_sent, report["files"]))
+    return [{"report": report}, document]
 
 
 if __name__ == "__main__":
+    told, folder, service = sys.argv[1:]
     try:
-        main(*sys.argv[1:])
+        main(told, folder)
     except Exception as error:  # a defect; its kind is told, and nothing of the file
-        print(f"{type(error).__name__}", file=sys.stderr)
-        os._exit(1)
+        print(f"{type(error).__name__}", file=sys.stderr, flush=True)
+        os._exit(NO_ROOM if isinstance(error, OSError) and error.errno in FULL else 1)
+    finally:
+        if os.getppid() != int(service):  # it was killed, and removes nothing any more
+            shutil.rmtree(folder, ignore_errors=True)

@@ -118,6 +118,20 @@ class MapLookup:
         key = digest, asked.sigma, asked.frame_id, directed
         return self._cache.get(key, lambda: self._index(asked, directed), deadline)
 
+    def index_once(self, asked: InlineMap, deadline: Deadline) -> MapIndex:
+        """Return the index, with its directions, of a map that is not searched; it is not cached.
+
+        Raises
+        ------
+        InvalidSegmentsError, InvalidMapError
+            When the map cannot be searched.
+        IndexingEndedError
+            When the deadline passes, or is cancelled, first.
+        """
+        self._cache.make_room(INDEXED_BYTES * len(asked.segments))
+        segments = Segments.from_array(asked.segments, argument="map.segments")
+        return MapIndex.build(segments, asked.sigma, deadline=deadline)
+
     def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
         document = found.document
         if document is None:

@@ -36,6 +36,7 @@ BEYOND = "\x7f"  # every letter that an id may have comes before it
 logger = logging.getLogger("linefix")
 
 BYTES_OF_ID = 500  # that an id takes beside its map, about
+SHARE = 0.5  # of all bytes, that maps whose ids begin alike may take: as of memory, no key has more than half
 
 
 class MapStore:
@@ -80,23 +81,29 @@ class MapStore:
         self._reader.close()
         self._engine.dispose()
 
-    def put(self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions) -> tuple[int, bool]:
+    def put(
+        self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions, prefix: str = ""
+    ) -> tuple[int, bool]:
         """Store a map; return its revision, and whether there was none before.
+
+        Those whose ids begin with a `prefix`, that of the key that writes, may take `SHARE` of all bytes.
 
         The transaction is on the disk when this returns, and was read back. A damaged map is replaced as any other.
         """
-        written = self._twice(lambda: self._put(map_id, document, outline, demands))
+        written = self._twice(lambda: self._put(map_id, document, outline, demands, prefix))
         # In damaged tables another connection may read other rows than the one that wrote: look before promising.
         with suppress(UnknownMapError):  # deleted by another meanwhile
             self.load(map_id)
         return written
 
-    def _put(self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions) -> tuple[int, bool]:
+    def _put(
+        self, map_id: str, document: bytes, outline: MapOutline, demands: Preconditions, prefix: str
+    ) -> tuple[int, bool]:
         with self._writing() as connection:
             row = _locked(connection, map_id)
             last, exists = _last(connection, map_id, row)
             demands.check(last if exists else None)
-            self._require_room(connection, map_id, len(document))
+            self._require_room(connection, map_id, len(document), prefix)
             record = MapRecord(map_id, last + 1, digest(document), outline.oriented)
             if row is None:
                 # Not an upsert: of two first writers one has to fail here, and look again.
@@ -112,9 +119,17 @@ class MapStore:
                 raise CorruptMapError
         return record.revision, not exists
 
-    def _require_room(self, connection: Connection, map_id: str, size: int) -> None:
-        if self._most_bytes is not None and _taken(connection, map_id) + BYTES_OF_ID + size > self._most_bytes:
+    def _require_room(self, connection: Connection, map_id: str, size: int, prefix: str) -> None:
+        if self._most_bytes is None:
+            return
+        size += BYTES_OF_ID
+        if _taken(connection, map_id) + size > self._most_bytes:
             raise StoreFullError(f"all maps together may take {self._most_bytes} bytes, and with this one take more")
+        share = int(SHARE * self._most_bytes)
+        if prefix and _taken(connection, map_id, prefix) + size > share:
+            raise StoreFullError(
+                f"the maps of this key's prefix may take {share} bytes, and with this one take more: delete some"
+            )
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
         """Forget a map; the number of its last revision is kept."""
@@ -210,10 +225,13 @@ class MapStore:
             return write()
 
 
-def _taken(connection: Connection, map_id: str) -> int:
-    """Return the bytes that all maps but one take; an id that was used once goes on taking some."""
+def _taken(connection: Connection, map_id: str, prefix: str = "") -> int:
+    """Return the bytes that all maps with a prefix but one take; an id that was used once goes on taking some."""
     others = select(func.count()).select_from(maps).where(maps.c.map_id != map_id)
     written = select(func.sum(func.length(documents.c.document))).where(documents.c.map_id != map_id)
+    if prefix:
+        others = others.where(maps.c.map_id.between(prefix, prefix + BEYOND))
+        written = written.where(documents.c.map_id.between(prefix, prefix + BEYOND))
     return BYTES_OF_ID * (connection.scalar(others) or 0) + int(connection.scalar(written) or 0)
 
 

@@ -123,14 +123,17 @@ class SearchAnswer(Answer):
     """How the search went."""
 
     complete: bool = Field(description="false when deadline or budget ended it early")
-    exhaustive: bool
+    exhaustive: bool = Field(description="whether every pair of segments was tried; only of a complete search")
     confidence: float
     bases: Index
     hypotheses: Index
     verified: Index
     seed: int
     sampling: Literal["ordered", "random"]
-    rivals_above: float = Field(description="share of the best score above which no rival was missed")
+    rivals_above: float = Field(
+        description="share of the best score above which no pose was missed whose matches agree within their "
+        "tolerances; 1 where the search is not complete"
+    )
 
 
 class WarningAnswer(Answer):

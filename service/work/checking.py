@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from association import Scan
+from association import CancelledError, IndexingEndedError, Scan
 from association.checking import (
     Advice,
     Finding,
@@ -87,6 +87,9 @@ def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | Non
     else:
         own, reference = on.oriented, None
     oriented = is_oriented(None, own)
+    # Of its own: an index without directions, which a check may add to it, goes with the check, for the cache does not
+    # count it.
+    cached = replace(cached, index=replace(cached.index))
     found = check_map(cached.index, job.deadline, oriented=oriented)
     return Checked(cached, oriented, scans, found, reference)
 
@@ -96,8 +99,13 @@ def sample(checked: Checked, asked: CheckRequest, number: int, job: Job) -> Samp
     if job.deadline.passed and not job.deadline.cancelled:
         return None
     pose = None if asked.poses is None else asked.poses[number]
-    said = None if pose is None else transform_of(pose)
-    return try_sample(checked.cached.index, checked.scans[number], job.deadline, oriented=checked.oriented, said=said)
+    said, index = None if pose is None else transform_of(pose), checked.cached.index
+    try:
+        return try_sample(index, checked.scans[number], job.deadline, oriented=checked.oriented, said=said)
+    except IndexingEndedError:
+        if job.deadline.cancelled:
+            raise CancelledError from None
+        return None
 
 
 @dataclass(frozen=True, slots=True)

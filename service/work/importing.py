@@ -6,15 +6,19 @@ from typing import Any
 
 import orjson
 
+from association import CancelledError, Deadline, IndexingEndedError, MapIndex
+from association.checking import check_map
+
+from ..admission.errors import DeadlinePassedError
 from ..importing.bounded import ReadMap
-from ..maps.lookup import MapLookup, outline_of
+from ..maps.lookup import MapLookup, is_oriented, outline_of
 from ..schemas.parts import InlineMap
-from .checking import check, check_json
+from .checking import check_json
 from .job import Done, Job
 
 
-def answer_import(lookup: MapLookup, line_map: InlineMap, read: ReadMap, job: Job) -> Done:
-    """Return a map that could be put as it is, what was done to make it, and what is doubtful in it.
+def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> MapIndex:
+    """Index an imported map, with the deadline; the index is not cached, since no search uses it.
 
     Raises
     ------
@@ -26,7 +30,21 @@ def answer_import(lookup: MapLookup, line_map: InlineMap, read: ReadMap, job: Jo
         When the client has gone.
     """
     outline_of(line_map)
-    found = check(lookup, line_map, None, job).found
+    try:
+        return lookup.index_once(line_map, deadline)
+    except IndexingEndedError:
+        raise CancelledError if deadline.cancelled else DeadlinePassedError from None
+
+
+def answer_import(index: MapIndex, line_map: InlineMap, read: ReadMap, job: Job) -> Done:
+    """Return a map that could be put as it is, what was done to make it, and what is doubtful in it.
+
+    Raises
+    ------
+    CancelledError
+        When the client has gone.
+    """
+    found = check_map(index, job.deadline, oriented=is_oriented(None, line_map.oriented))
     job.watch.lap("check")
     answer: dict[str, Any] = {"map": orjson.Fragment(read.map), "report": read.report, "check": check_json(found)}
     return job.done(answer, format=read.report["format"], findings=[one.code for one in found.findings])

@@ -318,7 +318,11 @@ def test_a_stopped_search_says_so() -> None:
     assert (reports[0].bases, reports[0].hypotheses, reports[0].confidence) == (0, 0, 0.0)
     for one, other in itertools.pairwise(reports):
         assert one.hypotheses <= other.hypotheses
-    assert all(report.exhaustive is (report.bases == reports[-1].bases) for report in reports)
+    assert [report.exhaustive for report in reports] == [False] * whole + [True]
+    assert sum(report.bases == reports[-1].bases for report in reports) > 1, (
+        "parallel walls are looked at after all bases"
+    )
+    assert [report.rivals_above for report in reports] == [1.0] * whole + [RIVAL_SHARE]
 
 
 def test_a_search_of_a_window_is_complete_when_both_are() -> None:

@@ -63,6 +63,17 @@ def test_feet_are_named() -> None:
     assert "seems to be in feet" in told(scaled(SCAN, 1.0 / 0.3048))["scale"]
 
 
+@pytest.mark.parametrize(("factor", "said"), [(25.4, "millimetres taken for inches"), (0.01, "metres taken for centi")])
+def test_a_map_of_another_unit(factor: float, said: str) -> None:
+    """The scan is as large as scans are: the map is divided, for gates of the search are metres."""
+    found = told(SCAN, index_of(ROOM * factor))
+    assert list(found) == ["scale"]
+    assert (
+        f"With all lengths times {factor:.4g} the scan fits much better: the map seems to be in {said}"
+        in found["scale"]
+    )
+
+
 @pytest.mark.parametrize("factor", [0.93, 0.96, 1.04, 1.07])
 def test_a_map_that_is_not_to_scale(factor: float) -> None:
     walls = maze(5)

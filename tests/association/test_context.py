@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
-from association import Deadline, HardPrior, Prior, SoftPrior, mirrored
+from association import Deadline, HardPrior, MapIndex, Prior, SoftPrior, mirrored
 from association.layout import GATES, HARD_PRIOR, NO_PRIOR, RULES, SOFT_PRIOR, record
 from association.scan_lines import ScanLines
 from association.tuning import GATE_SIGMAS, GREATEST_ANGLE_GATE, LEAST_ANGLE_GATE, LEAST_OFFSET_GATE, REACH
@@ -13,7 +15,7 @@ from registration import RigidTransform
 
 from .answers import ROOM_INDEX, SCAN
 from .records import UPPER
-from .scenes import INSIDE, ROOM, beams_of, context_of, pose, scan_of
+from .scenes import INSIDE, ROOM, beams_of, context_of, index_of, pose, scan_of
 
 ENDS = SCAN.measured.segments.endpoints
 BEAMS = beams_of(ROOM_INDEX, INSIDE)
@@ -136,3 +138,33 @@ def test_gates() -> None:
     assert asked.item() == (GATE_SIGMAS, 0.2, 0.2, 0.1, 0.1, 0.7)
     for overlap, expected in ((0.0, 0.001), (1.0, 0.999)):
         assert context_of(ROOM_INDEX, SCAN, min_overlap=overlap).gates["least_overlap"][0] == pytest.approx(expected)
+
+
+def along_rays(walls: int) -> MapIndex:
+    """Return a hall of 40 m with so many short walls along its middle, which rays along it pass and do not meet."""
+    rng = np.random.default_rng(0)
+    hall = np.array([[0.0, 0.0, 40.0, 0.0], [40.0, 0.0, 40.0, 4.0], [40.0, 4.0, 0.0, 4.0], [0.0, 4.0, 0.0, 0.0]])
+    middles = np.stack([rng.uniform(5.0, 35.0, walls), rng.uniform(1.5, 2.5, walls)], axis=1)
+    half = np.array([0.005, 0.0])
+    return index_of(np.vstack([hall, np.hstack([middles - half, middles + half])]))
+
+
+def test_rays_are_not_followed_along_more_walls_than_can_be_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bound grows with the rays, with how far they go, and with the walls in one place."""
+    monkeypatch.setattr("association.context.MOST_LOOKED_AT", 1_000)  # where it is told what a ray passes
+    few, many = along_rays(100), along_rays(10_000)
+    near = scan_of([[1.0, -1.0, 1.0, 1.0]], viewpoint=(0.0, 0.0))
+    far = scan_of([[30.0, -1.0, 30.0, 1.0]], viewpoint=(0.0, 0.0))
+    looks = [context_of(index, scan).looks for index, scan in product((few, many), (near, far))]
+    assert looks[0] < looks[1]
+    assert looks[2] < looks[3]
+    assert 20.0 * looks[1] < looks[3]
+    blind = scan_of([[30.0, -1.0, 30.0, 1.0]], viewpoint=None)
+    assert context_of(many, blind).looks < looks[3]
+    monkeypatch.setattr("association.context.MOST_LOOKED_AT", looks[2])
+    assert [context_of(many, scan).can_look for scan in (near, far)] == [True, False]
+    assert context_of(many, far).too_late_to_look
+
+
+def test_in_a_map_of_a_building_all_rays_are_followed() -> None:
+    assert context_of(ROOM_INDEX, scan_of(ENDS, viewpoint=(0.0, 0.0), beams=BEAMS)).can_look

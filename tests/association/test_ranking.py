@@ -5,21 +5,24 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from association import Beams, CancelledError, Deadline, HardPrior, MapIndex, Prior, SoftPrior, ranking
+from association import Beams, CancelledError, Deadline, HardPrior, MapIndex, Prior, SoftPrior, associate, ranking
 from association import explain as explaining
 from association.candidates import Candidates, find_candidates
 from association.context import SearchContext
 from association.explain import search_and_explain
-from association.layout import FOUND
-from association.ranking import Ranked, rank_candidates
+from association.kernels.beams import weigh_beams
+from association.layout import ESTIMATE, FOUND, record
+from association.ranking import Ranked, beam_evidence_at, rank_candidates
 from association.sight import missing_segments
+from association.tables import Place, Rays
 from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LATE_FINALISTS, LEAST_DISTINCT, MOST_BEAMS
 from registration import RigidTransform
-from registration.layout import Floats
+from registration.layout import Floats, Records
 
 from .answers import explanations_of, ranked
 from .records import rays_of
@@ -294,3 +297,45 @@ def test_what_the_deadline_leaves_unranked_is_said(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(explaining, "find_candidates", lambda context, effort: candidates)
     assert search_and_explain(context).search.complete
     assert not search_and_explain(late).search.complete
+
+
+@pytest.mark.parametrize("beams", [True, False])
+def test_where_no_ray_can_be_followed_the_answer_is_not_usable(beams: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pose is that of the segments; what speaks against it nobody looked at."""
+    index = index_of(ROOM)
+    scan = scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE) if beams else None)
+    assert associate(index, scan).usable
+    monkeypatch.setattr("association.context.MOST_LOOKED_AT", 1)
+    found = associate(index, scan)
+    assert found.pose is not None
+    assert same_pose(found.pose, INSIDE, 1e-3, 1e-3)
+    assert (found.usable, found.search.complete, found.reasons[0].code) == (False, False, "search_incomplete")
+    [warning] = [one for one in found.warnings if one.code == "search_incomplete"]
+    assert "walls lie in one place of the map" in warning.message
+
+
+def test_the_clock_is_looked_at_between_the_beams_of_some_poses(monkeypatch: pytest.MonkeyPatch) -> None:
+    index = index_of(equal_rooms(3))
+    context = context_of(index, scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE)))
+    poses = np.concatenate([room_estimate(index, k) for k in range(3)])
+    whole = beam_evidence_at(context, poses.copy(), 60, 2)
+    calls: list[int] = []
+
+    def counted(rays: Rays, some: Records, place: Place, refined: int, *rest: Any) -> None:
+        calls.append(len(some))
+        weigh_beams(rays, some, place, refined, *rest)
+
+    monkeypatch.setattr(ranking, "weigh_beams", counted)
+    monkeypatch.setattr(ranking, "MOST_LOOKED_AT", 1.5 * context.looks)
+    np.testing.assert_array_equal(beam_evidence_at(context, poses.copy(), 60, 2), whole)
+    assert calls == [1, 1, 1]
+    late = replace(context, deadline=Deadline(at=0.0))
+    evidence = beam_evidence_at(late, poses.copy(), 60, 2)
+    assert evidence[0] == whole[0]
+    assert not evidence[1:]["read"].any()
+
+
+def room_estimate(index: MapIndex, k: int) -> Records:
+    """Return the pose in the k-th of some equal rooms, (1,) of `ESTIMATE`."""
+    at = local(index, room(k))
+    return record(ESTIMATE, x=at.x, y=at.y, theta=at.theta)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -86,12 +87,13 @@ def test_what_is_far_behind_is_no_twin() -> None:
     model = as_model({"solitude": [1.0], "root_count": [1.0]})
     standing = Standing(Status.AMBIGUOUS, True, False, elsewhere=False, thin=False, twin=False)
 
-    def codes_at(lead: float) -> list[str]:
-        told = reasons_of(standing, USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0), model)
-        return [reason.code for reason in told]
+    def codes_at(lead: float, *, alone: bool = False) -> list[str]:
+        features = USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0)
+        return [reason.code for reason in reasons_of(replace(standing, alone=alone), features, model)]
 
     assert codes_at(NO_TWIN) == ["twin", "too_little"]
     assert codes_at(NO_TWIN + 0.01) == ["too_little"]
+    assert codes_at(NO_TWIN, alone=True) == ["too_little"]
 
 
 def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:

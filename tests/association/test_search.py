@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from association import HardPrior, Status
+from association import AssociationOptions, Deadline, HardPrior, Status, associate
 from registration import RigidTransform
 
 from .scenes import (
     INSIDE,
     ROOM,
     answer_of,
+    equal_rooms,
     index_of,
     maze,
     pose,
@@ -246,3 +248,19 @@ def test_results_are_values() -> None:
     result = answer_of(ROOM_INDEX, scan_of(seen(ROOM, INSIDE)[0]))
     with pytest.raises(dataclasses.FrozenInstanceError):
         result.usable = False  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("exhaustive", [True, False])
+def test_what_a_search_claims_holds_only_where_it_is_complete(exhaustive: bool) -> None:
+    """Whenever the deadline passes: while poses are looked for, while they are compared, and after that."""
+    options = AssociationOptions(exhaustive=exhaustive)
+    index, scan = index_of(equal_rooms(6)), scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
+    took: set[bool] = set()
+    for tenths in range(0, 60, 2):
+        search = associate(index, scan, None, options, Deadline(time.monotonic() + 1e-4 * tenths)).search
+        took.add(search.complete)
+        assert search.complete or not search.exhaustive
+        assert search.complete is (search.rivals_above < 1.0)
+    whole = associate(index, scan, None, options).search
+    assert (whole.complete, whole.exhaustive or not exhaustive) == (True, True)
+    assert False in took

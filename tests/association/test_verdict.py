@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from association import (
+    AssociationOptions,
     Deadline,
     HardPrior,
     Reason,
@@ -33,6 +34,7 @@ from .judged import AROUND, BESIDE, LIKELY, PLAIN, SOFT, Drawn, Numbers, crossin
 from .scenes import INSIDE, ROOM, equal_rooms, index_of, pose, same_pose, scan_of, seen
 
 SURE = {name: {"constant": [30.0]} for name in PLAIN}  # by which every answer is right
+THROUGH = AssociationOptions(exhaustive=True)
 BARS = {"USABLE_PROBABILITY": 0.7, "USABLE_CAUTIOUS": 0.6, "USABLE_CAUTIOUS_WITH_BEAMS": 0.9}
 
 
@@ -83,6 +85,17 @@ def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
     assert got.probability == pytest.approx(0.5)
     assert "twin" in [reason.code for reason in got.reasons]
+
+
+def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
+    """By a prior that likes the place little, it leads by less than twins do, but there is none."""
+    best, other = ranked(9.0, prior=-4.0), ranked(8.0, prior=-4.0, at=pose(9.0, 9.0))
+    with judged_by({**SURE, "cautious": {"constant": [-1.5], "lead": [0.2]}}):
+        alone, beside = (judge(room(), explanations_of(answer_with(best), *others)) for others in ((), (other,)))
+    assert alone.status is beside.status is Status.AMBIGUOUS
+    assert (alone.margin, beside.margin) == (None, 1.0)
+    assert [reason.code for reason in alone.reasons] == ["too_little"]
+    assert [reason.code for reason in beside.reasons] == ["twin"]
 
 
 def test_the_probability_is_that_for_scans_of_the_map() -> None:
@@ -244,14 +257,15 @@ def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypa
         deadline.at = 0.0
         return compared(*arguments)
 
-    in_time = associate(index, sent, None, deadline=Deadline(time.monotonic() + 60.0))
+    in_time = associate(index, sent, None, THROUGH, Deadline(time.monotonic() + 60.0))
     assert in_time.usable
-    assert in_time.search.complete
+    assert (in_time.search.complete, in_time.search.exhaustive) == (True, True)
+    assert in_time.search.rivals_above < 1.0
     monkeypatch.setattr(module, during, late)
-    got = associate(index, sent, None, deadline=deadline)
+    got = associate(index, sent, None, THROUGH, deadline)
     assert deadline.at == 0.0
     assert not got.usable
-    assert not got.search.complete
+    assert (got.search.complete, got.search.exhaustive, got.search.rivals_above) == (False, False, 1.0)
     assert got.pose == in_time.pose
     assert got.reasons[0].code == "search_incomplete"
     assert "search_incomplete" in [warning.code for warning in got.warnings]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from association import InvalidSearchError, Scan, Status, View, assemble, mirrored
+from association import Deadline, InvalidSearchError, Scan, Status, View, assemble, mirrored
 from association.alignment import aligned
 from association.explain import search_and_explain
 from association.features import features_of, weigh
@@ -181,7 +181,7 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
     together = assemble(views).views
     assert together is not None
     shown, variance = on_walls(rng, together), 0.02**2
-    settled = shown.settle(pose(), variance)
+    settled = shown.settle(pose(), variance, Deadline())
     assert same_pose(settled.pose, pose(), 1e-9, 1e-9)
     rows, by_pose, by_views, noise = [], [], [], []
     for one, wall in zip(shown.seen, shown.walls, strict=True):
@@ -245,12 +245,12 @@ def test_views_are_laid_on_one_another_where_their_walls_are_one() -> None:
     true = pose(-1.0, 0.3, 0.2)
     off = pose(-0.95, 0.24, 0.23)
     scan = assemble([view_at(pose()), view_at(off, true, np.diag([0.05**2, 0.05**2, 0.03**2]))])
-    found = aligned(scan).views
+    found = aligned(scan, Deadline()).views
     assert found is not None
     assert same_pose(found.poses[1], true, 0.02, 0.005)
     assert np.sqrt(np.diag(found.covariance)[3:5]).max() < 0.02
     exact = assemble([view_at(pose()), view_at(true)])
-    assert aligned(exact) is exact
+    assert aligned(exact, Deadline()) is exact
 
 
 def test_the_errors_of_views_are_found_beside_the_pose() -> None:
@@ -264,7 +264,7 @@ def test_the_errors_of_views_are_found_beside_the_pose() -> None:
     answer = search_and_explain(context_of(INDEX, scan)).answer
     assert answer is not None
     assert answer.settled.views is not None
-    views = corrected(aligned(scan), answer.settled.views.found, answer.settled.views.spread).views
+    views = corrected(aligned(scan, Deadline()), answer.settled.views.found, answer.settled.views.spread).views
     assert views is not None
     assert same_pose(views.poses[1], true, 0.02, 0.005)
 

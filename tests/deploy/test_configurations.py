@@ -42,7 +42,7 @@ def test_compose_names_what_it_uses() -> None:
     for service in services.values():
         assert set(service["secrets"]) <= set(document["secrets"])
         named = {volume.split(":")[0] for volume in service.get("volumes", ())}
-        assert named <= set(document["volumes"])
+        assert named <= {*document["volumes"], "../secrets/keys"}
     for secret in document["secrets"].values():
         assert (DEPLOY / secret["file"]).resolve().parent == ROOT / "secrets"
     linefix = services["linefix"]
@@ -133,6 +133,61 @@ def test_a_proxy_stands_in_front(
             assert client.put("/v1/maps/m", json=examples.MAP, headers=bearer).json()["code"] == "forbidden"
             assert client.post("/v1/associate", content=b" " * 34_000_000, headers=bearer).status_code == 413
             assert client.get("/metrics").status_code == 200  # from here
+    finally:
+        process.terminate()
+        process.wait(60)
+
+
+@pytest.mark.parametrize("proxy", [nginx, caddy])
+def test_no_way_of_writing_a_path_passes_its_rule(
+    proxy: Callable[[int, int, Path], list[str]], service: RunningService, tmp_path: Path
+) -> None:
+    """Class of attack: two that read one path differently."""
+    if shutil.which(proxy.__name__) is None:
+        pytest.skip(f"no {proxy.__name__}")
+    port = free_port()
+    command = proxy(service.port, port, tmp_path)
+    (written,) = [path for path in (tmp_path / "nginx.conf", tmp_path / "Caddyfile") if path.exists()]
+    rule = "allow 127.0.0.1;" if proxy is nginx else "not remote_ip 127.0.0.1"
+    text = written.read_text()
+    assert rule in text
+    written.write_text(text.replace(rule, ""))  # as from elsewhere
+    with (tmp_path / "proxy.log").open("wb") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=log)
+    try:
+        with httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=False, timeout=60) as client:
+            until(lambda: _answers(client))
+            assert client.get("/metrics").status_code == 403
+            controls = (
+                "%0A",
+                "%0D%0A",
+                "%00",
+                "%09",
+                "%7F",
+                "%C2%85",
+                "%E2%80%A8",
+                "%23",
+                "%3F",
+                "%2F",
+                "/",
+                ";x",
+                "%20",
+            )
+            paths = [f"/metrics{control}" for control in controls]
+            paths += [
+                "//metrics",
+                "/./metrics",
+                "/x/../metrics",
+                "/x/%2e%2e/metrics",
+                "/%6detrics",
+                "/METRICS",
+                "/%0A/metrics",
+                "/metrics#x",
+            ]
+            for path in paths:
+                answer = client.get("/", extensions={"target": path.encode()})  # as it stands there
+                assert answer.status_code in (400, 403, 404), path
+                assert "linefix_" not in answer.text, path
     finally:
         process.terminate()
         process.wait(60)

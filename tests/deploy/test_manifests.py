@@ -110,7 +110,8 @@ def test_compose_file_is_valid() -> None:
     services = compose()["services"]
     assert set(services) == {"linefix", "postgres", "nginx", "prometheus", "grafana"}
     mounted = [volume.split(":")[0] for service in services.values() for volume in service.get("volumes", [])]
-    assert [one for one in mounted if one not in compose()["volumes"] and not (REPLICAS / one).exists()] == []
+    there = {*compose()["volumes"], "../../secrets/keys"}  # the latter is made by who runs it
+    assert [one for one in mounted if one not in there and not (REPLICAS / one).exists()] == []
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from formats import (
     LoggedScan,
     LogOptions,
     MalformedFileError,
+    UnsupportedFormatError,
     read_log,
     read_map,
 )
@@ -309,3 +310,17 @@ def test_what_is_no_log_is_refused(tmp_path: Path, name: str, message: str) -> N
     (tmp_path / "a.log").write_bytes(b"PARAM a b\n")
     with pytest.raises(FormatError, match=message):
         scans_of(tmp_path / name)
+
+
+@pytest.mark.parametrize("folder", ["100%", "a%2f..", "what?", "no#1"])
+def test_a_path_that_sqlite_takes_for_another_is_refused(tmp_path: Path, folder: str) -> None:
+    """Class of attack: path traversal. SQLite is given a URI, of which these signs are no part of the path."""
+    bag = Recorder("sqlite3", tmp_path)
+    bag.scan(SECOND)
+    path = bag.done().rename(tmp_path / folder)
+    for one in (path, next(path.glob("*.db3"))):
+        with pytest.raises(UnsupportedFormatError, match="rename it"):
+            list(read_log(one))
+    bag = Recorder("mcap", path)
+    bag.scan(SECOND)
+    assert len(list(read_log(bag.done()))) == 1

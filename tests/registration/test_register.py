@@ -277,6 +277,38 @@ def test_no_weight_and_no_sigma_breaks_a_number(sigma: float, weights: Any, esti
     assert result.covariance is None or np.isfinite(result.covariance).all()
 
 
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize(("dx", "dy", "size"), [(1, 0, 1), (3, 4, 5), (-12, 5, 13), (0, -1, 1), (-8, -15, 17)])
+@pytest.mark.parametrize("away", [(0, 0), (3_000, -2_000), (500_000, 5_400_000)])
+@pytest.mark.parametrize("along", [0, 1_000, -400_000])
+@pytest.mark.parametrize("across", [0.0, 2.0**-6, 1.0])
+def test_ambiguity_of_parallel_lines_keeps_its_digits_far_out(
+    estimator: Estimator, dx: int, dy: int, size: int, away: tuple[int, int], along: int, across: float
+) -> None:
+    """The pose that is told may be far from the one that is asked about, and fits as well.
+
+    All coordinates are exact, so that the answer is: each of three lines is off by as much as the pose is, across them.
+    """
+    offsets = np.array([0.0, -8.0, 3.0])
+    ends = np.stack([np.array([0.0, 6.0, -2.0]), offsets, np.array([4.0, 9.0, -7.0]), offsets], axis=1)
+    turned = np.array([[dx, dy], [-dy, dx]])  # times `size`
+    on_map = (ends.reshape(-1, 2) @ turned + away).reshape(-1, 4)
+    scan = MeasuredSegments.from_segments(Segments.from_array(size * ends))
+    x, y = np.array(away) + np.array([along, across]) @ turned
+    at = RigidTransform(x, y, math.atan2(dy, dx))
+    options = RegistrationOptions(estimator, weights=[1.0] * 3, evaluate_at=at)
+    found = register(Segments.from_array(on_map), scan, diagonal(3), 0.0, options)
+    assert found.unobservable is not None
+    assert found.diagnostics.ambiguity_at is not None
+    expected = 3.0 * (across * size) ** 2
+    assert found.diagnostics.ambiguity_at.translation == pytest.approx(expected, rel=1e-7, abs=1e-15)
+    # Seen from where the frames of map and scan lie far from one another along the lines.
+    there = (ends.reshape(-1, 2) @ turned + np.array([along, across]) @ turned).reshape(-1, 4)
+    scan = MeasuredSegments.from_segments(Segments.from_array((ends.reshape(-1, 2) @ turned).reshape(-1, 4)))
+    before = register(Segments.from_array(there), scan, diagonal(3), 0.0, options).diagnostics.ambiguity_before
+    assert before.translation == pytest.approx(expected, rel=1e-7, abs=1e-15)
+
+
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
 def test_wrong_pairs_are_not_usable(weighting: Weighting) -> None:
     map_segments, scan = room()

@@ -10,10 +10,19 @@ function body(): string | null {
   return made ? JSON.stringify(made.asked) : null;
 }
 
-const quoted = (text: string) => `'${text.replaceAll("'", `'\\''`)}'`;
+// Text of an opened file may be part of the request, and the user may paste it into any shell. cmd.exe has no single
+// quotes, and PowerShell reads typographic ones as such. So every character with a meaning to a shell is escaped.
+const UNSAFE = /[^A-Za-z0-9{}[\]",:.+\-_\\/]/g;
+const escaped = (c: string) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`;
+const plain = (json: string) => json.replace(/\\(["\\])/g, (_, c: string) => escaped(c)).replace(UNSAFE, escaped);
 
 function asCurl(json: string): string {
-  return `curl -s ${location.origin}/v1/associate -H 'Content-Type: application/json' -d ${quoted(json)}`;
+  return `curl -s ${location.origin}/v1/associate -H "Content-Type: application/json" -d '${plain(json)}'`;
+}
+
+function asPowerShell(json: string): string {
+  const to = `-Method Post -Uri '${location.origin}/v1/associate' -ContentType 'application/json'`;
+  return `Invoke-RestMethod ${to} -Body '${plain(json)}'`;
 }
 
 function asPython(json: string): string {
@@ -21,7 +30,7 @@ function asPython(json: string): string {
     "import json",
     "import urllib.request",
     "",
-    `asked = json.loads(${JSON.stringify(json)})`,
+    `asked = json.loads(${JSON.stringify(plain(json))})`,
     `request = urllib.request.Request("${location.origin}/v1/associate", json.dumps(asked).encode(), {"Content-Type": "application/json"})`,
     "answer = json.load(urllib.request.urlopen(request))",
     'print(answer["status"], answer["usable"], answer["pose"])',
@@ -43,6 +52,7 @@ function copying(id: string, form: (json: string) => string): void {
 }
 
 copying("#curl", asCurl);
+copying("#powershell", asPowerShell);
 copying("#python", asPython);
 document.querySelector("#download")!.addEventListener("click", () => {
   const json = body();

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..inputs import read_map_or_id, read_scan
-from ..logs import Topic, opened, print_notes, scans_of, spread
+from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Server
 from ..printing import print_json, print_rows
 from ..service import Json, answering
@@ -25,11 +27,12 @@ def check(
         Path | None, typer.Option(metavar="FILE", help=f"A bag or a CARMEN log; {SAMPLES} of its scans are taken.")
     ] = None,
     topic: Topic = None,
+    tf_namespace: TfNamespace = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
     """Say what is doubtful in a map; beside scans taken there, also whether they fit better mirrored, scaled, moved."""
-    samples = [read_scan(name) for name in scan or []] + ([] if log is None else samples_of(log, topic))
+    samples = [read_scan(name) for name in scan or []] + ([] if log is None else samples_of(log, topic, tf_namespace))
     with answering(server) as service:
         answer = service.check(read_map_or_id(on), {"scans": samples} if samples else None)
     if as_json:
@@ -38,15 +41,19 @@ def check(
         print_rows(check_rows(answer))
 
 
-def samples_of(log: Path, topic: str | None) -> list[Json]:
-    """Return some scans of a log, spread over all of it; raises `RefusedError` when it cannot be read.
+def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) -> list[Json]:
+    """Return some scans of a log, spread over all of it; print on stderr what was made of the log.
 
-    Assumptions and omissions are printed on stderr.
+    Raises
+    ------
+    RefusedError
+        When it cannot be read.
     """
-    source = opened(log, topic)
-    found = list(scans_of(source))
-    print_notes(source)
-    return [one.scan for one in spread(found, SAMPLES)]
+    source = opened(log, options_of(topic, tf_namespace))
+    taken = spread(list(scans_of(source)), SAMPLES)
+    print_notes(source, sys.stderr)
+    # The mount does not matter to the map; an unknown motion would only loosen the fit.
+    return [sent(replace(one, mount=None, time_increment=0.0)) for one in taken]
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:

@@ -49,6 +49,12 @@ class SaidOfFile:
         False
     )
     topic: Annotated[str | None, typer.Option(help="Of the grid in a bag.")] = None
+    unknown: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GREY", help="Grey value of the unknown cells of a picture, 0 to 255; none: no such cells."
+        ),
+    ] = None
 
     @property
     def fields(self) -> Fields:
@@ -60,6 +66,7 @@ class SaidOfFile:
             "directions": self.directions,
             "local_metres": "true" if self.local_metres else None,
             "topic": self.topic,
+            "unknown": self.unknown,
         }
         found: dict[str, list[str]] = {name: [str(value)] for name, value in once.items() if value is not None}
         found |= {"layers": self.layers} if self.layers else {}

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
-import time
 from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from association import Deadline
-
-from ...admission.errors import DeadlinePassedError
-from ...importing.bounded import ReadMap, read_apart
-from ...importing.bounds import Bounds
+from ...importing.bounded import read_apart
 from ...parsing.reading import read_model
 from ...schemas.imports import FORM as SCHEMA
 from ...schemas.imports import ImportAnswer
 from ...schemas.parts import InlineMap
-from ...work.importing import answer_import
+from ...work.importing import answer_import, index_import
 from ...work.job import Done, Job
 from ..bodies import FORM
 from ..exchange import Exchange, searching
@@ -52,26 +46,15 @@ async def post_import(request: Request) -> Response:
 
 
 async def _work(exchange: Exchange, content: bytearray, content_type: str, job: Job) -> Done:
-    """Read the files in one turn at the gate, and check what came of them in another."""
-    services = exchange.services
-    settings = services.settings
-    bounds = Bounds(settings.max_import_bytes, settings.max_body_bytes, settings.max_map_segments)
-    read = await _alone(exchange, partial(read_apart, content, content_type, bounds, job.deadline), job.deadline)
+    """Read the files and index what came of them in turns of other kinds than a search's, and check it in one of these.
+
+    Meanwhile searches have all the slots at the gate.
+    """
+    services, deadline = exchange.services, job.deadline
+    reading = partial(read_apart, content, content_type, services.import_bounds, deadline)
+    read = await exchange.take_other_turn(services.importing, reading, deadline)
     job.watch.lap("read")
-    line_map = await exchange.parse(partial(read_model, InlineMap), read.map, job.deadline)
-    check = partial(answer_import, services.lookup, line_map, read, job)
-    return await exchange.take_turn(check, job.deadline, job.searching.is_set)
-
-
-async def _alone(exchange: Exchange, read: partial[ReadMap], deadline: Deadline) -> ReadMap:
-    """Read one map at a time: each may take much memory."""
-    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
-    try:
-        async with asyncio.timeout(left):
-            await exchange.services.imports.acquire()
-    except TimeoutError:
-        raise DeadlinePassedError from None
-    try:
-        return await exchange.take_turn(read, deadline)
-    finally:
-        exchange.services.imports.release()
+    line_map = await exchange.parse(partial(read_model, InlineMap), read.map, deadline)
+    indexing = partial(index_import, services.lookup, line_map, deadline)
+    index = await exchange.take_other_turn(services.indexing, indexing, deadline)
+    return await exchange.take_turn(partial(answer_import, index, line_map, read, job), deadline)

@@ -58,7 +58,7 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     services = exchange.services
     asked, document = await exchange.read(read_map)
     outline = await services.parse_threads.run(partial(outline_of, asked))
-    put = partial(services.store.put, map_id, document, outline, demands)
+    put = partial(services.store.put, map_id, document, outline, demands, exchange.maps)
     revision, created = await ask_store(services, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})

@@ -173,6 +173,7 @@ def test_a_view_is_what_stands_there() -> None:
     here = RigidTransform(4.0, 3.0, 0.7)
     at = RigidTransform(here.x - index.origin[0], here.y - index.origin[1], here.theta)
     view = look_about(Looker(index), at)
+    assert view is not None
     assert len(view.segments) >= 7
     back = here.apply(view.segments.reshape(-1, 2, 2)).reshape(-1, 4)
     for seen, wall in zip(back, view.walls, strict=True):

@@ -100,6 +100,23 @@ def test_a_map_that_is_not_to_scale(factor: float) -> None:
     assert said == pytest.approx(factor, rel=0.004)
 
 
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (25.4, "millimetres taken for inches"),
+        (1.0 / 25.4, "inches taken for millimetres"),
+        (100.0, "centimetres taken for metres"),
+        (1.0 / 0.0254, "inches taken for metres"),
+        (1e-3, "metres taken for millimetres"),
+    ],
+)
+def test_a_map_of_another_unit(factor: float, said: str) -> None:
+    report = told(faces() * factor)
+    assert codes(report) == ["scale"]
+    assert f"divide the map by {factor:.4g}," in report.findings[0].message
+    assert said in report.findings[0].message
+
+
 @pytest.mark.parametrize("drawn", [0.04, 0.1, 0.35])
 def test_walls_too_thick_or_too_thin_are_no_scale(drawn: float) -> None:
     """A room between them is too large or too small by as much, whatever its size."""

@@ -81,6 +81,21 @@ def joined(measured: MeasuredSegments, labels: list[int] | None = None) -> Recor
     return scans.join_labelled(given_of(measured), order, of_line, measured.counted)
 
 
+def test_union_length() -> None:
+    lows, highs = np.array([3.0, 0.0, 0.5, 3.0, 9.0]), np.array([4.0, 2.0, 1.0, 5.0, 9.5])
+    assert [scans.union_length(lows, highs, count) for count in range(6)] == [0.0, 1.0, 3.0, 3.0, 4.0, 4.5]
+
+
+@given(SEEDS)
+@settings(max_examples=100, deadline=None)
+def test_union_length_of_many(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lows = rng.integers(0, 40, 12).astype(float)
+    highs = lows + rng.integers(0, 9, 12).astype(float)
+    cells = {x for low, high in zip(lows, highs, strict=True) for x in range(int(low), int(high))}
+    assert scans.union_length(lows, highs, 12) == len(cells)
+
+
 @given(SEEDS)
 @settings(max_examples=150, deadline=None)
 def test_collinear_segments(seed: int) -> None:

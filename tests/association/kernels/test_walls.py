@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from association.kernels import walls
 from association.layout import ENDS, GRID_SHAPE, POINT, as_records, record
 from association.tuning import MOST_LOOKS, RUN_GAP
+from association.walls import collinear_groups
 from registration import Segments
 from registration.layout import Floats, Records
 
@@ -24,7 +25,7 @@ SHAPE = record(GRID_SHAPE, x0=-7.3, y0=-9.1, cell=1.7, columns=27, rows=29)  # h
 
 def labels_of(ends: Floats, gap: float, lateral: float, angle: float) -> list[int]:
     directions = as_records(POINT, Segments.from_array(ends).directions)
-    return walls.collinear_groups(as_records(ENDS, ends), directions, gap, lateral, math.cos(angle)).tolist()
+    return collinear_groups(as_records(ENDS, ends), directions, gap, lateral, math.cos(angle)).tolist()
 
 
 def continued(rng: np.random.Generator) -> Floats:
@@ -103,7 +104,7 @@ def test_one_piece_is_compared_with_so_many() -> None:
 
 
 def test_no_pieces() -> None:
-    assert walls.collinear_groups(np.zeros(0, ENDS), np.zeros(0, POINT), 0.3, 0.03, 0.9).tolist() == []
+    assert collinear_groups(np.zeros(0, ENDS), np.zeros(0, POINT), 0.3, 0.03, 0.9).tolist() == []
 
 
 def turned_maze(seed: int) -> Floats:

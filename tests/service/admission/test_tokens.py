@@ -144,7 +144,7 @@ def test_a_keyring_fetches_the_keys_of_its_issuer(tmp_path: Path) -> None:
     sent = [(b"authorization", b"Bearer " + issuing.token().encode())]
     with pytest.raises(UnknownKeyError):
         ring.grant(sent)
-    ring.refresh()
+    ring.refresh_tokens()
     assert ring.grant(sent).roles == {Role.ASSOCIATE}
 
 
@@ -213,7 +213,6 @@ def test_an_issuer_that_is_away_leaves_its_keys(monkeypatch: pytest.MonkeyPatch)
         # Elsewhere may be before and after it in the order of addresses.
         for text, elsewhere in (
             ("nothing", ""),
-            ('{"keys": []}', ""),
             *((Issuing().key_set(), to) for to in ("/other", "/A")),
         ):
             site.text, site.elsewhere = text, elsewhere

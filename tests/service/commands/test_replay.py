@@ -7,10 +7,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from registration import RigidTransform
+from service.commands.locators import Found
 from service.commands.tracking import LOST, Tracker
 from tests.association.checking.drawn import faces
 from tests.running import RunningService
@@ -101,9 +103,9 @@ def test_what_cannot_be_replayed(
     assert said in refused(linefix("replay", *arguments), code)
 
 
-def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = None) -> dict[str, Any]:
-    warnings = [] if warning is None else [{"code": warning, "message": ""}]
-    return {"usable": usable, "pose": {"x": pose.x, "y": pose.y, "theta": pose.theta}, "warnings": warnings}
+def answer(pose: RigidTransform, *, usable: bool = True, warning: str | None = None) -> Found:
+    warnings = [] if warning is None else [warning]
+    return Found("ok", usable, 0.9, pose, None, [], warnings, {})
 
 
 def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
@@ -115,11 +117,11 @@ def test_a_prior_follows_the_last_usable_pose_by_odometry() -> None:
     tracker.learn(answer(at), before)
     prior = tracker.prior(after)
     assert prior is not None
-    assert [round(prior[name], 9) for name in ("x", "y", "theta")] == [3.0, 1.2, 0.9]
+    assert [round(value, 9) for value in (prior.pose.x, prior.pose.y, prior.pose.theta)] == [3.0, 1.2, 0.9]
     tracker.learn(answer(at, usable=False), after)
     again = tracker.prior(after)
     assert again is not None
-    assert again["covariance"][0] == pytest.approx(prior["covariance"][0])
+    np.testing.assert_allclose(again.covariance, prior.covariance)
     tracker.learn(answer(at, warning="prior_contradicted"), after)
     assert tracker.prior(after) is None
 
@@ -133,7 +135,7 @@ def test_what_is_known_gets_less_with_the_way_and_ends() -> None:
         prior = tracker.prior(RigidTransform(float(k % 2), 0.0, 0.0))  # to and fro
         if prior is None:
             break
-        sigmas.append(math.sqrt(prior["covariance"][0][0]))
+        sigmas.append(math.sqrt(prior.covariance[0][0]))
     assert sigmas == sorted(sigmas)
     assert LOST - 0.2 < sigmas[-1] <= LOST
     tracker.learn(answer(here), here)

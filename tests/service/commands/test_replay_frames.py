@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
+from formats import LoggedScan
 from registration import RigidTransform
-from service.commands.frames import Frames
-from service.commands.logs import ReplayedScan
+from service.commands.errors import RefusedError
+from service.commands.frames import Frames, odometry_of
 from service.commands.replay import HOPELESS
 from tests.association.checking.drawn import faces
+from tests.running import RunningService
+from vectorization import LaserScan
 
 from .drives import write_log
 from .running import Ended, Linefix, refused
@@ -81,35 +84,40 @@ def test_without_a_mount_they_are_those_of_the_laser(
     assert "--mount X Y THETA would give those of the robot" in ended.err
 
 
-def test_a_scan_that_is_refused_is_a_row_and_the_replay_goes_on(linefix: Linefix, folder: Path) -> None:
+def test_a_scan_that_a_server_refuses_is_a_row_and_the_replay_goes_on(
+    linefix: Linefix, folder: Path, start_service: Callable[..., RunningService]
+) -> None:
     rows = (folder / "drive.log").read_text().splitlines()
     words = rows[2].split()
     beams = int(words[8])
     rows[2] = " ".join([*words[:4], "0.01", *words[5:8], str(beams + 9), *["1.0"] * 9, *words[9:]])
     (folder / "drive.log").write_text("\n".join(rows) + "\n")
-    found = lines(linefix(*ASKED, "--json", LINEFIX_MAX_BEAMS=str(beams)))
+    asked = (*ASKED, "--server", start_service(max_beams=beams).url)
+    found = lines(linefix(*asked, "--json"))
     assert [line["error"] is None for line in found] == [True, False, True, True]
     assert (found[1]["status"], found[1]["usable"], found[1]["pose"]) == (None, False, None)
     assert "ranges" in found[1]["error"]
-    told = linefix(*ASKED, LINEFIX_MAX_BEAMS=str(beams))
+    told = linefix(*asked)
     assert told.code == 0
     assert "refused" in told.out
     assert "25.0 %" in told.out
 
 
-def test_where_every_scan_is_refused_so_is_the_log(linefix: Linefix) -> None:
-    ended = linefix(*ASKED, "--json", LINEFIX_MAX_BEAMS="100")
+def test_where_a_server_refuses_every_scan_so_is_the_log(
+    linefix: Linefix, folder: Path, start_service: Callable[..., RunningService]
+) -> None:
+    asked = (*ASKED, "--server", start_service(max_beams=100).url, "--json")
+    ended = linefix(*asked)
     assert [line["usable"] for line in lines(ended, 3)] == [False] * SCANS
-    assert "linefix: at most 100 ranges" in ended.err
-
-
-def test_a_map_that_is_refused_ends_it_soon(linefix: Linefix, folder: Path) -> None:
+    assert "at most 100 ranges" in ended.err
     write_log(folder / "drive.log", HOPELESS + 5)
-    ended = linefix(*ASKED, "--json", LINEFIX_MAX_MAP_SEGMENTS="10")
-    assert len(lines(ended, 3)) == HOPELESS - 1
-    assert "linefix: at most 10 map segments" in ended.err
+    assert len(lines(linefix(*asked), 3)) == HOPELESS - 1
+
+
+def test_a_map_that_is_refused_ends_it_at_once(linefix: Linefix, folder: Path) -> None:
+    assert "at most 10 map segments" in refused(linefix(*ASKED, "--json", LINEFIX_MAX_MAP_SEGMENTS="10"), 3)
     (folder / "broken.json").write_text('{"segments": [[0, 0, 0, 0]]}')
-    assert "/map/segments/0" in refused(linefix("replay", "drive.log", "--map", "broken.json"), 3)
+    assert "/segments/0" in refused(linefix("replay", "drive.log", "--map", "broken.json"), 3)
 
 
 def test_what_comes_before_the_place_where_a_log_is_broken_counts(linefix: Linefix, folder: Path) -> None:
@@ -122,17 +130,28 @@ def test_what_comes_before_the_place_where_a_log_is_broken_counts(linefix: Linef
     assert "linefix: drive.log: line 6: expected at most" in ended.err
 
 
+def scan(mount: RigidTransform | None, pose: RigidTransform | None = None) -> LoggedScan:
+    laser = LaserScan(0.0, 0.1, [1.0, 1.0])
+    return LoggedScan(0, "/scan", "laser", laser, pose=pose, mount=mount, base_frame="base_link" if mount else "")
+
+
 def test_one_scan_without_a_mount_among_others_is_not_taken() -> None:
-    answer = {"pose": {"x": 1.0, "y": 2.0, "theta": 0.5}, "covariance": np.diag([1e-4, 4e-4, 1e-4]).tolist()}
-    frames = Frames.of(None)
-    told = frames.answer(ReplayedScan(0, {}, None, "laser", MOUNT, "base_link"), answer)
-    assert isinstance(told, dict)
-    expected = RigidTransform(1.0, 2.0, 0.5).compose(MOUNT.inverse())
-    assert_at(told, expected)
-    # The robot is farther from the laser along one axis than the other: its turn moves it so far.
-    away = math.hypot(expected.x - 1.0, expected.y - 2.0)
-    assert sum(told["covariance"][k][k] for k in (0, 1)) == pytest.approx(5e-4 + 1e-4 * away**2)
-    assert "does not say where laser was" in str(frames.answer(ReplayedScan(1, {}, None, "laser", None, ""), answer))
-    of_laser = Frames.of(None)
-    assert of_laser.answer(ReplayedScan(0, {}, None, "laser", None, ""), answer) is answer
-    assert of_laser.answer(ReplayedScan(1, {}, None, "laser", MOUNT, "base_link"), answer) is answer
+    frames = Frames(None)
+    assert frames.taken(scan(MOUNT)).mount == MOUNT
+    with pytest.raises(RefusedError, match="does not say where laser was"):
+        frames.taken(scan(None))
+    of_laser = Frames(None)
+    assert of_laser.taken(scan(None)).mount is None
+    assert of_laser.taken(scan(MOUNT)).mount is None
+    given = Frames(RigidTransform(1.0, 2.0, 3.0))
+    assert given.taken(scan(MOUNT)).mount == given.given
+    assert given.taken(scan(None)).mount == given.given
+
+
+def test_odometry_is_of_the_frame_whose_poses_are_located() -> None:
+    robot = RigidTransform(3.0, -1.0, 0.4)
+    found = odometry_of(scan(MOUNT, robot.compose(MOUNT)))
+    assert found is not None
+    assert (found.x, found.y, found.theta) == pytest.approx((robot.x, robot.y, robot.theta))
+    assert odometry_of(scan(None, robot)) == robot
+    assert odometry_of(scan(MOUNT)) is None

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import gzip
 import io
+import os
+import signal
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +18,8 @@ from ezdxf.filemanagement import new
 from PIL import Image
 
 from formats import read_map
-from tests.running import RunningService
+from service.schemas import examples
+from tests.running import RunningService, children_of, client_of, until
 from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
 
 URL = "/v1/maps:import"
@@ -88,6 +93,26 @@ def test_a_bomb_of_xml(client: httpx.Client) -> None:
     assert refused(answer, 422, "invalid_request").startswith("/files/0: declares XML entities")
 
 
+def test_an_encoding_that_nobody_knows(client: httpx.Client) -> None:
+    drawing = b'<?xml version="1.0" encoding="unknown-enc"?><svg xmlns="http://www.w3.org/2000/svg"/>'
+    answer = send(client, {"plan.svg": drawing}, ("units", "m"))
+    assert "encoding that is not known" in refused(answer, 422, "invalid_request")
+
+
+@pytest.mark.parametrize(("count", "status", "code"), [(8_000_000, 413, "too_large"), (1000, 422, "invalid_request")])
+def test_features_without_geometry(client: httpx.Client, count: int, status: int, code: str) -> None:
+    features = b'{"type": "FeatureCollection", "features": [' + b"{}," * count + b"{}]}"
+    refused(send(client, {"plan.geojson": features}, ("local_metres", "true")), status, code)
+
+
+def test_the_grey_value_of_unknown_cells(client: httpx.Client) -> None:
+    answer = send(client, room_grid(), ("unknown", "none"))
+    assert answer.status_code == 200, answer.text
+    assert {note["code"]: note["count"] for note in answer.json()["report"]["read"]}["unknown_cells"] == 0
+    answer = send(client, room_grid(), ("unknown", "grey"))
+    assert refused(answer, 422, "invalid_request").startswith("/unknown: expected none, or a grey value from 0 to 255")
+
+
 def test_a_format_that_is_not_read(client: httpx.Client) -> None:
     assert "ends in one of .yaml" in refused(send(client, {"a.dwg": b"AC1032"}), 415, "unsupported_media_type")
 
@@ -108,3 +133,19 @@ def test_a_body_is_held_to_what_every_body_is(client: httpx.Client, guarded: Run
     assert guarded.client.post(URL, content=bytes(form({})), headers=told).status_code == 401
     assert client.get(URL).status_code == 405
     assert client.get("/livez").status_code == 200
+
+
+def test_reading_files_takes_no_place_of_a_search(start_service: Callable[..., RunningService]) -> None:
+    """Class of attack: one key's long work in the only place. Others searched in what it left, 4 % of the time."""
+    running = start_service(searches=1, max_deadline_ms=600_000)
+    curves = b'<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0' + b" C1 1 2 2 3 3" * 200_000 + b'"/></svg>'
+    before = children_of(running.process.pid)
+    importing = threading.Thread(target=send, args=(running.client, {"a.svg": curves}))
+    importing.start()
+    with client_of(running.url) as client:
+        until(lambda: len(children_of(running.process.pid) - before) > 0)
+        assert running.count("linefix_searches_running") == 0
+        assert client.post("/v1/associate", json=examples.ASSOCIATE).status_code == 200
+        for child in children_of(running.process.pid) - before:
+            os.kill(child, signal.SIGKILL)
+    importing.join()

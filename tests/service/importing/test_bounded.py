@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import signal
+import subprocess
+import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from threading import Timer
 
+import orjson
 import pytest
 from PIL import Image
 
 from association import CancelledError, Deadline
+from service.importing import folders
 from service.importing.bounded import ReadMap, read_apart
 from service.importing.bounds import Bounds
 from service.importing.errors import FileTooLargeError, FormatsMissingError, TooLateError
-from tests.running import children_of
+from service.importing.folders import PREFIX, remove_abandoned
+from service.parsing.own_modules import command_of
+from tests.running import children_of, until
 
 from .forms import SQUARE, TYPE, YAML, encoded, form
 
@@ -92,3 +101,56 @@ def test_it_is_told_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         read({"a.csv": SQUARE})
     assert "'PATH'" in (tmp_path / "seen").read_text()
     assert "sesame" not in (tmp_path / "seen").read_text()
+
+
+def test_a_report_that_is_too_long_is_not_taken(tmp_path: Path) -> None:
+    """Class of attack: an answer that is larger than its question. It is bounded by the system, not by the reader."""
+    points = b"".join(b"%d,0,%d,1\n" % (k, k) for k in range(20_000))
+    with pytest.raises(FileTooLargeError, match="takes more than"):
+        read({"a.csv": b"x1,y1,x2,y2\n" + points}, Bounds(1_000_000_000, len(points) + 100, 200_000))
+
+
+def test_files_of_a_service_that_was_killed_are_removed_by_the_next_import(tmp_path: Path) -> None:
+    """Class of attack: what is left behind. Neither a folder in use, nor what a name of such a kind leads to, goes."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "kept").write_text("of somebody else")
+    left, linked, used = (tmp_path / f"{PREFIX}{name}" for name in ("left", "linked", "used"))
+    left.mkdir()
+    (left / "file-0.csv").write_bytes(SQUARE)
+    linked.symlink_to(elsewhere)
+    used.mkdir()
+    with used.joinpath("file-0.csv").open("wb"):
+        descriptor = os.open(used, os.O_RDONLY)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    remove_abandoned(tmp_path)
+    assert left.exists()  # as young as one that is not locked yet
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(folders, "YOUNG_SECONDS", 0.0)
+        read({"a.csv": SQUARE})
+    assert not left.exists()
+    assert used.exists()
+    assert (elsewhere / "kept").exists()
+    os.close(descriptor)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(folders, "YOUNG_SECONDS", 0.0)
+        remove_abandoned(tmp_path)
+    linked.unlink()
+    assert not used.exists()
+
+
+def test_the_process_that_reads_removes_the_files_when_its_service_was_killed(tmp_path: Path) -> None:
+    folder = tmp_path / f"{PREFIX}own"
+    folder.mkdir()
+    told = orjson.dumps({"bounds": asdict(BOUNDS), "content_type": TYPE}).decode()
+    # What starts it, and is killed as the service would be while it waits for the form.
+    command = command_of("service.importing.reader", told, str(folder))
+    starting = "import os, subprocess, sys; subprocess.Popen([*sys.argv[1:], str(os.getpid())]).wait()"
+    with subprocess.Popen([sys.executable, "-c", starting, *command], stdin=subprocess.PIPE) as service:
+        assert service.stdin is not None
+        until(lambda: bool(children_of(service.pid)))
+        os.kill(service.pid, signal.SIGKILL)
+        service.wait()
+        service.stdin.write(bytes(form({"a.csv": SQUARE})))
+        service.stdin.close()
+        until(lambda: not folder.exists())

@@ -297,3 +297,36 @@ def test_a_map_that_comes_before_others_is_a_map_of_its_own(store: MapStore) -> 
     store.delete("a", ANY)
     assert [store.load(name).document for name in ("b", "c")] == [b"b", b"c"]
     assert store.put("b", b"B", BOX, ANY) == (2, False)
+
+
+def test_the_maps_of_one_prefix_take_no_more_than_half(database: str) -> None:
+    """Class of attack: what is shared by all is filled by one. Ids that were used once count, too."""
+    store = MapStore(database_url(database), most_bytes=20_000)
+    try:
+        store.put("hq-a", bytes(5_000), BOX, ANY, "hq-")
+        with pytest.raises(StoreFullError, match="10000 bytes"):
+            store.put("hq-b", bytes(4_001), BOX, ANY, "hq-")
+        store.put("hq-b", bytes(4_000), BOX, ANY, "hq-")
+        store.put("hq-a", bytes(5_000), BOX, ANY, "hq-")  # in the place of what it takes itself
+        with pytest.raises(StoreFullError):
+            store.put("hq-c", b"", BOX, ANY, "hq-")
+        with pytest.raises(StoreFullError):
+            store.put("hq-a", bytes(5_001), BOX, ANY, "hq-")
+        store.put("lab-a", bytes(9_000), BOX, ANY, "lab-")  # other prefixes have their own half
+        store.delete("hq-b", ANY)
+        for number in range(8):
+            store.put(f"hq-{number}", b"", BOX, ANY, "hq-")
+            store.delete(f"hq-{number}", ANY)
+        with pytest.raises(StoreFullError):
+            store.put("hq-more", bytes(1), BOX, ANY, "hq-")
+    finally:
+        store.close()
+
+
+def test_a_key_for_all_maps_has_all_of_the_store(database: str) -> None:
+    store = MapStore(database_url(database), most_bytes=20_000)
+    try:
+        store.put("a", bytes(19_000), BOX, ANY)
+        assert len(store.load("a").document) == 19_000
+    finally:
+        store.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -332,6 +333,36 @@ def test_a_request_is_taken_along(page: Page, client: httpx.Client, tmp_path: Pa
     assert ran.stdout.startswith("ok True"), ran.stderr
     page.set_input_files("#files", [kept])
     verdict(page, "usable")
+
+
+MEANT_FOR_SHELLS = "a' & calc & $(id) `id` \" | \\ %PATH% ^ ! ; \u2018\u2019\u201a\u201b \n --output x <y >z \u2028 #"
+
+
+@pytest.mark.parametrize("button", ["Copy as curl", "Copy as PowerShell", "Copy as Python"])
+def test_what_is_copied_means_nothing_to_a_shell(page: Page, client: httpx.Client, tmp_path: Path, button: str) -> None:
+    """Class of attack: a file with commands in it. Whoever opens it copies the request into some shell."""
+    meta = {"note": MEANT_FOR_SHELLS}
+    asked = {**examples.ASSOCIATE, "map": {**examples.ASSOCIATE["map"], "meta": meta}}
+    (tmp_path / "request.json").write_text(json.dumps(asked))
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.goto("/")
+    page.set_input_files("#files", [tmp_path / "request.json"])
+    verdict(page, "usable")
+    page.locator("#share summary").click()
+    page.get_by_role("button", name=button).click()
+    expect(page.locator("#copied")).to_have_text("Copied.")
+    copied = page.evaluate("navigator.clipboard.readText()")
+    if button == "Copy as Python":
+        (line,) = [one for one in copied.splitlines() if one.startswith("asked = json.loads(")]
+        body = json.loads(line.removeprefix("asked = json.loads(").removesuffix(")"))
+    else:
+        before, body, after = copied.split("'{")[0], "{" + copied.split("'{")[1].rsplit("'", 1)[0], copied[-1]
+        assert (after, "'" in body) == ("'", False)
+        assert before.count("'") in (0, 4)
+    assert re.fullmatch(r"[A-Za-z0-9{}\[\]\",:.+\-_\\/]*", body)
+    assert '\\"' not in body
+    assert json.loads(body)["map"]["meta"] == meta
+    assert client.post("/v1/associate", content=body).json()["usable"] is True
 
 
 def test_nothing_comes_from_elsewhere(page: Page, service: RunningService) -> None:

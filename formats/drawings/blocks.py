@@ -1,0 +1,134 @@
+"""The visible entities of a DXF's model space, blocks taken apart by the rules of AutoCAD.
+
+An entity on layer 0 of a block is on the layer of the block's reference (INSERT). A frozen layer hides its entities
+and references, with all that is in them. A layer that is off hides its entities alone. Of a reference on it these are
+the entities on layer 0 of the block; those with a visible layer of their own remain.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ezdxf.entities.dxfentity import DXFEntity
+from ezdxf.entities.insert import Insert
+from ezdxf.entities.mline import MLine
+
+from ..errors import TooLargeError
+from ..limits import MAX_BLOCK_DEPTH, MAX_ENTITIES
+from ..report import Notes, listed, shown
+from .drawing import Drawing
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing as Document
+
+BYBLOCK = "0"  # the layer whose entities take that of their block's reference
+
+Placed = tuple[DXFEntity, tuple[str, ...]]
+"""An entity with its layers, those of the references that it is in first."""
+
+
+@dataclass(slots=True)
+class Expansion:
+    """Takes blocks apart and counts what is hidden or cannot be shown.
+
+    Attributes
+    ----------
+    frozen, off : set of str
+        Layers by name, casefolded.
+    drawing : Drawing
+        Whose notes take what was done.
+    """
+
+    frozen: set[str]
+    off: set[str]
+    drawing: Drawing
+    _hidden: Counter[str] = field(default_factory=Counter)
+    _external: Counter[str] = field(default_factory=Counter)
+    _missing: Counter[str] = field(default_factory=Counter)
+    _count: int = 0
+
+    @classmethod
+    def of(cls, document: Document, drawing: Drawing) -> Expansion:
+        """Take the states of a document's layers."""
+        layers = list(document.layers)
+        frozen = {layer.dxf.name.casefold() for layer in layers if layer.is_frozen()}
+        return cls(frozen, {layer.dxf.name.casefold() for layer in layers if layer.is_off()}, drawing)
+
+    def visible(self, entities: Iterable[Any]) -> Iterator[Placed]:
+        """Yield the visible entities with their layers; notes are complete when it ends.
+
+        Raises
+        ------
+        TooLargeError
+            When blocks lie too deep in one another, or expand to too much.
+        """
+        yield from self._visible(entities, (), 0)
+        self._note(self.drawing.notes)
+
+    def hides(self, layer: str, *, reference: bool = False) -> bool:
+        """Tell whether a layer hides its entities, or a reference on it with all that is in it."""
+        name = layer.casefold()
+        return name in self.frozen or (name in self.off and not reference)
+
+    def _visible(self, entities: Iterable[Any], outer: tuple[str, ...], depth: int) -> Iterator[Placed]:
+        for entity in entities:
+            self._count += 1
+            if self._count > MAX_ENTITIES:
+                self._refuse(f"expected at most {MAX_ENTITIES} entities, blocks expanded")
+            layer = str(entity.dxf.get("layer", BYBLOCK))
+            layers = (*outer, outer[-1] if outer and layer == BYBLOCK else layer)
+            if entity.dxf.get("invisible", 0):
+                self.drawing.notes.add_dropped("invisible", "entities and blocks with the attribute invisible", 1)
+            elif self.hides(layers[-1], reference=isinstance(entity, Insert)):
+                self._hidden[layers[-1]] += 1
+            elif isinstance(entity, Insert):
+                yield from self._expanded(entity, layers, depth)
+            elif isinstance(entity, MLine):
+                self.drawing.notes.add_read("entity_mline", "MLINE entities", 1)
+                lines = (part for part in entity.virtual_entities() if part.dxftype() != "HATCH")
+                yield from ((part, layers) for part in lines)
+            else:
+                yield entity, layers
+
+    def _expanded(self, reference: Insert, layers: tuple[str, ...], depth: int) -> Iterator[Placed]:
+        if depth >= MAX_BLOCK_DEPTH:
+            self._refuse(f"expected at most {MAX_BLOCK_DEPTH} blocks in one another")
+        if reference.mcount > MAX_ENTITIES:
+            self._refuse(f"expected at most {MAX_ENTITIES} copies of a block")
+        name, block = shown(str(reference.dxf.get("name", ""))), reference.block()
+        if block is None:
+            self._missing[name] += 1
+            return
+        if block.block is not None and (block.block.is_xref or block.block.is_xref_overlay):
+            x, y, _ = reference.dxf.insert
+            self._external[f"{name} ({shown(str(block.block.dxf.xref_path))}) at ({x:g}, {y:g})"] += 1
+            return
+        self.drawing.notes.add_merged("blocks", "blocks taken apart", reference.mcount)
+        for one in reference.multi_insert() if reference.mcount > 1 else (reference,):
+            self._count += 1  # so that empty blocks cannot be repeated without end
+            inner = one.virtual_entities(skipped_entity_callback=self._skipped)
+            yield from self._visible(inner, layers, depth + 1)
+
+    def _skipped(self, entity: DXFEntity, _reason: str) -> None:
+        self.drawing.drop(entity.dxftype())
+
+    def _note(self, notes: Notes) -> None:
+        if self._hidden:
+            what = f"entities and blocks on layers that are off or frozen: {listed(self._hidden)}"
+            notes.add_dropped("hidden_layer", what, self._hidden.total())
+        if self._external:
+            notes.add_dropped(
+                "external_reference",
+                f"external references, whose drawings are other files: {listed(self._external)}; bind them (XREF, "
+                "Bind) and save the drawing again",
+                self._external.total(),
+            )
+        if self._missing:
+            what = f"references to blocks that the file does not define: {listed(self._missing)}"
+            notes.add_dropped("missing_block", what, self._missing.total())
+
+    def _refuse(self, why: str) -> None:
+        raise TooLargeError(why, argument=self.drawing.name)

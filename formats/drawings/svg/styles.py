@@ -1,0 +1,105 @@
+"""What CSS says of elements: presentation attributes, style elements and style attributes, in the order of CSS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import cssselect2
+import tinycss2
+
+from ...errors import TooLargeError
+from ...limits import MAX_STYLE_RULES
+from .xml import kind_of
+
+PROPERTIES = frozenset(
+    {
+        "display",
+        "visibility",
+        "opacity",
+        "stroke",
+        "stroke-opacity",
+        "stroke-width",
+        "fill",
+        "fill-opacity",
+        "transform",
+        "clip-path",
+        "mask",
+    }
+)
+"""Those by which it is decided what is drawn, and where."""
+CACHED = 10_000  # texts of style attributes, which repeat
+
+Declared = tuple[tuple[str, str, bool], ...]
+"""Properties with their values, and whether these are important."""
+
+
+class Styles:
+    """The styles of a document's elements.
+
+    Parameters
+    ----------
+    root : Element
+    name : str
+        Of the file, for errors.
+    """
+
+    def __init__(self, root: Element, name: str) -> None:
+        self._matched: dict[Element, list[Declared]] = {}
+        self._inline: dict[str, Declared] = {}
+        sheets = [element.text for element in root.iter() if kind_of(element) == "style" and element.text]
+        matcher, count = cssselect2.Matcher(), 0
+        for sheet in sheets:
+            for selector, declared in _rules(sheet):
+                matcher.add_selector(selector, declared)
+                count += 1
+                if count > MAX_STYLE_RULES:
+                    raise TooLargeError(f"expected at most {MAX_STYLE_RULES} rules of style", argument=name)
+        if count:
+            for wrapper in cssselect2.ElementWrapper.from_xml_root(root).iter_subtree():
+                found = [declared for _, _, pseudo, declared in matcher.match(wrapper) if pseudo is None]
+                if found:
+                    self._matched[wrapper.etree_element] = found
+
+    def of(self, element: Element) -> Mapping[str, str]:
+        """Return the values of the properties that are set on an element itself, in lower case."""
+        values = {key: element.get(key, "").strip() for key in PROPERTIES & element.attrib.keys()}
+        layers = [*self._matched.get(element, ()), self._declared_inline(element.get("style", ""))]
+        for important in (False, True):
+            for declared in layers:
+                values |= {key: value for key, value, weight in declared if weight is important}
+        return {key: value for key, value in values.items() if value.lower() != "inherit"}
+
+    def _declared_inline(self, text: str) -> Declared:
+        if not text:
+            return ()
+        found = self._inline.get(text)
+        if found is None:
+            found = _declared(tinycss2.parse_blocks_contents(text, skip_comments=True, skip_whitespace=True))
+            if len(self._inline) < CACHED:
+                self._inline[text] = found
+        return found
+
+
+def _rules(sheet: str) -> Iterable[tuple[Any, Declared]]:
+    """Yield the selectors of a style sheet with their declarations; what is no valid rule is left out, as CSS says."""
+    for rule in tinycss2.parse_stylesheet(sheet, skip_comments=True, skip_whitespace=True):
+        if rule.type != "qualified-rule":
+            continue
+        declared = _declared(tinycss2.parse_blocks_contents(rule.content, skip_comments=True, skip_whitespace=True))
+        if not declared:
+            continue
+        try:
+            selectors = cssselect2.compile_selector_list(rule.prelude)
+        except cssselect2.SelectorError:
+            continue
+        yield from ((selector, declared) for selector in selectors)
+
+
+def _declared(nodes: Iterable[Any]) -> Declared:
+    return tuple(
+        (node.lower_name, tinycss2.serialize(node.value).strip(), bool(node.important))
+        for node in nodes
+        if node.type == "declaration" and node.lower_name in PROPERTIES
+    )

@@ -1,0 +1,296 @@
+"""Which shapes of an SVG are drawn, and where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import svgelements
+
+from ...errors import TooLargeError
+from ...limits import MAX_DEPTH, MAX_ENTITIES, MAX_PATH_BYTES, MAX_UNITS
+from ..drawing import Drawing
+from .shapes import SHAPES, Measure, Viewport
+from .styles import Styles
+from .xml import kind_of
+
+INKSCAPE_LABEL = "http://www.inkscape.org/namespaces/inkscape}label"
+LINK = "http://www.w3.org/1999/xlink}href"
+NOT_DRAWN = {
+    "defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata", "title", "desc", "style", "script",
+    "linearGradient", "radialGradient", "filter", "view", "cursor", "font", "animate", "animateTransform", "set",
+}  # fmt: skip
+GROUPS = {"g", "a"}
+CONDITIONS = {"systemLanguage", "requiredExtensions"}  # of a child of switch that is passed over
+NOTHING = {"none", "transparent"}  # as a stroke or a fill
+WHOLE = 1e-3  # of the picture; a background covers all but that
+
+Matrix = Any
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """What an element has of those that it is in.
+
+    Attributes
+    ----------
+    layers : tuple of str
+        Their names.
+    matrix : Matrix
+        From the element's units to the root's.
+    viewport : Viewport
+    stroke_width : float
+        The element's own units.
+    visible : bool
+    stroked, filled : bool or None
+        Whether lines, and areas, are painted; None: nobody says.
+    copied : tuple of Element
+        What the use elements around it refer to.
+    """
+
+    layers: tuple[str, ...] = ()
+    matrix: Matrix = field(default_factory=svgelements.Matrix)
+    viewport: Viewport = field(default_factory=Viewport)
+    stroke_width: float = 0.0
+    visible: bool = True
+    stroked: bool | None = None
+    filled: bool | None = None
+    copied: tuple[Element, ...] = ()
+
+    @property
+    def width(self) -> float:
+        """Of a line, the root's units."""
+        m = self.matrix
+        return self.stroke_width * math.sqrt(abs(m.a * m.d - m.b * m.c))
+
+
+class Visible:
+    """Goes through a document and yields the shapes that are drawn; the notes count the others.
+
+    Parameters
+    ----------
+    root : Element
+    drawing : Drawing
+    """
+
+    def __init__(self, root: Element, drawing: Drawing) -> None:
+        self._root, self._drawing = root, drawing
+        self._styles = Styles(root, drawing.name)
+        self._by_id: dict[str, Element] = {}
+        for element in root.iter():
+            self._by_id.setdefault(element.get("id", ""), element)
+        self._count = self._path_bytes = 0
+        self._whole = Viewport()
+
+    def shapes(self) -> Iterator[tuple[Element, Place]]:
+        """Yield the shapes that are drawn, with where they stand.
+
+        Raises
+        ------
+        FormatError
+            When copies by use are too many or too deep, or a length cannot be read.
+        """
+        self._whole = self._viewport_of_root()
+        style = self._styles.of(self._root)
+        if not self._displayed(self._root, style):
+            return
+        place = replace(self._inherited(self._root, Place(viewport=self._whole), style), layers=())
+        for child in self._root:
+            yield from self._drawn(child, place, 1)
+
+    def _drawn(self, element: Element, outer: Place, depth: int) -> Iterator[tuple[Element, Place]]:
+        kind = kind_of(element)
+        if kind in NOT_DRAWN or kind.startswith("{"):
+            return
+        self._bound(element, depth)
+        style = self._styles.of(element)
+        if not self._displayed(element, style):
+            return
+        place = self._inherited(element, outer, style)
+        if kind in GROUPS:
+            for child in element:
+                yield from self._drawn(child, place, depth + 1)
+        elif kind == "switch":
+            first = next((child for child in element if not CONDITIONS & child.attrib.keys()), None)
+            if first is not None:
+                yield from self._drawn(first, place, depth + 1)
+        elif kind == "svg":
+            yield from self._nested(element, element, place, depth)
+        elif kind == "use":
+            yield from self._copied(element, place, depth)
+        elif kind not in SHAPES:
+            self._drawing.drop(kind)
+        elif self._painted(element, kind, place):
+            yield element, place
+
+    def _bound(self, element: Element, depth: int) -> None:
+        self._count += 1
+        self._path_bytes += len(element.get("d", "")) + len(element.get("points", ""))
+        if self._count > MAX_ENTITIES or depth > MAX_DEPTH:
+            raise TooLargeError(
+                f"expected at most {MAX_ENTITIES} elements, copies by use included, {MAX_DEPTH} in one another",
+                argument=self._drawing.name,
+            )
+        if self._path_bytes > MAX_PATH_BYTES:
+            raise TooLargeError(
+                f"expected at most {MAX_PATH_BYTES} characters of paths, copies by use included",
+                argument=self._drawing.name,
+            )
+
+    def _displayed(self, element: Element, style: Mapping[str, str]) -> bool:
+        """Tell whether an element is displayed; count the shapes in it where it is not."""
+        if style.get("display", "").lower() != "none" and not _is_zero(style.get("opacity")):
+            return True
+        inner = sum(1 for one in element.iter() if kind_of(one) in SHAPES)
+        self._drawing.notes.add_dropped("hidden", "elements that are not displayed", max(1, inner))
+        return False
+
+    def _inherited(self, element: Element, outer: Place, style: Mapping[str, str]) -> Place:
+        names = [element.get(key, "") for key in ("id", "class", INKSCAPE_LABEL)]
+        clipped = any(style.get(key, "none").lower() != "none" for key in ("clip-path", "mask"))
+        if clipped:
+            self._drawing.notes.add_assumed(
+                "clipped", "elements with a clip-path or a mask are taken whole, although it may hide a part of them", 1
+            )
+        transform = style.get("transform", "")
+        visibility = style.get("visibility", "").lower()
+        return replace(
+            outer,
+            layers=(*outer.layers, *filter(None, names)),
+            matrix=svgelements.Matrix(transform) * outer.matrix if transform else outer.matrix,
+            stroke_width=_stroke_width(style.get("stroke-width"), outer.stroke_width),
+            visible=visibility == "visible" if visibility else outer.visible,
+            stroked=_paints(style.get("stroke"), style.get("stroke-opacity"), outer.stroked),
+            filled=_paints(style.get("fill"), style.get("fill-opacity"), outer.filled),
+        )
+
+    def _painted(self, element: Element, kind: str, place: Place) -> bool:
+        """Tell whether a shape can be seen; count those that cannot."""
+        notes = self._drawing.notes
+        if not place.visible:
+            notes.add_dropped("hidden", "elements that are not displayed", 1)
+        elif place.stroked is False and (kind == "line" or place.filled is False):
+            notes.add_dropped("not_painted", "elements with neither stroke nor fill", 1)
+        elif kind == "rect" and not place.stroked and place.filled and self._covers_all(element, place):
+            notes.add_dropped("background", "filled rectangles without a stroke that cover the whole picture", 1)
+        else:
+            return True
+        return False
+
+    def _covers_all(self, element: Element, place: Place) -> bool:
+        if element.get("width", "").strip() == element.get("height", "").strip() == "100%":
+            return True
+        if math.isnan(self._whole.width + self._whole.height):
+            return False
+        (points, _), *_ = [*SHAPES["rect"](Measure(element, place.viewport, self._drawing.name)), ([(0.0, 0.0)], False)]
+        corners = [place.matrix.point_in_matrix_space(point) for point in points]
+        x, y = [float(corner[0]) for corner in corners], [float(corner[1]) for corner in corners]
+        whole, slack = self._whole, WHOLE * max(self._whole.width, self._whole.height)
+        return (
+            min(x) <= whole.x + slack
+            and max(x) >= whole.x + whole.width - slack
+            and min(y) <= whole.y + slack
+            and max(y) >= whole.y + whole.height - slack
+        )
+
+    def _viewport_of_root(self) -> Viewport:
+        measure = Measure(self._root, Viewport(), self._drawing.name)
+        box = _view_box(measure)
+        if box is not None:
+            return box
+        if any("%" in self._root.get(key, "100%") for key in ("width", "height")):
+            return Viewport()
+        return Viewport(0.0, 0.0, measure.length("width", "x"), measure.length("height", "y"))
+
+    def _nested(self, element: Element, sized: Element, outer: Place, depth: int) -> Iterator[tuple[Element, Place]]:
+        """Yield the shapes of an svg or a symbol; its size may be that of the use."""
+        own, name = Measure(element, outer.viewport, self._drawing.name), self._drawing.name
+        size = Measure(sized if sized.attrib.keys() & {"width", "height"} else element, outer.viewport, name)
+        box = _view_box(own)
+        matrix = outer.matrix
+        if kind_of(element) == "svg":
+            matrix = svgelements.Matrix.translate(own.length("x", "x"), own.length("y", "y")) * matrix
+        viewport = outer.viewport
+        if size.element.attrib.keys() & {"width", "height"} or box is not None:
+            width = size.length("width", "x", "100%")
+            height = size.length("height", "y", "100%")
+            if width <= 0.0 or height <= 0.0 or (box is not None and (box.width <= 0.0 or box.height <= 0.0)):
+                self._drawing.notes.add_dropped("hidden", "elements that are not displayed", 1)
+                return
+            viewport = Viewport(0.0, 0.0, width, height)
+            if box is not None:
+                matrix = _fitted(box, viewport, element.get("preserveAspectRatio", "")) * matrix
+                viewport = box
+        place = replace(outer, matrix=matrix, viewport=viewport)
+        for child in element:
+            yield from self._drawn(child, place, depth + 1)
+
+    def _copied(self, element: Element, outer: Place, depth: int) -> Iterator[tuple[Element, Place]]:
+        """Yield the shapes that a use element refers to."""
+        link = element.get("href", element.get(LINK, "")).strip()
+        target = self._by_id.get(link[1:]) if link.startswith("#") and len(link) > 1 else None
+        if target is None or target in outer.copied or target is self._root:
+            why = "refers to itself" if target is not None else "refers to nothing in this file"
+            self._drawing.notes.add_dropped(
+                f"use_{'itself' if target is not None else 'nothing'}", f"use that {why}", 1
+            )
+            return
+        measure = Measure(element, outer.viewport, self._drawing.name)
+        moved = svgelements.Matrix.translate(measure.length("x", "x"), measure.length("y", "y")) * outer.matrix
+        place = replace(outer, matrix=moved, copied=(*outer.copied, target))
+        if kind_of(target) not in ("symbol", "svg"):
+            yield from self._drawn(target, place, depth + 1)
+            return
+        self._bound(target, depth)
+        style = self._styles.of(target)
+        if self._displayed(target, style):
+            yield from self._nested(target, element, self._inherited(target, place, style), depth)
+
+
+def _view_box(measure: Measure) -> Viewport | None:
+    if not measure.element.get("viewBox", "").strip():
+        return None
+    numbers = measure.numbers("viewBox")
+    if len(numbers) != 4:
+        raise measure.refused("viewBox", measure.element.get("viewBox", ""), "four numbers")
+    return Viewport(*numbers)
+
+
+def _fitted(box: Viewport, into: Viewport, aspect: str) -> Matrix:
+    """Return the matrix that fits a viewBox into a viewport, by preserveAspectRatio."""
+    align, *others = aspect.replace("defer", "").split() or ["xMidYMid"]
+    sx, sy = into.width / box.width, into.height / box.height
+    if align != "none":
+        sx = sy = max(sx, sy) if "slice" in others else min(sx, sy)
+    shares = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
+    x = shares.get(align[1:4], 0.5) * (into.width - sx * box.width) - sx * box.x
+    y = shares.get(align[5:8], 0.5) * (into.height - sy * box.height) - sy * box.y
+    return svgelements.Matrix(sx, 0.0, 0.0, sy, x, y)
+
+
+def _is_zero(value: str | None) -> bool:
+    try:
+        return value is not None and float(value.removesuffix("%")) == 0.0
+    except ValueError:
+        return False
+
+
+def _paints(paint: str | None, opacity: str | None, inherited: bool | None) -> bool | None:
+    """Tell whether a stroke or a fill paints anything; None where nobody says."""
+    if _is_zero(opacity):
+        return False
+    return inherited if paint is None else paint.lower() not in NOTHING
+
+
+def _stroke_width(told: str | None, inherited: float) -> float:
+    """Return how wide lines are drawn; what is no plain number, such as a share of the picture, is taken for none."""
+    if told is None:
+        return inherited
+    try:
+        width = float(told.strip().lower().removesuffix("px"))
+    except ValueError:
+        return 0.0
+    return width if 0.0 <= width <= MAX_UNITS else 0.0

@@ -1,0 +1,96 @@
+"""XML by the standard library, within bounds of depth, number and size."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder
+from xml.parsers import expat
+
+from ...errors import FormatError, MalformedFileError, TooLargeError
+from ...limits import MAX_DEPTH, MAX_ENTITIES, MAX_PATH_BYTES, MAX_STYLE_BYTES
+
+NAMESPACE = "http://www.w3.org/2000/svg"
+CHUNK = 64 * 2**10  # bytes that are parsed at a time
+MAX_TOKEN_BYTES = 2 * MAX_PATH_BYTES  # of one tag with its attributes
+
+
+class Node(Element):
+    """An element that knows its line in the file."""
+
+    line: int = 0
+
+
+class _Builder:
+    """Builds the tree of elements, with the text of style elements alone."""
+
+    def __init__(self, name: str) -> None:
+        self.tree = TreeBuilder(element_factory=Node)
+        self.parser = expat.ParserCreate(namespace_separator="}")
+        self.name = name
+        self.depth = self.count = self.path_bytes = self.style_bytes = 0
+        self.in_style = False
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
+        self.parser.CharacterDataHandler = self.text
+        self.parser.EntityDeclHandler = self.parser.AttlistDeclHandler = self.refuse
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.depth, self.count = self.depth + 1, self.count + 1
+        self.path_bytes += len(attributes.get("d", "")) + len(attributes.get("points", ""))
+        if self.path_bytes > MAX_PATH_BYTES:
+            raise TooLargeError(f"expected at most {MAX_PATH_BYTES} characters of paths", argument=self.name)
+        if self.depth > MAX_DEPTH or self.count > MAX_ENTITIES:
+            raise TooLargeError(
+                f"expected at most {MAX_ENTITIES} elements, {MAX_DEPTH} in one another", argument=self.name
+            )
+        node = self.tree.start("{" + tag if "}" in tag else tag, attributes)
+        assert isinstance(node, Node)
+        node.line = self.parser.CurrentLineNumber
+        self.in_style = kind_of(node) == "style"
+
+    def end(self, tag: str) -> None:
+        self.depth -= 1
+        self.in_style = False
+        self.tree.end("{" + tag if "}" in tag else tag)
+
+    def text(self, data: str) -> None:
+        if not self.in_style:
+            return
+        self.style_bytes += len(data)
+        if self.style_bytes > MAX_STYLE_BYTES:
+            raise TooLargeError(f"expected at most {MAX_STYLE_BYTES} characters of style elements", argument=self.name)
+        self.tree.data(data)
+
+    def refuse(self, *_declared: Any) -> None:
+        raise MalformedFileError("declares XML entities, which are not read", argument=self.name)
+
+
+def parse_xml(content: bytes, name: str) -> Element:
+    """Parse XML without entities of its own, within bounds of depth and number.
+
+    Raises
+    ------
+    MalformedFileError
+        When it is no XML, has an encoding that is not known, or declares entities or attributes.
+    TooLargeError
+        When elements lie too deep, are too many, or one is too long.
+    """
+    builder = _Builder(name)
+    try:
+        for begin in range(0, len(content), CHUNK):
+            builder.parser.Parse(content[begin : begin + CHUNK], False)
+            if begin - builder.parser.CurrentByteIndex > MAX_TOKEN_BYTES:
+                raise TooLargeError(f"expected elements of at most {MAX_TOKEN_BYTES} bytes", argument=name)
+        builder.parser.Parse(b"", True)
+        return builder.tree.close()
+    except FormatError:
+        raise
+    except LookupError as error:
+        raise MalformedFileError("has an encoding that is not known; save it in UTF-8", argument=name) from error
+    except (expat.ExpatError, ParseError, AssertionError, ValueError) as error:
+        line = builder.parser.CurrentLineNumber
+        raise MalformedFileError(f"is no XML from line {line} on; is it cut off?", argument=name) from error
+
+
+def kind_of(element: Element) -> str:
+    """Return the name of an element, without the namespace of SVG; those of other namespaces begin with a brace."""
+    return str(element.tag).removeprefix("{" + NAMESPACE + "}")

@@ -1,0 +1,145 @@
+"""Which levels of a grid stand for cells of which nothing is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .tuning import (
+    DARKER_SHARE,
+    DARKER_SIDES,
+    DARKEST_UNKNOWN,
+    LEAST_CELLS,
+    LEVELS,
+    NOISE_RATIO,
+    NOISE_REACH,
+    SHADE_REACH,
+    SPIKE_RATIO,
+    SPIKE_SHARE,
+    SPIKE_WINDOW,
+)
+
+Counts = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownLevels:
+    """Levels of occupancy, 0 (free) to 255 (occupied), that stand for unknown cells.
+
+    Attributes
+    ----------
+    taken : (256,) bool
+        Levels whose cells are unknown.
+    spikes : tuple of int
+        The level of each group in `taken` that has the most cells.
+    refused : tuple of int
+        Levels that tools write for unknown cells, but which are the lightest or the darkest of this grid.
+    """
+
+    taken: Flags
+    spikes: tuple[int, ...] = ()
+    refused: tuple[int, ...] = ()
+
+
+def find_unknown_levels(counts: Counts, shades: tuple[int, ...], between: tuple[int, int]) -> UnknownLevels:
+    """Find the levels of unknown cells in the histogram of a grid.
+
+    A level stands for unknown cells where lighter ones are free, darker ones are occupied, and it is one that tools
+    write, or stands out of the histogram.
+
+    Parameters
+    ----------
+    counts : (256,)
+        Cells of each level of occupancy, light first.
+    shades : tuple of int
+        Levels that tools write for unknown cells.
+    between : (int, int)
+        The levels that the thresholds of the file call neither free nor occupied, first and last.
+    """
+    usual = sorted({peak for shade in shades if (peak := _peak_near(counts, shade)) is not None})
+    lighter, darker = np.cumsum(counts) - counts, int(counts.sum()) - np.cumsum(counts)
+    spikes = [k for k in usual if lighter[k] >= LEAST_CELLS and darker[k] >= LEAST_CELLS]
+    if not spikes and (spike := find_unknown_level(counts, between)) is not None:
+        spikes = [spike]
+    taken = np.zeros(LEVELS, dtype=np.bool_)
+    for spike in spikes:
+        taken |= _with_noise(counts, spike)
+    refused = tuple(k for k in usual if k not in spikes)
+    return UnknownLevels(taken, tuple(spikes), refused if not spikes else ())
+
+
+def given_levels(levels: tuple[int, ...]) -> UnknownLevels:
+    """Return the levels that the caller says stand for unknown cells; none where there are no unknown cells."""
+    taken = np.zeros(LEVELS, dtype=np.bool_)
+    taken[list(levels)] = True
+    return UnknownLevels(taken, levels)
+
+
+def free_end(counts: Counts, unknown: int) -> float:
+    """Return the level below which cells may be free, given the lightest level of unknown cells.
+
+    Where most lighter cells have one level, it is halfway between: resizing and compression make cells beside walls
+    lighter than unknown ones are.
+    """
+    lighter = counts[:unknown]
+    free = int(np.argmax(lighter)) if unknown else 0
+    return 0.5 * (free + unknown) if 2 * int(lighter.max(initial=0)) > int(lighter.sum()) else float(unknown)
+
+
+def find_unknown_level(counts: Counts, between: tuple[int, int] = (1, 0)) -> int | None:
+    """Find the one level between light and dark that stands out of a histogram.
+
+    Parameters
+    ----------
+    counts : (256,)
+        Cells of each level of occupancy, light first.
+    between : (int, int)
+        The levels that the thresholds of the file call neither free nor occupied, first and last.
+
+    Returns
+    -------
+    int or None
+        None where no level between light and dark stands out.
+    """
+    total = int(counts.sum())
+    beside = np.maximum(np.r_[0, counts[:-1]], np.r_[counts[1:], 0])
+    stands_out = (counts > SPIKE_SHARE * total) & (counts > SPIKE_RATIO * beside)
+    spikes = np.flatnonzero(stands_out)
+    if len(spikes) < 2:
+        return None
+    free = int(counts[spikes[0]])
+    darker = total - np.cumsum(counts)
+    # Walls around a large hall are few cells: their number grows with the side of the free area, not with the area.
+    least = max(float(LEAST_CELLS), min(DARKER_SHARE * free, DARKER_SIDES * free**0.5))
+    fit = [
+        k
+        for k in spikes[1:]
+        if k <= DARKEST_UNKNOWN * (LEVELS - 1)
+        and (darker[k] >= least or (between[0] <= k <= between[1] and darker[k] >= LEAST_CELLS))
+    ]
+    return int(max(fit, key=lambda k: counts[k])) if fit else None
+
+
+def _peak_near(counts: Counts, shade: int) -> int | None:
+    """Return the level next to a shade that stands out of all others around it; None where none does."""
+    low, high = max(0, shade - SHADE_REACH), min(LEVELS, shade + SHADE_REACH + 1)
+    peak = low + int(np.argmax(counts[low:high]))
+    around = counts[max(0, peak - SPIKE_WINDOW) : peak + SPIKE_WINDOW + 1]
+    others = np.sort(around)[:-1]
+    stands_out = counts[peak] >= LEAST_CELLS and counts[peak] > SPIKE_RATIO * int(others[-1])
+    return peak if stands_out else None
+
+
+def _with_noise(counts: Counts, spike: int) -> Flags:
+    """Return the level of a spike, and those around it where a compression spread its cells."""
+    taken = np.zeros(LEVELS, dtype=np.bool_)
+    taken[spike] = True
+    distance = np.abs(np.arange(LEVELS) - spike)
+    near = int(counts[(distance > 0) & (distance <= NOISE_REACH)].sum())
+    far = int(counts[(distance > NOISE_REACH) & (distance <= 3 * NOISE_REACH)].sum())
+    if near > NOISE_RATIO * far:  # a gradient has as many cells farther from the spike
+        taken[distance <= 2 * NOISE_REACH] = True
+    return taken

@@ -1,0 +1,148 @@
+"""Which frames of a bag are odometry: where a sensor was over time, and how fast it moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from registration import RigidTransform, wrap_angle
+
+from .transforms import NS, Floats, Track, Transforms, planar
+from .trees import ODOM, OdometryTopic
+from .tuning import MOVED, SAMPLES
+
+BASES = ("base_link", "base_footprint")
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """The speed of a frame: m/s and rad/s, in the frame itself."""
+
+    vx: float
+    vy: float
+    omega: float
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Poses of a frame over time.
+
+    Attributes
+    ----------
+    outer : str
+        Frame that the poses are in.
+    source : str
+        ``tf``, or the topic of the Odometry messages.
+    """
+
+    outer: str
+    source: str
+    _tree: Transforms
+    _path: Sequence[str]  # from the frame outwards: to `outer`, or to the frame that the messages are of
+    _messages: Track | None = None
+    _moving: tuple[Track, ...] = field(default=(), repr=False)
+
+    @classmethod
+    def of_tree(cls, tree: Transforms, path: Sequence[str]) -> Odometry:
+        """Return the poses of the first frame of a path in the last one."""
+        return cls(path[-1], "tf", tree, path, None, tuple(_moving(tree, path)))
+
+    @classmethod
+    def of_messages(cls, tree: Transforms, path: Sequence[str], topic: OdometryTopic) -> Odometry:
+        """Return the poses of the first frame of a path, by messages that have those of the last one."""
+        moving = (*_moving(tree, path), *((topic.track,) if topic.track.moves else ()))
+        return cls(topic.outer, topic.topic, tree, path, topic.track, moving)
+
+    @property
+    def stands(self) -> bool:
+        """True where all poses are equal."""
+        return not self._moving
+
+    def at(self, stamp: int) -> Floats | None:
+        """Return outer_from_frame at a time, nanoseconds, (4, 4); None where it is not known."""
+        inner = self._tree.along(self._path, stamp)
+        if inner is None or self._messages is None:
+            return inner
+        outer = self._messages.at(stamp)
+        return None if outer is None else outer @ inner
+
+    def speed(self, begin: int, end: int, mount: Floats) -> Speed | None:
+        """Return how fast a sensor moved during a scan; None where its poses do not give it.
+
+        Parameters
+        ----------
+        begin, end : int
+            Of the scan, nanoseconds.
+        mount : (4, 4)
+            frame_from_sensor.
+        """
+        windows = [track.window(begin, end) for track in self._moving]
+        known = [one for one in windows if one is not None]
+        if len(known) < len(windows):
+            return None
+        first = max((one[0] for one in known), default=begin)
+        last = min((one[1] for one in known), default=end)
+        if last <= first:
+            return None
+        places = [self.at(first), self.at(last)]
+        if places[0] is None or places[1] is None:
+            return None
+        step, _ = planar(np.linalg.inv(places[0] @ mount) @ places[1] @ mount)
+        return _speed(step, (last - first) / NS)
+
+
+def _speed(step: RigidTransform, seconds: float) -> Speed:
+    """Return the constant twist that makes a step: x, y = V(theta) v t, with V of the exponential map of SE(2)."""
+    half = 0.5 * step.theta
+    a = 1.0 if abs(half) < 1e-9 else half / math.tan(half)
+    vx, vy = a * step.x + half * step.y, a * step.y - half * step.x
+    return Speed(vx / seconds, vy / seconds, step.theta / seconds)
+
+
+def base_of(path: Sequence[str]) -> str | None:
+    """Return the robot's own frame among frames; with a prefix, as ``robot1/base_link``, too."""
+    return next((frame for base in BASES for frame in path if frame.rpartition("/")[2] == base), None)
+
+
+def outer_frames(tree: Transforms, frame: str) -> list[str]:
+    """Return the frames that poses may be in: ``odom`` where a frame is in one, else the outermost ones."""
+    above = tree.above(frame)[1:]
+    named = [one for one in above if one.rpartition("/")[2] == ODOM]
+    return named or [one for one in above if not tree.parents(one)] or above[-1:]
+
+
+def moves(tree: Transforms, path: Sequence[str]) -> bool:
+    """Tell whether a robot moves, by the frames from its sensor outwards: a mount that moves is no robot that does.
+
+    The frame that has to move is the robot's own. Where no frame has that name, a frame has to change its position in
+    its parent: a sensor that turns on a hinge does not.
+    """
+    bases = [k for k, frame in enumerate(path) if frame.rpartition("/")[2] in BASES]
+    if bases:
+        return _moves(tree, path[bases[-1] :], turning=True)
+    return any(_moves(tree, path[k : k + 2], turning=False) for k in range(len(path) - 1))
+
+
+def _moves(tree: Transforms, path: Sequence[str], *, turning: bool) -> bool:
+    stamps = sorted({stamp for track in _moving(tree, path) for stamp in track.stamps})
+    places = (tree.along(path, stamp) for stamp in stamps[:: max(1, len(stamps) // SAMPLES)])
+    first: RigidTransform | None = None
+    for place in places:
+        if place is None:
+            continue
+        pose, _ = planar(place)
+        first = first or pose
+        if math.hypot(pose.x - first.x, pose.y - first.y) > MOVED:
+            return True
+        if turning and abs(wrap_angle(pose.theta - first.theta)) > MOVED:
+            return True
+    return False
+
+
+def _moving(tree: Transforms, path: Sequence[str]) -> Iterator[Track]:
+    tracks = (tree.track(parent, child) for child, parent in pairwise(path))
+    return (track for track in tracks if track.moves)

@@ -1,0 +1,141 @@
+"""Scans of scanners that are mounted on a robot, to views of the search: the one place where mount and motion count."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from association import Scan, View, mirrored
+from registration import RigidTransform
+from vectorization import LaserScan, VectorizationOptions, vectorize
+
+# Standard deviations of the speed of a robot whose motion is not known, m/s and rad/s: default limits of Nav2's
+# controllers.
+SPEED, TURN = 0.5, 1.0
+HERE = RigidTransform(0.0, 0.0, 0.0)
+
+
+@runtime_checkable
+class MountedScan(Protocol):
+    """Ranges, and how their scanner was mounted; such as `formats.LoggedScan`.
+
+    Attributes
+    ----------
+    laser : LaserScan
+        In the sensor's frame; with its `motion` where that is known.
+    time_increment : float
+        From beam to beam, seconds; 0: not known, the scan is taken for one of a moment.
+    mount : RigidTransform or None
+        base_from_sensor; None: not known, poses are those of the sensor.
+    flipped : bool
+        True: the sensor is mounted upside down, y becomes -y in its data before `mount` applies.
+    """
+
+    @property
+    def laser(self) -> LaserScan:
+        """Return the ranges."""
+        ...
+
+    @property
+    def time_increment(self) -> float:
+        """Return the seconds from beam to beam."""
+        ...
+
+    @property
+    def mount(self) -> RigidTransform | None:
+        """Return base_from_sensor."""
+        ...
+
+    @property
+    def flipped(self) -> bool:
+        """Return whether the sensor is upside down."""
+        ...
+
+
+def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: float | None = None) -> View:
+    """Return what a mounted scanner saw, in the frame of the robot; of the sensor where its mount is not known.
+
+    Parameters
+    ----------
+    seen : MountedScan
+    base_from_then : RigidTransform
+        Pose of the robot at the time of the first beam, in the frame whose pose is located.
+    sigma : float, optional
+        Of single ranges, metres; None: estimated.
+
+    Returns
+    -------
+    View
+        Several of them, put together by `assemble`, are one scan.
+
+    Raises
+    ------
+    InputError
+        When the ranges are no scan.
+
+    Examples
+    --------
+    A scan of a log, and one of a second scanner that was taken when the robot had driven on by 5 cm:
+
+    >>> import linefix
+    >>> from formats import LoggedScan
+    >>> laser = linefix.LaserScan(-1.0, 0.1, [2.0] * 21)
+    >>> front = LoggedScan(0, "/front", "front", laser, mount=linefix.RigidTransform(0.3, 0.0, 0.0))
+    >>> rear = LoggedScan(0, "/rear", "rear", laser, mount=linefix.RigidTransform(-0.3, 0.0, 3.14))
+    >>> step = linefix.RigidTransform(0.05, 0.0, 0.0)
+    >>> views = [linefix.view_of(front), linefix.view_of(rear, step)]
+    >>> [round(view.pose.x, 2) for view in views]
+    [0.3, -0.25]
+    >>> scan = linefix.assemble(views)
+    """
+    scan = ranges_scan(seen.laser, sigma)
+    place = base_from_then.compose(seen.mount or HERE)
+    return View(mirrored(scan) if seen.flipped else scan, place, motion_covariance(seen, base_from_then))
+
+
+def motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
+    """Return what is not known of where a scanner was because it moved during the scan; None where its motion is known.
+
+    On average the beams are taken half the duration after the first one. A robot moves by ``v`` and ``omega``
+    meanwhile, and a sensor at ``r`` by ``v + omega x r``.
+
+    Parameters
+    ----------
+    seen : MountedScan
+    base_from_then : RigidTransform
+        As of `view_of`.
+
+    Returns
+    -------
+    (3, 3) or None
+        Of additive (x, y, theta) of the view's pose: m^2, m rad, rad^2.
+    """
+    if not seen.time_increment > 0.0 or seen.laser.motion is not None:
+        return None
+    place = base_from_then.compose(seen.mount or HERE)
+    x, y = place.x - base_from_then.x, place.y - base_from_then.y
+    half = 0.5 * seen.time_increment * len(seen.laser.ranges)
+    moved = half * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+    covariance: NDArray[np.float64] = moved @ np.diag([SPEED**2, SPEED**2, TURN**2]) @ moved.T
+    return covariance
+
+
+def ranges_scan(scan: LaserScan | ArrayLike, sigma: float | None = None) -> Scan:
+    """Return ranges, or points in scanning order, as a scan: segments, and the single beams as evidence.
+
+    Parameters
+    ----------
+    scan : LaserScan, or array-like of shape (m, 2)
+        Metres in the sensor's frame.
+    sigma : float, optional
+        Of single ranges, metres; None: estimated.
+
+    Raises
+    ------
+    InputError
+        When it is no scan.
+    """
+    found = vectorize(scan, VectorizationOptions(sigma=sigma))
+    return Scan(found.measured, found.viewpoint, found.beams, ordered=found.ordered)

@@ -1,0 +1,153 @@
+"""Scans of a log to poses: by the search in this process, or by a server."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import orjson
+
+import linefix
+from registration import InputError, RigidTransform
+
+from .errors import RefusedError
+from .logs import sent
+from .service import Json, Service, answering
+
+if TYPE_CHECKING:
+    from formats import LoggedScan
+
+SEARCH = linefix.AssociationOptions(max_alternatives=0, parts=())
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The part of an answer that a replay needs, for the robot, or the sensor where its mount is not known.
+
+    Attributes
+    ----------
+    status : str
+    usable : bool
+    probability : float or None
+    pose : RigidTransform or None
+    covariance : (3, 3) rows or None
+    reasons : list of dict
+        ``code`` and ``message``.
+    warnings : list of str
+        Codes.
+    timing_ms : dict
+    """
+
+    status: str
+    usable: bool
+    probability: float | None
+    pose: RigidTransform | None
+    covariance: list[list[float]] | None
+    reasons: list[Json]
+    warnings: list[str]
+    timing_ms: Json
+
+
+class Locator(Protocol):
+    """Finds the scans of a log in one map."""
+
+    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
+        """Return where a scan was taken; raises `RefusedError` where it is not taken."""
+        ...
+
+
+@contextmanager
+def locating(on: Json, server: str | None) -> Iterator[Locator]:
+    """Give who locates scans in a map: this process, or the server at a URL.
+
+    Raises
+    ------
+    CommandError
+        When the map is not taken, or no server answers.
+    """
+    if server is not None:
+        with answering(server) as service:
+            yield Remote(service, on)
+        return
+    from .in_process import InProcess
+
+    here = InProcess()
+    try:
+        yield Local(here.indexed(on), here.longest_search)
+    finally:
+        here.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """The search of this process.
+
+    Attributes
+    ----------
+    index : MapIndex
+    seconds : float
+        That a search may take.
+    """
+
+    index: linefix.MapIndex
+    seconds: float
+
+    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
+        """Return where a scan was taken."""
+        begun = time.perf_counter()
+        try:
+            scan = linefix.scan_of(one)
+            read = time.perf_counter()
+            deadline = linefix.Deadline(time.monotonic() + self.seconds)
+            answer = linefix.locate(self.index, scan, prior=prior, options=SEARCH, deadline=deadline)
+        except InputError as error:
+            raise RefusedError(str(error)) from None
+        ended = time.perf_counter()
+        return Found(
+            str(answer.status),
+            answer.usable,
+            answer.probability,
+            answer.pose,
+            None if answer.covariance is None else answer.covariance.tolist(),
+            [{"code": reason.code, "message": reason.message} for reason in answer.reasons],
+            [warning.code for warning in answer.warnings],
+            {"decode": _ms(read - begun), "search": _ms(ended - read), "total": _ms(ended - begun)},
+        )
+
+
+class Remote:
+    """A server, over HTTP."""
+
+    def __init__(self, service: Service, on: Json) -> None:
+        self._service = service
+        self._map: Any = orjson.Fragment(orjson.dumps(on)) if "map_id" not in on else on
+
+    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
+        """Return where a scan was taken."""
+        body: Json = {"map": self._map, "scan": sent(one), "options": {"include": [], "max_alternatives": 0}}
+        if prior is not None:
+            body["prior"] = {**_pose(prior.pose), "covariance": np.asarray(prior.covariance).tolist()}
+        answer = self._service.ask("associate", body)
+        pose = answer["pose"]
+        return Found(
+            answer["status"],
+            answer["usable"],
+            answer["probability"],
+            None if pose is None else RigidTransform(pose["x"], pose["y"], pose["theta"]),
+            answer["covariance"],
+            answer["reasons"],
+            [warning["code"] for warning in answer["warnings"]],
+            answer["timing_ms"],
+        )
+
+
+def _pose(pose: RigidTransform) -> Json:
+    return {"x": pose.x, "y": pose.y, "theta": pose.theta}
+
+
+def _ms(seconds: float) -> float:
+    return round(1e3 * seconds, 3)

@@ -1,0 +1,134 @@
+"""Class of attack: a key that was taken back. In each form of deployment the service sees that its files changed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.running import RunningService, client_of, until
+from tests.service.issuing import key_lines
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+ONE, OTHER = key_lines("sesame", ["read"]), key_lines("other", ["read"])
+
+
+def in_place(folder: Path) -> Path:
+    """As `>>` and some editors write."""
+    (folder / "keys.toml").write_text(ONE + OTHER)
+    return folder
+
+
+def take_back_in_place(folder: Path) -> None:
+    (folder / "keys.toml").write_text(OTHER)
+
+
+def take_back_replaced(folder: Path) -> None:
+    """As most editors, and tools that copy files, write."""
+    (folder / "new").write_text(OTHER)
+    (folder / "new").rename(folder / "keys.toml")
+
+
+def take_back_as_if_nothing_had_changed(folder: Path) -> None:
+    """Of the same length, and with the time of the old one, as some tools that copy set it."""
+    before = (folder / "keys.toml").stat()
+    (folder / "keys.toml").write_text(key_lines("change", ["read"]) + OTHER)
+    os.utime(folder / "keys.toml", ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert (folder / "keys.toml").stat().st_size == before.st_size
+
+
+def a_file_each(folder: Path) -> Path:
+    (folder / "one.toml").write_text(ONE)
+    (folder / "other.toml").write_text(OTHER)
+    return folder
+
+
+def remove(folder: Path) -> None:
+    (folder / "one.toml").unlink()
+
+
+def mounted(folder: Path) -> Path:
+    """As the kubelet mounts a secret."""
+    (folder / "..1").mkdir()
+    (folder / "..1" / "keys.toml").write_text(ONE + OTHER)
+    (folder / "..data").symlink_to("..1")
+    (folder / "keys.toml").symlink_to("..data/keys.toml")
+    return folder
+
+
+def exchange(folder: Path) -> None:
+    (folder / "..2").mkdir()
+    (folder / "..2" / "keys.toml").write_text(OTHER)
+    (folder / "..data_tmp").symlink_to("..2")
+    (folder / "..data_tmp").rename(folder / "..data")
+
+
+@pytest.mark.parametrize(
+    ("lay", "take_back"),
+    [
+        (in_place, take_back_in_place),
+        (in_place, take_back_replaced),
+        (in_place, take_back_as_if_nothing_had_changed),
+        (a_file_each, remove),
+        (mounted, exchange),
+    ],
+)
+def test_a_key_is_refused_however_its_files_change(
+    lay: Callable[[Path], Path],
+    take_back: Callable[[Path], None],
+    start_service: Callable[..., RunningService],
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "keys"
+    folder.mkdir()
+    running = start_service(keys_file=lay(folder))
+    with (
+        client_of(running.url, authorization="Bearer sesame") as client,
+        client_of(running.url, authorization="Bearer other") as other,
+    ):
+        assert client.get("/v1/maps").status_code == 200
+        take_back(folder)
+        until(lambda: client.get("/v1/maps").status_code == 403)
+        assert other.get("/v1/maps").status_code == 200
+
+
+def test_the_unit_reads_keys_where_they_are_changed() -> None:
+    """LoadCredential= copies a file once, at the start."""
+    settings = [line for line in (DEPLOY / "linefix.service").read_text().splitlines() if not line.startswith("#")]
+    assert not any(line.startswith(("LoadCredential", "SetCredential", "ImportCredential")) for line in settings)
+    (file,) = [line.removeprefix("Environment=LINEFIX_KEYS_FILE=") for line in settings if "LINEFIX_KEYS_FILE=" in line]
+    assert Path(file).is_absolute()
+    assert not any("LINEFIX_KEYS=" in line for line in settings)
+
+
+@pytest.mark.parametrize("name", ["compose.yaml", "replicas/compose.yaml"])
+def test_containers_have_the_folder_of_the_keys(name: str) -> None:
+    """Of a single file that is mounted they keep the old one when it is replaced."""
+    linefix = yaml.safe_load((DEPLOY / name).read_text())["services"]["linefix"]
+    assert "LINEFIX_KEYS" not in linefix["environment"]
+    place = linefix["environment"]["LINEFIX_KEYS_FILE"]
+    (source,) = [volume.split(":")[0] for volume in linefix["volumes"] if volume.endswith(f":{place}:ro")]
+    assert Path(source).suffix == ""
+    assert "keys" not in linefix.get("secrets", ())
+
+
+def test_a_pod_has_the_folder_of_the_keys() -> None:
+    """With a subPath it would keep the files that it had at its start; so it does what the environment says."""
+    pod: dict[str, Any] = yaml.safe_load((DEPLOY / "kubernetes" / "deployment.yaml").read_text())
+    pod = pod["spec"]["template"]["spec"]
+    (container,) = pod["containers"]
+    told = {one["name"]: one.get("value") for one in container["env"]}
+    assert "LINEFIX_KEYS" not in told
+    (mount,) = [one for one in container["volumeMounts"] if one["mountPath"] == told["LINEFIX_KEYS_FILE"]]
+    assert "subPath" not in mount
+    assert any(one["name"] == mount["name"] and "secret" in one for one in pod["volumes"])
+
+
+def test_grafana_has_no_password_that_everybody_knows() -> None:
+    grafana = yaml.safe_load((DEPLOY / "replicas" / "compose.yaml").read_text())["services"]["grafana"]
+    assert grafana["environment"]["GF_SECURITY_ADMIN_PASSWORD"] == "${GRAFANA_PASSWORD:?}"
+    assert all(port.startswith("127.0.0.1:") for port in grafana["ports"])

@@ -1,0 +1,178 @@
+"""Kinds of DXF and of what is in one: binary files, multilines, and messages that name what is not read."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from ezdxf import units
+from ezdxf.document import Drawing as Document
+from ezdxf.filemanagement import new
+
+from formats import ImportedMap, ImportOptions, MalformedFileError, TooLargeError, read_map
+
+ROOM = [(0.0, 0.0), (7.0, 0.0), (7.0, 4.0), (3.0, 4.0), (3.0, 6.0), (0.0, 6.0)]
+
+
+def drawn(*, to: tuple[float, float] = (0.0, 0.0)) -> Document:
+    document = new(units=units.M)
+    for (x1, y1), (x2, y2) in zip(ROOM, ROOM[1:] + ROOM[:1], strict=True):
+        document.modelspace().add_line((x1 + to[0], y1 + to[1]), (x2 + to[0], y2 + to[1]))
+    return document
+
+
+def read(tmp_path: Path, document: Document, *, fmt: str = "asc") -> ImportedMap:
+    document.saveas(tmp_path / "plan.dxf", fmt=fmt)
+    return read_map(tmp_path / "plan.dxf", ImportOptions(drawn="faces"))
+
+
+def notes(found: ImportedMap) -> dict[str, tuple[str, int]]:
+    report = found.report
+    return {n.code: (n.message, n.count) for n in (*report.read, *report.dropped, *report.assumed)}
+
+
+@pytest.mark.parametrize("version", ["R12", "R2000", "R2007", "R2018"])
+def test_binary_files(tmp_path: Path, version: str) -> None:
+    document = new(version, units=units.MM)
+    block = document.blocks.new("WING")
+    block.add_line((0, 0), (3000, 0))
+    document.modelspace().add_blockref("WING", (0, 1000))
+    document.modelspace().add_arc((0, 0), 2000, 0, 90)
+    found = []
+    for fmt in ("asc", "bin"):
+        document.saveas(tmp_path / "plan.dxf", fmt=fmt)
+        found.append(read_map(tmp_path / "plan.dxf", ImportOptions(units="mm")).map.segments.endpoints)
+    assert len(found[0]) > 5
+    assert (found[0] == found[1]).all()
+
+
+@pytest.mark.parametrize("kept", [23, 300, 5_000])
+def test_binary_files_that_are_cut_off(tmp_path: Path, kept: int) -> None:
+    drawn().saveas(tmp_path / "plan.dxf", fmt="bin")
+    content = (tmp_path / "plan.dxf").read_bytes()
+    (tmp_path / "plan.dxf").write_bytes(content[:kept])
+    with pytest.raises(MalformedFileError, match=r"is no DXF|has no lines"):
+        read_map(tmp_path / "plan.dxf", ImportOptions(units="m"))
+
+
+def test_multilines(tmp_path: Path) -> None:
+    """Both faces of a wall 0.3 m thick, at corners too, with its ends closed; in a block as well."""
+    document = new(units=units.M)
+    style = document.mline_styles.new("WALL")
+    style.elements.append(0.15)
+    style.elements.append(-0.15)
+    document.modelspace().add_mline([(0, 0), (5, 0), (5, 4)], dxfattribs={"style_name": "WALL"})
+    block = document.blocks.new("PLAN")
+    block.add_mline([(0, 0), (2, 0)], dxfattribs={"style_name": "WALL"})
+    document.modelspace().add_blockref("PLAN", (10, 10), dxfattribs={"rotation": 90})
+    found = read(tmp_path, document)
+    lengths = sorted(found.map.segments.lengths.round(3).tolist())
+    assert lengths == [2.0, 2.0, 4.0, 4.3, 5.0, 5.3]  # its upper element runs through the points
+    assert notes(found)["entity_mline"][1] == 2
+
+
+def test_a_closed_multiline_on_a_frozen_layer(tmp_path: Path) -> None:
+    document = drawn()
+    document.layers.add("OLD").freeze()
+    document.modelspace().add_mline(ROOM, close=True, dxfattribs={"layer": "OLD"})
+    found = read(tmp_path, document)
+    assert len(found.map.segments) == 6
+    assert notes(found)["hidden_layer"] == ("entities and blocks on layers that are off or frozen: OLD", 1)
+
+
+def refused(tmp_path: Path, document: Document) -> str:
+    with pytest.raises(MalformedFileError, match="has no lines that could be walls") as caught:
+        read(tmp_path, document)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_walls_in_paper_space(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    sheet = document.layout("Layout1")
+    for a, b in pairwise(ROOM):
+        sheet.add_line(a, b)
+    sheet.add_text("Hall")
+    message = refused(tmp_path, document)
+    assert "layout Layout1: 5 LINE, 1 TEXT from (0, 0) to (7, 6)" in message
+    assert "CHSPACE" in message
+
+
+def test_an_external_reference(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    document.add_xref_def("C:\\plans\\ground floor.dwg", "GROUND")
+    document.modelspace().add_blockref("GROUND", (12, -3))
+    message = refused(tmp_path, document)
+    assert "GROUND (C:\\plans\\ground floor.dwg) at (12, -3)" in message
+    assert "bind" in message
+
+
+def test_other_contents_are_named_with_their_counts(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    document.modelspace().add_text("Hall")
+    document.modelspace().add_text("Lift")
+    document.modelspace().add_point((1, 1))
+    document.modelspace().add_blockref("NOWHERE", (1, 1))
+    document.modelspace().add_polyface().append_face([(0, 0, 0), (1, 0, 0), (1, 1, 0)])
+    message = refused(tmp_path, document)
+    for part in ("TEXT is not read (2)", "POINT is not read (1)", "POLYLINE of a mesh is not read (1)"):
+        assert part in message
+
+
+def test_objects_of_other_programs(tmp_path: Path) -> None:
+    document = new(units=units.M)
+    document.saveas(tmp_path / "plan.dxf")
+    proxy = (
+        "  0\nACAD_PROXY_ENTITY\n  5\nFF{}\n100\nAcDbEntity\n  8\nA-WALL\n100\nAcDbProxyEntity\n 90\n498\n 91\n500\n"
+    )
+    text = (tmp_path / "plan.dxf").read_text()
+    head, section, tail = text.partition("ENTITIES\n")
+    (tmp_path / "plan.dxf").write_text(head + section + proxy.format(1) + proxy.format(2) + tail)
+    with pytest.raises(MalformedFileError, match=r"ACAD_PROXY_ENTITY is not read: .*EXPORTTOAUTOCAD.* \(2\)"):
+        read_map(tmp_path / "plan.dxf")
+
+
+@pytest.mark.parametrize("far", [(0.0, 0.0), (450_000.0, 5_400_000.0), (352_500.0, 5_400_000.0)])
+def test_a_stray_line_is_left_out_and_named(tmp_path: Path, far: tuple[float, float]) -> None:
+    document = drawn(to=(350_000.0, 5_400_000.0))
+    document.modelspace().add_line(far, (far[0] + 2, far[1]), dxfattribs={"layer": "SCRATCH"})
+    found = read(tmp_path, document)
+    assert len(found.map.segments) == 6
+    message, count = notes(found)["far_lines"]
+    assert f"1 on SCRATCH at ({far[0] + 1:.6g}, {far[1]:.6g}) m" in message
+    assert count == 1
+
+
+def test_a_line_from_the_origin_to_the_building(tmp_path: Path) -> None:
+    document = drawn(to=(350_000.0, 5_400_000.0))
+    document.modelspace().add_line((0, 0), (350_000, 5_400_000), dxfattribs={"layer": "AXIS"})
+    found = read(tmp_path, document)
+    assert len(found.map.segments) == 6
+    assert "1 on AXIS" in notes(found)["long_lines"][0]
+
+
+def test_two_buildings_too_far_apart_are_refused_by_name(tmp_path: Path) -> None:
+    document = drawn()
+    for k, (a, b) in enumerate(pairwise(ROOM)):
+        document.modelspace().add_line(
+            (a[0] + 3e5, a[1]), (b[0] + 3e5, b[1]), dxfattribs={"layer": "EAST" if k else "ANNEX"}
+        )
+    with pytest.raises(MalformedFileError, match=r"29999[0-9] m or more from the others: 5 on ANNEX, EAST") as caught:
+        read(tmp_path, document)
+    assert "6 on 0 around" in str(caught.value)
+
+
+def test_buildings_of_one_site_stay_together(tmp_path: Path) -> None:
+    document = drawn()
+    for a, b in pairwise(ROOM):
+        document.modelspace().add_line((a[0] + 600, a[1]), (b[0] + 600, b[1]))
+    found = read(tmp_path, document)
+    assert len(found.map.segments) == 11
+    assert "594 m or more" in notes(found)["far_lines"][0]
+
+
+def test_many_tiny_entities_are_refused_before_they_are_parsed(tmp_path: Path) -> None:
+    (tmp_path / "plan.dxf").write_text("  0\nSECTION\n  2\nENTITIES\n" + "0\nLINE\n" * 800_000 + "0\nENDSEC\n0\nEOF\n")
+    with pytest.raises(TooLargeError, match="entities and objects"):
+        read_map(tmp_path / "plan.dxf")

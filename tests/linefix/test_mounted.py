@@ -1,0 +1,122 @@
+"""Scans of logs as they are mounted, upside down, and during which the robot moved."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import linefix
+from formats import LoggedScan
+from linefix import RigidTransform
+
+ROOM = np.array([[0, 0, 7, 0], [7, 0, 7, 3], [7, 3, 4, 3], [4, 3, 4, 6], [4, 6, 0, 6], [0, 6, 0, 0]], dtype=float)
+WALLS = linefix.Segments.from_array(ROOM)
+BEAMS = 500
+STEP = math.tau / BEAMS
+MOUNT = RigidTransform(0.25, -0.15, 1.1)
+ROBOT = RigidTransform(2.2, 1.7, 0.6)
+HERE = RigidTransform(0.0, 0.0, 0.0)
+
+
+def seen(
+    mount: RigidTransform, *, seconds: float = 0.0, twist: tuple[float, float, float] = (0.0, 0.0, 0.0), seed: int = 3
+) -> np.ndarray:
+    """Return ranges of a scanner on a robot that moves at a twist, the first beam from `ROBOT`."""
+    way = linefix.Motion(seconds / BEAMS, *twist).places(BEAMS)
+    found = []
+    for k, (x, y, theta) in enumerate(way):
+        beam = linefix.simulation.Scanner(beams=1, angle_min=-math.pi + k * STEP, angle_increment=STEP, sigma=0.01)
+        pose = ROBOT.compose(RigidTransform(x, y, theta)).compose(mount)
+        found.append(linefix.simulation.scan(WALLS, pose, beam, np.random.default_rng(seed * BEAMS + k)).ranges[0])
+    return np.array(found)
+
+
+def logged(
+    ranges: np.ndarray,
+    *,
+    flipped: bool = False,
+    mount: RigidTransform | None = MOUNT,
+    seconds: float = 0.0,
+    motion: linefix.Motion | None = None,
+) -> LoggedScan:
+    """Return what a log has of ranges that are counter-clockwise as seen from above."""
+    first = -math.pi
+    if flipped:  # the same beams as the sensor names them: its own angles run the other way
+        laser = linefix.LaserScan(-first, -STEP, ranges, motion=motion)
+    else:
+        laser = linefix.LaserScan(first, STEP, ranges, motion=motion)
+    return LoggedScan(0, "/scan", "laser", laser, seconds / BEAMS, None, "", mount, flipped, "base_link")
+
+
+def off(answer: linefix.AssociationResult, truth: RigidTransform) -> tuple[float, float]:
+    """Return by how much a pose is wrong, metres and radians."""
+    assert answer.pose is not None
+    step = truth.inverse().compose(answer.pose)
+    return math.hypot(step.x, step.y), abs(step.theta)
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+@pytest.mark.parametrize("mount", [MOUNT, None])
+def test_the_loop_over_a_log_gives_poses_of_the_robot(mount: RigidTransform | None, flipped: bool) -> None:
+    answer = linefix.locate(linefix.index_map(ROOM), logged(seen(MOUNT), mount=mount, flipped=flipped))
+    assert answer.usable
+    metres, radians = off(answer, ROBOT.compose(HERE if mount else MOUNT))
+    assert metres < 0.02
+    assert radians < 0.005
+
+
+def test_a_prior_is_of_the_robot() -> None:
+    away = linefix.HardPrior(ROBOT.compose(RigidTransform(1.5, 0.0, 0.0)), 0.5, 0.5)
+    near = linefix.HardPrior(ROBOT, 0.1, 0.1)
+    scan = logged(seen(MOUNT))
+    assert linefix.locate(ROOM, scan, prior=near).usable
+    assert not linefix.locate(ROOM, scan, prior=away).usable
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_the_motion_of_the_sensor_counts(flipped: bool) -> None:
+    twist = (0.4, 0.0, 1.2)  # of the robot
+    ranges = seen(MOUNT, seconds=0.2, twist=twist)
+    vx, vy = twist[0] - twist[2] * MOUNT.y, twist[2] * MOUNT.x
+    c, s = math.cos(MOUNT.theta), math.sin(MOUNT.theta)
+    side = -1.0 if flipped else 1.0
+    motion = linefix.Motion(0.2 / BEAMS, c * vx + s * vy, side * (c * vy - s * vx), side * twist[2])
+    answer = linefix.locate(ROOM, logged(ranges, flipped=flipped, seconds=0.2, motion=motion))
+    metres, radians = off(answer, ROBOT)
+    assert answer.usable
+    assert metres < 0.02
+    assert radians < 0.006
+
+
+@pytest.mark.parametrize("twist", [(0.0, 0.0, 1.0), (0.5, 0.0, -1.0), (0.6, 0.0, 0.0), (0.0, 0.0, 0.0)])
+def test_a_motion_that_is_not_known_widens_the_covariance(twist: tuple[float, float, float]) -> None:
+    answer = linefix.locate(ROOM, logged(seen(MOUNT, seconds=0.1, twist=twist), seconds=0.1))
+    assert answer.covariance is not None
+    metres, radians = off(answer, ROBOT)
+    sigma = np.sqrt(np.diag(answer.covariance))
+    assert radians < 2.0 * sigma[2]
+    assert metres < 2.0 * math.hypot(sigma[0], sigma[1])
+    assert sigma[2] == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_scan_of_a_moment_has_nothing_to_widen() -> None:
+    answer = linefix.locate(ROOM, logged(seen(MOUNT)))
+    assert answer.covariance is not None
+    assert math.sqrt(answer.covariance[2, 2]) < 0.005
+
+
+def test_two_scanners_are_one_scan() -> None:
+    rear, step = RigidTransform(-0.3, 0.1, 3.0), RigidTransform(0.2, 0.05, 0.1)
+    then = logged(seen(step.compose(rear), seed=5), mount=rear)
+    together = linefix.assemble([linefix.view_of(logged(seen(MOUNT))), linefix.view_of(then, step)])
+    answer = linefix.locate(ROOM, together)
+    assert answer.usable
+    assert off(answer, ROBOT)[0] < 0.02
+
+
+def test_the_documented_loop_is_the_one_that_is_tested() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    assert "linefix.locate(index, logged)" in text

@@ -1,0 +1,192 @@
+"""linefix replay and map check: bags without odometry, of a robot that moves during scans, with upright scanners."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from registration import RigidTransform, Segments
+from simulation import Scanner, scan
+from tests.formats.test_log_frames import SECOND, Robots
+from tests.running import RunningService
+from vectorization import Motion
+
+from .running import Ended, Linefix, refused
+
+BEAMS = 400
+STEP = math.tau / BEAMS
+ROOM: list[list[float]] = [[0, 0, 7, 0], [7, 0, 7, 3], [7, 3, 4, 3], [4, 3, 4, 6], [4, 6, 0, 6], [0, 6, 0, 0]]
+MOUNT = RigidTransform(0.3, 0.1, 0.5)
+TWIST = (0.3, 0.0, 1.0)
+SECONDS = 0.1  # of a scan
+COUNT = 4
+
+
+def swept(walls: list[list[float]], robot: RigidTransform, mount: RigidTransform, *, moving: bool, seed: int) -> Any:
+    """Return the ranges of a scanner on a robot that moves at `TWIST`, or stands."""
+    way = Motion(SECONDS / BEAMS, *(TWIST if moving else (0.0, 0.0, 0.0))).places(BEAMS)
+    map_walls, rng = Segments.from_array(np.array(walls, dtype=float)), np.random.default_rng(seed)
+    found = []
+    for k, (x, y, theta) in enumerate(way):
+        beam = Scanner(beams=1, angle_min=-math.pi + k * STEP, angle_increment=STEP, sigma=0.01)
+        found += list(scan(map_walls, robot.compose(RigidTransform(x, y, theta)).compose(mount), beam, rng).ranges)
+    return np.array(found, dtype=np.float32)
+
+
+def put_scan(bag: Robots, ns: int, ranges: Any, frame: str = "laser", *, moving: bool = False) -> None:
+    kind = "sensor_msgs/msg/LaserScan"
+    beat = SECONDS / BEAMS if moving else 0.0
+    numbers = (-math.pi, -math.pi + STEP * (BEAMS - 1), STEP, beat, SECONDS, 0.05, 30.0)
+    nothing = np.zeros(0, dtype=np.float32)
+    bag.write("/scan", kind, ns, bag.type(kind, bag.header(ns, frame), *numbers, ranges, nothing))
+
+
+def robots() -> list[RigidTransform]:
+    return [RigidTransform(1.5 + 0.4 * k, 1.5, 0.5 * k) for k in range(COUNT)]
+
+
+def quaternion(pose: RigidTransform) -> tuple[float, float, float, float]:
+    return (0.0, 0.0, math.sin(0.5 * pose.theta), math.cos(0.5 * pose.theta))
+
+
+def write_drive(folder: Path, *, odometry: bool, moving: bool = True) -> None:
+    """Write a bag of a robot that turns while it scans; the folder is ``robot_mcap``."""
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    bag = Robots("mcap", folder)
+    bag.transform("/tf_static", 0, "base_link", "laser", (MOUNT.x, MOUNT.y, 0.2), quaternion(MOUNT))
+    for k, robot in enumerate(robots()):
+        begun = (k + 1) * SECOND
+        for j in range(-2, 5) if odometry else ():
+            seconds = j * 0.05
+            x, y, theta = Motion(seconds, *TWIST).places(2)[1]
+            at = robot.compose(RigidTransform(x, y, theta))
+            bag.transform("/tf", begun + round(seconds * SECOND), "odom", "base_link", (at.x, at.y, 0), quaternion(at))
+        put_scan(bag, begun, swept(ROOM, robot, MOUNT, moving=moving, seed=k), moving=moving)
+    bag.done()
+
+
+def lines(ended: Ended) -> list[dict[str, Any]]:
+    assert ended.code == 0, ended.err
+    return [json.loads(line) for line in ended.out.splitlines()]
+
+
+def errors(found: list[dict[str, Any]]) -> list[tuple[float, float]]:
+    """Return by how much each usable pose is wrong, metres and radians."""
+    return [
+        (
+            math.hypot(line["pose"]["x"] - truth.x, line["pose"]["y"] - truth.y),
+            abs(math.remainder(line["pose"]["theta"] - truth.theta, math.tau)),
+        )
+        for line, truth in zip(found, robots(), strict=True)
+        if line["usable"]
+    ]
+
+
+ASKED = ("replay", "robot_mcap", "--map", "room.json", "--json")
+
+
+@pytest.mark.parametrize("mode", ["global", "track"])
+def test_a_robot_that_turns_while_it_scans_is_where_odometry_takes_each_beam(
+    linefix: Linefix, folder: Path, mode: str
+) -> None:
+    write_drive(folder, odometry=True)
+    ended = linefix(*ASKED, "--mode", mode)
+    found = errors(lines(ended))
+    assert len(found) == COUNT
+    assert max(metres for metres, _ in found) < 0.03
+    assert max(radians for _, radians in found) < 0.01
+    assert "is not known" not in ended.err
+
+
+def test_without_odometry_its_covariance_says_how_far_it_may_be_off(linefix: Linefix, folder: Path) -> None:
+    write_drive(folder, odometry=False)
+    ended = linefix(*ASKED, "--out", "poses.tum")
+    found = errors(lines(ended))
+    assert found
+    assert max(radians for _, radians in found) < 0.1  # two standard deviations of 1 rad/s over 0.05 s
+    assert "no odometry was found" in ended.err
+    assert "each scan is searched on the whole map" in ended.err
+    assert "during which the motion of the sensor is not known" in ended.err
+    assert "covariances allow for a motion of 0.5 m/s and 1.0 rad/s" in ended.err
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_a_server_answers_the_same(linefix: Linefix, folder: Path, service: RunningService, odometry: bool) -> None:
+    write_drive(folder, odometry=odometry)
+    here, there = lines(linefix(*ASKED)), lines(linefix(*ASKED, "--server", service.url))
+    for one in (*here, *there):
+        one.pop("timing_ms")
+    assert here == there
+
+
+TWINS: list[list[float]] = [
+    *([x, 0, x + 5, 0] for x in (0, 12)),
+    *([x + 5, 0, x + 5, 4] for x in (0, 12)),
+    *([x + 5, 4, x + 2, 4] for x in (0, 12)),
+    *([x + 2, 4, x + 2, 3] for x in (0, 12)),
+    *([x + 2, 3, x, 3] for x in (0, 12)),
+    *([x, 3, x, 0] for x in (0, 12)),
+    [-1, -1, -1, -9],
+    [-1, -9, 9, -9],
+]
+STOOL = [[4.0, 1.0, 4.4, 1.0], [4.4, 1.0, 4.4, 0.6], [4.4, 0.6, 4.0, 0.6], [4.0, 0.6, 4.0, 1.0]]
+
+
+@pytest.mark.parametrize("frames", ["static", "repeated"])
+def test_a_frame_that_stands_leads_no_scan_to_the_room_before(linefix: Linefix, folder: Path, frames: str) -> None:
+    """Two equal rooms but for a stool; the robot is carried from one to the other, and the stool is moved."""
+    (folder / "twins.json").write_text(json.dumps({"segments": [*TWINS, *STOOL]}))
+    bag = Robots("mcap", folder)
+    bag.transform("/tf_static", 0, "base_link", "laser")
+    for k, x in enumerate((1.5, 1.5, 13.5, 13.5)):
+        begun = (k + 1) * SECOND
+        bag.transform("/tf" if frames == "repeated" else "/tf_static", begun, "odom", "base_link", (4.0, 4.0, 0.0))
+        seen = swept([*TWINS, *STOOL], RigidTransform(x, 1.2, 0.7), RigidTransform(0, 0, 0), moving=False, seed=k)
+        put_scan(bag, begun, seen)
+    bag.done()
+    for mode in ("track", "global"):
+        found = lines(linefix("replay", "robot_mcap", "--map", "twins.json", "--json", "--mode", mode))
+        assert all(line["pose"]["x"] > 12.0 for line in found[2:] if line["usable"])
+
+
+def test_an_upright_scanner_is_refused_with_its_frame(linefix: Linefix, folder: Path) -> None:
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    bag = Robots("mcap", folder)
+    bag.transform("/tf_static", 0, "base_link", "camera_optical", (0.3, 0.1, 0.2), (-0.5, 0.5, -0.5, 0.5))
+    put_scan(bag, SECOND, swept(ROOM, robots()[0], MOUNT, moving=False, seed=1), "camera_optical")
+    bag.done()
+    told = refused(linefix(*ASKED), 3)
+    for words in ("camera_optical", "90.0 degrees from horizontal in base_link", "at most 20", "state the mount"):
+        assert words in told
+    checked = linefix("map", "check", "room.json", "--log", "robot_mcap")
+    assert checked.code == 3
+    assert "camera_optical" in checked.err
+    (line,) = lines(linefix(*ASKED, "--mount", str(MOUNT.x), str(MOUNT.y), str(MOUNT.theta)))
+    assert errors([line, *[{"usable": False}] * (COUNT - 1)])[0] < (0.03, 0.01)
+
+
+def test_a_check_takes_the_motion_of_the_scans(linefix: Linefix, folder: Path) -> None:
+    write_drive(folder, odometry=True)
+    ended = linefix("map", "check", "room.json", "--log", "robot_mcap", "--json")
+    assert ended.code == 0, ended.err
+    samples = json.loads(ended.out)["samples"]["scans"]
+    for one, robot in zip(samples, robots(), strict=True):
+        sensor = robot.compose(MOUNT)
+        assert one["usable"]
+        assert math.remainder(one["pose"]["theta"] - sensor.theta, math.tau) == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_check_reports_what_was_left_out_of_the_log(linefix: Linefix, folder: Path) -> None:
+    write_drive(folder, odometry=False, moving=False)
+    bag = Robots("mcap", folder / "again")
+    bag.transform("/tf", 0, "a", "b", (math.nan, 0.0, 0.0))
+    put_scan(bag, SECOND, swept(ROOM, robots()[0], MOUNT, moving=False, seed=1))
+    bag.done()
+    ended = linefix("map", "check", "room.json", "--log", "again/robot_mcap")
+    assert ended.code == 0
+    assert "invalid transforms" in ended.err

@@ -1,0 +1,54 @@
+"""The stages of an import after its reading are bounded as the reading is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from association import CancelledError, Deadline
+from service.admission.errors import DeadlinePassedError
+from service.app import create_app
+from service.part import Part
+from service.settings import Settings
+from service.work.importing import index_import
+from tests.service.maps.test_lookup import Lookup, inline
+
+
+@pytest.fixture
+def lookup(tmp_path: Path) -> Iterator[Lookup]:
+    made = Lookup(tmp_path)
+    yield made
+    made.parser.close()
+    made.store.close()
+
+
+def test_an_import_is_indexed_until_its_deadline_or_its_client_is_gone(lookup: Lookup) -> None:
+    """Class of attack: work without a client."""
+    with pytest.raises(DeadlinePassedError):
+        index_import(lookup, inline(), Deadline(time.monotonic()))
+    gone = Deadline()
+    gone.cancel()
+    with pytest.raises(CancelledError):
+        index_import(lookup, inline(), gone)
+
+
+def test_an_import_takes_no_place_of_maps_that_are_searched(lookup: Lookup) -> None:
+    index = index_import(lookup, inline(), Deadline())
+    assert index.directed == len(inline().segments)
+    assert (len(lookup.cache), lookup.cache.bytes) == (0, 0)
+
+
+def test_readers_of_several_workers_have_the_memory_of_one(tmp_path: Path) -> None:
+    """Class of attack: a limit of a process that is one of each of several."""
+    settings = Settings(data_dir=tmp_path)
+    parts = [create_app(settings, Part(k, 2)).state.services for k in range(2)]
+    assert sum(services.import_bounds.memory_bytes for services in parts) == settings.max_import_bytes
+    assert all(services.importing.slots == 1 for services in parts)
+    many = create_app(settings, Part(0, 8)).state.services
+    assert many.import_bounds.memory_bytes == 400_000_000  # with less no file is read at all
+    many.close()
+    for services in parts:
+        services.close()
