@@ -19,7 +19,7 @@ from registration import Segments
 from registration.layout import Floats
 
 COUNT = 40_000
-MOST_BETWEEN_LOOKS = 0.5  # s of this thread's processor time
+MOST_BETWEEN_LOOKS = 1.0  # s of this thread's processor time; estimating crossings takes 0.5, whatever the map
 MOST_HELD = 100_000_000  # bytes in addition to the index
 
 
