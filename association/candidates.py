@@ -40,6 +40,7 @@ from .tuning import (
     SLIDE_SPACING_FOR_BEAMS,
     TELLING_SEGMENTS,
     USUAL_CROWD,
+    USUAL_LINES,
 )
 
 NO_NOISE = np.zeros(0)
@@ -165,8 +166,9 @@ class Begun:
     @classmethod
     def of(cls, context: SearchContext, effort: Effort, chunk: int | None = None) -> Begun:
         """Prepare a search of the map, or of the window of a hard prior; `chunk` as in `find_candidates`."""
-        # A test of a pose takes longer the more walls lie where it is.
-        budget = int((chunk or CHUNK) / max(1.0, context.index.crowd / USUAL_CROWD))
+        # A pose takes longer to score the more lines the scan has, and the more walls lie where each is.
+        crowd, lines = context.index.crowd / USUAL_CROWD, len(context.lines.rows) / USUAL_LINES
+        budget = int((chunk or CHUNK) / (max(1.0, crowd) * max(1.0, lines)))
         how, rules = _limits(effort, context.window and context.window.radius, budget, with_beams=context.with_beams)
         found, progress = np.zeros(effort.kept + KEPT_SLIDES, FOUND), record(PROGRESS, best_value=effort.known)
         return cls(effort, context.question(rules), _planning(context, effort), found, progress, how)

@@ -96,12 +96,15 @@ class Cause:
         Of the scan once it is undone, nats.
     sure : bool
         Whether the answer would then be usable.
+    of_map : bool
+        Whether the map's lengths were changed, and not the scan's.
     """
 
     mistake: Mistake
     factor: float
     score: float
     sure: bool
+    of_map: bool = False
 
 
 def find_causes(
@@ -144,6 +147,7 @@ def find_causes(
         cause = _tried(changed, mistake, factor, _known(explanations, changed.scan))
         if cause is None:
             continue
+        cause = replace(cause, of_map=changed.index is not again.index)
         if cause.sure:
             return (cause,)
         if mistake not in found or found[mistake].score < cause.score:
@@ -202,20 +206,23 @@ def _likely_map_units(context: SearchContext) -> list[float]:
 
     Scan lines are parts of walls: in the same unit their usual length is a quarter of that of walls to all of it.
     """
-    scan, walls = context.scan.measured.segments.lengths, context.index.walls.longest
-    extent, usual = inner_extent(context.scan.measured.segments), _usual(walls) / _usual(scan)
-    if not LEAST_EXTENT <= extent <= GREATEST_EXTENT or context.index.directed > MOST_FOR_UNITS:
+    index, scan = context.index, context.scan.measured.segments
+    extent = inner_extent(scan)
+    if not LEAST_EXTENT <= extent <= GREATEST_EXTENT or index.directed > MOST_FOR_UNITS:
         return []
+    # In a map that is too small all lines are near one another, and are merged to walls that are none.
+    seen, walls, pieces = _usual(scan.lengths), _usual(index.walls.longest), _usual(index.segments.lengths)
+    off = {factor: factor * seen / (walls if factor > 1.0 else pieces) for factor in UNITS}
     likely = [
         factor
         for factor in UNITS
         if abs(math.log(factor)) > math.log(GREATEST_SAME_GATES)
-        and USUAL_PART[0] <= factor / usual <= USUAL_PART[1]
-        and extent * factor <= EXCEEDING * context.index.diagonal
-        and float(walls.min()) / factor >= MIN_LENGTH
-        and float(walls.max()) / factor <= MAX_LENGTH
+        and USUAL_PART[0] <= off[factor] <= USUAL_PART[1]
+        and extent * factor <= EXCEEDING * index.diagonal
+        and float(index.segments.lengths.min()) / factor >= MIN_LENGTH
+        and float(index.segments.lengths.max()) / factor <= MAX_LENGTH
     ]
-    return sorted(likely, key=lambda factor: abs(math.log(factor / usual)))
+    return sorted(likely, key=lambda factor: abs(math.log(off[factor])))
 
 
 def _usual(lengths: Floats) -> float:

@@ -163,6 +163,7 @@ SAMPLE_SEED = 20190901
 # Work between two looks at the clock, in tests of a wall: a few milliseconds. Measured.
 CHUNK = 300_000
 USUAL_CROWD = 8.0  # walls on the list that a place on a wall has
+USUAL_LINES = 200.0  # of a scan; with more, poses take longer in proportion
 TESTS_BASE = 100
 TESTS_ANCHOR = 5
 TESTS_REJECTED = 10

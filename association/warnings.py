@@ -68,7 +68,7 @@ def warnings_of(
 def _mistaken(cause: Cause) -> str:
     if cause.mistake is not Mistake.SCALE:
         return SENTENCES[cause.mistake]
-    unit, taken = UNITS.get(cause.factor), unit_mistake(cause.factor)
+    unit, taken = None if cause.of_map else UNITS.get(cause.factor), unit_mistake(cause.factor)
     what = "the scan or the map is not to scale"
     if unit is not None:
         what = f"the scan seems to be in {unit}"

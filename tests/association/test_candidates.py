@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, SearchReport
-from association.candidates import Candidates, find_candidates
+from association.candidates import Begun, Candidates, Effort, find_candidates
 from association.kernels.planning import pair_up
 from association.tuning import (
     BASE_SEGMENTS,
@@ -353,3 +353,14 @@ def test_a_deadline_holds_where_walls_are_kilometres_long(seen_walls: list[list[
     report = found(index, scan_of(seen_walls), deadline=Deadline(at=time.monotonic() + 0.1)).report
     assert time.thread_time() - begun < 1.0
     assert not report.complete
+
+
+def test_the_clock_is_looked_at_after_fewer_poses_of_a_scan_of_many_segments() -> None:
+    """Each takes as many times longer as there are more lines than usual."""
+    budgets = []
+    for count in (20, 200, 2_000):
+        y = 3.0 * np.arange(count)
+        context = context_of(CAMPUS, scan_of(np.stack([0.0 * y, y, 2.0 + 0.0 * y, y + 1.0], axis=1)))
+        assert len(context.lines.rows) == count
+        budgets.append(int(Begun.of(context, Effort.of(context)).how["budget"][0]))
+    assert budgets[0] == budgets[1] == pytest.approx(10 * budgets[2], rel=1e-3)

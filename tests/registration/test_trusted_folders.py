@@ -104,7 +104,7 @@ class Planted:
     def __init__(self, mark: Path) -> None:
         self.mark = mark
 
-    def __reduce__(self) -> tuple[object, tuple[str, str]]:
+    def __reduce__(self) -> tuple[object, tuple[str]]:
         return os.system, (f"touch {self.mark}",)
 
 
