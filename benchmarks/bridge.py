@@ -22,10 +22,10 @@ from cyclonedds.domain import DomainParticipant
 import linefix
 from association import MapIndex, associate
 from bridge import messages
+from bridge.frames import NS
 from bridge.locating import laser_of
 from bridge.odometry import nanoseconds
 from bridge.wire import LATCHED, RELIABLE, SENSOR, Heard, Told, Waiting
-from formats.logs.transforms import NS
 
 from .collection import Collection, Query
 from .outcomes import is_right, offset, progress
@@ -96,7 +96,7 @@ class Player:
         while time.monotonic() < ends:
             self._scans.say(blind)
             self._waiting.wait(0.2)
-            if any("tf_static" not in told.status[0].message for told in self._diagnostics.take()):
+            if any("no transform" not in told.status[0].message for told in self._diagnostics.take()):
                 time.sleep(0.5)  # for what was sent meanwhile
                 self._diagnostics.take()
                 return

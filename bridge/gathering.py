@@ -6,9 +6,11 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .locating import Look, Mounts, seconds_of
+from .frames import FrameError, Frames, Mount
+from .locating import Look, seconds_of
 from .messages import LaserScan
 from .odometry import Heard, nanoseconds
+from .text import MAX_NAME, quoted
 
 
 @dataclass(slots=True)
@@ -50,11 +52,20 @@ class Gathering:
 
 
 def looks_of(
-    scans: Sequence[LaserScan], mounts: Mounts, odometry: Heard, *, motion: bool = True
+    scans: Sequence[LaserScan], frames: Frames, base: str, odometry: Heard, *, motion: bool = True
 ) -> tuple[list[Look], list[str]]:
-    """Return scans with where they were taken, as seen from the robot at the time of the first.
+    """Return scans with the poses that they were taken from, relative to the robot at the time of the first.
 
-    With `motion` they come with how fast the robot moved meanwhile, as far as odometry says it.
+    Parameters
+    ----------
+    scans : sequence of LaserScan
+        The newest first.
+    frames : Frames
+    base : str
+        The base frame of the robot.
+    odometry : Heard
+    motion : bool
+        Whether the speed of the robot goes with them, as far as odometry has it.
 
     Returns
     -------
@@ -66,12 +77,31 @@ def looks_of(
     missing: list[str] = []
     for scan in scans:
         frame, now = scan.header.frame_id, (looks[0].message if looks else scan).header.stamp
-        mount, step = mounts.of(frame), odometry.step(now, scan.header.stamp)
-        if mount is None:
-            missing.append(f"/tf_static does not say where {frame} is in {mounts.base}")
-        elif step is None:
-            missing.append(f"no odometry says how the robot moved since the scan of {frame}")
-        else:
-            middle = nanoseconds(scan.header.stamp) + round(0.5e9 * seconds_of(scan))
-            looks.append(Look(scan, mount, step, odometry.speed(middle) if motion else None))
+        try:
+            mount = _mount_of(frame, frames, base, nanoseconds(scan.header.stamp))
+        except FrameError as error:
+            missing.append(str(error))
+            continue
+        step = odometry.step(now, scan.header.stamp)
+        if step is None:
+            missing.append(f"no odometry says how the robot moved since the scan of {quoted(frame)}")
+            continue
+        middle = nanoseconds(scan.header.stamp) + round(0.5e9 * seconds_of(scan))
+        looks.append(Look(scan, mount, step, odometry.speed(middle) if motion else None))
     return looks, missing
+
+
+def _mount_of(frame: str, frames: Frames, base: str, stamp: int) -> Mount:
+    if not frame.strip("/"):
+        raise FrameError(
+            "the scan has an empty frame_id, expected the frame of the laser; set it in the parameters of its driver"
+        )
+    if len(frame) > MAX_NAME:
+        raise FrameError(f"the frame_id of the scan has {len(frame)} characters, expected at most {MAX_NAME}")
+    mount = frames.mount(base, frame, stamp)
+    if mount is None:
+        raise FrameError(
+            f"no transform from {quoted(frame)} to {quoted(base)} on /tf_static; publish it, "
+            "or name the base frame with --base"
+        )
+    return mount

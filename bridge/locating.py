@@ -10,21 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import linefix
-from formats.logs.transforms import Transforms, matrix_of, planar
-from registration import RigidTransform
+from registration import InvalidArgumentError, RigidTransform
 
-from .messages import LaserScan, TFMessage, Time
+from .frames import Mount
+from .messages import LaserScan, Time
 from .odometry import Speed
+from .tuning import MAX_BEAMS
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Mount:
-    """Where a scanner sits: base_from_laser, and whether it is upside down."""
-
-    base_from_laser: RigidTransform
-    flipped: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,39 +39,6 @@ class Located:
     answer: linefix.AssociationResult
     pose: RigidTransform | None
     covariance: NDArray[np.float64] | None
-
-
-class Mounts:
-    """Where scanners sit on the robot, by what ``/tf_static`` says.
-
-    Parameters
-    ----------
-    base : str
-        The robot's own frame.
-    """
-
-    def __init__(self, base: str) -> None:
-        self.base = base.strip("/")
-        self._frames = Transforms("tf_static")
-
-    def hear(self, message: TFMessage) -> None:
-        """Take what was said; the last word on a frame holds.
-
-        Raises
-        ------
-        ValueError
-            When it is no transform.
-        """
-        for one in message.transforms:
-            matrix = matrix_of(one.transform.translation, one.transform.rotation)
-            self._frames.add(one.header.frame_id, one.child_frame_id, 0, matrix, static=True)
-
-    def of(self, frame: str) -> Mount | None:
-        """Return where a scanner sits; None where nobody has said so yet."""
-        if frame.strip("/") == self.base:
-            return Mount(HERE)
-        matrix = self._frames.lookup(self.base, frame, 0)
-        return None if matrix is None else Mount(*planar(matrix))
 
 
 def seconds_of(message: LaserScan) -> float:
@@ -109,6 +69,8 @@ def laser_of(message: LaserScan, *, flipped: bool, motion: linefix.Motion | None
     InputError
         When it is no scan, or the scanner turned nearly as fast as it scans.
     """
+    if not 1 <= len(message.ranges) <= MAX_BEAMS:
+        raise InvalidArgumentError(f"found {len(message.ranges)} ranges, expected 1 to {MAX_BEAMS}", argument="ranges")
     sign = -1.0 if flipped else 1.0
     return linefix.LaserScan(
         sign * message.angle_min,
@@ -146,7 +108,7 @@ class Look:
         return laser_of(self.message, flipped=self.mount.flipped, motion=motion)
 
 
-def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
+def locate(index: linefix.MapIndex, looks: Sequence[Look], deadline: linefix.Deadline | None = None) -> Located:
     """Find where the robot is by one scan, or by several scanners together, at the time of the first one's first beam.
 
     Raises
@@ -159,9 +121,9 @@ def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
     if len(looks) > 1:
         places = [look.base_from_then.compose(look.mount.base_from_laser) for look in looks]
         views = [linefix.View(linefix.scan_of(laser), at) for laser, at in zip(lasers, places, strict=True)]
-        together = linefix.locate(index, linefix.assemble(views))
+        together = linefix.locate(index, linefix.assemble(views), deadline=deadline)
         return Located(stamp, together, together.pose, together.covariance)
-    answer = linefix.locate(index, lasers[0])
+    answer = linefix.locate(index, lasers[0], deadline=deadline)
     if answer.pose is None:
         return Located(stamp, answer, None, None)
     laser_from_base = looks[0].mount.base_from_laser.inverse()

@@ -151,6 +151,24 @@ class OccupancyGrid(IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
 
 
 @dataclass
+class SerializedGrid(IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
+    """An OccupancyGrid that stays as the bytes that came: four million cells take too long to decode at once."""
+
+    header: Header = field(default_factory=Header)
+    info: MapMetaData = field(default_factory=MapMetaData)
+    data: sequence[int8] = field(default_factory=list)
+
+    @classmethod
+    def deserialize(cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> "SerializedGrid":
+        """Return the message with its bytes in `serialized`, and its fields empty."""
+        message = cls()
+        message.serialized = bytes(data)
+        return message
+
+    serialized = b""
+
+
+@dataclass
 class KeyValue(IdlStruct, typename=_type("diagnostic_msgs", "KeyValue")):
     key: str = ""
     value: str = ""

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from formats.logs.transforms import NS, matrix_of, planar, stamp_of
 from registration import RigidTransform
 
+from .frames import NS, matrix_of
 from .messages import Odometry, Time
+from .tuning import MAX_SPEED, MAX_TURN_RATE
 
 KEPT = 2000  # messages; 20 s at 100 Hz
 STALE_NS = NS // 2  # a robot is not known to be where it was longer ago than this,
@@ -50,11 +51,16 @@ class Heard:
             When it is no pose, or no speed.
         """
         pose, twist = message.pose.pose, message.twist.twist
-        found, _ = planar(matrix_of(pose.position, pose.orientation))
+        place, turn = pose.position, pose.orientation
+        matrix = matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w))
+        found = RigidTransform(place.x, place.y, math.atan2(matrix[1, 0], matrix[0, 0]))
         speed = Speed(twist.linear.x, twist.linear.y, twist.angular.z)
-        if not all(math.isfinite(one) for one in (speed.vx, speed.vy, speed.omega)):
-            raise ValueError(f"a twist of finite numbers is expected, got {speed}")
-        stamp = stamp_of(message.header)
+        if not (math.hypot(speed.vx, speed.vy) <= MAX_SPEED and abs(speed.omega) <= MAX_TURN_RATE):
+            raise ValueError(
+                f"found a twist of {speed.vx:.4g} m/s, {speed.vy:.4g} m/s and {speed.omega:.4g} rad/s, "
+                f"expected at most {MAX_SPEED:g} m/s and {MAX_TURN_RATE:g} rad/s"
+            )
+        stamp = nanoseconds(message.header.stamp)
         if self._stamps and stamp <= self._stamps[-1]:
             self._stamps.clear()
             self._poses.clear()

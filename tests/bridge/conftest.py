@@ -24,3 +24,8 @@ def map_file(tmp_path: Path) -> str:
     file = tmp_path / "room.json"
     linefix.write_map(linefix.LineMap(linefix.Segments.from_array(ROOM)), file)
     return str(file)
+
+
+@pytest.fixture(scope="session")
+def room() -> linefix.MapIndex:
+    return linefix.index_map(ROOM)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import linefix
-from bridge import messages
+from bridge import Bridge, BridgeOptions, messages
 from bridge.wire import LATCHED, RELIABLE, SENSOR, Heard, Told
 
 ROOT = Path(__file__).parent.parent.parent
@@ -55,6 +56,35 @@ def scan(second: int, *, seen: bool = True) -> messages.LaserScan:
     )  # fmt: skip
 
 
+def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:
+    size, cell = 140, 0.05
+    x, y = np.meshgrid(*[np.arange(size) * cell + 0.5 * cell - 0.5] * 2)
+    free = (x > 0) & (y > 0) & (((x < 6) & (y < 2)) | ((x < 4) & (y < 5)))
+    near = np.zeros_like(free)
+    for dx in (-1, 0, 1):
+        for dy in (-1, 0, 1):
+            near |= np.roll(free, (dy, dx), (0, 1))
+    cells = np.where(free, 0, np.where(near, 100, -1)).ravel().tolist()
+    info = messages.MapMetaData(resolution=cell, width=size, height=size)
+    info.origin.position = messages.Point(-0.5, -0.5, 0.0)
+    return messages.OccupancyGrid(messages.Header(frame_id=frame), info, cells)
+
+
+@contextmanager
+def running(options: BridgeOptions, index: linefix.MapIndex | None) -> Iterator[Bridge]:
+    """Run a bridge in a thread of this process, which takes no time to start."""
+    node = Bridge(options, index)
+    with ThreadPoolExecutor(1) as pool:
+        ended = pool.submit(node.run)
+        try:
+            yield node
+            assert not ended.done()
+        finally:
+            node.end()
+            ended.result(PATIENCE)
+            assert node.close()
+
+
 @contextmanager
 def bridge(*arguments: str) -> Iterator[subprocess.Popen[str]]:
     program = "import sys; from service.commands.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
@@ -65,7 +95,8 @@ def bridge(*arguments: str) -> Iterator[subprocess.Popen[str]]:
         assert process.stderr is not None
         assert "listening" in process.stderr.readline()
         yield process
-        process.send_signal(signal.SIGTERM)
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE) == 0
     finally:
         process.kill()
@@ -75,17 +106,18 @@ def bridge(*arguments: str) -> Iterator[subprocess.Popen[str]]:
 class Robot:
     """The topics of a robot, and what the bridge says to it."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, namespace: str = "") -> None:
         from cyclonedds.domain import DomainParticipant
 
         self.net = net = DomainParticipant(domain)
-        self.scans = Told(net, "/scan", messages.LaserScan, SENSOR)
-        self.mounts = Told(net, "/tf_static", messages.TFMessage, LATCHED)
-        self.maps = Told(net, "/map", messages.OccupancyGrid, LATCHED)
-        self.asking = Told(net, "/linefix/locate", messages.Empty, RELIABLE)
-        self.initial = Heard(net, "/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
-        self.poses = Heard(net, "/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
-        self.markers = Heard(net, "/linefix/markers", messages.MarkerArray, LATCHED)
+        self.scans = Told(net, f"{namespace}/scan", messages.LaserScan, SENSOR)
+        self.mounts = Told(net, f"{namespace}/tf_static", messages.TFMessage, LATCHED)
+        self.maps = Told(net, f"{namespace}/map", messages.OccupancyGrid, LATCHED)
+        self.asking = Told(net, f"{namespace}/linefix/locate", messages.Empty, RELIABLE)
+        self.initial = Heard(net, f"{namespace}/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self.poses = Heard(net, f"{namespace}/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self.markers = Heard(net, f"{namespace}/linefix/markers", messages.MarkerArray, LATCHED)
+        self.walls = Heard(net, f"{namespace}/linefix/map_markers", messages.MarkerArray, LATCHED)
         self.diagnostics = Heard(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
 
     def until(self, heard: Heard[Any], play: Callable[[], None], wanted: Callable[[Any], bool] = bool) -> Any:

@@ -10,8 +10,9 @@ import pytest
 
 import linefix
 from bridge import messages
+from bridge.frames import Frames, Mount
 from bridge.gathering import looks_of
-from bridge.locating import Look, Mount, Mounts, locate, motion_of, seconds_of
+from bridge.locating import Look, locate, motion_of, seconds_of
 from bridge.odometry import Heard as Driven
 from bridge.odometry import Speed
 from bridge.wire import SENSOR, Told
@@ -69,13 +70,13 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
         driven = Told(robot.net, "/odom", messages.Odometry, SENSOR)
         robot.mounts.say(mount())
         robot.until(
-            robot.diagnostics, lambda: driven.say(broken), lambda one: "odometry is not" in one.status[0].message
+            robot.diagnostics, lambda: driven.say(broken), lambda one: "odometry is not used" in one.status[0].message
         )
         driven.say(odometry(10))
         robot.until(
             robot.diagnostics,
             lambda: robot.scans.say(scan),
-            lambda one: one.header.stamp == scan.header.stamp and "tf_static" not in one.status[0].message,
+            lambda one: one.header.stamp == scan.header.stamp and "no transform" not in one.status[0].message,
         )
         found = robot.poses.take()
     assert bool(found) == (not arguments)
@@ -84,11 +85,11 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
 
 def looked(scan: messages.LaserScan, *told: messages.Odometry) -> Speed | None:
     """Return how fast the robot is taken to have moved during a scan."""
-    where, driven = Mounts("base_link"), Driven()
-    where.hear(mount())
+    where, driven = Frames(), Driven()
+    where.take(mount(), static=True)
     for one in told:
         driven.hear(one)
-    looks, missing = looks_of([scan], where, driven)
+    looks, missing = looks_of([scan], where, "base_link", driven)
     assert missing == []
     return looks[0].speed
 
