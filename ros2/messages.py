@@ -35,6 +35,11 @@ class Empty(IdlStruct, typename=_type("std_msgs", "Empty")):
 
 
 @dataclass
+class String(IdlStruct, typename=_type("std_msgs", "String")):
+    data: str = ""
+
+
+@dataclass
 class ColorRGBA(IdlStruct, typename=_type("std_msgs", "ColorRGBA")):
     r: float32 = 0.0
     g: float32 = 0.0
@@ -118,6 +123,24 @@ class TransformStamped(IdlStruct, typename=_type("geometry_msgs", "TransformStam
 @dataclass
 class TFMessage(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
     transforms: sequence[TransformStamped] = field(default_factory=list)
+
+
+@dataclass
+class SerializedTransforms(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
+    """A TFMessage that stays as the bytes that came: most of those on a topic that robots share are of others."""
+
+    transforms: sequence[TransformStamped] = field(default_factory=list)
+
+    @classmethod
+    def deserialize(
+        cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None
+    ) -> "SerializedTransforms":
+        """Return the message with its bytes in `serialized`, and its fields empty."""
+        message = cls()
+        message.serialized = bytes(data)
+        return message
+
+    serialized = b""
 
 
 @dataclass

@@ -41,7 +41,7 @@ def _ignore(problem: str) -> None:
     pass
 
 
-class Heard(Generic[Message]):
+class Subscription(Generic[Message]):
     """A subscription.
 
     Parameters
@@ -68,12 +68,22 @@ class Heard(Generic[Message]):
         problem: Callable[[str], None] = _ignore,
     ) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
-        self.name, self._problem = name, problem
+        self.name, self.problem = name, problem
         self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
 
     def take(self) -> Sequence[Message]:
         """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
         return [message for reader in self.readers for message in self._taken(reader)]
+
+    @property
+    def publishers(self) -> int:
+        """How many publishers are connected."""
+        return max(len(reader.get_matched_publications()) for reader in self.readers)
+
+    @property
+    def incompatible(self) -> bool:
+        """Whether there are publishers whose quality of service fits none of the readers."""
+        return all(reader.get_requested_incompatible_qos_status().total_count > 0 for reader in self.readers)
 
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []
@@ -81,10 +91,10 @@ class Heard(Generic[Message]):
             try:
                 samples = reader.take(1)  # one at a time: an error in a message takes all that are taken with it
             except DDSException as error:
-                self._problem(f"{self.name}: reading failed: {error}")
+                self.problem(f"{self.name}: reading failed: {error}")
                 break
             except Exception as error:  # whatever decoding raises for bytes that are no such message
-                self._problem(f"{self.name}: a message cannot be decoded and is ignored: {error}")
+                self.problem(f"{self.name}: a message cannot be decoded and is ignored: {error}")
                 continue
             if not samples:
                 break
@@ -92,7 +102,7 @@ class Heard(Generic[Message]):
         return found
 
 
-class Told(Generic[Message]):
+class Publisher(Generic[Message]):
     """A publisher."""
 
     def __init__(self, participant: DomainParticipant, name: str, kind: type[Message], quality: Qos) -> None:
@@ -101,9 +111,14 @@ class Told(Generic[Message]):
         self._writer: Any = DataWriter(participant, topic, qos=quality)
         self._known: frozenset[int] = frozenset()
 
-    def say(self, message: Message) -> None:
+    def publish(self, message: Message) -> None:
         """Publish a message."""
         self._writer.write(message)
+
+    @property
+    def incompatible(self) -> bool:
+        """Whether there are subscribers whose quality of service does not fit."""
+        return bool(self._writer.get_offered_incompatible_qos_status().total_count > 0)
 
     @property
     def subscribed(self) -> bool:
@@ -119,7 +134,7 @@ class Told(Generic[Message]):
 class Waiting:
     """Waits until one of several subscriptions has a message, or another thread ends the waiting."""
 
-    def __init__(self, participant: DomainParticipant, topics: Sequence[Heard[Any]]) -> None:
+    def __init__(self, participant: DomainParticipant, topics: Sequence[Subscription[Any]]) -> None:
         self._set: Any = WaitSet(participant)
         self._woken: Any = GuardCondition(participant)
         self._set.attach(self._woken)

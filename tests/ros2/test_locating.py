@@ -9,9 +9,9 @@ import pytest
 from linefix_client import Pose, base_from_laser
 
 import linefix
-from bridge import messages
-from bridge.frames import Frames, Mount
-from bridge.locating import Look, locate
+from ros2 import messages
+from ros2.frames import Frames, Mount
+from ros2.locating import Look, locate
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)

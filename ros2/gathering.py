@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from .frames import FrameError, Frames, Mount
 from .locating import Look, seconds_of
 from .messages import LaserScan
-from .odometry import Heard, nanoseconds
+from .odometry import OdometryHistory, nanoseconds
+from .options import NodeOptions
 from .text import MAX_NAME, quoted
 
 
@@ -52,7 +53,7 @@ class Gathering:
 
 
 def looks_of(
-    scans: Sequence[LaserScan], frames: Frames, base: str, odometry: Heard, *, motion: bool = True
+    scans: Sequence[LaserScan], frames: Frames, options: NodeOptions, odometry: OdometryHistory
 ) -> tuple[list[Look], list[str]]:
     """Return scans with the poses that they were taken from, relative to the robot at the time of the first.
 
@@ -61,11 +62,9 @@ def looks_of(
     scans : sequence of LaserScan
         The newest first.
     frames : Frames
-    base : str
-        The base frame of the robot.
-    odometry : Heard
-    motion : bool
-        Whether the speed of the robot goes with them, as far as odometry has it.
+    options : NodeOptions
+        The base frame, and whether the speed of the robot goes with the scans, as far as odometry has it.
+    odometry : OdometryHistory
 
     Returns
     -------
@@ -76,32 +75,46 @@ def looks_of(
     looks: list[Look] = []
     missing: list[str] = []
     for scan in scans:
-        frame, now = scan.header.frame_id, (looks[0].message if looks else scan).header.stamp
+        now, stamp = (looks[0].message if looks else scan).header.stamp, scan.header.stamp
         try:
-            mount = _mount_of(frame, frames, base, nanoseconds(scan.header.stamp))
+            mount = _mount_of(scan, frames, options)
         except FrameError as error:
             missing.append(str(error))
             continue
-        step = odometry.step(now, scan.header.stamp)
+        step = odometry.step(now, stamp)
         if step is None:
-            missing.append(f"no odometry says how the robot moved since the scan of {quoted(frame)}")
+            frame = quoted(scan.header.frame_id)
+            missing.append(f"no odometry between the newest scan and that of {frame}, which is left out")
             continue
-        middle = nanoseconds(scan.header.stamp) + round(0.5e9 * seconds_of(scan))
-        looks.append(Look(scan, mount, step, odometry.speed(middle) if motion else None))
+        middle = nanoseconds(stamp) + round(0.5e9 * seconds_of(scan))
+        looks.append(Look(scan, mount, step, odometry.speed(middle) if options.motion else None))
     return looks, missing
 
 
-def _mount_of(frame: str, frames: Frames, base: str, stamp: int) -> Mount:
-    if not frame.strip("/"):
+def _mount_of(scan: LaserScan, frames: Frames, options: NodeOptions) -> Mount:
+    name = scan.header.frame_id
+    if not name.strip("/"):
         raise FrameError(
             "the scan has an empty frame_id, expected the frame of the laser; set it in the parameters of its driver"
         )
-    if len(frame) > MAX_NAME:
-        raise FrameError(f"the frame_id of the scan has {len(frame)} characters, expected at most {MAX_NAME}")
-    mount = frames.mount(base, frame, stamp)
+    if len(name) > MAX_NAME:
+        raise FrameError(f"the frame_id of the scan has {len(name)} characters, expected at most {MAX_NAME}")
+    if not has_returns(scan):
+        raise FrameError(
+            f"no valid range in the scan of {quoted(name)}: {len(scan.ranges)} ranges, none of them a number; "
+            "is the laser on?"
+        )
+    frame = options.frame(name)
+    base = options.base_of(frame)
+    mount = frames.mount(base, frame, nanoseconds(scan.header.stamp))
     if mount is None:
         raise FrameError(
-            f"no transform from {quoted(frame)} to {quoted(base)} on /tf_static; publish it, "
-            "or name the base frame with --base"
+            f"no transform from {quoted(frame)} to {quoted(base)} on {options.topic('/tf_static')} or "
+            f"{options.topic('/tf')}; publish it, or name the base frame with --base"
         )
     return mount
+
+
+def has_returns(scan: LaserScan) -> bool:
+    """Return whether a range of a scan says anything: a return, or that nothing came back."""
+    return any(one == one and one >= scan.range_min for one in scan.ranges)

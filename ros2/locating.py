@@ -12,17 +12,19 @@ from numpy.typing import NDArray
 import linefix
 from registration import InvalidArgumentError, RigidTransform
 
+from .agreement import Observation
 from .frames import Mount
 from .messages import LaserScan, Time
 from .odometry import Speed
-from .tuning import MAX_BEAMS
+from .tuning import INCONCLUSIVE_NATS, MAX_BEAMS
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
+OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be where the robot is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Located:
-    """What came of a scan.
+    """The result of a scan.
 
     Attributes
     ----------
@@ -33,12 +35,31 @@ class Located:
         map_from_base.
     covariance : (3, 3) or None
         Of `pose`: additive (x, y, theta) in the map frame.
+    others : tuple of RigidTransform
+        map_from_base of the alternatives.
     """
 
     stamp: Time
     answer: linefix.AssociationResult
     pose: RigidTransform | None
     covariance: NDArray[np.float64] | None
+    others: tuple[RigidTransform, ...] = ()
+
+    def observation(self, odometry: RigidTransform | None, stamp: int) -> Observation:
+        """Return the result for the agreement, with odom_from_base at its stamp (nanoseconds)."""
+        return Observation(
+            stamp, self.pose, self.covariance, self.answer.usable, odometry, self.others, self._conclusive
+        )
+
+    @property
+    def _conclusive(self) -> bool:
+        """Whether each pose that explains the scan about as well is listed."""
+        answer = self.answer
+        if answer.status not in (linefix.Status.OK, linefix.Status.AMBIGUOUS) or answer.diagnostics is None:
+            return False
+        unlisted = (1.0 - answer.search.rivals_above) * answer.diagnostics.score
+        listed = len(answer.alternatives) < OPTIONS.max_alternatives
+        return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
 
 
 def seconds_of(message: LaserScan) -> float:
@@ -48,17 +69,14 @@ def seconds_of(message: LaserScan) -> float:
 
 
 def motion_of(message: LaserScan, mount: Mount, speed: Speed | None) -> linefix.Motion | None:
-    """Return how a scanner moved while it scanned, by how fast the robot did.
+    """Return the motion of a scanner while it scanned, from the speed of the robot.
 
-    None where nobody says how fast, or the message does not say how long the scan took.
+    None where the speed is not known, or the message does not say how long the scan took.
     """
     if speed is None or not seconds_of(message):
         return None
-    at = mount.base_from_laser
-    # The turn of the robot takes the scanner along.
-    vx, vy = speed.vx - speed.omega * at.y, speed.vy + speed.omega * at.x
-    c, s = math.cos(at.theta), math.sin(at.theta)
-    return linefix.Motion(message.time_increment, c * vx + s * vy, c * vy - s * vx, speed.omega)
+    carried = speed.carried(mount.base_from_laser)
+    return linefix.Motion(message.time_increment, carried.vx, carried.vy, carried.omega)
 
 
 def laser_of(message: LaserScan, *, flipped: bool, motion: linefix.Motion | None = None) -> linefix.LaserScan:
@@ -121,11 +139,13 @@ def locate(index: linefix.MapIndex, looks: Sequence[Look], deadline: linefix.Dea
     if len(looks) > 1:
         places = [look.base_from_then.compose(look.mount.base_from_laser) for look in looks]
         views = [linefix.View(linefix.scan_of(laser), at) for laser, at in zip(lasers, places, strict=True)]
-        together = linefix.locate(index, linefix.assemble(views), deadline=deadline)
-        return Located(stamp, together, together.pose, together.covariance)
-    answer = linefix.locate(index, lasers[0], deadline=deadline)
+        together = linefix.locate(index, linefix.assemble(views), options=OPTIONS, deadline=deadline)
+        others = tuple(one.pose for one in together.alternatives)
+        return Located(stamp, together, together.pose, together.covariance, others)
+    answer = linefix.locate(index, lasers[0], options=OPTIONS, deadline=deadline)
     if answer.pose is None:
         return Located(stamp, answer, None, None)
     laser_from_base = looks[0].mount.base_from_laser.inverse()
     covariance = None if answer.covariance is None else answer.pose.carry(answer.covariance, laser_from_base)
-    return Located(stamp, answer, answer.pose.compose(laser_from_base), covariance)
+    others = tuple(one.pose.compose(laser_from_base) for one in answer.alternatives)
+    return Located(stamp, answer, answer.pose.compose(laser_from_base), covariance, others)

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import linefix
-from bridge import BridgeOptions, messages
-from bridge.tuning import MAX_FRAMES
-from bridge.wire import LATCHED, RELIABLE, Told
+from ros2 import NodeOptions, messages
+from ros2.tuning import MAX_FRAMES
+from ros2.wire import LATCHED, RELIABLE, Publisher
 
 from .robot import Robot, bridge, grid_of_room, is_at_truth, mount, running, scan
 
@@ -84,22 +84,22 @@ BROKEN: dict[str, tuple[str, Any]] = {
 def test_the_bridge_goes_on_after_broken_messages(domain: int, room: linefix.MapIndex) -> None:
     """Also where they are latched, so that a bridge that starts again receives them first."""
     robot = Robot(domain)
-    writers = {name: Told(robot.net, f"/{topic}", type(one), LATCHED) for name, (topic, one) in BROKEN.items()}
-    with running(BridgeOptions(domain=domain), room):
+    writers = {name: Publisher(robot.net, f"/{topic}", type(one), LATCHED) for name, (topic, one) in BROKEN.items()}
+    with running(NodeOptions(agree=1, domain=domain), room):
         for second, (name, (_, message)) in enumerate(BROKEN.items(), 1):
-            writers[name].say(message)
+            writers[name].publish(message)
             time.sleep(0.1)
             assert is_at_truth(pose_at(robot, second)), name
         told = {one.status[0].message for one in robot.diagnostics.take()}
     assert any("cannot be decoded" in one for one in told)
-    with running(BridgeOptions(domain=domain), room):
+    with running(NodeOptions(agree=1, domain=domain), room):
         assert is_at_truth(pose_at(robot, 1))
 
 
 def pose_at(robot: Robot, second: int) -> messages.PoseWithCovarianceStamped:
     def play() -> None:
-        robot.mounts.say(mount())
-        robot.scans.say(scan(second))
+        robot.mounts.publish(mount())
+        robot.scans.publish(scan(second))
 
     found: messages.PoseWithCovarianceStamped = robot.until(
         robot.poses, play, lambda one: one.header.stamp.sec == second
@@ -110,24 +110,24 @@ def pose_at(robot: Robot, second: int) -> messages.PoseWithCovarianceStamped:
 def test_a_bad_transform_does_not_lose_those_beside_it(domain: int, room: linefix.MapIndex) -> None:
     bad = transform("base_link", "camera", rotation=messages.Quaternion(0.0, 0.0, 0.0, 0.0)).transforms
     worse = transform("base_link", "imu", translation=messages.Vector3(math.inf)).transforms
-    with running(BridgeOptions(domain=domain), room):
+    with running(NodeOptions(agree=1, domain=domain), room):
         robot = Robot(domain)
-        robot.mounts.say(messages.TFMessage(bad + mount().transforms + worse))
-        robot.until(robot.initial, lambda: robot.scans.say(scan(1)))
+        robot.mounts.publish(messages.TFMessage(bad + mount().transforms + worse))
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
         told = [one.status[0].message for one in robot.diagnostics.take()]
     assert any('"camera"' in one and "quaternion (0, 0, 0, 0)" in one for one in told)
     assert any('"imu"' in one and "inf" in one for one in told)
 
 
 def test_a_mount_is_taken_after_ever_so_many_frames(domain: int, room: linefix.MapIndex) -> None:
-    with running(BridgeOptions(domain=domain), room):
+    with running(NodeOptions(agree=1, domain=domain), room):
         robot = Robot(domain)
         for begin in range(0, MAX_FRAMES + 1000, 500):
             many = [transform("base_link", f"tag_{k}").transforms[0] for k in range(begin, begin + 500)]
-            robot.mounts.say(messages.TFMessage(many))
+            robot.mounts.publish(messages.TFMessage(many))
             time.sleep(0.05)
-        robot.mounts.say(mount())
-        robot.until(robot.initial, lambda: robot.scans.say(scan(1)))
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
 
 
 def noise(cells: int) -> messages.OccupancyGrid:
@@ -137,11 +137,11 @@ def noise(cells: int) -> messages.OccupancyGrid:
 
 
 def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
-    with bridge("--base", "laser") as process:
+    with bridge("--base", "laser", "--agree", "1") as process:
         robot = Robot(domain)
-        robot.maps.say(noise(1500))
+        robot.maps.publish(noise(1500))
         converting = robot.until(
-            robot.diagnostics, lambda: robot.scans.say(scan(1)), lambda one: "converted" in one.status[0].message
+            robot.diagnostics, lambda: robot.scans.publish(scan(1)), lambda one: "converted" in one.status[0].message
         )
         assert converting.status[0].level == 2
         process.send_signal(signal.SIGTERM)
@@ -150,43 +150,43 @@ def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
 
 @pytest.mark.parametrize("quality", [LATCHED, RELIABLE], ids=["transient local", "volatile"])
 def test_a_map_is_taken_however_it_is_published(domain: int, quality: Any) -> None:
-    with running(BridgeOptions(domain=domain, base_frame="laser", map_topic="/map"), None):
+    with running(NodeOptions(agree=1, domain=domain, base_frame="laser", map_topic="map"), None):
         robot = Robot(domain)
-        maps = Told(robot.net, "/map", messages.OccupancyGrid, quality)
-        robot.until(robot.diagnostics, lambda: robot.scans.say(scan(1)))
-        maps.say(grid_of_room())
-        robot.until(robot.initial, lambda: robot.scans.say(scan(1)))
+        maps = Publisher(robot.net, "/map", messages.OccupancyGrid, quality)
+        robot.until(robot.diagnostics, lambda: robot.scans.publish(scan(1)))
+        maps.publish(grid_of_room())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
 
 
 def test_mounts_are_taken_however_they_are_published(domain: int, room: linefix.MapIndex) -> None:
-    with running(BridgeOptions(domain=domain), room):
+    with running(NodeOptions(agree=1, domain=domain), room):
         robot = Robot(domain)
-        mounts = Told(robot.net, "/tf_static", messages.TFMessage, RELIABLE)
+        mounts = Publisher(robot.net, "/tf_static", messages.TFMessage, RELIABLE)
 
         def play() -> None:
-            mounts.say(mount())
-            robot.scans.say(scan(1))
+            mounts.publish(mount())
+            robot.scans.publish(scan(1))
 
         robot.until(robot.initial, play)
 
 
 def test_who_subscribes_later_gets_an_initial_pose(domain: int, room: linefix.MapIndex) -> None:
-    with running(BridgeOptions(domain=domain), room):
+    with running(NodeOptions(agree=1, domain=domain), room):
         robot = Robot(domain)
-        robot.mounts.say(mount())
-        robot.until(robot.initial, lambda: robot.scans.say(scan(1)))
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
         later = Robot(domain)
-        again = later.until(later.initial, lambda: robot.scans.say(scan(3)))
+        again = later.until(later.initial, lambda: robot.scans.publish(scan(3)))
     assert again.header.stamp.sec == 3
 
 
-def test_a_namespace_comes_from_the_topic_of_scans(domain: int, room: linefix.MapIndex) -> None:
-    with running(BridgeOptions(scans=("/robot1/scan",), domain=domain), room):
+def test_a_robot_in_a_namespace(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(agree=1, namespace="/robot1", domain=domain), room):
         stranger, robot = Robot(domain), Robot(domain, "/robot1")
-        stranger.mounts.say(transform("base_link", "laser", translation=messages.Vector3(5.0)))
-        robot.mounts.say(mount())
-        assert is_at_truth(robot.until(robot.poses, lambda: robot.scans.say(scan(1))))
-        robot.until(robot.initial, lambda: robot.scans.say(scan(2)))
+        stranger.mounts.publish(transform("base_link", "laser", translation=messages.Vector3(5.0)))
+        robot.mounts.publish(mount())
+        assert is_at_truth(robot.until(robot.poses, lambda: robot.scans.publish(scan(1))))
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(2)))
         assert stranger.initial.take() == []
         assert stranger.poses.take() == []
 
@@ -214,12 +214,12 @@ UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, 
 @pytest.mark.parametrize("what", UNUSABLE)
 def test_why_a_scan_is_not_used(domain: int, room: linefix.MapIndex, what: str) -> None:
     mounts, seen, expected = UNUSABLE[what]
-    with running(BridgeOptions(domain=domain), room):
+    with running(NodeOptions(agree=1, domain=domain), room):
         robot = Robot(domain)
-        robot.mounts.say(mounts())
+        robot.mounts.publish(mounts())
         told = robot.until(
             robot.diagnostics,
-            lambda: robot.scans.say(seen),
+            lambda: robot.scans.publish(seen),
             lambda one: expected in one.status[0].message,
         )
         assert told.status[0].level == 2
@@ -237,7 +237,7 @@ def test_sigterm_ends_it_during_a_search(domain: int, tmp_path: Any) -> None:
     with bridge("--map", str(file), "--base", "laser") as process:
         robot = Robot(domain)
         for _ in range(10):
-            robot.scans.say(replace(scan(1), ranges=ranges.tolist()))
+            robot.scans.publish(replace(scan(1), ranges=ranges.tolist()))
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)
         assert process.wait(SOON) == 0

@@ -106,8 +106,8 @@ class Frames:
     def __init__(self) -> None:
         self._frames: OrderedDict[str, _Frame] = OrderedDict()
 
-    def take(self, message: TFMessage, *, static: bool) -> list[str]:
-        """Add the transforms of a message, each by itself.
+    def take(self, message: TFMessage, *, static: bool, prefix: str = "") -> list[str]:
+        """Add the transforms of a message, each by itself; only those of frames that begin with a prefix.
 
         Returns
         -------
@@ -116,6 +116,8 @@ class Frames:
         """
         problems: list[str] = []
         for transform in message.transforms[:MAX_TRANSFORMS]:
+            if not transform.child_frame_id.strip("/").startswith(prefix):
+                continue  # of another robot
             try:
                 self._add(transform, static=static)
             except FrameError as error:
@@ -153,6 +155,14 @@ class Frames:
                 return None
             matrix = step @ matrix
         return matrix
+
+    def between(self, outer: str, inner: str) -> Floats | None:
+        """Return outer_from_inner by the newest transforms, whichever of the two is above the other."""
+        matrix = self.lookup(outer, inner, None)
+        if matrix is not None:
+            return matrix
+        back = self.lookup(inner, outer, None)
+        return None if back is None else np.asarray(np.linalg.inv(back), dtype=np.float64)
 
     def mount(self, base: str, laser: str, stamp: int | None) -> Mount | None:
         """Return where a laser is mounted; None where the frames do not connect it with the base.
@@ -211,15 +221,34 @@ def mount_of(matrix: Floats, base: str, laser: str) -> Mount:
             f"{quoted(laser)} is {away:.4g} m away from {quoted(base)}, expected at most {MAX_MOUNT:g} m; "
             "correct the transform, it is in metres"
         )
-    tilt = math.acos(min(1.0, abs(float(matrix[2, 2]))))
+    pose, flipped, tilt = planar(matrix)
     if tilt > MAX_TILT:
         raise FrameError(
             f"the scan plane of {quoted(laser)} is tilted by {math.degrees(tilt):.0f} degrees in {quoted(base)}, "
             f"expected at most {math.degrees(MAX_TILT):.0f} degrees; use the frame whose z axis is the axis of "
             "rotation of the laser, not an optical frame"
         )
+    return Mount(pose, flipped, tilt)
+
+
+def planar(matrix: Floats) -> tuple[RigidTransform, bool, float]:
+    """Return a transform of space in the plane, whether it turns the z axis down, and its tilt.
+
+    Parameters
+    ----------
+    matrix : (4, 4)
+        Homogeneous; metres.
+
+    Returns
+    -------
+    RigidTransform
+    bool
+    float
+        Radians between the planes x, y of both frames, 0 to pi / 2.
+    """
     heading = math.atan2(matrix[1, 0], matrix[0, 0])
-    return Mount(RigidTransform(float(matrix[0, 3]), float(matrix[1, 3]), heading), bool(matrix[2, 2] < 0.0), tilt)
+    tilt = math.acos(min(1.0, abs(float(matrix[2, 2]))))
+    return RigidTransform(float(matrix[0, 3]), float(matrix[1, 3]), heading), bool(matrix[2, 2] < 0.0), tilt
 
 
 def matrix_of(x: float, y: float, z: float, quaternion: tuple[float, float, float, float]) -> Floats:

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,8 +18,8 @@ from typing import Any
 import numpy as np
 
 import linefix
-from bridge import Bridge, BridgeOptions, messages
-from bridge.wire import LATCHED, RELIABLE, SENSOR, Heard, Told
+from ros2 import Node, NodeOptions, messages
+from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
 ROOT = Path(__file__).parent.parent.parent
 LOOPBACK = (
@@ -71,9 +72,10 @@ def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:
 
 
 @contextmanager
-def running(options: BridgeOptions, index: linefix.MapIndex | None) -> Iterator[Bridge]:
+def running(options: NodeOptions, index: linefix.MapIndex | None) -> Iterator[Node]:
     """Run a bridge in a thread of this process, which takes no time to start."""
-    node = Bridge(options, index)
+    node = Node(options, index, log=lambda _: None)
+    node.wait_until_ready()
     with ThreadPoolExecutor(1) as pool:
         ended = pool.submit(node.run)
         try:
@@ -86,21 +88,24 @@ def running(options: BridgeOptions, index: linefix.MapIndex | None) -> Iterator[
 
 
 @contextmanager
-def bridge(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+def bridge(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run ``linefix ros2`` in a process of its own."""
     program = "import sys; from service.commands.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
-    process = subprocess.Popen(
-        [sys.executable, "-c", program, *arguments], cwd=ROOT, env=dict(os.environ), stderr=subprocess.PIPE, text=True
-    )
-    try:
-        assert process.stderr is not None
-        assert "listening" in process.stderr.readline()
-        yield process
-        if process.poll() is None:
-            process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE) == 0
-    finally:
-        process.kill()
-        process.communicate()
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, *arguments], cwd=ROOT, env=dict(os.environ), stderr=log
+        )
+        try:
+            while b"listening" not in os.pread(log.fileno(), 100_000, 0):
+                assert process.poll() is None, os.pread(log.fileno(), 100_000, 0)
+                time.sleep(0.1)
+            yield process
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+                assert process.wait(PATIENCE) == 0
+        finally:
+            process.kill()
+            process.wait()
 
 
 class Robot:
@@ -110,17 +115,17 @@ class Robot:
         from cyclonedds.domain import DomainParticipant
 
         self.net = net = DomainParticipant(domain)
-        self.scans = Told(net, f"{namespace}/scan", messages.LaserScan, SENSOR)
-        self.mounts = Told(net, f"{namespace}/tf_static", messages.TFMessage, LATCHED)
-        self.maps = Told(net, f"{namespace}/map", messages.OccupancyGrid, LATCHED)
-        self.asking = Told(net, f"{namespace}/linefix/locate", messages.Empty, RELIABLE)
-        self.initial = Heard(net, f"{namespace}/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
-        self.poses = Heard(net, f"{namespace}/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
-        self.markers = Heard(net, f"{namespace}/linefix/markers", messages.MarkerArray, LATCHED)
-        self.walls = Heard(net, f"{namespace}/linefix/map_markers", messages.MarkerArray, LATCHED)
-        self.diagnostics = Heard(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
+        self.scans = Publisher(net, f"{namespace}/scan", messages.LaserScan, SENSOR)
+        self.mounts = Publisher(net, f"{namespace}/tf_static", messages.TFMessage, LATCHED)
+        self.maps = Publisher(net, f"{namespace}/map", messages.OccupancyGrid, LATCHED)
+        self.asking = Publisher(net, f"{namespace}/linefix/locate", messages.Empty, RELIABLE)
+        self.initial = Subscription(net, f"{namespace}/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self.poses = Subscription(net, f"{namespace}/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self.markers = Subscription(net, f"{namespace}/linefix/markers", messages.MarkerArray, LATCHED)
+        self.walls = Subscription(net, f"{namespace}/linefix/map_markers", messages.MarkerArray, LATCHED)
+        self.diagnostics = Subscription(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
 
-    def until(self, heard: Heard[Any], play: Callable[[], None], wanted: Callable[[Any], bool] = bool) -> Any:
+    def until(self, heard: Subscription[Any], play: Callable[[], None], wanted: Callable[[Any], bool] = bool) -> Any:
         """Play again and again until something wanted is heard; return it."""
         ends = time.monotonic() + PATIENCE
         while time.monotonic() < ends:

@@ -12,13 +12,14 @@ from cyclonedds.idl import IdlStruct
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from bridge import messages
+from ros2 import messages
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
+SERIALIZED = (IdlStruct, messages.SerializedGrid, messages.SerializedTransforms)
 ALL: dict[str, Any] = {
     f"{re.split('[.:]', kind.__idl_typename__)[0]}/msg/{name}": kind  # type: ignore[attr-defined]
     for name, kind in vars(messages).items()
-    if isinstance(kind, type) and issubclass(kind, IdlStruct) and kind not in (IdlStruct, messages.SerializedGrid)
+    if isinstance(kind, type) and issubclass(kind, IdlStruct) and kind not in SERIALIZED
 }
 
 
