@@ -24,6 +24,7 @@ from .ranges import ranges
 from .replicas import replicas
 from .request import request
 from .ros2 import ros2
+from .starts import starts
 from .sums import sums
 from .table import Row, machine, print_rows
 from .views import views
@@ -123,6 +124,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "replicas": replicas,
     "plan": plan,
     "ros2": ros2,
+    "starts": starts,
 }
 
 
