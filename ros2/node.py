@@ -26,7 +26,7 @@ from .searching import Found, Searcher
 from .silence import Silence
 from .text import quoted
 from .topics import Topics
-from .tuning import END_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
+from .tuning import END_SECONDS, SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
 from .watching import Watch
 from .wire import Waiting
 
@@ -73,6 +73,8 @@ class Node:
         self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
         self._watch, self._correction = Watch(), MapToOdom()
         self._ended, self._searched = False, False
+        self._pending: tuple[Time, Observation, str] | None = None
+        self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
         self._transformed = 0  # the time of the last transform that was published, nanoseconds
         participant = connect(options.domain)
         self._topics = Topics(participant, options, lambda problem: self._health.problem(problem))
@@ -124,6 +126,7 @@ class Node:
         found = self._searcher.result()
         if found is not None:
             self._take_result(found)
+        self._publish_initial()
         self._turn_scans()
         self._health.beat(self._state, self._now, self._values)
 
@@ -163,6 +166,7 @@ class Node:
             self._begin_again()
         if self._topics.initial.joined():
             self._initial.want()
+            self._settled = max(self._settled, time.monotonic() + SETTLE_SECONDS)
         self._requests.expire()
 
     def _begin_again(self) -> None:
@@ -171,6 +175,7 @@ class Node:
         self._correction.reset()
         self._watch.reset()
         self._initial.want()
+        self._pending = None
 
     def _turn_scans(self) -> None:
         for topic, scans in enumerate(self._topics.scans):
@@ -244,6 +249,7 @@ class Node:
         event = self._agreement.take(scan)
         self._correction.take(event, scan)
         if event is Event.CONTRADICTED:
+            self._pending = None
             self._health.note("the agreed pose is contradicted by a scan")
         if event not in (Event.AGREED, Event.CONFIRMED):
             return
@@ -258,8 +264,19 @@ class Node:
         agreed = stamped_pose(stamp, scan.pose, scan.covariance, self._frame)
         self._topics.agreed.publish(agreed)
         self._requests.answer(agreed)
-        if reason is None:
+        if reason is not None:
+            self._pending = stamp, scan, reason
+            self._publish_initial()
+
+    def _publish_initial(self) -> None:
+        """Publish the pose that waits to be, unless a subscriber has come that would not receive it yet."""
+        if self._pending is None or time.monotonic() < self._settled:
             return
+        (stamp, scan, reason), self._pending = self._pending, None
+        if scan.pose is None or scan.covariance is None:
+            return
+        if reason == "lost":
+            self._health.beat(State.LOST, self._now, self._values)
         widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
         self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self._frame))
         subscribed = self._topics.initial.subscribed

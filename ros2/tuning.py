@@ -50,6 +50,7 @@ INCONCLUSIVE_NATS = 10.0  # a pose that is not listed explains the scan worse by
 LOCALIZER_SIGMA = 0.1  # m; how far a localizer that is right may be off besides its own covariance,
 LOCALIZER_SIGMA_THETA = math.radians(3.0)  # rad
 MAX_COVARIANCE = 1e6  # m^2, rad^2
+SETTLE_SECONDS = 1.0  # s until a new subscriber has discovered the publisher, too: what comes earlier is lost
 LOST_SCANS = 3  # scans that confirm another pose than the localizer's
 LOST_SECONDS = 10.0  # s between two poses for a lost localizer: it needs some time to take one
 ALWAYS_SECONDS = 0.5  # s between two poses with `--when always`
