@@ -22,7 +22,7 @@ from .messages import (
     TFMessage,
 )
 from .options import NodeOptions
-from .wire import LATCHED, RELIABLE, SENSOR, STREAM, Publisher, Subscription
+from .wire import LATCHED, NEWEST, RELIABLE, SENSOR, STREAM, Publisher, Subscription
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,10 +90,10 @@ class Topics:
         self.agreed: Publisher[PoseWithCovarianceStamped] = publish(
             "linefix/agreed_pose", PoseWithCovarianceStamped, RELIABLE
         )
-        # On a topic of its own: behind ten robots the map would be no longer latched.
-        self.walls: Publisher[MarkerArray] = publish("linefix/map_markers", MarkerArray, LATCHED)
-        self.markers: Publisher[MarkerArray] = publish("linefix/markers", MarkerArray, LATCHED)
-        self.status: Publisher[DiagnosticStatus] = publish("linefix/status", DiagnosticStatus, LATCHED)
+        # On a topic of its own: behind robots the map would be no longer latched.
+        self.walls: Publisher[MarkerArray] = publish("linefix/map_markers", MarkerArray, NEWEST)
+        self.markers: Publisher[MarkerArray] = publish("linefix/markers", MarkerArray, NEWEST)
+        self.status: Publisher[DiagnosticStatus] = publish("linefix/status", DiagnosticStatus, NEWEST)
         self.results: Publisher[DiagnosticStatus] = publish("linefix/locate_result", DiagnosticStatus, LATCHED)
         self.diagnostics: Publisher[DiagnosticArray] = publish("/diagnostics", DiagnosticArray, RELIABLE)
         name = "tf" if options.namespace and not options.frame_prefix else "/tf"

@@ -27,6 +27,10 @@ STREAM = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.H
 LATCHED = Qos(
     Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(10)
 )
+# For a state: only the newest counts, also for subscribers that come later.
+NEWEST = Qos(
+    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(1)
+)
 RELIABLE = Qos(
     Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.Volatile, Policy.History.KeepLast(10)
 )

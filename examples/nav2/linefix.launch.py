@@ -6,7 +6,14 @@ those that differ from robot to robot.
 """
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, RegisterEventHandler
+from launch.actions import (
+    DeclareLaunchArgument,
+    EmitEvent,
+    ExecuteProcess,
+    OpaqueFunction,
+    RegisterEventHandler,
+    TimerAction,
+)
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
@@ -29,8 +36,8 @@ OPTIONS = {
     "params_file": ("", "a YAML file of parameters"),
 }
 FLAGS = {
-    "motion": ("true", "correct scans for motion"),
-    "publish_tf": ("false", "publish the transform from the map to the odometry frame"),
+    "motion": ("", "true or false: correct scans for motion"),
+    "publish_tf": ("", "true or false: publish the transform from the map to the odometry frame"),
 }
 RESPAWN_DELAY = 3.0  # s
 
@@ -43,8 +50,9 @@ def command(context):
         if value:
             words += [f"--{name.replace('_', '-')}", value]
     for name in FLAGS:
-        on = LaunchConfiguration(name).perform(context).lower() in ("true", "1")
-        words.append(f"--{'' if on else 'no-'}{name.replace('_', '-')}")
+        value = LaunchConfiguration(name).perform(context).lower()
+        if value:
+            words.append(f"--{'' if value in ('true', '1') else 'no-'}{name.replace('_', '-')}")
     process = ExecuteProcess(cmd=words, name="linefix", output="screen", respawn=False)
     return [process, RegisterEventHandler(OnProcessExit(target_action=process, on_exit=ended))]
 
@@ -55,8 +63,6 @@ def ended(event, context):
         return []
     if event.returncode in (2, 3):
         return [EmitEvent(event=Shutdown(reason="linefix: a wrong option or map, see above"))]
-    from launch.actions import TimerAction
-
     return [TimerAction(period=RESPAWN_DELAY, actions=[OpaqueFunction(function=command)])]
 
 
