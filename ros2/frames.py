@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from formats.logs.sensors import tilt_of
+from formats.logs.tuning import MOST_TILT
 from registration import RigidTransform
 
 from .messages import TFMessage, TransformStamped
@@ -20,7 +22,6 @@ from .tuning import (
     MAX_COORDINATE,
     MAX_FRAMES,
     MAX_MOUNT,
-    MAX_TILT,
     MAX_TRANSFORMS,
     QUATERNION_TOLERANCE,
     STALE_NS,
@@ -213,7 +214,7 @@ def mount_of(matrix: Floats, base: str, laser: str) -> Mount:
     Raises
     ------
     FrameError
-        When the laser is farther than `MAX_MOUNT` away, or its scan plane is tilted by more than `MAX_TILT`.
+        When the laser is farther than `MAX_MOUNT` away, or its scan plane is tilted by more than `MOST_TILT`.
     """
     away = float(np.linalg.norm(matrix[:3, 3]))
     if not away <= MAX_MOUNT:
@@ -222,10 +223,10 @@ def mount_of(matrix: Floats, base: str, laser: str) -> Mount:
             "correct the transform, it is in metres"
         )
     pose, flipped, tilt = planar(matrix)
-    if tilt > MAX_TILT:
+    if tilt > MOST_TILT:
         raise FrameError(
             f"the scan plane of {quoted(laser)} is tilted by {math.degrees(tilt):.0f} degrees in {quoted(base)}, "
-            f"expected at most {math.degrees(MAX_TILT):.0f} degrees; use the frame whose z axis is the axis of "
+            f"expected at most {math.degrees(MOST_TILT):.0f} degrees; use the frame whose z axis is the axis of "
             "rotation of the laser, not an optical frame"
         )
     return Mount(pose, flipped, tilt)
@@ -247,8 +248,7 @@ def planar(matrix: Floats) -> tuple[RigidTransform, bool, float]:
         Radians between the planes x, y of both frames, 0 to pi / 2.
     """
     heading = math.atan2(matrix[1, 0], matrix[0, 0])
-    tilt = math.acos(min(1.0, abs(float(matrix[2, 2]))))
-    return RigidTransform(float(matrix[0, 3]), float(matrix[1, 3]), heading), bool(matrix[2, 2] < 0.0), tilt
+    return RigidTransform(float(matrix[0, 3]), float(matrix[1, 3]), heading), bool(matrix[2, 2] < 0.0), tilt_of(matrix)
 
 
 def matrix_of(x: float, y: float, z: float, quaternion: tuple[float, float, float, float]) -> Floats:

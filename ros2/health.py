@@ -66,6 +66,12 @@ class Health:
             self.publish("scan", stamp or Time(), (ERROR, problem))
         self.note(problem)
 
+    def warn(self, warning: str, stamp: Time) -> None:
+        """Publish a warning, and log it, as often as a problem."""
+        if _is_new(self._published, warning, time.monotonic(), REPEAT_SECONDS):
+            self.publish("scan", stamp, (WARN, warning))
+        self.note(warning)
+
     def note(self, line: str) -> None:
         """Log a line; the same one at most once in `LOG_SECONDS`."""
         if _is_new(self._logged, line, time.monotonic(), LOG_SECONDS):

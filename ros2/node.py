@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -224,6 +225,12 @@ class Node:
         looks, missing = looks_of(scans, self._frames, self._options, self._odometry)
         for problem in missing:
             self._health.problem(problem, stamp)
+        for look in looks:
+            if not look.mount.level:
+                frame, degrees = quoted(look.message.header.frame_id), math.degrees(look.mount.tilt)
+                self._health.warn(
+                    f"the scan plane of {frame} is tilted by {degrees:.0f} degrees; ranges are taken as they are", stamp
+                )
         self._searched = bool(looks)
         if looks:
             self._silence.searched()
@@ -282,7 +289,7 @@ class Node:
         subscribed = self._topics.initial.subscribed
         self._initial.published(subscribed=subscribed, now=time.monotonic())
         self._watch.reset()
-        x, y, degrees = scan.pose.x, scan.pose.y, 57.29578 * scan.pose.theta
+        x, y, degrees = scan.pose.x, scan.pose.y, math.degrees(scan.pose.theta)
         nobody = "" if subscribed else ", to which nobody subscribes"
         self._health.note(
             f"published {self._topics.initial.name}{nobody} ({reason}): x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
@@ -333,7 +340,7 @@ class Node:
         latest = self._agreement.latest
         values = {
             "scans that agree": f"{agreeing} of {self._options.agree}",
-            "moved": f"{moved:.2f} m, {57.29578 * turned:.0f} degrees",
+            "moved": f"{moved:.2f} m, {math.degrees(turned):.0f} degrees",
         }
         if latest is not None and latest.pose is not None:
             values["pose"] = f"{latest.pose.x:.3f} {latest.pose.y:.3f} {latest.pose.theta:.4f}"

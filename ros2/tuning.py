@@ -15,7 +15,6 @@ MAX_GRID_BYTES = 64 * 2**20  # of an OccupancyGrid: 64 million cells
 MAX_SPEED = 100.0  # m/s
 MAX_TURN_RATE = 100.0  # rad/s
 QUATERNION_TOLERANCE = 0.1  # of the length; tf2 refuses what is farther from 1 than 0.01
-MAX_TILT = math.radians(20.0)  # of a scan plane; ranges to walls are 6 % too long there
 LEVEL_TILT = math.radians(2.0)  # below this, ranges are less than 0.1 % too long
 STALE_NS = 500_000_000  # ns; a moving transform is not used this long after its last value
 CLOCK_BACK_NS = 1_000_000_000  # ns; stamps that jump back by more are those of a clock that was set back

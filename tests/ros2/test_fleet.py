@@ -78,7 +78,7 @@ def off(message: messages.PoseWithCovarianceStamped, second: float) -> float:
 
 
 def stamp_of(message: messages.PoseWithCovarianceStamped) -> float:
-    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+    return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
 
 
 def test_a_pose_is_published_when_scans_agree(domain: int, room: linefix.MapIndex) -> None:
