@@ -31,7 +31,7 @@ COPY analysis analysis
 COPY formats formats
 COPY fleet fleet
 COPY linefix linefix
-COPY bridge bridge
+COPY ros2 ros2
 COPY service service
 # Given the time of a commit, the wheel is that of `make wheel`, to the byte.
 ARG SOURCE_DATE_EPOCH
@@ -45,7 +45,7 @@ ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.warmup import warm_up; warm_up()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE registration vectorization association simulation analysis formats fleet linefix bridge service \
+    && $COMPILE registration vectorization association simulation analysis formats fleet linefix ros2 service \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}

@@ -9,7 +9,6 @@ from . import vectorization
 from .adversarial import adversarial
 from .analysis import analysis
 from .batch import batch
-from .bridge import bridge
 from .drawn import SCANNER
 from .estimators import estimators
 from .growth import PAIRS, SIZES, growth
@@ -24,6 +23,8 @@ from .queries import DATA, data_found
 from .ranges import ranges
 from .replicas import replicas
 from .request import request
+from .ros2 import ros2
+from .starts import starts
 from .sums import sums
 from .table import Row, machine, print_rows
 from .views import views
@@ -122,7 +123,8 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "views": views,
     "replicas": replicas,
     "plan": plan,
-    "bridge": bridge,
+    "ros2": ros2,
+    "starts": starts,
 }
 
 

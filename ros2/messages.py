@@ -35,6 +35,11 @@ class Empty(IdlStruct, typename=_type("std_msgs", "Empty")):
 
 
 @dataclass
+class String(IdlStruct, typename=_type("std_msgs", "String")):
+    data: str = ""
+
+
+@dataclass
 class ColorRGBA(IdlStruct, typename=_type("std_msgs", "ColorRGBA")):
     r: float32 = 0.0
     g: float32 = 0.0
@@ -121,6 +126,24 @@ class TFMessage(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
 
 
 @dataclass
+class SerializedTransforms(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
+    """A TFMessage that stays as the bytes that came: most of those on a topic that robots share are of others."""
+
+    transforms: sequence[TransformStamped] = field(default_factory=list)
+
+    @classmethod
+    def deserialize(
+        cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None
+    ) -> "SerializedTransforms":
+        """Return the message with its bytes in `serialized`, and its fields empty."""
+        message = cls()
+        message.serialized = bytes(data)
+        return message
+
+    serialized = b""
+
+
+@dataclass
 class LaserScan(IdlStruct, typename=_type("sensor_msgs", "LaserScan")):
     header: Header = field(default_factory=Header)
     angle_min: float32 = 0.0
@@ -148,6 +171,24 @@ class OccupancyGrid(IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
     header: Header = field(default_factory=Header)
     info: MapMetaData = field(default_factory=MapMetaData)
     data: sequence[int8] = field(default_factory=list)
+
+
+@dataclass
+class SerializedGrid(IdlStruct, typename=_type("nav_msgs", "OccupancyGrid")):
+    """An OccupancyGrid that stays as the bytes that came: four million cells take too long to decode at once."""
+
+    header: Header = field(default_factory=Header)
+    info: MapMetaData = field(default_factory=MapMetaData)
+    data: sequence[int8] = field(default_factory=list)
+
+    @classmethod
+    def deserialize(cls, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> "SerializedGrid":
+        """Return the message with its bytes in `serialized`, and its fields empty."""
+        message = cls()
+        message.serialized = bytes(data)
+        return message
+
+    serialized = b""
 
 
 @dataclass

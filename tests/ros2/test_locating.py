@@ -9,8 +9,9 @@ import pytest
 from linefix_client import Pose, base_from_laser
 
 import linefix
-from bridge import messages
-from bridge.locating import Look, Mount, Mounts, locate
+from ros2 import messages
+from ros2.frames import Frames, Mount
+from ros2.locating import Look, locate
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
@@ -52,11 +53,12 @@ def test_its_covariance_is_that_of_the_client() -> None:
 
 
 def test_a_scanner_upside_down_is_known_by_its_mount() -> None:
-    mounts = Mounts("base_link")
-    assert mounts.of("laser") is None
+    mounts = Frames()
+    assert mounts.mount("base_link", "laser", None) is None
     over = messages.Transform(messages.Vector3(0.3, -0.1, 0.5), messages.Quaternion(1.0, 0.0, 0.0, 0.0))
-    mounts.hear(messages.TFMessage([messages.TransformStamped(messages.Header(frame_id="base_link"), "laser", over)]))
-    found = mounts.of("/laser")
+    told = messages.TransformStamped(messages.Header(frame_id="base_link"), "laser", over)
+    assert mounts.take(messages.TFMessage([told]), static=True) == []
+    found = mounts.mount("base_link", "/laser", None)
     assert found is not None
     assert found.flipped
     assert (found.base_from_laser.x, found.base_from_laser.y) == pytest.approx((0.3, -0.1))

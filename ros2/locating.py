@@ -10,26 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 import linefix
-from formats.logs.transforms import Transforms, matrix_of, planar
-from registration import RigidTransform
+from registration import InvalidArgumentError, RigidTransform
 
-from .messages import LaserScan, TFMessage, Time
+from .agreement import Observation
+from .frames import Mount
+from .messages import LaserScan, Time
 from .odometry import Speed
+from .tuning import INCONCLUSIVE_NATS, MAX_BEAMS
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Mount:
-    """Where a scanner sits: base_from_laser, and whether it is upside down."""
-
-    base_from_laser: RigidTransform
-    flipped: bool = False
+OPTIONS = linefix.AssociationOptions(max_alternatives=10)  # each of them may be where the robot is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Located:
-    """What came of a scan.
+    """The result of a scan.
 
     Attributes
     ----------
@@ -40,45 +35,31 @@ class Located:
         map_from_base.
     covariance : (3, 3) or None
         Of `pose`: additive (x, y, theta) in the map frame.
+    others : tuple of RigidTransform
+        map_from_base of the alternatives.
     """
 
     stamp: Time
     answer: linefix.AssociationResult
     pose: RigidTransform | None
     covariance: NDArray[np.float64] | None
+    others: tuple[RigidTransform, ...] = ()
 
+    def observation(self, odometry: RigidTransform | None, stamp: int) -> Observation:
+        """Return the result for the agreement, with odom_from_base at its stamp (nanoseconds)."""
+        return Observation(
+            stamp, self.pose, self.covariance, self.answer.usable, odometry, self.others, self._conclusive
+        )
 
-class Mounts:
-    """Where scanners sit on the robot, by what ``/tf_static`` says.
-
-    Parameters
-    ----------
-    base : str
-        The robot's own frame.
-    """
-
-    def __init__(self, base: str) -> None:
-        self.base = base.strip("/")
-        self._frames = Transforms("tf_static")
-
-    def hear(self, message: TFMessage) -> None:
-        """Take what was said; the last word on a frame holds.
-
-        Raises
-        ------
-        ValueError
-            When it is no transform.
-        """
-        for one in message.transforms:
-            matrix = matrix_of(one.transform.translation, one.transform.rotation)
-            self._frames.add(one.header.frame_id, one.child_frame_id, 0, matrix, static=True)
-
-    def of(self, frame: str) -> Mount | None:
-        """Return where a scanner sits; None where nobody has said so yet."""
-        if frame.strip("/") == self.base:
-            return Mount(HERE)
-        matrix = self._frames.lookup(self.base, frame, 0)
-        return None if matrix is None else Mount(*planar(matrix))
+    @property
+    def _conclusive(self) -> bool:
+        """Whether each pose that explains the scan about as well is listed."""
+        answer = self.answer
+        if answer.status not in (linefix.Status.OK, linefix.Status.AMBIGUOUS) or answer.diagnostics is None:
+            return False
+        unlisted = (1.0 - answer.search.rivals_above) * answer.diagnostics.score
+        listed = len(answer.alternatives) < OPTIONS.max_alternatives
+        return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
 
 
 def seconds_of(message: LaserScan) -> float:
@@ -88,17 +69,14 @@ def seconds_of(message: LaserScan) -> float:
 
 
 def motion_of(message: LaserScan, mount: Mount, speed: Speed | None) -> linefix.Motion | None:
-    """Return how a scanner moved while it scanned, by how fast the robot did.
+    """Return the motion of a scanner while it scanned, from the speed of the robot.
 
-    None where nobody says how fast, or the message does not say how long the scan took.
+    None where the speed is not known, or the message does not say how long the scan took.
     """
     if speed is None or not seconds_of(message):
         return None
-    at = mount.base_from_laser
-    # The turn of the robot takes the scanner along.
-    vx, vy = speed.vx - speed.omega * at.y, speed.vy + speed.omega * at.x
-    c, s = math.cos(at.theta), math.sin(at.theta)
-    return linefix.Motion(message.time_increment, c * vx + s * vy, c * vy - s * vx, speed.omega)
+    carried = speed.carried(mount.base_from_laser)
+    return linefix.Motion(message.time_increment, carried.vx, carried.vy, carried.omega)
 
 
 def laser_of(message: LaserScan, *, flipped: bool, motion: linefix.Motion | None = None) -> linefix.LaserScan:
@@ -109,6 +87,8 @@ def laser_of(message: LaserScan, *, flipped: bool, motion: linefix.Motion | None
     InputError
         When it is no scan, or the scanner turned nearly as fast as it scans.
     """
+    if not 1 <= len(message.ranges) <= MAX_BEAMS:
+        raise InvalidArgumentError(f"found {len(message.ranges)} ranges, expected 1 to {MAX_BEAMS}", argument="ranges")
     sign = -1.0 if flipped else 1.0
     return linefix.LaserScan(
         sign * message.angle_min,
@@ -146,7 +126,7 @@ class Look:
         return laser_of(self.message, flipped=self.mount.flipped, motion=motion)
 
 
-def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
+def locate(index: linefix.MapIndex, looks: Sequence[Look], deadline: linefix.Deadline | None = None) -> Located:
     """Find where the robot is by one scan, or by several scanners together, at the time of the first one's first beam.
 
     Raises
@@ -159,11 +139,13 @@ def locate(index: linefix.MapIndex, looks: Sequence[Look]) -> Located:
     if len(looks) > 1:
         places = [look.base_from_then.compose(look.mount.base_from_laser) for look in looks]
         views = [linefix.View(linefix.scan_of(laser), at) for laser, at in zip(lasers, places, strict=True)]
-        together = linefix.locate(index, linefix.assemble(views))
-        return Located(stamp, together, together.pose, together.covariance)
-    answer = linefix.locate(index, lasers[0])
+        together = linefix.locate(index, linefix.assemble(views), options=OPTIONS, deadline=deadline)
+        others = tuple(one.pose for one in together.alternatives)
+        return Located(stamp, together, together.pose, together.covariance, others)
+    answer = linefix.locate(index, lasers[0], options=OPTIONS, deadline=deadline)
     if answer.pose is None:
         return Located(stamp, answer, None, None)
     laser_from_base = looks[0].mount.base_from_laser.inverse()
     covariance = None if answer.covariance is None else answer.pose.carry(answer.covariance, laser_from_base)
-    return Located(stamp, answer, answer.pose.compose(laser_from_base), covariance)
+    others = tuple(one.pose.compose(laser_from_base) for one in answer.alternatives)
+    return Located(stamp, answer, answer.pose.compose(laser_from_base), covariance, others)

@@ -1,6 +1,6 @@
 """Each log over DDS to the bridge, a process of its own: whether what it says is right, and what the way costs.
 
-``python -m benchmarks bridge``
+``python -m benchmarks ros2``
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from cyclonedds.domain import DomainParticipant
 
 import linefix
 from association import MapIndex, associate
-from bridge import messages
-from bridge.locating import laser_of
-from bridge.odometry import nanoseconds
-from bridge.wire import LATCHED, RELIABLE, SENSOR, Heard, Told, Waiting
-from formats.logs.transforms import NS
+from ros2 import messages
+from ros2.frames import NS
+from ros2.locating import laser_of
+from ros2.odometry import nanoseconds
+from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription, Waiting
 
 from .collection import Collection, Query
 from .outcomes import is_right, offset, progress
@@ -79,24 +79,24 @@ class Player:
 
     def __init__(self, domain: int) -> None:
         net = DomainParticipant(domain)
-        self._scans = Told(net, "/scan", messages.LaserScan, SENSOR)
-        self._odometry = Told(net, "/odom", messages.Odometry, SENSOR)
-        self._mounts = Told(net, "/tf_static", messages.TFMessage, LATCHED)
-        self._initial = Heard(net, "/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
-        self._poses = Heard(net, "/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
-        self._diagnostics = Heard(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
+        self._scans = Publisher(net, "/scan", messages.LaserScan, SENSOR)
+        self._odometry = Publisher(net, "/odom", messages.Odometry, SENSOR)
+        self._mounts = Publisher(net, "/tf_static", messages.TFMessage, LATCHED)
+        self._initial = Subscription(net, "/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self._poses = Subscription(net, "/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self._diagnostics = Subscription(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
         self._waiting = Waiting(net, [self._poses, self._diagnostics])
 
     def meet(self, blind: messages.LaserScan) -> None:
         """Say where the scanner sits, and wait until a scan that sees nothing is answered."""
         place = messages.Transform(messages.Vector3(BASE_FROM_LASER.x, BASE_FROM_LASER.y, 0.3))
         header = messages.Header(frame_id="base_link")
-        self._mounts.say(messages.TFMessage([messages.TransformStamped(header, blind.header.frame_id, place)]))
+        self._mounts.publish(messages.TFMessage([messages.TransformStamped(header, blind.header.frame_id, place)]))
         ends = time.monotonic() + PATIENCE
         while time.monotonic() < ends:
-            self._scans.say(blind)
+            self._scans.publish(blind)
             self._waiting.wait(0.2)
-            if any("tf_static" not in told.status[0].message for told in self._diagnostics.take()):
+            if any("no transform" not in told.status[0].message for told in self._diagnostics.take()):
                 time.sleep(0.5)  # for what was sent meanwhile
                 self._diagnostics.take()
                 return
@@ -105,12 +105,12 @@ class Player:
     def ask(self, scan: messages.LaserScan, driven: Sequence[messages.Odometry]) -> tuple[float, list[messages.Pose]]:
         """Publish a scan; return milliseconds until it is answered, and the poses that were said of it."""
         for one in driven:
-            self._odometry.say(one)
+            self._odometry.publish(one)
         time.sleep(0.01)
         poses: list[messages.Pose] = []
         answered = math.nan
         begun = time.perf_counter()
-        self._scans.say(scan)
+        self._scans.publish(scan)
         while (now := time.perf_counter()) < begun + PATIENCE:
             self._waiting.wait(1.0)
             found = [told.pose.pose for told in self._poses.take() if told.header.stamp == scan.header.stamp]
@@ -213,7 +213,7 @@ def play(collection: Collection) -> tuple[list[Exchange], list[int]]:
             return exchanges, player.initial()
 
 
-def bridge(quick: int) -> list[Row]:
+def ros2(quick: int) -> list[Row]:
     """Print the table; nothing without data."""
     rows: list[Row] = []
     for collection in logs(quick):

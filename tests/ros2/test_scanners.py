@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import linefix
-from bridge import messages
-from bridge.gathering import Gathering, looks_of
-from bridge.locating import Mounts, locate
-from bridge.odometry import Heard as Driven
-from bridge.wire import SENSOR, Told
+from ros2 import messages
+from ros2.frames import Frames
+from ros2.gathering import Gathering, looks_of
+from ros2.locating import locate
+from ros2.odometry import OdometryHistory
+from ros2.options import NodeOptions
+from ros2.wire import SENSOR, Publisher
 
 from .robot import MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, quaternion
 
@@ -57,44 +59,46 @@ def odometry(second: int, nanosec: int, at: linefix.RigidTransform) -> messages.
 
 
 def test_two_scanners_find_together_what_neither_finds(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file, "--scan", "/front", "--scan", "/back"):
+    with bridge("--map", map_file, "--agree", "1", "--scan", "/front", "--scan", "/back"):
         robot = Robot(domain)
-        front, back = (Told(robot.net, f"/{name}", messages.LaserScan, SENSOR) for name in AT)
-        driven = Told(robot.net, "/odom", messages.Odometry, SENSOR)
-        robot.mounts.say(mounts())
+        front, back = (Publisher(robot.net, f"/{name}", messages.LaserScan, SENSOR) for name in AT)
+        driven = Publisher(robot.net, "/odom", messages.Odometry, SENSOR)
+        robot.mounts.publish(mounts())
         for told in (front, back):
             name = "front" if told is front else "back"
             robot.until(
                 robot.diagnostics,
-                lambda name=name, told=told: told.say(seen(name, 1)),  # type: ignore[misc]
-                lambda one: one.status[0].message != "" and "tf_static" not in one.status[0].message,
+                lambda name=name, told=told: told.publish(seen(name, 1)),  # type: ignore[misc]
+                lambda one: one.status[0].message != "" and "no transform" not in one.status[0].message,
             )
         assert robot.initial.take() == []  # neither alone
 
         def play(second: list[int] = [1]) -> None:  # noqa: B006
             second[0] += 1
-            driven.say(odometry(second[0], 0, HERE))
-            driven.say(odometry(second[0], 90_000_000, DRIVEN))
-            back.say(seen("back", second[0]))
-            front.say(seen("front", second[0]))
+            driven.publish(odometry(second[0], 0, HERE))
+            driven.publish(odometry(second[0], 90_000_000, DRIVEN))
+            back.publish(seen("back", second[0]))
+            front.publish(seen("front", second[0]))
 
         found = robot.until(robot.initial, play)
     assert found.header.stamp.nanosec == AT["front"]  # the newest
     assert is_at_truth(found)
 
 
-def gathered(*names: str, moved: bool = True, told: Driven | None = None) -> tuple[Any, list[str]]:
+def gathered(*names: str, moved: bool = True, told: OdometryHistory | None = None) -> tuple[Any, list[str]]:
     """Answer scans as the bridge does."""
-    where = Mounts("base_link")
-    where.hear(mounts())
-    looks, missing = looks_of([seen(name, 3, moved=moved) for name in names], where, told or Driven())
+    where = Frames()
+    where.take(mounts(), static=True)
+    looks, missing = looks_of(
+        [seen(name, 3, moved=moved) for name in names], where, NodeOptions(), told or OdometryHistory()
+    )
     return locate(linefix.index_map(ROOM), looks), missing
 
 
 def test_odometry_says_how_the_robot_moved_between_them() -> None:
-    told = Driven()
+    told = OdometryHistory()
     for nanosec, at in ((0, HERE), (40_000_000, linefix.RigidTransform(0.12, 0.01, 0.07)), (90_000_000, DRIVEN)):
-        told.hear(odometry(3, nanosec, at))
+        told.take(odometry(3, nanosec, at))
     alone, _ = gathered("front", told=told)
     assert not alone.answer.usable
     found, missing = gathered("front", "back", told=told)
@@ -105,27 +109,27 @@ def test_odometry_says_how_the_robot_moved_between_them() -> None:
 
 def test_without_odometry_the_older_scan_is_left_out_and_that_is_told() -> None:
     found, missing = gathered("front", "back")
-    assert missing == ["no odometry says how the robot moved since the scan of back"]
+    assert missing == ['no odometry between the newest scan and that of "back", which is left out']
     assert not found.answer.usable
 
 
 def test_odometry_is_interpolated_and_forgotten() -> None:
-    told = Driven()
+    told = OdometryHistory()
     begin, end = messages.Time(5, 0), messages.Time(5, 500_000_000)
     assert told.step(begin, begin) == HERE
     assert told.step(begin, end) is None
-    told.hear(odometry(5, 0, HERE))
-    told.hear(odometry(6, 0, linefix.RigidTransform(1.0, 0.0, 0.4)))
+    told.take(odometry(5, 0, HERE))
+    told.take(odometry(6, 0, linefix.RigidTransform(1.0, 0.0, 0.4)))
     half = told.step(begin, end)
     assert half is not None
     assert (half.x, half.y, half.theta) == pytest.approx((0.5, 0.0, 0.2))
     assert told.step(begin, messages.Time(7, 0)) is None  # nobody said for a second
-    told.hear(odometry(2, 0, HERE))  # the clock went back
+    told.take(odometry(2, 0, HERE))  # the clock went back
     assert told.step(begin, end) is None
     broken = messages.Odometry()
     broken.pose.pose.orientation = messages.Quaternion(0.0, 0.0, 0.0, 0.0)
-    with pytest.raises(ValueError, match="length 1"):
-        told.hear(broken)
+    with pytest.raises(ValueError, match="quaternion"):
+        told.take(broken)
 
 
 def test_scans_wait_for_one_another_for_a_while() -> None:

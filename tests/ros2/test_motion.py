@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import linefix
-from bridge import messages
-from bridge.gathering import looks_of
-from bridge.locating import Look, Mount, Mounts, locate, motion_of, seconds_of
-from bridge.odometry import Heard as Driven
-from bridge.odometry import Speed
-from bridge.wire import SENSOR, Told
+from ros2 import messages
+from ros2.frames import Frames, Mount
+from ros2.gathering import looks_of
+from ros2.locating import Look, locate, motion_of, seconds_of
+from ros2.odometry import OdometryHistory, Speed
+from ros2.options import NodeOptions
+from ros2.wire import SENSOR, Publisher
 
 from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, mount
 
@@ -66,16 +67,18 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
     broken.twist.twist.angular.z = math.inf
     with bridge("--map", map_file, *arguments):
         robot = Robot(domain)
-        driven = Told(robot.net, "/odom", messages.Odometry, SENSOR)
-        robot.mounts.say(mount())
-        robot.until(
-            robot.diagnostics, lambda: driven.say(broken), lambda one: "odometry is not" in one.status[0].message
-        )
-        driven.say(odometry(10))
+        driven = Publisher(robot.net, "/odom", messages.Odometry, SENSOR)
+        robot.mounts.publish(mount())
         robot.until(
             robot.diagnostics,
-            lambda: robot.scans.say(scan),
-            lambda one: one.header.stamp == scan.header.stamp and "tf_static" not in one.status[0].message,
+            lambda: driven.publish(broken),
+            lambda one: "twist" in one.status[0].message,
+        )
+        driven.publish(odometry(10))
+        robot.until(
+            robot.diagnostics,
+            lambda: robot.scans.publish(scan),
+            lambda one: one.header.stamp == scan.header.stamp and "no transform" not in one.status[0].message,
         )
         found = robot.poses.take()
     assert bool(found) == (not arguments)
@@ -84,11 +87,11 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
 
 def looked(scan: messages.LaserScan, *told: messages.Odometry) -> Speed | None:
     """Return how fast the robot is taken to have moved during a scan."""
-    where, driven = Mounts("base_link"), Driven()
-    where.hear(mount())
+    where, driven = Frames(), OdometryHistory()
+    where.take(mount(), static=True)
     for one in told:
-        driven.hear(one)
-    looks, missing = looks_of([scan], where, driven)
+        driven.take(one)
+    looks, missing = looks_of([scan], where, NodeOptions(), driven)
     assert missing == []
     return looks[0].speed
 
@@ -105,9 +108,9 @@ def test_the_twist_nearest_to_the_middle_of_the_scan_counts() -> None:
 
 
 def test_the_clock_that_goes_back_takes_twists_along() -> None:
-    driven = Driven()
-    driven.hear(odometry(10, 0, Speed(0.1, 0.0, 0.0)))
-    driven.hear(odometry(5, 0, SPEED))
+    driven = OdometryHistory()
+    driven.take(odometry(10, 0, Speed(0.1, 0.0, 0.0)))
+    driven.take(odometry(5, 0, SPEED))
     assert driven.speed(5 * 10**9) == SPEED
     assert driven.speed(10 * 10**9) is None
 

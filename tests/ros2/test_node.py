@@ -11,10 +11,10 @@ import pytest
 from rosbags.rosbag2 import Reader, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from bridge import messages
+from ros2 import messages
 from service.commands.entry import run
 
-from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, is_at_truth, mount, scan
+from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, grid_of_room, is_at_truth, mount, scan
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 
@@ -33,20 +33,20 @@ def bag(folder: Path) -> Path:
 
 def test_a_bag_that_is_played_gives_an_initial_pose(domain: int, map_file: str, tmp_path: Path) -> None:
     kinds: dict[str, Any] = {"/tf_static": messages.TFMessage, "/scan": messages.LaserScan}
-    with bridge("--map", map_file):
+    with bridge("--map", map_file, "--agree", "1"):
         robot = Robot(domain)
         with Reader(bag(tmp_path)) as reader:
             played = [(c.topic, kinds[c.topic].deserialize(raw)) for c, _, raw in reader.messages()]
-        robot.mounts.say(played[0][1])
+        robot.mounts.publish(played[0][1])
         blind, *seeing = [message for _, message in played[1:]]
         said = robot.until(
             robot.diagnostics,
-            lambda: robot.scans.say(blind),
-            lambda one: one.header.stamp.sec == 1 and "tf_static" not in one.status[0].message,
+            lambda: robot.scans.publish(blind),
+            lambda one: one.header.stamp.sec == 1 and "no transform" not in one.status[0].message,
         )
         assert said.status[0].level == 1
         assert robot.initial.take() == []
-        robot.scans.say(seeing[0])
+        robot.scans.publish(seeing[0])
         found = robot.until(robot.initial, lambda: None)
     assert found.header.stamp.sec == 2  # the first scan that is usable
     assert is_at_truth(found)
@@ -58,63 +58,58 @@ def test_a_bag_that_is_played_gives_an_initial_pose(domain: int, map_file: str, 
 
 
 def test_it_is_silent_until_asked_again(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file):
+    with bridge("--map", map_file, "--agree", "1"):
         robot = Robot(domain)
-        robot.mounts.say(mount())
-        robot.until(robot.initial, lambda: robot.scans.say(scan(1)))
-        robot.until(robot.poses, lambda: robot.scans.say(scan(2)), lambda one: one.header.stamp.sec == 2)
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+        robot.until(robot.poses, lambda: robot.scans.publish(scan(2)), lambda one: one.header.stamp.sec == 2)
         assert robot.initial.take() == []
-        robot.asking.say(messages.Empty())
-        again = robot.until(robot.initial, lambda: robot.scans.say(scan(3)))
+        robot.asking.publish(messages.Empty())
+        again = robot.until(robot.initial, lambda: robot.scans.publish(scan(3)))
         assert again.header.stamp.sec == 3
-        assert robot.markers.take()[0].markers[0].ns == "linefix/map"
+        assert {one.markers[0].ns for one in robot.walls.take()} == {"linefix/map"}
 
 
 def test_without_a_mount_it_says_what_is_missing(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file):
+    with bridge("--map", map_file, "--agree", "1"):
         robot = Robot(domain)
-        said = robot.until(robot.diagnostics, lambda: robot.scans.say(scan(1)))
+        said = robot.until(
+            robot.diagnostics,
+            lambda: robot.scans.publish(scan(1)),
+            lambda one: 'no transform from "laser" to "base_link"' in one.status[0].message,
+        )
         assert said.status[0].level == 2
-        assert "/tf_static does not say where laser is in base_link" in said.status[0].message
         assert robot.poses.take() == []
 
 
 def test_the_map_may_come_as_a_grid(domain: int) -> None:
     """And a scanner that has the robot's own frame needs no mount."""
-    size, cell = 140, 0.05
-    x, y = np.meshgrid(*[np.arange(size) * cell + 0.5 * cell - 0.5] * 2)
-    free = (x > 0) & (y > 0) & (((x < 6) & (y < 2)) | ((x < 4) & (y < 5)))
-    near = np.zeros_like(free)
-    for dx in (-1, 0, 1):
-        for dy in (-1, 0, 1):
-            near |= np.roll(free, (dy, dx), (0, 1))
-    cells = np.where(free, 0, np.where(near, 100, -1)).ravel().tolist()
-    info = messages.MapMetaData(resolution=cell, width=size, height=size)
-    info.origin.position = messages.Point(-0.5, -0.5, 0.0)
-    with bridge("--base", "laser"):
+    with bridge("--base", "laser", "--agree", "1"):
         robot = Robot(domain)
-        robot.maps.say(messages.OccupancyGrid(messages.Header(frame_id="floor"), info, cells))
-        found = robot.until(robot.initial, lambda: robot.scans.say(scan(1)))
+        robot.maps.publish(grid_of_room("floor"))
+        found = robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
     truth = MAP_FROM_BASE.compose(BASE_FROM_LASER)
     assert found.header.frame_id == "floor"
     assert math.hypot(found.pose.pose.position.x - truth.x, found.pose.pose.position.y - truth.y) < 0.05
 
 
 def test_what_is_broken_is_told_and_the_next_is_answered(domain: int, map_file: str) -> None:
-    with bridge("--map", map_file):
+    with bridge("--map", map_file, "--agree", "1"):
         robot = Robot(domain)
         turned = mount()
         turned.transforms[0].transform.rotation = messages.Quaternion(0.0, 0.0, 0.0, 0.0)
         robot.until(
-            robot.diagnostics, lambda: robot.mounts.say(turned), lambda one: "mount is not" in one.status[0].message
+            robot.diagnostics, lambda: robot.mounts.publish(turned), lambda one: "quaternion" in one.status[0].message
         )
-        robot.mounts.say(mount())
+        robot.mounts.publish(mount())
         broken = scan(1)
         broken.angle_increment = 0.0
         robot.until(
-            robot.diagnostics, lambda: robot.scans.say(broken), lambda one: "scan is not" in one.status[0].message
+            robot.diagnostics,
+            lambda: robot.scans.publish(broken),
+            lambda one: "cannot be used" in one.status[0].message,
         )
-        robot.until(robot.initial, lambda: robot.scans.say(scan(2)))
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(2)))
 
 
 def test_a_stored_map_is_taken_by_its_id(
@@ -122,7 +117,7 @@ def test_a_stored_map_is_taken_by_its_id(
 ) -> None:
     monkeypatch.setenv("LINEFIX_DATA_DIR", str(tmp_path / "data"))
     assert run(["map", "put", "hq-3", map_file]) == 0
-    with bridge("--map", "hq-3"):
+    with bridge("--map", "hq-3", "--agree", "1"):
         robot = Robot(domain)
-        robot.mounts.say(mount())
-        assert is_at_truth(robot.until(robot.initial, lambda: robot.scans.say(scan(2))))
+        robot.mounts.publish(mount())
+        assert is_at_truth(robot.until(robot.initial, lambda: robot.scans.publish(scan(2))))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 import linefix
 
 from .locating import Located
 from .messages import (
     ColorRGBA,
-    DiagnosticArray,
     DiagnosticStatus,
     Header,
     KeyValue,
@@ -22,7 +23,10 @@ from .messages import (
     PoseWithCovariance,
     PoseWithCovarianceStamped,
     Quaternion,
+    TFMessage,
     Time,
+    Transform,
+    TransformStamped,
     Vector3,
 )
 
@@ -31,6 +35,8 @@ ARROW, LINES = 0, 5  # as Marker counts
 ADD, DELETE = 0, 2
 GREEN, AMBER, GREY = ColorRGBA(0.1, 0.7, 0.2, 1.0), ColorRGBA(0.9, 0.6, 0.0, 1.0), ColorRGBA(0.5, 0.5, 0.5, 0.6)
 LINE_WIDTH = 0.04  # m
+Floats = NDArray[np.float64]
+
 PLANAR = np.array([0, 1, 5])  # x, y and the turn about z among ROS's six
 
 
@@ -40,14 +46,38 @@ def pose_of(pose: linefix.RigidTransform) -> Pose:
     return Pose(Point(pose.x, pose.y, 0.0), Quaternion(0.0, 0.0, math.sin(half), math.cos(half)))
 
 
-def stamped_pose(located: Located, frame: str) -> PoseWithCovarianceStamped | None:
-    """Return the robot's pose with its covariance; None where there is none, or it is not known in each direction."""
-    if located.pose is None or located.covariance is None:
-        return None
+def stamped_pose(
+    stamp: Time, pose: linefix.RigidTransform, covariance: Floats, frame: str
+) -> PoseWithCovarianceStamped:
+    """Return the robot's pose, map_from_base, with its covariance (3, 3) in the plane."""
     full = np.zeros((6, 6))
-    full[np.ix_(PLANAR, PLANAR)] = located.covariance
-    pose = PoseWithCovariance(pose_of(located.pose), full.ravel().tolist())
-    return PoseWithCovarianceStamped(Header(located.stamp, frame), pose)
+    full[np.ix_(PLANAR, PLANAR)] = covariance
+    return PoseWithCovarianceStamped(Header(stamp, frame), PoseWithCovariance(pose_of(pose), full.ravel().tolist()))
+
+
+def at_least(covariance: Floats, sigma: float, sigma_theta: float) -> Floats:
+    """Return a covariance whose standard deviations, in every direction of the plane, are at least so much.
+
+    Parameters
+    ----------
+    covariance : (3, 3)
+        Of x, y, theta.
+    sigma, sigma_theta : float
+        Metres, radians.
+    """
+    scale = np.array([1.0, 1.0, 1.0])
+    scale[2] = sigma / sigma_theta if sigma > 0.0 and sigma_theta > 0.0 else 1.0
+    widened = covariance * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(widened)
+    floor: Floats = (vectors * np.maximum(values, sigma**2)) @ vectors.T / np.outer(scale, scale)
+    return floor
+
+
+def transform_of(stamp: Time, frames: tuple[str, str], pose: linefix.RigidTransform) -> TFMessage:
+    """Return a transform for ``/tf``; `frames` are the parent and the child, `pose` is parent_from_child."""
+    turn = pose_of(pose).orientation
+    transform = Transform(Vector3(pose.x, pose.y, 0.0), turn)
+    return TFMessage([TransformStamped(Header(stamp, frames[0]), frames[1], transform)])
 
 
 def map_marker(index: linefix.MapIndex, frame: str) -> MarkerArray:
@@ -77,10 +107,10 @@ def _marker(
     )  # fmt: skip
 
 
-def diagnosis(located: Located, milliseconds: float) -> DiagnosticArray:
-    """Return how the last scan was answered."""
+def values_of(located: Located, milliseconds: float) -> dict[str, str]:
+    """Return the verdict of a scan as keys and values."""
     answer = located.answer
-    told = {
+    return {
         "status": answer.status.value,
         "usable": str(answer.usable).lower(),
         "probability": f"{answer.probability:.4f}",
@@ -88,15 +118,19 @@ def diagnosis(located: Located, milliseconds: float) -> DiagnosticArray:
         "warnings": ", ".join(warning.code for warning in answer.warnings),
         "milliseconds": f"{milliseconds:.1f}",
     }
-    message = "pose usable" if answer.usable else (answer.reasons[0].message if answer.reasons else told["status"])
-    return _diagnostics(located.stamp, OK if answer.usable else WARN, message, told)
 
 
-def complaint(stamp: Time, message: str) -> DiagnosticArray:
-    """Return why no scan can be answered."""
-    return _diagnostics(stamp, ERROR, message, {})
+def verdict_of(located: Located) -> tuple[int, str]:
+    """Return the level and the message of a scan's verdict."""
+    answer = located.answer
+    if answer.usable:
+        return OK, "pose usable"
+    return WARN, answer.reasons[0].message if answer.reasons else answer.status.value
 
 
-def _diagnostics(stamp: Time, level: int, message: str, values: dict[str, str]) -> DiagnosticArray:
-    pairs = [KeyValue(key, value) for key, value in values.items()]
-    return DiagnosticArray(Header(stamp, ""), [DiagnosticStatus(level, "linefix: localization", message, "", pairs)])
+def status_of(
+    name: str, hardware_id: str, verdict: tuple[int, str], values: Mapping[str, str] | None = None
+) -> DiagnosticStatus:
+    """Return a status; `verdict` is its level and message."""
+    pairs = [KeyValue(key, value) for key, value in (values or {}).items()]
+    return DiagnosticStatus(verdict[0], name, verdict[1], hardware_id, pairs)

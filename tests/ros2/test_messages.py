@@ -12,13 +12,14 @@ from cyclonedds.idl import IdlStruct
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from bridge import messages
+from ros2 import messages
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
+SERIALIZED = (IdlStruct, messages.SerializedGrid, messages.SerializedTransforms)
 ALL: dict[str, Any] = {
     f"{re.split('[.:]', kind.__idl_typename__)[0]}/msg/{name}": kind  # type: ignore[attr-defined]
     for name, kind in vars(messages).items()
-    if isinstance(kind, type) and issubclass(kind, IdlStruct) and kind is not IdlStruct
+    if isinstance(kind, type) and issubclass(kind, IdlStruct) and kind not in SERIALIZED
 }
 
 
@@ -59,3 +60,9 @@ def test_its_bytes_are_those_of_rosbags(name: str) -> None:
 def test_a_scan_has_72_bytes() -> None:
     scan = messages.LaserScan(messages.Header(messages.Time(1, 2), "laser"), ranges=[1.0, 2.0, 3.0])
     assert len(scan.serialize()) == 72
+
+
+def test_a_serialized_grid_has_the_bytes_of_the_grid() -> None:
+    grid = messages.OccupancyGrid(messages.Header(messages.Time(1, 2), "map"), data=[0, 100, -1])
+    kept = messages.SerializedGrid.deserialize(grid.serialize())
+    assert messages.OccupancyGrid.deserialize(kept.serialized) == grid

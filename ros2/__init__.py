@@ -1,0 +1,39 @@
+"""ROS 2 without ROS: subscribe to scans and publish poses over DDS. The extra ``linefix[ros2]``.
+
+::
+
+    node              Node: the main loop between messages and searches
+    options           what the node is told; names of topics and frames
+    connecting        the DDS domain, within the range that the variables of ROS allow
+    topics, wire      all topics; readers, writers and their quality of service
+    messages          the messages, byte for byte as ROS has them
+    frames            the tree of frames, and where a laser is mounted
+    odometry          the motion of the robot between two times
+    gathering         scans of several scanners that belong together
+    locating          one scan to the robot's pose
+    searching         the thread of the searches
+    map_conversion    an OccupancyGrid to a map, in a process of its own
+    agreement         several scans that agree through odometry
+    deciding          when initialpose is published
+    watching          whether the localizer of the robot agrees
+    correcting        the transform from the map to the odometry frame
+    health, silence   diagnostics, status, log; why nothing happens
+    requests          requests with an id, and their results
+    reporting         results as messages
+    tuning, text      limits and thresholds; text from outside
+"""
+
+from .connecting import ConnectionRefusedError, domain_of
+from .node import Node
+from .options import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
+
+__all__ = [
+    "ConnectionRefusedError",
+    "Node",
+    "NodeOptions",
+    "OptionError",
+    "checked_namespace",
+    "domain_of",
+    "namespace_of",
+    "remapping_of",
+]

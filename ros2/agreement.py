@@ -1,0 +1,259 @@
+"""Several scans that agree through odometry: only then is a robot told where it is. No DDS in here.
+
+The state is a list of hypotheses, each a pose of the robot in the map that odometry carries along:
+
+1. A usable scan that agrees with the prediction of a hypothesis supports it; with none, it starts a new one.
+2. A usable scan that disagrees counts against a hypothesis; so does one that is not usable, where the prediction is
+   neither its pose nor one of its alternatives although all poses that explain it as well are listed.
+3. A hypothesis is agreed when the scans that support it, less those against it, are as many as needed, and the robot
+   has moved far enough between them, or has rested long enough while nothing spoke against it.
+4. The agreed hypothesis stays until another one is agreed; what speaks against it meanwhile is reported at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import RigidTransform, wrap_angle
+
+from .tuning import (
+    AGREEING_CHI_SQUARE,
+    CLOCK_BACK_NS,
+    FORGOTTEN_NS,
+    MAX_HYPOTHESES,
+    MOVED,
+    ODOMETRY_ANGLE,
+    ODOMETRY_ANGLE_PER_ANGLE,
+    ODOMETRY_ANGLE_PER_METRE,
+    ODOMETRY_DISTANCE,
+    ODOMETRY_DISTANCE_PER_METRE,
+    RESTED_NS,
+    SEPARATE_ANGLE,
+    SEPARATE_DISTANCE,
+    SEPARATE_NS,
+    TURNED,
+)
+
+Floats = NDArray[np.float64]
+
+HERE = RigidTransform(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """What one scan says about the pose of the robot.
+
+    Attributes
+    ----------
+    stamp : int
+        Nanoseconds.
+    pose : RigidTransform or None
+        map_from_base.
+    covariance : (3, 3) or None
+        Of `pose`, additive (x, y, theta) in the map frame; m^2, m rad, rad^2.
+    usable : bool
+    odometry : RigidTransform or None
+        odom_from_base at `stamp`; None: no odometry, the robot is taken to rest.
+    others : sequence of RigidTransform
+        Other poses, map_from_base, that explain the scan.
+    conclusive : bool
+        Whether every pose that explains the scan about as well is `pose` or one of `others`.
+    """
+
+    stamp: int
+    pose: RigidTransform | None
+    covariance: Floats | None
+    usable: bool
+    odometry: RigidTransform | None = None
+    others: Sequence[RigidTransform] = ()
+    conclusive: bool = False
+
+
+class Event(StrEnum):
+    """What an observation changes."""
+
+    NOTHING = "nothing"
+    AGREED = "agreed"  # another hypothesis is agreed now
+    CONFIRMED = "confirmed"  # the agreed hypothesis is supported once more
+    CONTRADICTED = "contradicted"  # the observation speaks against the agreed hypothesis
+
+
+@dataclass(slots=True, eq=False)
+class _Hypothesis:
+    """A pose that odometry carries along; `latest` is the last scan that supports it."""
+
+    first: Observation
+    latest: Observation
+    counted: Observation
+    supporting: int = 1
+    against: int = 0
+    moved: float = 0.0
+    turned: float = 0.0
+
+    def support(self, scan: Observation) -> None:
+        """Take a usable scan that agrees; scans of nearly the same place and time count once."""
+        whole = step_between(self.first, scan) or HERE
+        self.moved = max(self.moved, math.hypot(whole.x, whole.y))
+        self.turned = max(self.turned, abs(whole.theta))
+        since = step_between(self.counted, scan) or HERE
+        if (
+            math.hypot(since.x, since.y) >= SEPARATE_DISTANCE
+            or abs(since.theta) >= SEPARATE_ANGLE
+            or scan.stamp - self.counted.stamp >= SEPARATE_NS
+        ):
+            self.supporting += 1
+            self.counted = scan
+        self.latest = scan
+
+    def agreed(self, needed: int) -> bool:
+        if self.supporting - self.against < needed:
+            return False
+        rested = self.against == 0 and self.latest.stamp - self.first.stamp >= RESTED_NS
+        return needed == 1 or self.moved >= MOVED or self.turned >= TURNED or rested
+
+
+@dataclass(slots=True)
+class Agreement:
+    """Follows the hypotheses from scan to scan.
+
+    Attributes
+    ----------
+    needed : int
+        Scans that have to agree; 1: each usable scan is agreed by itself.
+    """
+
+    needed: int = 3
+    _hypotheses: list[_Hypothesis] = field(default_factory=list)
+    _agreed: _Hypothesis | None = None
+    _newest: int | None = None
+    _contradicted: bool = False
+
+    @property
+    def latest(self) -> Observation | None:
+        """The last scan that supports the agreed hypothesis; None where nothing is agreed."""
+        return None if self._agreed is None else self._agreed.latest
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether something spoke against the agreed hypothesis since it was last supported."""
+        return self._contradicted
+
+    @property
+    def progress(self) -> tuple[int, float, float]:
+        """Scans for the best hypothesis less those against it, metres and radians that the robot has moved."""
+        best = max(self._hypotheses, key=lambda one: one.supporting - one.against, default=None)
+        return (0, 0.0, 0.0) if best is None else (max(0, best.supporting - best.against), best.moved, best.turned)
+
+    def reset(self) -> None:
+        """Forget everything, as when the robot was carried, or the map changed."""
+        self._hypotheses, self._agreed, self._newest, self._contradicted = [], None, None, False
+
+    def take(self, scan: Observation) -> Event:
+        """Take the next scan.
+
+        Scans that are older than the last one are left out; where the clock was set back, everything is forgotten.
+        """
+        if self._newest is not None and scan.stamp < self._newest:
+            if self._newest - scan.stamp <= CLOCK_BACK_NS:
+                return Event.NOTHING
+            self.reset()
+        self._newest = scan.stamp
+        self._hypotheses = [
+            one for one in self._hypotheses if one is self._agreed or scan.stamp - one.latest.stamp <= FORGOTTEN_NS
+        ]
+        verdicts = [(one, _verdict(one.latest, scan)) for one in self._hypotheses]
+        for one, agrees in verdicts:
+            if agrees is False:
+                one.against += 1
+        supported = [one for one, agrees in verdicts if agrees and scan.usable]
+        for one in supported:
+            one.support(scan)
+        if scan.usable and not supported:
+            self._begin(scan)
+            supported = self._hypotheses[-1:]
+        return self._event(supported, {id(one): agrees for one, agrees in verdicts})
+
+    def _begin(self, scan: Observation) -> None:
+        self._hypotheses.append(_Hypothesis(scan, scan, scan))
+        if len(self._hypotheses) > MAX_HYPOTHESES:
+            self._hypotheses.remove(
+                min((one for one in self._hypotheses if one is not self._agreed), key=lambda one: one.latest.stamp)
+            )
+
+    def _event(self, supported: Sequence[_Hypothesis], verdicts: dict[int, bool | None]) -> Event:
+        if self._agreed is not None and any(one is self._agreed for one in supported):
+            self._agreed.against, self._contradicted = 0, False
+            return Event.CONFIRMED
+        for one in supported:
+            if one.agreed(self.needed):
+                self._agreed, self._contradicted = one, False
+                self._hypotheses = [one]
+                return Event.AGREED
+        if self._agreed is not None and verdicts.get(id(self._agreed)) is False:
+            self._contradicted = True
+            return Event.CONTRADICTED
+        return Event.NOTHING
+
+
+def step_between(begin: Observation, end: Observation) -> RigidTransform | None:
+    """Return where the robot is at `end`, relative to where it was at `begin`.
+
+    Without odometry at both it is taken to rest. None where odometry is known at one of them only.
+    """
+    if begin.odometry is None and end.odometry is None:
+        return HERE
+    if begin.odometry is None or end.odometry is None:
+        return None
+    return begin.odometry.inverse().compose(end.odometry)
+
+
+def predict(begin: Observation, step: RigidTransform) -> tuple[RigidTransform, Floats]:
+    """Return the pose that odometry predicts from a scan with a pose, and its covariance.
+
+    Parameters
+    ----------
+    begin : Observation
+    step : RigidTransform
+        As by `step_between`.
+
+    Returns
+    -------
+    RigidTransform
+        map_from_base.
+    (3, 3)
+        Additive (x, y, theta) in the map frame; with the error of odometry.
+    """
+    assert begin.pose is not None
+    predicted = begin.pose.compose(step)
+    known = np.zeros((3, 3)) if begin.covariance is None else begin.pose.carry(begin.covariance, step)
+    distance, angle = math.hypot(step.x, step.y), abs(step.theta)
+    place = ODOMETRY_DISTANCE + ODOMETRY_DISTANCE_PER_METRE * distance
+    turn = ODOMETRY_ANGLE + ODOMETRY_ANGLE_PER_ANGLE * angle + ODOMETRY_ANGLE_PER_METRE * distance
+    return predicted, known + np.diag([place**2, place**2, turn**2])
+
+
+def chi_square(a: RigidTransform, b: RigidTransform, covariance: Floats) -> float:
+    """Return the squared Mahalanobis distance of two poses, three degrees of freedom."""
+    difference = np.array([a.x - b.x, a.y - b.y, wrap_angle(a.theta - b.theta)])
+    return float(difference @ np.linalg.solve(covariance, difference))
+
+
+def _verdict(begin: Observation, scan: Observation) -> bool | None:
+    """Return whether a scan agrees with what odometry predicts; None where it says nothing about it."""
+    step = step_between(begin, scan)
+    if step is None or scan.pose is None:
+        return None
+    predicted, covariance = predict(begin, step)
+    if scan.usable:
+        both = covariance + (0.0 if scan.covariance is None else scan.covariance)
+        return chi_square(predicted, scan.pose, both) <= AGREEING_CHI_SQUARE
+    if not scan.conclusive:
+        return None
+    near = any(chi_square(predicted, pose, covariance) <= AGREEING_CHI_SQUARE for pose in (scan.pose, *scan.others))
+    return None if near else False

@@ -1,0 +1,110 @@
+"""What the node reports about itself: diagnostics, status, and lines of a log."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from .messages import DiagnosticArray, DiagnosticStatus, Header, Time
+from .reporting import ERROR, OK, WARN, status_of
+from .tuning import LOG_SECONDS, REPEAT_SECONDS
+from .wire import Publisher
+
+MOST_PROBLEMS = 100  # different ones that are remembered
+
+
+class State(StrEnum):
+    """What the node knows."""
+
+    NO_MAP = "no_map"
+    NO_SCAN = "no_scan"
+    SEARCHING = "searching"
+    AGREED = "agreed"
+    CONTRADICTED = "contradicted"
+    LOST = "lost"
+
+
+SAID = {
+    State.NO_MAP: (WARN, "no map has been published"),
+    State.NO_SCAN: (WARN, "no scan can be searched"),
+    State.SEARCHING: (WARN, "no pose is agreed yet"),
+    State.AGREED: (OK, "the pose is agreed"),
+    State.CONTRADICTED: (ERROR, "the agreed pose is contradicted by the last scans"),
+    State.LOST: (ERROR, "the localizer of the robot has another pose than the scans"),
+}
+
+
+@dataclass(slots=True)
+class Health:
+    """Publishes what the node reports.
+
+    Attributes
+    ----------
+    diagnostics : Publisher of DiagnosticArray
+    status : Publisher of DiagnosticStatus
+    names : (str, str)
+        Prefix of the names in diagnostics, and hardware id.
+    log : callable
+        Takes a line.
+    """
+
+    diagnostics: Publisher[DiagnosticArray]
+    status: Publisher[DiagnosticStatus]
+    names: tuple[str, str]
+    log: Callable[[str], None]
+    _published: dict[str, float] = field(default_factory=dict)
+    _logged: dict[str, float] = field(default_factory=dict)
+    _state: State | None = None
+    _beat: float = 0.0
+
+    def problem(self, problem: str, stamp: Time | None = None) -> None:
+        """Publish a problem, and log it; the same one at most once in `REPEAT_SECONDS` and `LOG_SECONDS`."""
+        now = time.monotonic()
+        if _is_new(self._published, problem, now, REPEAT_SECONDS):
+            self.publish("scan", stamp or Time(), (ERROR, problem))
+        self.note(problem)
+
+    def warn(self, warning: str, stamp: Time) -> None:
+        """Publish a warning, and log it, as often as a problem."""
+        if _is_new(self._published, warning, time.monotonic(), REPEAT_SECONDS):
+            self.publish("scan", stamp, (WARN, warning))
+        self.note(warning)
+
+    def note(self, line: str) -> None:
+        """Log a line; the same one at most once in `LOG_SECONDS`."""
+        if _is_new(self._logged, line, time.monotonic(), LOG_SECONDS):
+            self.log(line)
+
+    def publish(
+        self, part: str, stamp: Time, verdict: tuple[int, str], values: Mapping[str, str] | None = None
+    ) -> None:
+        """Publish diagnostics of a part of the node."""
+        prefix, hardware_id = self.names
+        status = status_of(f"{prefix}linefix: {part}", hardware_id, verdict, values)
+        self.diagnostics.publish(DiagnosticArray(Header(stamp, ""), [status]))
+
+    def beat(self, state: State, stamp: Time, values: Mapping[str, str]) -> None:
+        """Publish the state: at once where it has changed, else once a second."""
+        now = time.monotonic()
+        changed = state is not self._state
+        if not changed and now - self._beat < 1.0:
+            return
+        self._beat = now
+        self.publish("localization", stamp, SAID[state], {"state": state.value, **values})
+        if changed:
+            self._state = state
+            prefix, hardware_id = self.names
+            told = {"state": state.value, **values}
+            self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, SAID[state], told))
+            self.log(f"state {state.value}: {SAID[state][1]}")
+
+
+def _is_new(times: dict[str, float], text: str, now: float, seconds: float) -> bool:
+    if now - times.get(text, -seconds) < seconds:
+        return False
+    if len(times) >= MOST_PROBLEMS:
+        times.clear()
+    times[text] = now
+    return True

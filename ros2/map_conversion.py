@@ -1,0 +1,234 @@
+"""An OccupancyGrid to a map that can be searched, in a process of its own: bounded in time and memory.
+
+The process is started before the first grid comes, because loading the code takes some seconds, and ends when no grid
+has come for a while.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import multiprocessing
+import os
+import pickle
+import queue
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Literal
+
+import numpy as np
+
+import linefix
+
+from .messages import Header, MapMetaData, OccupancyGrid, SerializedGrid
+from .text import MAX_NAME
+from .tuning import CONVERSION_BYTES, CONVERSION_IDLE, CONVERSION_PATIENCE, CONVERSION_SECONDS, MAX_GRID_BYTES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Converted:
+    """The result of a conversion.
+
+    Attributes
+    ----------
+    index : MapIndex or None
+        None where the grid is not used.
+    frame : str
+        Of the map.
+    size : str
+        Of the grid, to be logged.
+    problem : str
+        Why the grid is not used.
+    """
+
+    index: linefix.MapIndex | None = None
+    frame: str = "map"
+    size: str = ""
+    problem: str = ""
+
+
+class MapConverter:
+    """Converts the newest grid in the background.
+
+    Parameters
+    ----------
+    done : callable
+        Called in another thread when a result can be taken.
+    """
+
+    def __init__(self, done: Callable[[], None]) -> None:
+        self._done = done
+        self._grids: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._results: queue.SimpleQueue[Converted] = queue.SimpleQueue()
+        self._digest = b""
+        self._process: _Process | None = None
+        self._ended = False
+        self.busy = False
+        self.ready = threading.Event()
+        threading.Thread(target=self._run, name="map conversion", daemon=True).start()
+
+    def take(self, grid: SerializedGrid) -> None:
+        """Convert a grid, unless it is the one that was converted last; a grid that still waits is left out."""
+        digest = digest_of(grid.serialized)
+        if digest != self._digest:
+            self._digest, self.busy = digest, True
+            self._grids.put(grid.serialized)
+
+    def result(self) -> Converted | None:
+        """Return the result of the last conversion once, None where there is none."""
+        try:
+            found = self._results.get_nowait()
+        except queue.Empty:
+            return None
+        self.busy = not self._grids.empty()
+        return found
+
+    def end(self) -> None:
+        """Stop converting; returns at once."""
+        self._ended = True
+        self._grids.put(None)
+        process = self._process
+        if process is not None:
+            process.kill()
+
+    def _run(self) -> None:
+        self._process = _Process()
+        self._process.wait_until_ready()
+        self.ready.set()
+        idle: float | None = None
+        while not self._ended:
+            try:
+                grid = self._grids.get(timeout=idle)
+                while not self._grids.empty():
+                    grid = self._grids.get()
+            except queue.Empty:
+                if self._process is not None:
+                    self._process.kill()
+                self._process, idle = None, None
+                continue
+            if grid is None:
+                break
+            self._results.put(self._convert(grid))
+            self._done()
+            idle = CONVERSION_IDLE
+        if self._process is not None:
+            self._process.kill()
+
+    def _convert(self, grid: bytes) -> Converted:
+        if len(grid) > MAX_GRID_BYTES:
+            return Converted(problem=f"found {len(grid)} bytes, expected at most {MAX_GRID_BYTES}")
+        if self._process is None or not self._process.alive:
+            self._process = _Process()
+        converted = self._process.convert(grid)
+        if converted is None:
+            self._process.kill()
+            return Converted(
+                problem=f"its conversion takes more than {CONVERSION_SECONDS:g} s of a core or 4 GB, as noise does; "
+                "look at the map, or convert it with `linefix map import` and pass it with --map"
+            )
+        return converted
+
+
+class _Process:
+    """The process that converts."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), name="map conversion", daemon=True)
+        self._process.start()
+        theirs.close()
+
+    @property
+    def alive(self) -> bool:
+        return self._process.is_alive()
+
+    def wait_until_ready(self) -> None:
+        with contextlib.suppress(OSError, EOFError):
+            self._connection.send_bytes(b"")
+            if self._connection.poll(CONVERSION_PATIENCE):
+                self._connection.recv_bytes()
+
+    def convert(self, grid: bytes) -> Converted | None:
+        """Return the result; None where the process ended, or takes too long."""
+        try:
+            self._connection.send_bytes(grid)
+            if self._connection.poll(CONVERSION_PATIENCE):
+                converted: Converted = pickle.loads(self._connection.recv_bytes())
+                return converted
+        except (OSError, EOFError):
+            pass
+        return None
+
+    def kill(self) -> None:
+        self._process.kill()
+
+
+def convert(serialized: bytes) -> Converted:
+    """Return the map of a serialized OccupancyGrid."""
+    from formats import map_of_grid
+
+    try:
+        grid = OccupancyGrid.deserialize(serialized)
+    except Exception as error:  # whatever decoding raises for bytes that are no such message
+        return Converted(problem=f"its message cannot be decoded: {error}")
+    frame = grid.header.frame_id.strip("/")
+    if not frame or len(frame) > MAX_NAME:
+        return Converted(problem=f"its frame_id has {len(frame)} characters, expected 1 to {MAX_NAME}, such as map")
+    try:
+        index = linefix.index_map(map_of_grid(grid))
+    except linefix.InputError as error:
+        return Converted(problem=str(error))
+    size = f"{grid.info.width} x {grid.info.height} cells of {grid.info.resolution:.3g} m"
+    return Converted(index, frame, size)
+
+
+def digest_of(serialized: bytes) -> bytes:
+    """Return a digest of a serialized grid without its stamps: they change when the map is published again."""
+    order: Literal["little", "big"] = "little" if serialized[1:2] == b"\x01" else "big"
+    name = 4 + 8  # after the header of the encoding, and the stamp
+    end = name + 4 + int.from_bytes(serialized[name : name + 4], order)
+    end += -end % 4
+    digest = hashlib.sha256(serialized[name:end])
+    digest.update(serialized[end + 8 :])  # without the load time
+    return digest.digest()
+
+
+def _serve(connection: Connection[Any, Any]) -> None:
+    """Convert grids until the other process has gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt at a terminal goes to all processes there
+    _limit_memory()
+    convert(_small_grid())  # loads the compiled code
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            grid = connection.recv_bytes(MAX_GRID_BYTES)
+            _limit_time()
+            connection.send_bytes(pickle.dumps(convert(grid)) if grid else b"")
+
+
+def _small_grid() -> bytes:
+    cells = np.full((40, 60), -1, dtype=np.int8)
+    cells[5:35, 5:55] = 100
+    cells[6:34, 6:54] = 0
+    info = MapMetaData(resolution=0.1, width=60, height=40)
+    return bytes(OccupancyGrid(Header(frame_id="map"), info, cells.ravel().tolist()).serialize())
+
+
+def _limit_memory() -> None:
+    with contextlib.suppress(ImportError, ValueError, OSError):  # not on every system
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (CONVERSION_BYTES, resource.RLIM_INFINITY))
+
+
+def _limit_time() -> None:
+    """Have the process ended after so much time of a core from now on."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        used = os.times()
+        end = int(used.user + used.system + CONVERSION_SECONDS) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))

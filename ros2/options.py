@@ -1,0 +1,151 @@
+"""What the node is told: topics, frames, when a pose is published; and how names of topics are resolved."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from .text import MAX_NAME
+
+When = Literal["start", "lost", "always"]
+
+_NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+
+class OptionError(ValueError):
+    """An option cannot be used; the message names it, what was found, and what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeOptions:
+    """Topics and frames of one robot, and when its pose is published.
+
+    Names of topics without a leading slash are in `namespace`; remappings hold for all.
+
+    Attributes
+    ----------
+    scans : tuple of str
+        Topics of scans.
+    together : float
+        Seconds; scans of several topics that are taken no farther apart are searched as one. 0: each by itself.
+    odometry : str
+        Topic of odometry: the motion of the robot between scans, and during each.
+    motion : bool
+        Take every beam to where the scanner was, where a scan has a `time_increment` and odometry a twist.
+    map_topic : str or None
+        Of an OccupancyGrid, for a node that was given no map.
+    base_frame, odom_frame : str
+        Without `frame_prefix`.
+    namespace : str
+        Of the robot, such as ``/robot1``; empty: none.
+    remappings : mapping of str to str
+        Of names of topics.
+    frame_prefix : str
+        That all frames of the robot begin with, such as ``robot1/``.
+    agree : int
+        Scans that have to agree before a pose is published; 1: each usable scan by itself.
+    when : "start", "lost" or "always"
+        When ``initialpose`` is published: at the start, on request and for new subscribers; also when the localizer of
+        the robot disagrees; or for each scan that confirms the pose.
+    min_sigma, min_sigma_theta : float
+        Least standard deviations of ``initialpose``, metres and radians: less collapses the particles of AMCL.
+    publish_tf : bool
+        Publish the transform from the map to `odom_frame`.
+    domain : int
+        ``ROS_DOMAIN_ID``.
+    hardware_id : str
+        Of the diagnostics.
+    """
+
+    scans: tuple[str, ...] = ("scan",)
+    together: float = 0.1
+    odometry: str = "odom"
+    motion: bool = True
+    map_topic: str | None = None
+    base_frame: str = "base_link"
+    odom_frame: str = "odom"
+    namespace: str = ""
+    remappings: Mapping[str, str] = field(default_factory=dict)
+    frame_prefix: str = ""
+    agree: int = 3
+    when: When = "start"
+    min_sigma: float = 0.05
+    min_sigma_theta: float = math.radians(2.0)
+    publish_tf: bool = False
+    domain: int = 0
+    hardware_id: str = ""
+
+    def topic(self, name: str) -> str:
+        """Return the absolute name of a topic: in the namespace where it is relative, and remapped."""
+        absolute = absolute_name(name, self.namespace)
+        for begin, end in self.remappings.items():
+            if absolute_name(begin, self.namespace) == absolute:
+                return absolute_name(end, self.namespace)
+        return absolute
+
+    @property
+    def prefix(self) -> str:
+        """The prefix of the robot's frames on topics that robots share: `frame_prefix`, else the namespace."""
+        return self.frame_prefix or (f"{self.namespace.strip('/')}/" if self.namespace else "")
+
+    def frame(self, frame: str) -> str:
+        """Return the frame of a scan as the tree of frames has it."""
+        frame = frame.strip("/")
+        return frame if not frame or frame.startswith(self.frame_prefix) else f"{self.frame_prefix}{frame}"
+
+    def base_of(self, frame: str) -> str:
+        """Return the base frame for a scan in a frame: with the prefix where the frame has it."""
+        base = self.base_frame.strip("/")
+        prefixed = bool(self.prefix) and frame.startswith(self.prefix)
+        return f"{self.prefix}{base}" if prefixed and not base.startswith(self.prefix) else base
+
+
+def namespace_of(scans: Sequence[str]) -> str:
+    """Return the namespace that absolute topics of scans have: ``/robot1`` for ``/robot1/scan``, else empty."""
+    above = scans[0].rpartition("/")[0] if scans and scans[0].startswith("/") else ""
+    return above.rstrip("/")
+
+
+def absolute_name(name: str, namespace: str) -> str:
+    """Return a topic's name with its namespace, as ROS expands it; ``~/`` stands for the node ``linefix``.
+
+    Raises
+    ------
+    OptionError
+        When it is no name of a topic.
+    """
+    if not _NAME.fullmatch(name.replace("~/", "~", 1)) or len(name) > MAX_NAME:
+        raise OptionError(f"found the topic {name[:80]!r}, expected a name such as /robot1/scan")
+    if name.startswith("/"):
+        return name
+    inner = f"linefix/{name[2:]}" if name.startswith("~/") else name
+    return f"{namespace}/{inner}"
+
+
+def checked_namespace(namespace: str) -> str:
+    """Return a namespace as ``/robot1``, or empty for the root.
+
+    Raises
+    ------
+    OptionError
+        When it is none.
+    """
+    inner = namespace.strip("/")
+    return absolute_name(f"/{inner}", "") if inner else ""
+
+
+def remapping_of(rule: str) -> tuple[str, str]:
+    """Return both names of a remapping, ``from:=to``.
+
+    Raises
+    ------
+    OptionError
+        When it is none.
+    """
+    begin, found, end = rule.partition(":=")
+    if not found or not begin or not end:
+        raise OptionError(f"found the remapping {rule[:80]!r}, expected FROM:=TO, such as scan:=/front/scan")
+    return begin, end

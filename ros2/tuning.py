@@ -1,0 +1,62 @@
+"""Limits and thresholds of the package, with unit and origin."""
+
+from __future__ import annotations
+
+import math
+
+# What is read of messages from outside. More is refused, never cut.
+MAX_BEAMS = 100_000  # of a scan; geometry: a beam each 0.0036 degrees
+MAX_TRANSFORMS = 2_000  # of one message; a humanoid robot has some 200
+MAX_FRAMES = 5_000  # that are stored, some 2 KB each
+TRANSFORMS_KEPT = 200  # of a moving frame: 2 s at 100 Hz
+MAX_COORDINATE = 1e8  # m; the radius of the Earth is 6.4e6 m
+MAX_MOUNT = 100.0  # m from the base to a laser; the longest vehicles with lasers have some 60 m
+MAX_GRID_BYTES = 64 * 2**20  # of an OccupancyGrid: 64 million cells
+MAX_SPEED = 100.0  # m/s
+MAX_TURN_RATE = 100.0  # rad/s
+QUATERNION_TOLERANCE = 0.1  # of the length; tf2 refuses what is farther from 1 than 0.01
+LEVEL_TILT = math.radians(2.0)  # below this, ranges are less than 0.1 % too long
+STALE_NS = 500_000_000  # ns; a moving transform is not used this long after its last value
+CLOCK_BACK_NS = 1_000_000_000  # ns; stamps that jump back by more are those of a clock that was set back
+
+# What takes time.
+CONVERSION_SECONDS = 60.0  # s of a core for a grid: the slowest public plan takes 4 s, noise some minutes
+CONVERSION_PATIENCE = 300.0  # s, where others are at work on the cores
+CONVERSION_IDLE = 60.0  # s after which the process of conversions ends; it holds some 200 MB
+CONVERSION_BYTES = 4 * 2**30  # address space of the process that converts a grid
+SEARCH_SECONDS = 10.0  # s for one scan; the slowest of the public logs takes 1 s
+END_SECONDS = 0.5  # s that the end waits for a search
+REPEAT_SECONDS = 1.0  # s within which the same problem is published once
+
+# When scans agree.
+AGREEING_CHI_SQUARE = 16.27  # quantile of 99.9 % at three degrees of freedom
+ODOMETRY_DISTANCE = 0.03  # m, standard deviation of a step of any length: times of scans and odometry differ
+ODOMETRY_DISTANCE_PER_METRE = 0.05  # wheels slip by some per cent
+ODOMETRY_ANGLE = 0.01  # rad
+ODOMETRY_ANGLE_PER_ANGLE = 0.05
+ODOMETRY_ANGLE_PER_METRE = 0.02  # rad/m
+SEPARATE_DISTANCE = 0.15  # m; scans nearer to each other in place,
+SEPARATE_ANGLE = math.radians(10.0)  # heading,
+SEPARATE_NS = 1_000_000_000  # ns and time count once: their errors are the same
+MOVED = 0.5  # m, or
+TURNED = math.radians(30.0)  # between the scans that agree, or
+RESTED_NS = 5_000_000_000  # ns at rest
+FORGOTTEN_NS = 60_000_000_000  # ns after which a hypothesis without support is dropped
+MAX_HYPOTHESES = 20
+INCONCLUSIVE_NATS = 10.0  # a pose that is not listed explains the scan worse by at least so much, or nothing is said
+
+# What is published, and when.
+LOCALIZER_SIGMA = 0.1  # m; how far a localizer that is right may be off besides its own covariance,
+LOCALIZER_SIGMA_THETA = math.radians(3.0)  # rad
+MAX_COVARIANCE = 1e6  # m^2, rad^2
+SETTLE_SECONDS = 1.0  # s until a new subscriber has discovered the publisher, too: what comes earlier is lost
+LOST_SCANS = 3  # scans that confirm another pose than the localizer's
+LOST_SECONDS = 10.0  # s between two poses for a lost localizer: it needs some time to take one
+ALWAYS_SECONDS = 0.5  # s between two poses with `--when always`
+CORRECTION_SPEED = 0.2  # m/s, and
+CORRECTION_TURN_RATE = math.radians(10.0)  # rad/s, with which the published transform follows the agreed pose
+TRANSFORM_PERIOD_NS = 50_000_000  # ns between two transforms: 20 Hz
+TRANSFORM_TOLERANCE_NS = 200_000_000  # ns that a published transform is dated ahead, as AMCL does
+SILENT_SECONDS = 10.0  # s without scans, a map or a transform, after which that is logged
+RESULT_SECONDS = 30.0  # s after which a request without an agreed pose is answered
+LOG_SECONDS = 60.0  # s within which the same line is logged once

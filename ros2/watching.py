@@ -1,0 +1,103 @@
+"""Whether the localizer of the robot, such as AMCL, has the robot where the scans find it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import RigidTransform
+
+from .agreement import Observation, chi_square
+from .frames import Frames, matrix_of, planar
+from .messages import PoseWithCovarianceStamped
+from .odometry import OdometryHistory, nanoseconds
+from .tuning import (
+    AGREEING_CHI_SQUARE,
+    LOCALIZER_SIGMA,
+    LOCALIZER_SIGMA_THETA,
+    LOST_SCANS,
+    MAX_COVARIANCE,
+)
+
+Floats = NDArray[np.float64]
+
+PLANAR = np.array([0, 1, 5])  # x, y and rotation about z among the six of ROS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Estimate:
+    stamp: int
+    pose: RigidTransform
+    covariance: Floats
+
+
+class Watch:
+    """Compares poses with ``amcl_pose``, or with the transform from the map to the odometry frame."""
+
+    def __init__(self) -> None:
+        self._amcl: _Estimate | None = None
+        self._against = 0
+
+    @property
+    def lost(self) -> bool:
+        """Whether the localizer disagreed with the last scans that confirmed the pose."""
+        return self._against >= LOST_SCANS
+
+    def reset(self) -> None:
+        """Forget what was compared, as after a new pose was published."""
+        self._against = 0
+
+    def take(self, message: PoseWithCovarianceStamped) -> None:
+        """Take a message of ``amcl_pose``.
+
+        Raises
+        ------
+        FrameError
+            When it is no pose.
+        """
+        place, turn = message.pose.pose.position, message.pose.pose.orientation
+        pose, _, _ = planar(matrix_of(place.x, place.y, place.z, (turn.x, turn.y, turn.z, turn.w)))
+        covariance = np.reshape(np.asarray(message.pose.covariance, dtype=np.float64), (6, 6))[np.ix_(PLANAR, PLANAR)]
+        self._amcl = _Estimate(nanoseconds(message.header.stamp), pose, _valid(covariance))
+
+    def compare(
+        self, scan: Observation, names: tuple[str, str], frames: Frames, odometry: OdometryHistory
+    ) -> bool | None:
+        """Return whether the localizer agrees with a scan that is agreed; None where it is not known.
+
+        `names` are the frames of the map and of odometry. The result counts for `lost`.
+        """
+        estimate = self._at(scan, names, frames, odometry)
+        if estimate is None or scan.pose is None:
+            return None
+        both = estimate.covariance + (0.0 if scan.covariance is None else scan.covariance)
+        both = both + np.diag([LOCALIZER_SIGMA**2, LOCALIZER_SIGMA**2, LOCALIZER_SIGMA_THETA**2])
+        agrees = chi_square(estimate.pose, scan.pose, both) <= AGREEING_CHI_SQUARE
+        self._against = 0 if agrees else self._against + 1
+        return agrees
+
+    def _at(
+        self, scan: Observation, names: tuple[str, str], frames: Frames, odometry: OdometryHistory
+    ) -> _Estimate | None:
+        matrix = frames.lookup(*names, scan.stamp)
+        if matrix is not None and scan.odometry is not None:
+            covariance = np.zeros((3, 3)) if self._amcl is None else self._amcl.covariance
+            return _Estimate(scan.stamp, planar(matrix)[0].compose(scan.odometry), covariance)
+        if self._amcl is None:
+            return None
+        step = odometry.between(self._amcl.stamp, scan.stamp)
+        if step is None:
+            return None
+        return _Estimate(scan.stamp, self._amcl.pose.compose(step), self._amcl.pose.carry(self._amcl.covariance, step))
+
+
+def _valid(covariance: Floats) -> Floats:
+    """Return a covariance without what is none: negative, not finite or too large numbers."""
+    if not (np.isfinite(covariance).all() and (np.abs(covariance) <= MAX_COVARIANCE).all()):
+        return np.diag([1.0, 1.0, math.pi])
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    valid: Floats = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return valid

@@ -1,0 +1,157 @@
+"""Topics of ROS 2 over DDS: their names, their quality of service, readers and writers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, TypeVar
+
+from cyclonedds.core import DDSException, GuardCondition, ReadCondition, SampleState, ViewState, WaitSet
+from cyclonedds.core import InstanceState as Instances
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+Message = TypeVar("Message", bound=IdlStruct)
+
+MOST = 200  # messages that are taken from a reader at a time
+
+# The sensor data profile of ROS: only the newest message counts.
+SENSOR = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1))
+# For streams of which each message counts, though some may be lost.
+STREAM = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(100))
+# For what is published once and holds, also for subscribers that come later: maps and mounts.
+LATCHED = Qos(
+    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(10)
+)
+# For a state: only the newest counts, also for subscribers that come later.
+NEWEST = Qos(
+    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(1)
+)
+RELIABLE = Qos(
+    Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.Volatile, Policy.History.KeepLast(10)
+)
+
+
+def topic_name(name: str) -> str:
+    """Return the name in DDS of a topic of ROS: ``/scan`` is ``rt/scan``."""
+    return f"rt/{name.strip('/')}"
+
+
+def _ignore(problem: str) -> None:
+    pass
+
+
+class Subscription(Generic[Message]):
+    """A subscription.
+
+    Parameters
+    ----------
+    participant : DomainParticipant
+    name : str
+        Of the topic, as in ROS.
+    kind : type
+        Of the message.
+    *profiles : Qos
+        One reader for each. A topic that some robots publish transient local and others volatile needs two readers:
+        one that requests transient local does not match a volatile writer, and a volatile one misses what was
+        published before it came. Messages then come twice.
+    problem : callable
+        Called with a sentence for each message that cannot be decoded.
+    """
+
+    def __init__(
+        self,
+        participant: DomainParticipant,
+        name: str,
+        kind: type[Message],
+        *profiles: Qos,
+        problem: Callable[[str], None] = _ignore,
+    ) -> None:
+        topic: Any = Topic(participant, topic_name(name), kind)
+        self.name, self.problem = name, problem
+        self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
+
+    def take(self) -> Sequence[Message]:
+        """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
+        return [message for reader in self.readers for message in self._taken(reader)]
+
+    @property
+    def publishers(self) -> int:
+        """How many publishers are connected."""
+        return max(len(reader.get_matched_publications()) for reader in self.readers)
+
+    @property
+    def incompatible(self) -> bool:
+        """Whether there are publishers whose quality of service fits none of the readers."""
+        return all(reader.get_requested_incompatible_qos_status().total_count > 0 for reader in self.readers)
+
+    def _taken(self, reader: Any) -> list[Message]:
+        found: list[Message] = []
+        for _ in range(MOST):
+            try:
+                samples = reader.take(1)  # one at a time: an error in a message takes all that are taken with it
+            except DDSException as error:
+                self.problem(f"{self.name}: reading failed: {error}")
+                break
+            except Exception as error:  # whatever decoding raises for bytes that are no such message
+                self.problem(f"{self.name}: a message cannot be decoded and is ignored: {error}")
+                continue
+            if not samples:
+                break
+            found += [sample for sample in samples if isinstance(sample, IdlStruct)]  # not that a writer has gone
+        return found
+
+
+class Publisher(Generic[Message]):
+    """A publisher."""
+
+    def __init__(self, participant: DomainParticipant, name: str, kind: type[Message], quality: Qos) -> None:
+        topic: Any = Topic(participant, topic_name(name), kind)
+        self.name = name
+        self._writer: Any = DataWriter(participant, topic, qos=quality)
+        self._known: frozenset[int] = frozenset()
+
+    def publish(self, message: Message) -> None:
+        """Publish a message."""
+        self._writer.write(message)
+
+    @property
+    def incompatible(self) -> bool:
+        """Whether there are subscribers whose quality of service does not fit."""
+        return bool(self._writer.get_offered_incompatible_qos_status().total_count > 0)
+
+    @property
+    def subscribed(self) -> bool:
+        """Whether somebody is subscribed."""
+        return bool(self._writer.get_matched_subscriptions())
+
+    def joined(self) -> bool:
+        """Return whether somebody subscribed since the last call."""
+        known, self._known = self._known, frozenset(self._writer.get_matched_subscriptions())
+        return bool(self._known - known)
+
+
+class Waiting:
+    """Waits until one of several subscriptions has a message, or another thread ends the waiting."""
+
+    def __init__(self, participant: DomainParticipant, topics: Sequence[Subscription[Any]]) -> None:
+        self._set: Any = WaitSet(participant)
+        self._woken: Any = GuardCondition(participant)
+        self._set.attach(self._woken)
+        state = SampleState.NotRead | ViewState.Any | Instances.Any
+        self._conditions = [ReadCondition(reader, state) for topic in topics for reader in topic.readers]
+        for condition in self._conditions:
+            self._set.attach(condition)
+
+    def wait(self, seconds: float) -> None:
+        """Return when a message has come, after `wake`, or after a time."""
+        self._set.wait(duration(seconds=seconds))
+        self._woken.take()
+
+    def wake(self) -> None:
+        """End the waiting, or the next one; from any thread."""
+        self._woken.set(True)

@@ -1,0 +1,143 @@
+"""The bridge in a process of its own, and a robot beside it: both over loopback."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import linefix
+from ros2 import Node, NodeOptions, messages
+from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
+
+ROOT = Path(__file__).parent.parent.parent
+LOOPBACK = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces></General>"
+    "<Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery></Domain></CycloneDDS>"
+)
+PATIENCE = 60.0  # s for what has to come about
+
+ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
+MAP_FROM_BASE = linefix.RigidTransform(1.0, 1.5, 0.4)
+BASE_FROM_LASER = linefix.RigidTransform(0.3, -0.1, 2.0)
+SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
+
+
+def quaternion(theta: float) -> messages.Quaternion:
+    return messages.Quaternion(0.0, 0.0, math.sin(0.5 * theta), math.cos(0.5 * theta))
+
+
+def mount(child: str = "laser") -> messages.TFMessage:
+    place = messages.Transform(
+        messages.Vector3(BASE_FROM_LASER.x, BASE_FROM_LASER.y, 0.2), quaternion(BASE_FROM_LASER.theta)
+    )
+    return messages.TFMessage([messages.TransformStamped(messages.Header(frame_id="base_link"), child, place)])
+
+
+def scan(second: int, *, seen: bool = True) -> messages.LaserScan:
+    """Return what the robot sees; `seen` False: nothing within its range."""
+    truth = MAP_FROM_BASE.compose(BASE_FROM_LASER)
+    walls = linefix.Segments.from_array(ROOM)
+    ranges = linefix.simulation.scan(walls, truth, SCANNER, np.random.default_rng(second)).ranges
+    return messages.LaserScan(
+        messages.Header(messages.Time(second, 5), "laser"),
+        SCANNER.angle_min, SCANNER.angle_min + 719 * SCANNER.angle_increment, SCANNER.angle_increment,
+        range_min=0.05, range_max=30.0, ranges=ranges.tolist() if seen else [math.inf] * 720,
+    )  # fmt: skip
+
+
+def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:
+    size, cell = 140, 0.05
+    x, y = np.meshgrid(*[np.arange(size) * cell + 0.5 * cell - 0.5] * 2)
+    free = (x > 0) & (y > 0) & (((x < 6) & (y < 2)) | ((x < 4) & (y < 5)))
+    near = np.zeros_like(free)
+    for dx in (-1, 0, 1):
+        for dy in (-1, 0, 1):
+            near |= np.roll(free, (dy, dx), (0, 1))
+    cells = np.where(free, 0, np.where(near, 100, -1)).ravel().tolist()
+    info = messages.MapMetaData(resolution=cell, width=size, height=size)
+    info.origin.position = messages.Point(-0.5, -0.5, 0.0)
+    return messages.OccupancyGrid(messages.Header(frame_id=frame), info, cells)
+
+
+@contextmanager
+def running(options: NodeOptions, index: linefix.MapIndex | None) -> Iterator[Node]:
+    """Run a bridge in a thread of this process, which takes no time to start."""
+    node = Node(options, index, log=lambda _: None)
+    node.wait_until_ready()
+    with ThreadPoolExecutor(1) as pool:
+        ended = pool.submit(node.run)
+        try:
+            yield node
+            assert not ended.done()
+        finally:
+            node.end()
+            ended.result(PATIENCE)
+            assert node.close()
+
+
+@contextmanager
+def bridge(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run ``linefix ros2`` in a process of its own."""
+    program = "import sys; from service.commands.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, *arguments], cwd=ROOT, env=dict(os.environ), stderr=log
+        )
+        try:
+            while b"listening" not in os.pread(log.fileno(), 100_000, 0):
+                assert process.poll() is None, os.pread(log.fileno(), 100_000, 0)
+                time.sleep(0.1)
+            yield process
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+                assert process.wait(PATIENCE) == 0
+        finally:
+            process.kill()
+            process.wait()
+
+
+class Robot:
+    """The topics of a robot, and what the bridge says to it."""
+
+    def __init__(self, domain: int, namespace: str = "") -> None:
+        from cyclonedds.domain import DomainParticipant
+
+        self.net = net = DomainParticipant(domain)
+        self.scans = Publisher(net, f"{namespace}/scan", messages.LaserScan, SENSOR)
+        self.mounts = Publisher(net, f"{namespace}/tf_static", messages.TFMessage, LATCHED)
+        self.maps = Publisher(net, f"{namespace}/map", messages.OccupancyGrid, LATCHED)
+        self.asking = Publisher(net, f"{namespace}/linefix/locate", messages.Empty, RELIABLE)
+        self.initial = Subscription(net, f"{namespace}/initialpose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self.poses = Subscription(net, f"{namespace}/linefix/pose", messages.PoseWithCovarianceStamped, RELIABLE)
+        self.markers = Subscription(net, f"{namespace}/linefix/markers", messages.MarkerArray, LATCHED)
+        self.walls = Subscription(net, f"{namespace}/linefix/map_markers", messages.MarkerArray, LATCHED)
+        self.diagnostics = Subscription(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
+
+    def until(self, heard: Subscription[Any], play: Callable[[], None], wanted: Callable[[Any], bool] = bool) -> Any:
+        """Play again and again until something wanted is heard; return it."""
+        ends = time.monotonic() + PATIENCE
+        while time.monotonic() < ends:
+            play()
+            time.sleep(0.05)
+            for message in heard.take():
+                if wanted(message):
+                    return message
+        raise AssertionError(f"nothing on {heard.name}; told: {self.diagnostics.take()}")
+
+
+def is_at_truth(message: messages.PoseWithCovarianceStamped) -> bool:
+    at, turn = message.pose.pose.position, message.pose.pose.orientation
+    away = math.hypot(at.x - MAP_FROM_BASE.x, at.y - MAP_FROM_BASE.y)
+    return away < 0.03 and abs(2.0 * math.atan2(turn.z, turn.w) - MAP_FROM_BASE.theta) < 0.02

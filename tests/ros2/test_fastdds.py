@@ -1,0 +1,196 @@
+"""The node and a robot that uses eProsima Fast DDS, the default middleware of ROS 2: every topic in both directions.
+
+It is built from IDL where a compiler and Debian's packages ``libfastrtps-dev`` and ``fastddsgen`` are installed.
+"""
+
+from __future__ import annotations
+
+import queue
+import shutil
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import linefix
+from ros2 import NodeOptions
+
+from .robot import BASE_FROM_LASER, PATIENCE, ROOM, SCANNER, grid_of_room, running
+
+SOURCES = Path(__file__).parent / "fastdds"
+WALLS = linefix.Segments.from_array(ROOM)
+HEADER = Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp")
+MISSING = [tool for tool in ("fastddsgen", "g++") if shutil.which(tool) is None]
+
+pytestmark = pytest.mark.skipif(
+    bool(MISSING) or not HEADER.exists(), reason="apt-get install libfastrtps-dev fastddsgen g++"
+)
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the robot."""
+    folder = tmp_path_factory.mktemp("fastdds")
+    for name in ("ros.idl", "robot.cpp"):
+        shutil.copy(SOURCES / name, folder)
+    sources = ["robot.cpp", "ros.cxx", "rosPubSubTypes.cxx"]
+    for command in (
+        ["fastddsgen", "-replace", "ros.idl"],
+        ["g++", "-I.", *sources, "-o", "robot", "-lfastrtps", "-lfastcdr", "-pthread"],
+    ):
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "robot"
+
+
+class Peer:
+    """A robot in a process of its own: commands in, lines out."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self.reader = threading.Thread(target=self._read)
+        self.reader.start()
+
+    def _read(self) -> None:
+        for line in self._process.stdout or ():
+            self._lines.put(line.strip())
+
+    def send(self, *words: object) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(" ".join(map(str, words)) + "\n")
+        self._process.stdin.flush()
+
+    def mount(self) -> None:
+        self.send("mount", BASE_FROM_LASER.x, BASE_FROM_LASER.y, BASE_FROM_LASER.theta)
+
+    def drive(self, at: linefix.RigidTransform, second: float) -> None:
+        """Publish odometry and a scan from a pose, map_from_base."""
+        stamp = int(second), int(1e9 * (second % 1.0))
+        self.send("odom", *stamp, at.x, at.y, at.theta)
+        rng = np.random.default_rng(int(1e3 * second))
+        ranges = linefix.simulation.scan(WALLS, at.compose(BASE_FROM_LASER), SCANNER, rng).ranges
+        time.sleep(0.02)
+        self.send("scan", *stamp, SCANNER.angle_min, SCANNER.angle_increment, *ranges.round(4).tolist())
+
+    def lines(self) -> list[str]:
+        found = []
+        while not self._lines.empty():
+            found.append(self._lines.get())
+        return found
+
+    def until(self, begin: str, play: Callable[[], None]) -> list[str]:
+        """Play until a line comes that begins so; return its words."""
+        ends, seen = time.monotonic() + PATIENCE, []
+        while time.monotonic() < ends:
+            play()
+            time.sleep(0.1)
+            for line in self.lines():
+                if line.startswith(begin):
+                    return line.split()
+                seen.append(line)
+        raise AssertionError(f"no line that begins with {begin}: {seen[-20:]}")
+
+
+@contextmanager
+def peer(program: Path, domain: int, namespace: str = "") -> Iterator[Peer]:
+    with subprocess.Popen(
+        [program, str(domain), namespace], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        found = Peer(process)
+        try:
+            found.until("ready", lambda: None)
+            yield found
+        finally:
+            process.kill()
+            found.reader.join()
+
+
+class Way:
+    """Drives on at 0.3 m/s."""
+
+    def __init__(self, robot: Peer, second: float = 1.0) -> None:
+        self.robot, self.second, self._driven = robot, second, 0.0
+
+    def __call__(self) -> None:
+        self.second += 0.5
+        self._driven = min(2.4, self._driven + 0.15)
+        self.robot.drive(linefix.RigidTransform(0.8 + self._driven, 1.0, 0.1), self.second)
+
+
+def test_scans_odometry_and_mounts_in_poses_and_status_out(domain: int, room: linefix.MapIndex, program: Path) -> None:
+    with running(NodeOptions(domain=domain, publish_tf=True), room), peer(program, domain) as robot:
+        robot.mount()
+        way = Way(robot)
+        found = robot.until("initialpose", way)
+        seconds = float(found[1]) + 1e-9 * float(found[2])
+        assert float(found[3]) == pytest.approx(0.8 + min(2.4, 0.3 * (seconds - 1.0)), abs=0.03)
+        assert float(found[4]) == pytest.approx(1.0, abs=0.03)
+        assert float(found[5]) == pytest.approx(0.1, abs=0.02)
+        assert found[6] == "map"
+        for expected in ("pose ", "tf map odom", "diagnostics linefix: localization: the pose is agreed"):
+            robot.until(expected, way)
+
+
+def test_a_robot_that_starts_again_gets_the_state_and_the_pose(
+    domain: int, room: linefix.MapIndex, program: Path
+) -> None:
+    with running(NodeOptions(domain=domain), room):
+        for second in (1.0, 100.0):
+            with peer(program, domain) as robot:
+                robot.mount()
+                way = Way(robot, second)
+                robot.until("initialpose", way)
+        with peer(program, domain) as late:
+            assert late.until("status", lambda: None)[1] == "0"  # latched
+
+
+def test_a_grid_is_received(domain: int, program: Path) -> None:
+    grid = grid_of_room()
+    options = NodeOptions(domain=domain, map_topic="map", agree=1)
+    with running(options, None), peer(program, domain) as robot:
+        robot.mount()
+        robot.send("map", grid.info.resolution, grid.info.width, grid.info.height, -0.5, -0.5, *grid.data)
+        found = robot.until("initialpose", Way(robot))
+    assert float(found[4]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_stamps_that_jump_back_and_stamps_of_zero(domain: int, room: linefix.MapIndex, program: Path) -> None:
+    with running(NodeOptions(domain=domain), room), peer(program, domain) as robot:
+        robot.mount()
+        robot.until("initialpose", Way(robot, 1000.0))
+        robot.until("pose 1", Way(robot, 10.0))
+        robot.until("diagnostics linefix: localization: the pose is agreed", Way(robot, 20.0))
+        robot.until("pose 0 0", lambda: robot.drive(linefix.RigidTransform(0.8, 1.0, 0.1), 0.0))
+
+
+def test_a_request_is_received(domain: int, room: linefix.MapIndex, program: Path) -> None:
+    with running(NodeOptions(domain=domain, agree=1), room), peer(program, domain) as robot:
+        robot.mount()
+        way = Way(robot)
+        robot.until("initialpose", way)
+        for _ in range(5):
+            way()
+        time.sleep(0.5)
+        assert [line for line in robot.lines() if line.startswith("initialpose")] == []
+        robot.send("locate")
+        robot.until("initialpose", way)
+
+
+def test_robots_with_namespaces_do_not_hear_each_other(domain: int, room: linefix.MapIndex, program: Path) -> None:
+    first, second = (NodeOptions(domain=domain, namespace=f"/robot{k}") for k in (1, 2))
+    with (
+        running(first, room), running(second, room),
+        peer(program, domain, "/robot1") as one, peer(program, domain, "/robot2") as other,
+    ):  # fmt: skip
+        one.mount()
+        other.mount()
+        found = one.until("initialpose", Way(one))
+        assert float(found[4]) == pytest.approx(1.0, abs=0.03)
+        poses = [line for line in other.lines() if line.startswith(("pose", "initialpose"))]
+        assert poses == []

@@ -1,0 +1,287 @@
+"""Agreement over DDS, and several robots in one domain."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import linefix
+from ros2 import NodeOptions, messages
+from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
+
+from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, SCANNER, Robot, mount, quaternion, running
+
+WALLS = linefix.Segments.from_array(ROOM)
+
+
+def scan_from(base: linefix.RigidTransform, second: float, frame: str = "laser") -> messages.LaserScan:
+    """Return what a robot scans from a pose, map_from_base."""
+    rng = np.random.default_rng(int(1e3 * second))
+    ranges = linefix.simulation.scan(WALLS, base.compose(BASE_FROM_LASER), SCANNER, rng).ranges
+    stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
+    return messages.LaserScan(
+        messages.Header(stamp, frame),
+        SCANNER.angle_min, SCANNER.angle_min + 719 * SCANNER.angle_increment, SCANNER.angle_increment,
+        range_min=0.05, range_max=30.0, ranges=ranges.tolist(),
+    )  # fmt: skip
+
+
+class Fleet(Robot):
+    """A robot with odometry and a localizer."""
+
+    def __init__(self, domain: int, namespace: str = "", prefix: str = "") -> None:
+        super().__init__(domain, namespace)
+        self.prefix = prefix
+        self.odometry = Publisher(self.net, f"{namespace}/odom", messages.Odometry, SENSOR)
+        self.tf = Publisher(self.net, f"{namespace if not prefix else ''}/tf", messages.TFMessage, RELIABLE)
+        self.global_mounts = Publisher(self.net, "/tf_static", messages.TFMessage, LATCHED)
+        self.agreed = Subscription(
+            self.net, f"{namespace}/linefix/agreed_pose", messages.PoseWithCovarianceStamped, RELIABLE
+        )
+        self.status = Subscription(self.net, f"{namespace}/linefix/status", messages.DiagnosticStatus, LATCHED)
+        self.transforms = Subscription(self.net, "/tf", messages.TFMessage, RELIABLE)
+
+    def drive(self, at: linefix.RigidTransform, second: float) -> None:
+        """Publish odometry and a scan; the odometry frame is where the map is, 1 m aside."""
+        stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
+        message = messages.Odometry(messages.Header(stamp, f"{self.prefix}odom"), f"{self.prefix}base_link")
+        message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
+        self.odometry.publish(message)
+        time.sleep(0.02)
+        self.scans.publish(scan_from(at, second, f"{self.prefix}laser"))
+
+
+def moved(second: float, speed: float = 0.3) -> linefix.RigidTransform:
+    return linefix.RigidTransform(0.8 + speed * (second - 1.0), 1.0, 0.1 * second)
+
+
+def drive_until(robot: Fleet, heard: Subscription[Any], second: float = 1.0, wanted: Any = bool) -> tuple[Any, float]:
+    """Drive on until something wanted is published; return it, and the time."""
+    times = [second]
+
+    def play() -> None:
+        times[0] += 0.5
+        robot.drive(moved(min(times[0], 9.0)), times[0])
+        time.sleep(0.1)
+
+    return robot.until(heard, play, wanted), times[0]
+
+
+def off(message: messages.PoseWithCovarianceStamped, second: float) -> float:
+    at, truth = message.pose.pose.position, moved(min(second, 9.0))
+    return math.hypot(at.x - truth.x, at.y - truth.y)
+
+
+def stamp_of(message: messages.PoseWithCovarianceStamped) -> float:
+    return float(message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec)
+
+
+def test_a_pose_is_published_when_scans_agree(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        usable, _ = drive_until(robot, robot.poses)
+        assert robot.initial.take() == []
+        initial, _ = drive_until(robot, robot.initial, stamp_of(usable))
+        assert off(initial, stamp_of(initial)) < 0.03
+        assert stamp_of(initial) - stamp_of(usable) >= 0.9  # three scans, 0.5 m or 30 degrees
+        covariance = np.reshape(initial.pose.covariance, (6, 6))
+        assert (np.sqrt(np.diag(covariance)[[0, 1]]) >= 0.05 - 1e-9).all()
+        assert math.sqrt(covariance[5, 5]) >= math.radians(2.0) - 1e-4
+        states = [one.message for one in robot.status.take()]
+        assert "the pose is agreed" in states
+
+
+def test_a_pose_that_is_contradicted_is_reported_and_corrected(domain: int, room: linefix.MapIndex) -> None:
+    """The robot is carried to the other end of the room, which odometry does not notice."""
+    with running(NodeOptions(domain=domain), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        _, second = drive_until(robot, robot.initial)
+        robot.status.take()
+        there = linefix.RigidTransform(2.0, 4.0, -1.0)
+        clock = [second]
+
+        def play() -> None:
+            clock[0] += 0.5
+            stamp = messages.Time(int(clock[0]), int(1e9 * (clock[0] % 1.0)))
+            message = messages.Odometry(messages.Header(stamp, "odom"), "base_link")
+            at = moved(second)
+            message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
+            robot.odometry.publish(message)
+            robot.scans.publish(scan_from(there, clock[0]))
+            time.sleep(0.1)
+
+        contradicted = robot.until(robot.status, play)
+        assert contradicted.level == 2
+        assert "contradicted" in contradicted.message
+        corrected = robot.until(robot.initial, play)
+    assert math.hypot(corrected.pose.pose.position.x - 2.0, corrected.pose.pose.position.y - 4.0) < 0.03
+
+
+def amcl_at(pose: linefix.RigidTransform, second: float) -> messages.PoseWithCovarianceStamped:
+    place = messages.Pose(messages.Point(pose.x, pose.y), quaternion(pose.theta))
+    stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
+    covariance = np.diag([0.01, 0.01, 0.0, 0.0, 0.0, 0.01]).ravel().tolist()
+    return messages.PoseWithCovarianceStamped(
+        messages.Header(stamp, "map"), messages.PoseWithCovariance(place, covariance)
+    )
+
+
+def localized(robot: Fleet, error: float, second: float = 1.0) -> Any:
+    """Return a drive with a localizer that is off by some metres."""
+    amcl = Publisher(robot.net, "/amcl_pose", messages.PoseWithCovarianceStamped, LATCHED)
+    clock = [second]
+
+    def play() -> None:
+        clock[0] += 0.5
+        at = moved(min(clock[0], 9.0))
+        amcl.publish(amcl_at(linefix.RigidTransform(at.x + error, at.y, at.theta), clock[0]))
+        robot.drive(at, clock[0])
+        time.sleep(0.1)
+
+    return play
+
+
+def test_a_bridge_that_starts_again_leaves_a_localizer_alone_that_has_the_pose(
+    domain: int, room: linefix.MapIndex
+) -> None:
+    with running(NodeOptions(domain=domain), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        play = localized(robot, 0.05)
+        robot.until(robot.agreed, play)
+        for _ in range(5):
+            play()
+        assert robot.initial.take() == []
+
+
+@pytest.mark.parametrize("when", ["start", "lost"])
+def test_a_localizer_that_is_lost_is_reported(domain: int, room: linefix.MapIndex, when: Any) -> None:
+    with running(NodeOptions(domain=domain, when=when), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        right = localized(robot, 0.0)
+        robot.until(robot.agreed, right)
+        wrong = localized(robot, 1.5, 5.0)
+        lost = robot.until(robot.status, wrong, lambda one: one.level == 2)
+        assert "localizer" in lost.message
+        if when == "lost":
+            robot.until(robot.initial, wrong)
+        else:
+            for _ in range(5):
+                wrong()
+            assert robot.initial.take() == []
+
+
+def test_two_robots_with_namespaces_do_not_hear_each_other(domain: int, room: linefix.MapIndex) -> None:
+    first, second = (NodeOptions(domain=domain, namespace=f"/robot{k}") for k in (1, 2))
+    with running(first, room), running(second, room):
+        one, other = Fleet(domain, "/robot1"), Fleet(domain, "/robot2")
+        one.mounts.publish(mount())
+        turned = mount()
+        turned.transforms[0].transform.translation.x += 1.0
+        other.mounts.publish(turned)
+        initial, _ = drive_until(one, one.initial)
+        assert off(initial, stamp_of(initial)) < 0.03
+        assert other.poses.take() == other.initial.take() == []
+
+
+def test_two_robots_with_prefixes_share_the_topics_of_transforms(domain: int, room: linefix.MapIndex) -> None:
+    prefixes = "robot1/", "robot2/"
+    first, second = (NodeOptions(domain=domain, namespace=f"/{p[:-1]}", frame_prefix=p) for p in prefixes)
+    with running(first, room), running(second, room):
+        one, other = (Fleet(domain, f"/{p[:-1]}", p) for p in prefixes)
+        for robot, aside in ((one, 0.0), (other, 1.0)):
+            message = mount(f"{robot.prefix}laser")
+            message.transforms[0].header.frame_id = f"{robot.prefix}base_link"
+            message.transforms[0].transform.translation.x += aside
+            robot.global_mounts.publish(message)
+        initial, _ = drive_until(one, one.initial)
+        assert off(initial, stamp_of(initial)) < 0.03
+        assert other.poses.take() == []
+
+
+def test_the_transform_from_the_map_is_published_where_that_is_wanted(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain, publish_tf=True), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        found, _ = drive_until(robot, robot.transforms)
+    one = found.transforms[0]
+    assert (one.header.frame_id, one.child_frame_id) == ("map", "odom")
+    assert one.transform.translation.x == pytest.approx(-1.0, abs=0.05)
+    assert one.transform.translation.y == pytest.approx(0.0, abs=0.05)
+
+
+def test_odometry_may_be_of_another_frame_than_the_base(domain: int, room: linefix.MapIndex) -> None:
+    footprint = messages.Transform(messages.Vector3(0.2, 0.1, 0.0), quaternion(1.0))
+    with running(NodeOptions(domain=domain), room):
+        robot = Fleet(domain)
+        base = messages.TransformStamped(messages.Header(frame_id="wheels"), "base_link", footprint)
+        robot.mounts.publish(messages.TFMessage([*mount().transforms, base]))
+        base_in_wheels = linefix.RigidTransform(0.2, 0.1, 1.0)
+        clock = [1.0]
+
+        def play() -> None:
+            clock[0] += 0.5
+            at = moved(min(clock[0], 9.0))
+            wheels = at.compose(base_in_wheels.inverse())
+            stamp = messages.Time(int(clock[0]), int(1e9 * (clock[0] % 1.0)))
+            message = messages.Odometry(messages.Header(stamp, "odom"), "wheels")
+            message.pose.pose = messages.Pose(messages.Point(wheels.x, wheels.y), quaternion(wheels.theta))
+            robot.odometry.publish(message)
+            time.sleep(0.02)
+            robot.scans.publish(scan_from(at, clock[0]))
+            time.sleep(0.1)
+
+        initial = robot.until(robot.initial, play)
+    assert off(initial, stamp_of(initial)) < 0.03
+
+
+def test_a_mount_that_moves_is_followed(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain, agree=1), room):
+        robot = Fleet(domain)
+        seconds = [1.0]
+
+        def play() -> None:
+            seconds[0] += 0.5
+            for k, turn in enumerate((0.0, 0.4)):  # where it looked before does not count
+                message = mount()
+                transform = message.transforms[0]
+                second = seconds[0] - 0.2 + 0.2 * k
+                transform.header.stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
+                transform.transform.rotation = quaternion(BASE_FROM_LASER.theta + turn - 0.4)
+                robot.tf.publish(message)
+            time.sleep(0.02)
+            robot.scans.publish(scan_from(MAP_FROM_BASE, seconds[0]))
+
+        found = robot.until(robot.poses, play)
+    turn = 2.0 * math.atan2(found.pose.pose.orientation.z, found.pose.pose.orientation.w)
+    assert turn == pytest.approx(MAP_FROM_BASE.theta, abs=0.02)
+
+
+def test_a_request_with_an_id_is_answered(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain, agree=1), room):
+        robot = Fleet(domain)
+        requests = Publisher(robot.net, "/linefix/locate_request", messages.String, RELIABLE)
+        results = Subscription(robot.net, "/linefix/locate_result", messages.DiagnosticStatus, LATCHED)
+        robot.mounts.publish(mount())
+        robot.until(robot.poses, lambda: robot.drive(MAP_FROM_BASE, 1.0))
+        requests.publish(messages.String("job 7"))
+        found, _ = drive_until(robot, results, 2.0)
+    assert (found.name, found.level) == ("job 7", 0)
+    assert {one.key for one in found.values} >= {"x", "y", "qz", "qw", "stamp", "frame_id"}
+
+
+def test_scans_without_a_time_are_taken(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(domain=domain, agree=1), room):
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        unstamped = replace(scan_from(MAP_FROM_BASE, 1.0), header=messages.Header(frame_id="laser"))
+        found = robot.until(robot.initial, lambda: robot.scans.publish(unstamped))
+    assert found.header.stamp == messages.Time()

@@ -1,0 +1,246 @@
+"""No message from outside ends the bridge, blocks it, or keeps it from what comes after."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import linefix
+from ros2 import NodeOptions, messages
+from ros2.tuning import MAX_FRAMES
+from ros2.wire import LATCHED, RELIABLE, Publisher
+
+from .robot import Robot, bridge, grid_of_room, is_at_truth, mount, running, scan
+
+SOON = 20.0  # s; what the bridge is busy with takes minutes
+
+
+class NotUtf8(str):
+    """Text that is written as bytes that no decoder takes."""
+
+    def encode(self, *_: Any) -> bytes:
+        return b"\xff\xfe\xc3"
+
+
+BAD = NotUtf8("bad")
+
+
+def transform(parent: str, child: str, **changes: Any) -> messages.TFMessage:
+    one = mount(child).transforms[0]
+    one.header.frame_id = parent
+    for name, value in changes.items():
+        setattr(one.transform, name, value)
+    return messages.TFMessage([one])
+
+
+def at(x: float) -> dict[str, Any]:
+    return {"translation": messages.Vector3(x, 0.0, 0.2)}
+
+
+def turned(x: float, w: float) -> dict[str, Any]:
+    return {"rotation": messages.Quaternion(x, 0.0, 0.0, w)}
+
+
+def odometry_at(x: float) -> messages.Odometry:
+    return messages.Odometry(pose=messages.PoseWithCovariance(messages.Pose(messages.Point(x))))
+
+
+LOOP = transform("x", "laser").transforms + transform("laser", "x").transforms
+BROKEN: dict[str, tuple[str, Any]] = {
+    "a frame that is not UTF-8": ("tf_static", transform("base_link", BAD)),
+    "a parent that is not UTF-8": ("tf_static", transform(BAD, "laser")),
+    "a mount of 1e308 m": ("tf_static", transform("base_link", "laser", **at(1e308))),
+    "a mount that is not finite": ("tf_static", transform("base_link", "laser", **at(math.nan))),
+    "a mount of 1 km": ("tf_static", transform("base_link", "laser", **at(1000.0))),
+    "a quaternion of length 0": ("tf_static", transform("base_link", "laser", **turned(0.0, 0.0))),
+    "a quaternion of length 1e300": ("tf_static", transform("base_link", "laser", **turned(0.0, 1e300))),
+    "a quaternion of NaN": ("tf_static", transform("base_link", "laser", **turned(math.nan, 1.0))),
+    "its own parent": ("tf_static", transform("laser", "laser")),
+    "a loop": ("tf_static", messages.TFMessage(LOOP)),
+    "an empty parent": ("tf_static", transform("", "laser")),
+    "a long name": ("tf_static", transform("b" * 100_000, "laser")),
+    "a scan whose frame is not UTF-8": ("scan", replace(scan(1), header=messages.Header(frame_id=BAD))),
+    "a scan with a long frame": ("scan", replace(scan(1), header=messages.Header(frame_id="l" * 100_000))),
+    "a scan without beams": ("scan", replace(scan(1), ranges=[])),
+    "a scan with 200,000 beams": ("scan", replace(scan(1), ranges=[1.0] * 200_000)),
+    "a scan of NaN": ("scan", replace(scan(1), ranges=[math.nan] * 720)),
+    "a scan with steps of 1e38": ("scan", replace(scan(1), angle_increment=1e38)),
+    "a scan that begins nowhere": ("scan", replace(scan(1), angle_min=math.nan)),
+    "a scan that takes a year": ("scan", replace(scan(1), time_increment=1e38)),
+    "a scan of a negative range": ("scan", replace(scan(1), range_max=-1.0)),
+    "odometry at 1e308 m": ("odom", odometry_at(1e308)),
+    "odometry of NaN": ("odom", odometry_at(math.nan)),
+    "odometry whose child is not UTF-8": ("odom", messages.Odometry(child_frame_id=BAD)),
+}
+
+
+def test_the_bridge_goes_on_after_broken_messages(domain: int, room: linefix.MapIndex) -> None:
+    """Also where they are latched, so that a bridge that starts again receives them first."""
+    robot = Robot(domain)
+    writers = {name: Publisher(robot.net, f"/{topic}", type(one), LATCHED) for name, (topic, one) in BROKEN.items()}
+    with running(NodeOptions(agree=1, domain=domain), room):
+        for second, (name, (_, message)) in enumerate(BROKEN.items(), 1):
+            writers[name].publish(message)
+            time.sleep(0.1)
+            assert is_at_truth(pose_at(robot, second)), name
+        told = {one.status[0].message for one in robot.diagnostics.take()}
+    assert any("cannot be decoded" in one for one in told)
+    with running(NodeOptions(agree=1, domain=domain), room):
+        assert is_at_truth(pose_at(robot, 1))
+
+
+def pose_at(robot: Robot, second: int) -> messages.PoseWithCovarianceStamped:
+    def play() -> None:
+        robot.mounts.publish(mount())
+        robot.scans.publish(scan(second))
+
+    found: messages.PoseWithCovarianceStamped = robot.until(
+        robot.poses, play, lambda one: one.header.stamp.sec == second
+    )
+    return found
+
+
+def test_a_bad_transform_does_not_lose_those_beside_it(domain: int, room: linefix.MapIndex) -> None:
+    bad = transform("base_link", "camera", rotation=messages.Quaternion(0.0, 0.0, 0.0, 0.0)).transforms
+    worse = transform("base_link", "imu", translation=messages.Vector3(math.inf)).transforms
+    with running(NodeOptions(agree=1, domain=domain), room):
+        robot = Robot(domain)
+        mixed = messages.TFMessage(bad + mount().transforms + worse)
+        for expected in ('"camera" to "base_link" is not used: found the quaternion (0, 0, 0, 0)', '"imu"'):
+            robot.until(
+                robot.diagnostics,
+                lambda: robot.mounts.publish(mixed),
+                lambda one, expected=expected: expected in one.status[0].message,  # type: ignore[misc]
+            )
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+
+
+def test_a_mount_is_taken_after_ever_so_many_frames(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(agree=1, domain=domain), room):
+        robot = Robot(domain)
+        for begin in range(0, MAX_FRAMES + 1000, 500):
+            many = [transform("base_link", f"tag_{k}").transforms[0] for k in range(begin, begin + 500)]
+            robot.mounts.publish(messages.TFMessage(many))
+            time.sleep(0.05)
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+
+
+def noise(cells: int) -> messages.OccupancyGrid:
+    data = np.random.default_rng(1).choice([0, 100, -1], cells * cells).tolist()
+    info = messages.MapMetaData(resolution=0.05, width=cells, height=cells)
+    return messages.OccupancyGrid(messages.Header(frame_id="map"), info, data)
+
+
+def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
+    with bridge("--base", "laser", "--agree", "1") as process:
+        robot = Robot(domain)
+        robot.maps.publish(noise(1500))
+        converting = robot.until(
+            robot.diagnostics, lambda: robot.scans.publish(scan(1)), lambda one: "converted" in one.status[0].message
+        )
+        assert converting.status[0].level == 2
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(SOON) == 0
+
+
+@pytest.mark.parametrize("quality", [LATCHED, RELIABLE], ids=["transient local", "volatile"])
+def test_a_map_is_taken_however_it_is_published(domain: int, quality: Any) -> None:
+    with running(NodeOptions(agree=1, domain=domain, base_frame="laser", map_topic="map"), None):
+        robot = Robot(domain)
+        maps = Publisher(robot.net, "/map", messages.OccupancyGrid, quality)
+        robot.until(robot.diagnostics, lambda: robot.scans.publish(scan(1)))
+        maps.publish(grid_of_room())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+
+
+def test_mounts_are_taken_however_they_are_published(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(agree=1, domain=domain), room):
+        robot = Robot(domain)
+        mounts = Publisher(robot.net, "/tf_static", messages.TFMessage, RELIABLE)
+
+        def play() -> None:
+            mounts.publish(mount())
+            robot.scans.publish(scan(1))
+
+        robot.until(robot.initial, play)
+
+
+def test_who_subscribes_later_gets_an_initial_pose(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(agree=1, domain=domain), room):
+        robot = Robot(domain)
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+        later = Robot(domain)
+        again = later.until(later.initial, lambda: robot.scans.publish(scan(3)))
+    assert again.header.stamp.sec == 3
+
+
+def test_a_robot_in_a_namespace(domain: int, room: linefix.MapIndex) -> None:
+    with running(NodeOptions(agree=1, namespace="/robot1", domain=domain), room):
+        stranger, robot = Robot(domain), Robot(domain, "/robot1")
+        stranger.mounts.publish(transform("base_link", "laser", translation=messages.Vector3(5.0)))
+        robot.mounts.publish(mount())
+        assert is_at_truth(robot.until(robot.poses, lambda: robot.scans.publish(scan(1))))
+        robot.until(robot.initial, lambda: robot.scans.publish(scan(2)))
+        assert stranger.initial.take() == []
+        assert stranger.poses.take() == []
+
+
+def tilted(degrees: float) -> messages.Quaternion:
+    half = 0.5 * math.radians(degrees)
+    return messages.Quaternion(0.0, math.sin(half), 0.0, math.cos(half))
+
+
+UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, str]] = {
+    "no frame": (mount, replace(scan(1), header=messages.Header(messages.Time(1))), "empty frame_id"),
+    "optical": (
+        lambda: transform("base_link", "laser", rotation=messages.Quaternion(-0.5, 0.5, -0.5, 0.5)),
+        scan(1),
+        '"laser" is tilted by 90 degrees',
+    ),
+    "steep": (
+        lambda: transform("base_link", "laser", rotation=tilted(23.0)),
+        scan(1),
+        '"laser" is tilted by 23 degrees',
+    ),
+}
+
+
+@pytest.mark.parametrize("what", UNUSABLE)
+def test_why_a_scan_is_not_used(domain: int, room: linefix.MapIndex, what: str) -> None:
+    mounts, seen, expected = UNUSABLE[what]
+    with running(NodeOptions(agree=1, domain=domain), room):
+        robot = Robot(domain)
+        robot.mounts.publish(mounts())
+        told = robot.until(
+            robot.diagnostics,
+            lambda: robot.scans.publish(seen),
+            lambda one: expected in one.status[0].message,
+        )
+        assert told.status[0].level == 2
+        assert robot.poses.take() == []
+
+
+def test_sigterm_ends_it_during_a_search(domain: int, tmp_path: Any) -> None:
+    """Of many walls without order, in which nothing is found for a long time."""
+    rng = np.random.default_rng(4)
+    begins = rng.uniform(0.0, 60.0, (8000, 2))
+    walls = np.hstack([begins, begins + rng.uniform(-2.0, 2.0, (8000, 2))])
+    file = tmp_path / "noise.json"
+    linefix.write_map(linefix.LineMap(linefix.Segments.from_array(walls)), file)
+    ranges = rng.uniform(1.0, 20.0, 60).repeat(12)
+    with bridge("--map", str(file), "--base", "laser") as process:
+        robot = Robot(domain)
+        for _ in range(10):
+            robot.scans.publish(replace(scan(1), ranges=ranges.tolist()))
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(SOON) == 0

@@ -1,0 +1,101 @@
+"""Names of topics and frames, and the parameters of files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ros2 import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
+from ros2.options import absolute_name
+from service.commands.entry import run
+from service.commands.errors import WrongUseError
+from service.commands.ros2 import parameters_of
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("scan", "/r1/scan"), ("/scan", "/scan"), ("front/scan", "/r1/front/scan"), ("~/pose", "/r1/linefix/pose")],
+)
+def test_a_relative_name_is_in_the_namespace(name: str, expected: str) -> None:
+    assert absolute_name(name, "/r1") == expected
+
+
+@pytest.mark.parametrize("name", ["", "/", "a//b", "scan/", "1scan", "a b", "rt/ü", "a" * 300, "scan\n", "{node}/x"])
+def test_what_is_no_name_is_refused(name: str) -> None:
+    with pytest.raises(OptionError, match="expected a name"):
+        absolute_name(name, "")
+
+
+def test_remappings_hold_for_relative_and_absolute_names() -> None:
+    rules = dict(map(remapping_of, ["scan:=/front", "/tf:=tf", "initialpose:=pose_in"]))
+    options = NodeOptions(namespace="/r1", remappings=rules)
+    assert options.topic("scan") == "/front"
+    assert options.topic("/r1/scan") == "/front"
+    assert options.topic("/tf") == "/r1/tf"
+    assert options.topic("initialpose") == "/r1/pose_in"
+    assert options.topic("odom") == "/r1/odom"
+    for rule in ("scan", "scan:=", ":=x", "a=b"):
+        with pytest.raises(OptionError, match="FROM:=TO"):
+            remapping_of(rule)
+
+
+def test_a_namespace_is_that_of_an_absolute_topic_of_scans() -> None:
+    assert namespace_of(("/r1/scan",)) == "/r1"
+    assert namespace_of(("/fleet/r1/scan", "/other/scan")) == "/fleet/r1"
+    assert namespace_of(("/scan",)) == namespace_of(("front/scan",)) == ""
+    assert checked_namespace("r1/") == "/r1"
+    assert checked_namespace("/") == ""
+    with pytest.raises(OptionError):
+        checked_namespace("/a b")
+
+
+def test_frames_have_the_prefix() -> None:
+    prefixed = NodeOptions(frame_prefix="r1/")
+    assert prefixed.frame("laser") == prefixed.frame("/r1/laser") == "r1/laser"
+    assert prefixed.base_of("r1/laser") == "r1/base_link"
+    spaced = NodeOptions(namespace="/r1")
+    assert spaced.frame("laser") == "laser"
+    assert spaced.base_of("laser") == "base_link"
+    assert spaced.base_of("r1/laser") == "r1/base_link"
+
+
+def test_a_file_of_parameters_is_that_of_ros(tmp_path: Path) -> None:
+    file = tmp_path / "linefix.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters:\n    agree: 4\n    base: chassis\n"
+        "/robot1/linefix:\n  ros__parameters:\n    agree: 5\n    map: hq.yaml\n    scan: [/a, /b]\n"
+        "amcl:\n  ros__parameters:\n    agree: 9\n"
+    )
+    assert parameters_of(file) == {"agree": 5, "base": "chassis", "on": "hq.yaml", "scan": ["/a", "/b"]}
+    for text in ("", "[1]", "linefix: 3", "a: b: c", "\x00", "other:\n  ros__parameters: {}", "x: &a 1\ny: {<<: *a}"):
+        file.write_text(text)
+        with pytest.raises(WrongUseError, match="ros__parameters"):
+            parameters_of(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("agrees: 3", "found the parameter agrees, expected one of"),
+        ("agree: many", "agree"),
+        ("agree: 0", "agree"),
+        ("when: never", "when"),
+        ("map: nowhere.yaml", "nowhere.yaml: there is no such file"),
+    ],
+)
+def test_a_wrong_parameter_ends_with_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, expected: str
+) -> None:
+    file = tmp_path / "linefix.yaml"
+    file.write_text(f"linefix:\n  ros__parameters:\n    {text}\n")
+    assert run(["ros2", "--params-file", str(file)]) == 2
+    assert expected in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--scan", "a b"], ["-r", "scan"], ["--namespace", "1"], ["--map-topic", "//"], ["--odom", ""]]
+)
+def test_a_wrong_name_ends_with_2(arguments: list[str], capsys: pytest.CaptureFixture[str], domain: int) -> None:
+    assert run(["ros2", *arguments]) == 2
+    assert "expected" in capsys.readouterr().err

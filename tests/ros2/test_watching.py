@@ -1,0 +1,108 @@
+"""Whether the localizer of a robot is where the scans find the robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from registration import RigidTransform
+from ros2 import messages
+from ros2.agreement import Observation
+from ros2.frames import FrameError, Frames
+from ros2.odometry import OdometryHistory
+from ros2.watching import Watch
+
+from .robot import quaternion
+
+SECOND = 1_000_000_000
+MAP_FROM_ODOM = RigidTransform(2.0, 1.0, 0.5)
+NAMES = "map", "odom"
+
+
+def stamped(second: float) -> messages.Header:
+    return messages.Header(messages.Time(int(second), int(1e9 * (second % 1.0))), "map")
+
+
+def amcl(second: float, pose: RigidTransform, sigma: float = 0.1) -> messages.PoseWithCovarianceStamped:
+    covariance = np.diag([sigma**2, sigma**2, 0.0, 0.0, 0.0, 0.05**2]).ravel().tolist()
+    place = messages.Pose(messages.Point(pose.x, pose.y), quaternion(pose.theta))
+    return messages.PoseWithCovarianceStamped(stamped(second), messages.PoseWithCovariance(place, covariance))
+
+
+def history() -> OdometryHistory:
+    odometry = OdometryHistory()
+    for k in range(11):
+        message = messages.Odometry(messages.Header(messages.Time(k), "odom"), "base_link")
+        message.pose.pose = messages.Pose(messages.Point(0.3 * k), quaternion(0.0))
+        odometry.take(message)
+    return odometry
+
+
+def confirmed(second: int, off: float = 0.0) -> Observation:
+    odometry = RigidTransform(0.3 * second, 0.0, 0.0)
+    pose = MAP_FROM_ODOM.compose(odometry)
+    return Observation(
+        second * SECOND, RigidTransform(pose.x + off, pose.y, pose.theta), np.eye(3) * 1e-4, True, odometry
+    )
+
+
+def published(second: float, pose: RigidTransform = MAP_FROM_ODOM) -> messages.TFMessage:
+    transform = messages.Transform(messages.Vector3(pose.x, pose.y, 0.0), quaternion(pose.theta))
+    return messages.TFMessage([messages.TransformStamped(stamped(second), "odom", transform)])
+
+
+def test_nothing_is_known_without_a_localizer() -> None:
+    watch = Watch()
+    assert watch.compare(confirmed(3), NAMES, Frames(), history()) is None
+    assert not watch.lost
+
+
+@pytest.mark.parametrize("off", [0.0, 0.2, -0.2])
+def test_amcl_agrees_as_odometry_carries_it(off: float) -> None:
+    watch = Watch()
+    pose = MAP_FROM_ODOM.compose(RigidTransform(0.6, 0.0, 0.0))
+    watch.take(amcl(2.0, pose))
+    assert watch.compare(confirmed(7, off), NAMES, Frames(), history()) is True
+
+
+def test_the_transform_of_the_map_counts_where_it_is_published() -> None:
+    watch, frames = Watch(), Frames()
+    watch.take(amcl(2.0, RigidTransform(9.0, 9.0, 0.0)))
+    assert frames.take(published(6.9), static=False) == []
+    assert frames.take(published(7.1), static=False) == []
+    assert watch.compare(confirmed(7), NAMES, frames, history()) is True
+    assert watch.compare(confirmed(10), NAMES, frames, history()) is False  # by amcl_pose: the transform is too old
+
+
+def test_a_localizer_is_lost_after_some_scans_and_found_again() -> None:
+    watch, frames = Watch(), Frames()
+    frames.take(published(7.0), static=False)
+    for k in range(3):
+        assert not watch.lost, k
+        assert watch.compare(confirmed(7, off=2.0), NAMES, frames, history()) is False
+    assert watch.lost
+    assert watch.compare(confirmed(7), NAMES, frames, history()) is True
+    assert not watch.lost
+
+
+def test_a_wide_localizer_is_not_lost() -> None:
+    watch = Watch()
+    watch.take(amcl(7.0, MAP_FROM_ODOM.compose(RigidTransform(2.1, 0.0, 0.0)), sigma=1.0))
+    assert watch.compare(confirmed(7, off=2.0), NAMES, Frames(), history()) is True
+
+
+@pytest.mark.parametrize("entry", [math.nan, math.inf, -1.0, 1e300])
+def test_a_covariance_that_is_none_ends_nothing(entry: float) -> None:
+    watch = Watch()
+    message = amcl(7.0, MAP_FROM_ODOM)
+    message.pose.covariance[0] = entry
+    message.pose.covariance[1] = entry
+    watch.take(message)
+    assert watch.compare(confirmed(7), NAMES, Frames(), history()) in (True, False)
+
+
+def test_a_pose_that_is_none_is_refused() -> None:
+    with pytest.raises(FrameError, match="expected metres"):
+        Watch().take(amcl(7.0, RigidTransform(1e300, 0.0, 0.0)))
