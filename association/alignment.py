@@ -25,15 +25,16 @@ from .views import corrected
 Indices = NDArray[np.intp]
 
 
-def aligned(scan: Scan, deadline: Deadline) -> Scan:
+def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
     """Return a scan with its views laid on one another; one of exact views is returned as it is.
 
-    After the deadline no round begins: the views stay where the rounds before have laid them.
+    After the deadline no round begins: the views stay where the rounds before have laid them. `directed`: whether the
+    directions of its segments mean anything.
     """
     views = scan.views
     if views is None or not views.uncertain:
         return scan
-    lines = _Lines.of(scan, views)
+    lines = _Lines.of(scan, views, directed=directed)
     found, spread = views.found, views.spread
     for _ in range(ALIGNING_ROUNDS):
         if deadline.passed:
@@ -82,8 +83,8 @@ class _Lines:
     places: Floats
 
     @classmethod
-    def of(cls, scan: Scan, views: Views) -> _Lines:
-        _, parts, of_view = parts_of(scan.measured, views)
+    def of(cls, scan: Scan, views: Views, *, directed: bool) -> _Lines:
+        _, parts, of_view = parts_of(scan.measured, views, directed=directed)
         order = np.lexsort((-parts["length"], of_view))
         rank = np.arange(len(order)) - np.searchsorted(of_view[order], of_view[order])
         chosen = order[rank < ALIGNED_LINES]

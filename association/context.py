@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -46,6 +47,7 @@ from .tuning import (
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 NOTHING_KEPT = record(RULES)
+ONE_VIEW = np.ones(1)
 
 
 @lru_cache
@@ -91,9 +93,14 @@ class SearchContext:
     def of(
         cls, index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline
     ) -> SearchContext:
-        """Prepare a search; views that are not exact are laid on one another, as far as the deadline lets it."""
+        """Prepare a search; views that are not exact are laid on one another, as far as the deadline lets it.
+
+        On a map whose directions mean nothing those of the scan mean nothing, whatever the options say.
+        """
         place = index if options.oriented else index.undirected
-        scan = aligned(scan, deadline)
+        if options.oriented and len(place.segments) > place.directed:
+            options = replace(options, oriented=False)
+        scan = aligned(scan, deadline, directed=options.oriented)
         lines = ScanLines.of(scan, place.sigma, options)
         return cls(place, scan, prior, options, deadline, lines, gates(options))
 
@@ -123,11 +130,13 @@ class SearchContext:
         seen, views = self.lines.sightings, self.scan.views
         if views is None:
             seen = seen if self.scan.viewpoint is not None else seen[:0]
-            return Sights(_place(*(self.scan.viewpoint or (0.0, 0.0))), np.array([0, len(seen)]), seen)
+            place = _place(*(self.scan.viewpoint or (0.0, 0.0)))
+            return Sights(place, np.array([0, len(seen)]), seen, np.arange(len(seen)), ONE_VIEW)
         sighted = ~np.isnan(views.viewpoints[:, 0])
         seen = seen[sighted[seen["sensor"]]]
         places = as_records(POINT, np.where(sighted[:, None], views.viewpoints, 0.0))
-        return Sights(places, np.searchsorted(seen["sensor"], np.arange(len(views) + 1)), seen)
+        starts = np.searchsorted(seen["sensor"], np.arange(len(views) + 1))
+        return Sights(places, starts, seen, np.lexsort((seen["sensor"], seen["row"])), views.weights)
 
     @property
     def lines_of_sight(self) -> Sights:
@@ -137,7 +146,8 @@ class SearchContext:
     @cached_property
     def nothing_seen(self) -> Sights:
         """The same, without lines of sight."""
-        return Sights(self.sights.places, np.zeros(len(self.sights.starts), np.int64), np.zeros(0, SIGHTING))
+        nothing = np.zeros(len(self.sights.starts), np.int64), np.zeros(0, SIGHTING), np.zeros(0, np.intp)
+        return Sights(self.sights.places, *nothing, self.sights.weights)
 
     @cached_property
     def looks(self) -> float:

@@ -117,7 +117,8 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
     longest, sums = np.zeros((2, len(views)))
     np.maximum.at(longest, seen["sensor"], np.minimum(seen["length"], LONGEST_UNMATCHED))
     np.add.at(sums, seen["sensor"], seen["length"])
-    facts["longest"], facts["unmatched"] = longest.mean(), sums.mean()
+    share = views.weights / views.weights.sum()
+    facts["longest"], facts["unmatched"] = longest @ share, sums @ share
     return facts
 
 

@@ -207,8 +207,10 @@ RAY = _fields((_F, "x y dx dy limit"))
 # A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return.
 BEAM = _fields((_F, "x y dx dy range"))
 
-# How many rays pass through a wall on their way to a segment of the consensus set, and to another one.
-BLOCKER = _fields((_I, "to_matched to_clutter"))
+# How many rays pass through a wall on their way to a segment of the consensus set, and to another one. While they are
+# counted: the scan line that the last one goes to, from 1 up; the view it comes from; how many go from there to that
+# line, and how many at most from any view.
+BLOCKER = _fields((_I, "to_matched to_clutter row sensor here most"))
 
 # What single beams say of a pose: the shares that read the wall they should, and that passed through one.
 BEAM_EVIDENCE = _fields((_F, "read passed"))

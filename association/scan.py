@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from registration import Beams, MeasuredSegments, RigidTransform, Segments
 
+from .tuning import VIEWS_APART
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -58,6 +60,17 @@ class Views:
     def covariance(self) -> Floats:
         """Of the errors that remain, (3 v, 3 v)."""
         return self.root @ self.spread @ self.root.T
+
+    @property
+    def weights(self) -> Floats:
+        """What each view counts, (v,): one, or less where others see from the same place, so that these count as one.
+
+        Views without a viewpoint count fully.
+        """
+        gaps = self.viewpoints[:, None] - self.viewpoints
+        squares = np.einsum("ijk,ijk->ij", gaps, gaps) / (2.0 * VIEWS_APART**2)
+        near = np.where(np.isnan(squares), np.eye(len(self)), np.exp(-squares))
+        return np.asarray(1.0 / near.sum(axis=1))
 
     def mirrored(self) -> Views:
         """Return them with left and right exchanged; beams are in reverse order then."""

@@ -82,10 +82,12 @@ class ScanLines:
         variances, model = variances_of(map_sigma or 0.0, options, with_beams=scan.beams is not None)
         if scan.views is None:
             given = given or _given(measured)
-            row_of, rows, seen = _describe_view(given, measured.counted, variances, model)
+            row_of, rows, seen = _describe_view(given, measured.counted, options.oriented, variances, model)
             return cls(row_of, rows, model, seen, given)
-        part_of, parts, views = parts_of(measured, scan.views)
-        line_row, rows = describe_labelled(*_joined_views(parts, scan.views), variances, model)
+        part_of, parts, views = parts_of(measured, scan.views, directed=options.oriented)
+        line_row, rows = describe_labelled(
+            *_joined_views(parts, scan.views, directed=options.oriented), variances, model
+        )
         return cls(line_row[part_of], rows, model, _sightings(parts, views, line_row))
 
     def mirrored(self) -> ScanLines:
@@ -103,8 +105,10 @@ def _given(measured: MeasuredSegments) -> Measured:
     )  # fmt: skip
 
 
-def parts_of(measured: MeasuredSegments, views: Views) -> tuple[NDArray[np.intp], Records, NDArray[np.intp]]:
-    """Join what each view shows of a line.
+def parts_of(
+    measured: MeasuredSegments, views: Views, *, directed: bool = True
+) -> tuple[NDArray[np.intp], Records, NDArray[np.intp]]:
+    """Join what each view shows of a line; unless they are `directed`, also segments that run against one another.
 
     Returns
     -------
@@ -117,7 +121,7 @@ def parts_of(measured: MeasuredSegments, views: Views) -> tuple[NDArray[np.intp]
     covariance, before = views.covariance, 0
     for v, pose in enumerate(views.poses):
         own = np.flatnonzero(views.of_segment == v)
-        labels, lines = lines_of_a_view(_given(_taken(measured, own)), measured.counted)
+        labels, lines = lines_of_a_view(_given(_taken(measured, own)), measured.counted, directed)
         part_of[own] = labels + before
         block = covariance[3 * v : 3 * v + 3, 3 * v : 3 * v + 3]
         levers = lines["dx"] * (lines["centroid_x"] - pose.x) + lines["dy"] * (lines["centroid_y"] - pose.y)
@@ -141,7 +145,7 @@ def _taken(measured: MeasuredSegments, rows: NDArray[np.intp]) -> MeasuredSegmen
     )
 
 
-def _joined_views(parts: Records, views: Views) -> tuple[Integers, Records]:
+def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Integers, Records]:
     """Join what several views show of a line, so that it is one piece of evidence.
 
     What is not known of where they were seen from lets them lie so much farther apart. The line that they make is as
@@ -151,7 +155,7 @@ def _joined_views(parts: Records, views: Views) -> tuple[Integers, Records]:
     if views.uncertain and len(parts):
         lateral = min(MOST_LATERAL, lateral + VIEW_SIGMAS * float(np.sqrt(parts["common_offset"].mean())))
         turn = min(MOST_TURN, turn + VIEW_SIGMAS * float(np.sqrt(parts["common_angle"].mean())))
-    labels, lines = join_lines(parts, lateral, math.cos(turn), True)
+    labels, lines = join_lines(parts, lateral, math.cos(turn), True, directed)
     weights = np.bincount(labels, parts["length"], len(lines))
     for name in ("common_offset", "common_angle"):
         lines[name] = np.bincount(labels, parts["length"] * parts[name], len(lines)) / weights

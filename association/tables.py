@@ -192,11 +192,15 @@ class Sights(NamedTuple):
     places : (v,) of `POINT`, where the sensor of each stood, in the scan frame
     starts : (v + 1,) view v saw ``seen[starts[v]:starts[v + 1]]``; nothing where lines of sight are no evidence
     seen : (k,) of `SIGHTING`
+    by_line : (k,) their order by scan line, and there by view
+    weights : (v,) what each view counts, so that views from one place count as one
     """
 
     places: Records
     starts: Integers
     seen: Records
+    by_line: Indices
+    weights: Floats
 
 
 class Rays(NamedTuple):

@@ -65,6 +65,7 @@ MOST_APART = 0.6  # m, tables; by which they lie apart at most,
 MOST_TURNED = 0.3  # sine, tables; and by which they are turned
 SAME_LINE = 0.08  # m, tables; two lines of one view that are farther apart cannot both be the line of another
 ALIGNING_SHARE = 0.5  # tables; of its information that a seam counts with: seams of one wall have errors in common
+VIEWS_APART = 0.1  # m, tables; standard deviation: views from places nearer to each other see about the same
 VIEW_ROUNDS = 6  # tables; of solving for a pose and the errors of its views
 # What finding a segment on a wall is worth against its being clutter: a share of its own, and one by length.
 GAIN = 6.0  # nats, tables

@@ -62,7 +62,9 @@ def without_wall_error(terms: Terms) -> None:
     terms[1]["wall_variance"] = TINY**2
 
 
-def each_by_itself(measured: Measured, counted: bool, variances: Records, model: Records) -> tuple[Any, Records, Any]:
+def each_by_itself(
+    measured: Measured, counted: bool, _: bool, variances: Records, model: Records
+) -> tuple[Any, Records, Any]:
     """Describe the segments as lines without joining any."""
     apart, given = np.arange(len(measured.lengths)), as_lines(measured)
     lines = join_labelled(given, longest_first(given), apart, counted)

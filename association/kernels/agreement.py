@@ -86,6 +86,7 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
 
     Rays from the sensor of each view. For: the first segment and the first wall are as far away. Against: the wall is
     before the segment, or there is none where the wall should have left one. What stands before a wall tells nothing.
+    Each view counts with its weight.
     `pose` (1,).
     """
     walls = place.walls
@@ -98,10 +99,11 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
     looked = empty(RAYS, np.bool_)
     c = math.cos(at.theta)
     s = math.sin(at.theta)
-    agree = 0
-    against = 0
+    agree = 0.0
+    against = 0.0
     for v in range(len(sights.places)):
         sensor = sights.places[v]
+        weight = sights.weights[v]
         seen = sights.seen[sights.starts[v] : sights.starts[v + 1]]
         farthest = scan_distances(seen, sensor.x, sensor.y, distances)
         in_view(distances, looked)
@@ -122,13 +124,13 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
             if distances[k] < math.inf:
                 tolerance = AGREEING + AGREEING_SHARE * distances[k]
                 if abs(distances[k] - reach) < tolerance:
-                    agree += 1
+                    agree += weight
                 elif reach < distances[k]:
-                    against += 1
+                    against += weight
             elif (
                 reach < min(farthest, MISSING_RANGE)
                 and walls[w].end - walls[w].begin > MISSING_LENGTH
                 and abs(walls[w].dx * dy - walls[w].dy * dx) > MISSING_SINE
             ):
-                against += 1
-    return agree / (agree + against) if agree + against > 0 else NEUTRAL
+                against += weight
+    return agree / (agree + against) if agree + against > 0.0 else NEUTRAL

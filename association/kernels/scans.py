@@ -68,12 +68,13 @@ def longest_first(lines: Records) -> Integers:
 
 
 @kernel
-def collinear_lines(given: Records, order: Integers, lateral: float, least_cosine: float) -> Indices:
+def collinear_lines(given: Records, order: Integers, lateral: float, least_cosine: float, directed: bool) -> Indices:
     """Label parts of lines that continue or repeat one another, (n,): the number of the line each is part of.
 
     In `order`, the longest first: each that is on no line yet begins one, and takes on those whose middle is within
     `lateral` metres of it and that are turned by no more than `least_cosine` says, as far as they follow without a gap
-    of more than `LINE_GAP`. The lines are numbered in the order of those that begin them.
+    of more than `LINE_GAP`. Unless they are `directed` a part may run against its line. The lines are numbered in the
+    order of those that begin them.
     """
     n = len(order)
     labels = np.full(n, -1)
@@ -93,6 +94,8 @@ def collinear_lines(given: Records, order: Integers, lateral: float, least_cosin
         for later in range(k + 1, n):
             j = order[later]
             cosine = given[j].dx * dx + given[j].dy * dy
+            if not directed:
+                cosine = abs(cosine)
             if labels[j] >= 0 or cosine < least_cosine:
                 continue
             x = given[j].x - first.x
@@ -314,24 +317,26 @@ def set_map_sigma(sigma: float, variances: Records, model: Records) -> None:
 
 
 @kernel
-def join_lines(given: Records, lateral: float, least_cosine: float, counted: bool) -> tuple[Indices, Records]:
+def join_lines(
+    given: Records, lateral: float, least_cosine: float, counted: bool, directed: bool
+) -> tuple[Indices, Records]:
     """Join what continues or repeats one another; return (n,) the line of each part, and the lines."""
     order = longest_first(given)
-    labels = collinear_lines(given, order, lateral, least_cosine)
+    labels = collinear_lines(given, order, lateral, least_cosine, directed)
     return labels, join_labelled(given, order, labels, counted)
 
 
 @kernel
-def lines_of_a_view(measured: Measured, counted: bool) -> tuple[Indices, Records]:
+def lines_of_a_view(measured: Measured, counted: bool, directed: bool) -> tuple[Indices, Records]:
     """Join what one view shows of a line: first what was cut, then what lies about on it.
 
     Returns (n,) the line of each segment, and the lines, (k,) of `LINE_PARTS`.
     """
     given = as_lines(measured)
-    cut, lines = join_lines(given, CUT_LATERAL, CUT_COSINE, True)
+    cut, lines = join_lines(given, CUT_LATERAL, CUT_COSINE, True, directed)
     if len(lines) == len(given):
-        return join_lines(given, LINE_LATERAL, LINE_COSINE, counted)
-    apart, lines = join_lines(lines, LINE_LATERAL, LINE_COSINE, counted)
+        return join_lines(given, LINE_LATERAL, LINE_COSINE, counted, directed)
+    apart, lines = join_lines(lines, LINE_LATERAL, LINE_COSINE, counted, directed)
     for i in range(len(cut)):
         cut[i] = apart[cut[i]]
     return cut, lines
@@ -366,10 +371,10 @@ def seen_at_once(rows: Records) -> Records:
 
 @kernel
 def describe_view(
-    measured: Measured, counted: bool, variances: Records, model: Records
+    measured: Measured, counted: bool, directed: bool, variances: Records, model: Records
 ) -> tuple[Indices, Records, Records]:
     """Return the row of each segment of a scan of one view, the rows, and what is seen of them."""
-    labels, lines = lines_of_a_view(measured, counted)
+    labels, lines = lines_of_a_view(measured, counted, directed)
     row_of, rows = describe_labelled(labels, lines, variances, model)
     return row_of, rows, seen_at_once(rows)
 

@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import kernel
+from registration.compiling import inlined, kernel
 from registration.layout import Record, Records
 
 from ..layout import Integers
@@ -87,6 +87,7 @@ def count_blockers(
 ) -> int:
     """Count for every wall the rays to segments, from where each was seen, that pass through it well before their end.
 
+    Of the rays that several views send to one line of the scan those of the view count that has most of them.
     `matches` by row of the scan. `blockers` counts nothing before. Returns how many walls that are, listed in
     ``blockers.touched``.
     """
@@ -101,7 +102,7 @@ def count_blockers(
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     seen = sights.seen
-    for i in range(len(seen)):
+    for i in sights.by_line:
         view = places[seen[i].sensor]
         x = c * view.x - s * view.y + pose.x
         y = s * view.x + c * view.y + pose.y
@@ -127,11 +128,29 @@ def count_blockers(
                     if counts[w].to_matched + counts[w].to_clutter == 0:
                         touched[count] = w
                         count += 1
-                    if matches[seen[i].row].wall >= 0:
-                        counts[w].to_matched += 1
-                    else:
-                        counts[w].to_clutter += 1
+                    if is_another(counts[w], seen[i]):
+                        if matches[seen[i].row].wall >= 0:
+                            counts[w].to_matched += 1
+                        else:
+                            counts[w].to_clutter += 1
     return count
+
+
+@inlined
+def is_another(blocker: Record, sighting: Record) -> bool:
+    """Count a ray through a wall; tell whether no view before sent as many through it to that line of the scan."""
+    if blocker.row != sighting.row + 1:
+        blocker.row = sighting.row + 1
+        blocker.most = 0
+        blocker.here = 0
+    elif blocker.sensor != sighting.sensor:
+        blocker.here = 0
+    blocker.sensor = sighting.sensor
+    blocker.here += 1
+    if blocker.here <= blocker.most:
+        return False
+    blocker.most = blocker.here
+    return True
 
 
 @kernel
@@ -151,4 +170,5 @@ def sight_penalty(blockers: Blockers, count: int, walls: Records) -> float:
         total += BLOCKED_CLUTTER * length * min(1.0, counts[w].to_clutter / BLOCKING_RAYS)
         counts[w].to_matched = 0
         counts[w].to_clutter = 0
+        counts[w].row = 0
     return total

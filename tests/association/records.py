@@ -50,4 +50,6 @@ def sights_of(scan: Records, viewpoint: Any = (0.0, 0.0), *, sighted: bool = Tru
     for name in ("dx", "dy", "x", "y", "length") if sighted else ():
         seen[name] = scan[name]
     seen["row"] = np.arange(len(seen))
-    return Sights(record(POINT, x=viewpoint[0], y=viewpoint[1]), np.array([0, len(seen)]), seen)
+    return Sights(
+        record(POINT, x=viewpoint[0], y=viewpoint[1]), np.array([0, len(seen)]), seen, np.arange(len(seen)), np.ones(1)
+    )

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from association import AssociationResult, MapIndex, Scan, Status
+from association import AssociationResult, MapIndex, Scan, Status, View, assemble
 from examples.building import draw_cases
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
@@ -296,3 +296,42 @@ def test_a_wall_that_is_drawn_whole_and_in_pieces_is_one_wall() -> None:
         again = np.vstack([ROOM, [[0.0, 0.0, split, 0.0], [split, 0.0, 9.0, 0.0]]])
         one, other = (answer_of(index_of(by.apply(m.reshape(-1, 2, 2)).reshape(-1, 4)), scan) for m in (ROOM, again))
         assert_same(one, other)
+
+
+@pytest.mark.parametrize("on_map", [True, False])
+def test_a_reversed_copy_is_no_second_witness_where_directions_mean_nothing(on_map: bool) -> None:
+    """Whether the map says so or the options do."""
+    index = MapIndex.build(Segments.from_array(LOBBY), oriented=not on_map)
+    corner = seen(LOBBY, pose(3.0, 1.0, 0.4), noise=0.01, cut=0.6, seed=5)[0][:3]
+    copies = np.vstack([corner, corner[:2, [2, 3, 0, 1]]])
+    one, other = (answer_of(index, scan_of(ends, 0.01, (0.0, 0.0)), oriented=on_map) for ends in (corner, copies))
+    assert_same(one, other)
+    assert len(other.correspondences) == len(one.correspondences) + 2
+
+
+def test_a_reversed_segment_is_another_side_where_directions_mean_something() -> None:
+    index = index_of(np.vstack([LOBBY, LOBBY[:2, [2, 3, 0, 1]]]))
+    there_and_back = np.vstack([CORNER, CORNER[:, [2, 3, 0, 1]]])
+    one, other = (answer_of(index, scan_of(ends)) for ends in (CORNER, there_and_back))
+    assert one.diagnostics is not None and other.diagnostics is not None
+    assert other.diagnostics.score > one.diagnostics.score + 5.0
+
+
+@pytest.mark.parametrize("copies", [2, 3])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_view_that_is_sent_again_changes_nothing(seed: int, copies: int) -> None:
+    """Its segments are seen once, and its lines of sight pass through walls once."""
+    walls, ends = view_of(seed)
+    index, view = index_of(walls), View(scan_of(ends, viewpoint=(0.0, 0.0)))
+    one, other = (answer_of(index, assemble([view] * count)) for count in (1, copies))
+    assert_same(one, other)
+    if one.diagnostics is not None and other.diagnostics is not None:
+        assert other.diagnostics.margin == pytest.approx(one.diagnostics.margin, abs=1e-6)
+
+
+def test_views_a_millimetre_apart_are_lines_of_sight_from_one_place() -> None:
+    walls, ends = view_of(1)
+    view = View(scan_of(ends, viewpoint=(0.0, 0.0)))
+    near = View(scan_of(ends - np.tile([1e-3, 0.0], 2), viewpoint=(0.0, 0.0)), pose(1e-3))
+    one, other = (answer_of(index_of(walls), assemble(views)) for views in ([view], [view, near]))
+    assert other.probability == pytest.approx(one.probability, abs=PROBABILITY)

@@ -69,9 +69,11 @@ def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
     return MeasuredSegments(segments, lines["sigma"], lines["points"], centroids, lines["spread"], counted)
 
 
-def labelled(measured: MeasuredSegments, lateral: float = LINE_LATERAL, cosine: float = LINE_COSINE) -> list[int]:
+def labelled(
+    measured: MeasuredSegments, lateral: float = LINE_LATERAL, cosine: float = LINE_COSINE, *, directed: bool = True
+) -> list[int]:
     order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
-    return [int(label) for label in scans.collinear_lines(given_of(measured), order, lateral, cosine)]
+    return [int(label) for label in scans.collinear_lines(given_of(measured), order, lateral, cosine, directed)]
 
 
 def joined(measured: MeasuredSegments, labels: list[int] | None = None) -> Records:
@@ -100,9 +102,14 @@ def test_union_length_of_many(seed: int) -> None:
 @settings(max_examples=150, deadline=None)
 def test_collinear_segments(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    measured = measured_of(rng, in_pieces(rng))
+    ends = in_pieces(rng)
+    turned = rng.random(len(ends)) < 0.3
+    ends[turned] = ends[turned][:, [2, 3, 0, 1]]
+    measured = measured_of(rng, ends)
     for lateral, cosine in ((LINE_LATERAL, LINE_COSINE), (CUT_LATERAL, CUT_COSINE)):
-        assert labelled(measured, lateral, cosine) == twin.collinear_segments(measured, lateral, cosine)
+        for directed in (True, False):
+            expected = twin.collinear_segments(measured, lateral, cosine, directed=directed)
+            assert labelled(measured, lateral, cosine, directed=directed) == expected
 
 
 @pytest.mark.parametrize(
@@ -230,7 +237,7 @@ def test_describe_view(seed: int) -> None:
         once, cut = measured, list(range(len(measured)))
     apart = twin.collinear_segments(once, LINE_LATERAL, LINE_COSINE)
     order, expected = twin.describe_lines(twin.join_segments(once, apart), variances[0], model[0])
-    row_of, rows, seen = scans.describe_view(given_to(measured), measured.counted, variances, model)
+    row_of, rows, seen = scans.describe_view(given_to(measured), measured.counted, True, variances, model)
     assert row_of.tolist() == [order.index(apart[line]) for line in cut]
     assert_rows(rows, expected, 1e-7)
     assert seen["row"].tolist() == list(range(len(rows)))
@@ -244,9 +251,9 @@ def test_describe_view(seed: int) -> None:
 def test_mirror_lines(seed: int) -> None:
     """Those of the mirrored scan, to rounding: its segments lie in the same order, and go together in the same way."""
     measured, variances, model = view_of(seed)
-    row_of, rows, _ = scans.describe_view(given_to(measured), measured.counted, variances, model)
+    row_of, rows, _ = scans.describe_view(given_to(measured), measured.counted, True, variances, model)
     other = mirrored(Scan(measured)).measured
-    expected_row_of, expected, _ = scans.describe_view(given_to(other), other.counted, variances, model)
+    expected_row_of, expected, _ = scans.describe_view(given_to(other), other.counted, True, variances, model)
     assert row_of.tolist() == expected_row_of.tolist()
     got, got_seen = scans.mirror_lines(rows)
     assert_rows(got, expected, 1e-9)

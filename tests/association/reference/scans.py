@@ -31,7 +31,9 @@ def longest_first(lengths: Floats) -> list[int]:
     return sorted(range(len(lengths)), key=lambda i: (-lengths[i], i))
 
 
-def collinear_segments(measured: MeasuredSegments, lateral: float, least_cosine: float) -> list[int]:
+def collinear_segments(
+    measured: MeasuredSegments, lateral: float, least_cosine: float, *, directed: bool = True
+) -> list[int]:
     """Label segments by line: the longest that is left takes all that it can reach, one after the other."""
     segments = measured.segments
     left, labels, line = longest_first(segments.lengths), [-1] * len(segments), 0
@@ -46,7 +48,7 @@ def collinear_segments(measured: MeasuredSegments, lateral: float, least_cosine:
             more = {
                 i
                 for i in left
-                if segments.directions[i] @ d >= least_cosine
+                if (segments.directions[i] @ d if directed else abs(segments.directions[i] @ d)) >= least_cosine
                 and beside[i] <= lateral
                 and spans[i][0] <= high + LINE_GAP
                 and spans[i][1] >= low - LINE_GAP
