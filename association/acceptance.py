@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from registration import RegistrationOptions, RegistrationResult, RigidTransform, register
+from registration import Correspondences, RegistrationOptions, RegistrationResult, RigidTransform, register
 from registration.values import value
+from registration.weights import MIN_WEIGHT
 
 from .context import SearchContext
 from .kernels.acceptance import accept_matches
@@ -19,6 +21,7 @@ from .ranking import Ranked
 from .result import Correspondence
 from .settling import Settled
 from .tables import Lines
+from .tuning import LEAST_KNOWN_VARIANCE
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -71,22 +74,83 @@ def overlaps_at(context: SearchContext, best: Ranked, accepted: Accepted, pose: 
     return shares
 
 
-def register_accepted(context: SearchContext, accepted: Accepted, settled: Settled) -> RegistrationResult | None:
-    """Evaluate the settled pose on the pairs, walls off as they are there; None without pairs.
+def register_accepted(
+    context: SearchContext, best: Ranked, accepted: Accepted, settled: Settled, *, fitted: bool = True
+) -> tuple[RegistrationResult, Settled] | None:
+    """Register the scan by the pairs, walls off as they were settled, and settle there; None without pairs.
 
-    The paper's estimator fits a pose of its own to the same pairs.
+    So a caller who registers by the same pairs and weights gets the same pose. Where that is not fixed, where the views
+    are not exact, or unless it is to be `fitted`, the settled pose is evaluated on the pairs instead, and by the
+    paper's estimator a pose of its own is fitted.
     """
     if not len(accepted.pairs):
         return None
-    index, options = context.index, context.options
+    index, options, measured = context.index, context.options, context.scan.measured
+    sigma = settled.wall_sigma if index.sigma is None else index.sigma
+    weights = _weights(context, best, accepted, sigma)
     how = _how(options.estimator, options.rotation)
-    at = context.in_map(settled.pose) if options.estimator == "joint" else None
-    return register(index.segments, context.scan.measured, accepted.pairs, settled.wall_sigma, how, at)
+    if weights is not None:
+        how = replace(how, weights=weights)
+    elif index.sigma == 0.0 and not measured.sigma[accepted.pairs[:, 0]].all():
+        sigma = settled.wall_sigma  # nothing at all is known to be off, and pairs need a weight
+    if options.estimator == "one_step":
+        return register(index.segments, measured, accepted.pairs, sigma, how), settled
+    if fitted and settled.views is None and not settled.free and not settled.degenerate:
+        found = register(index.segments, measured, accepted.pairs, sigma, how)
+        if found.covariance is not None and found.pose is not None:
+            return found, replace(settled, pose=context.in_index(found.pose), covariance=found.covariance)
+    at = context.in_map(settled.pose)
+    return register(index.segments, measured, accepted.pairs, sigma, how, at), settled
 
 
 @lru_cache
 def _how(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
     return RegistrationOptions(estimator=estimator, rotation=rotation)
+
+
+def _weights(context: SearchContext, best: Ranked, accepted: Accepted, wall_sigma: float) -> Floats | None:
+    """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have.
+
+    What several segments show of one line counts once, and so does the error of a wall that several pairs lie on: of
+    the variance of the wall each has a share. Alone on its wall a pair has ``1 / (sigma^2 / points + wall_sigma^2)``.
+    """
+    rows = context.lines.row_of[accepted.pairs[:, 0]]
+    walls = best.matches["wall"][rows]
+    ties = context.index.ties[walls]
+    if len(set(walls.tolist())) == len(walls) and not (ties >= 0.0).any():
+        return None
+    given = Correspondences.of(context.index.segments, context.scan.measured, accepted.pairs)
+    alone = _not_shown_before(given, rows) / np.maximum(given.variances, LEAST_KNOWN_VARIANCE**2)
+    apart = np.abs(ties[:, None] - ties)
+    tied = (ties[:, None] >= 0.0) & (ties >= 0.0)
+    one = np.where(walls[:, None] == walls, 1.0, np.where(tied, np.exp(-apart), 0.0))
+    weights: Floats = alone / (1.0 + wall_sigma**2 * (one @ alone))
+    return np.where(weights >= MIN_WEIGHT, weights, 0.0)
+
+
+def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
+    """Return the share of each scan segment that no longer one of its line covers, (n,), of equal ones the first."""
+    shares = np.ones(len(rows))
+    for row in np.flatnonzero(np.bincount(rows) > 1):
+        members = np.flatnonzero(rows == row)
+        members = members[np.argsort(-given.lengths[members], kind="stable")]
+        along = given.directions[members[0]]
+        middles = given.midpoints[members] @ along
+        reach = 0.5 * given.lengths[members]
+        covered: list[tuple[float, float]] = []
+        for k, member in enumerate(members.tolist()):
+            low, high = float(middles[k] - reach[k]), float(middles[k] + reach[k])
+            own = sum(max(0.0, min(high, b) - max(low, a)) for a, b in covered)
+            shares[member] = max(0.0, 1.0 - own / (high - low))
+            covered = _united(covered, low, high)
+    return shares
+
+
+def _united(covered: list[tuple[float, float]], low: float, high: float) -> list[tuple[float, float]]:
+    """Return disjoint intervals with one more."""
+    apart = [(a, b) for a, b in covered if b < low or a > high]
+    over = [(a, b) for a, b in covered if not (b < low or a > high)]
+    return [*apart, (min([low, *(a for a, _ in over)]), max([high, *(b for _, b in over)]))]
 
 
 def correspondences(

@@ -196,7 +196,7 @@ class SearchContext:
         """The walls, and what is known of where they stand."""
         known = self.index.sigma
         parallel = most_parallel_up_to(len(self.lines.rows))
-        return KnownWalls(self.index.walls.rows, -1.0 if known is None else known**2, parallel)
+        return KnownWalls(self.index.walls.rows, self.index.ties, -1.0 if known is None else known**2, parallel)
 
     def question(self, rules: Records) -> Question:
         """Return what the kernels search for; `rules` (1,) say which poses are kept."""
@@ -235,6 +235,11 @@ class SearchContext:
         """Return a pose of the index frame in the map frame."""
         x, y = self.index.origin
         return RigidTransform(pose.x + float(x), pose.y + float(y), pose.theta)
+
+    def in_index(self, pose: RigidTransform) -> RigidTransform:
+        """Return a pose of the map frame in the index frame."""
+        x, y = self.index.origin
+        return RigidTransform(pose.x - float(x), pose.y - float(y), pose.theta)
 
     @cached_property
     def prior_record(self) -> Records:

@@ -70,9 +70,10 @@ def _answer(context: SearchContext, best: Ranked) -> Answer | None:
     if settled.views is not None:
         # What is told of it holds where the views are found to have been.
         context = replace(context, scan=corrected(context.scan, settled.views.found, settled.views.spread))
-    registered = register_accepted(context, accepted, settled)
-    if registered is None:
+    found = register_accepted(context, best, accepted, settled)
+    if found is None:
         return None
+    registered, settled = found
     chance = significance(context, worth_of(best.matches))
     beams = compare_beams(context, settled)
     return Answer(best, accepted, settled, registered, agreement(context, best), beams, chance)

@@ -14,6 +14,7 @@ from .kernels.walls import direction_raster, grid_cells
 from .layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
 from .tables import Crossings, Grid, Raster, Sweep, Walls
 from .tuning import (
+    APART_STEP,
     CELL,
     CELL_GROWTH,
     CROSSING_BAND,
@@ -26,7 +27,6 @@ from .tuning import (
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
-    MERGE_LATERAL,
     MOST_BANDS,
     MOST_CROSSINGS,
     NARROW_REACH,
@@ -112,13 +112,13 @@ def listed(runs: Records, found: Records, reach: float) -> Crossings:
 
 def directions_near(walls: Walls, runs: Walls) -> Raster:
     """Set in each cell the sectors of the walls and runs near it: runs also have directions over their doorways."""
-    # The line of a run may pass its walls by as much as they were merged with.
+    # The line of a run may pass its walls by as much as they were joined with.
     both = np.vstack([ends_of(walls), ends_of(runs)])
-    shape = _shape(both, RASTER_CELL, REACH + MERGE_LATERAL, MAX_CELLS)
+    shape = _shape(both, RASTER_CELL, REACH + APART_STEP, MAX_CELLS)
     sectors, ends = np.concatenate([_sectors(walls.rows), _sectors(runs.rows)]), as_records(ENDS, both)
     bits = np.zeros(int(shape["columns"][0] * shape["rows"][0]), dtype=np.uint32)
-    direction_raster(ends, REACH + MERGE_LATERAL, shape, sectors, bits)
-    direction_raster(ends, NARROW_REACH + MERGE_LATERAL, shape, sectors + SECTORS, bits)
+    direction_raster(ends, REACH + APART_STEP, shape, sectors, bits)
+    direction_raster(ends, NARROW_REACH + APART_STEP, shape, sectors + SECTORS, bits)
     return Raster(shape, bits)
 
 

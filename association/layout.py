@@ -58,9 +58,10 @@ LINE_PARTS = _fields(
 # midpoint; length; mean of the points and their second moment along the line (m^2); variance of its offset (m^2).
 SIGHTING = _fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid_y spread variance"))
 
-# Where a scan line lies: the wall or -1; offset from it; sine of the angle to it; share of the length on walls;
-# worth of the match.
-MATCH = _fields((_I, "wall"), (_F, "offset sine overlap worth"))
+# Where a scan line lies: the wall or -1; offset from the line under it, which tied walls make up together; sine of the
+# angle to the wall; share of the length on walls; by how much that line is beside the wall's own (m), and the mean
+# square by which the walls under it are off it (m^2); what the match gains, and what it is worth with its cost, nats.
+MATCH = _fields((_I, "wall"), (_F, "offset sine overlap shift uneven gain worth"))
 
 # A pose with its covariance, of additive x, y, theta.
 ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
@@ -76,8 +77,9 @@ VALUE = _fields((_F, "gain cost freedom"))
 MERIT = _fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed count"))
 
 # What one wall has in the sums: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of
-# its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs.
-WALL_SHARE = _fields((_F, "c s x y one weight count"))
+# its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs. What is known of the wall's error but
+# by these pairs: weight (1/m^2), and weight times the error (1/m) at a pose. Whether it is listed.
+WALL_SHARE = _fields((_F, "c s x y one weight count other_weight other_sum"), (_I, "listed"))
 
 # A pose among the best: score and prior together; the score alone.
 FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
@@ -193,9 +195,10 @@ SETTLED = np.dtype([("pose", ESTIMATE), *_fields((_F, "wall_variance weakest dx 
 # A pose among walls of which each is off by itself, with that standard deviation, m.
 POSE_AMONG_WALLS = _fields((_F, "theta x y wall_sigma"))
 
-# What a pose would be without one wall: the wall; by how much it would move, m; the position's deviation along its
-# weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed.
-HINGE = np.dtype([("wall", _I), *_fields((_F, "moves deviation dx dy")).descr])
+# What a pose would be without one wall, and what is tied to it: the wall; by how much it would move, m; the position's
+# deviation along its weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed;
+# how far the wall counts as one of its own, beside those that it is tied to, 0 to 1.
+HINGE = np.dtype([("wall", _I), *_fields((_F, "moves deviation dx dy own")).descr])
 
 # What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
 # together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
@@ -251,14 +254,18 @@ BEND = _fields((_F, "start more"))
 # value from which it speaks for the answer, and that at which it does in full.
 TWO_FEATURES = _fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
-# What kernels write to while they look at one pose: the pose; the information of its consensus set, its sums, and what
-# it is worth; the end of a beam; a ray; what the beams say; what the search of a base goes by. A record that a kernel
+# What kernels write to while they look at one pose: the pose; the information of its consensus set; its sums, without
+# the walls' errors and with them; a line; what is known of the error of walls that are tied; what the set is worth; the
+# end of a beam; a ray; what the beams say; what the search of a base goes by. A record that a kernel
 # takes from an array of its own would outlive the array, whose last use ends it: hence these come from outside.
 SCRATCH = np.dtype(
     [
         ("estimate", ESTIMATE),
         ("information", SYMMETRIC3),
         ("sums", JOINT_SUMS),
+        ("plain", JOINT_SUMS),
+        ("line", WALL),
+        ("common", WALL_SHARE),
         ("value", VALUE),
         ("point", SEEN),
         ("ray", RAY),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -17,8 +18,17 @@ from .grids import crossing_runs, directions_near, near_walls, swept_runs
 from .layout import ENDS, Integers, as_records
 from .options import Deadline
 from .tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
-from .tuning import MAX_EXTENT, MAX_MAP_SIGMA, MERGE_GAP, RUN_GAP
-from .walls import both_ways, ends_of, link, merge
+from .tuning import (
+    BLENDED_SIGMAS,
+    BLENDED_STEP,
+    LEAST_ONE_LINE,
+    MAX_EXTENT,
+    MAX_MAP_SIGMA,
+    ONE_LINE,
+    ONE_LINE_SHARE,
+    WHOLE_GAP,
+)
+from .walls import blended, both_ways, merge, runs_of, tie
 
 Floats = NDArray[np.float64]
 
@@ -43,8 +53,9 @@ class MapIndex:
     pieces : Pieces
         Which segments each wall consists of.
     walls : Walls
+    ties : (m,) how walls that continue one another are tied: see `tables.Place`
     runs : Walls
-        The walls joined across doorways: where a scan segment may lie that bridges one.
+        Lines through what nearly continues one another, also across doorways: where a segment of a base may lie.
     grid : Grid
         Walls within `REACH` of each cell, whatever their direction: what lies at a point?
     sweep : Sweep
@@ -63,6 +74,7 @@ class MapIndex:
     wall_of_piece: Integers
     pieces: Pieces
     walls: Walls
+    ties: Floats
     runs: Walls
     grid: Grid
     sweep: Sweep
@@ -116,19 +128,23 @@ class MapIndex:
         cls, segments: Segments, sigma: float | None, origin: Floats, directed: int, deadline: Deadline | None
     ) -> MapIndex:
         local = segments.shifted(-origin)
-        walls, wall_of_piece = merge(local, MERGE_GAP, deadline)
-        runs, run_of_wall = merge(Segments.derived(ends_of(walls)), RUN_GAP, deadline)
-        link(walls, run_of_wall)
+        one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_ONE_LINE, ONE_LINE_SHARE * sigma))
+        walls, wall_of_piece = merge(local, WHOLE_GAP, one_line, deadline)
+        blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
+        if blends > one_line:
+            walls, wall_of_piece = blended(local, walls, wall_of_piece.astype(np.intp), blends, deadline)
+        runs = runs_of(walls, deadline)
+        ties, firsts = tie(walls, deadline)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
-        pieces = Pieces(order, starts, as_records(ENDS, local.endpoints))
+        pieces = Pieces(order, starts, as_records(ENDS, local.endpoints), firsts)
         _require_time(deadline)
         sweep = swept_runs(runs)
         _require_time(deadline)
         crossings = crossing_runs(sweep.runs)
         _require_time(deadline)
         grids = near_walls(walls), sweep, crossings, directions_near(walls, runs)
-        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, runs, *grids)
+        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, ties, runs, *grids)
         for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
             getattr(index, name)  # kept from here on, so that the first search does not wait for them
         return index
@@ -197,8 +213,14 @@ class MapIndex:
     def tables(self) -> MapTables:
         """What the kernels of the search are handed."""
         return MapTables(
-            Place(self.walls.rows, self.walls.bin_starts, self.grid), self.sweep, self.crossings, self.raster
+            Place(self.walls.rows, self.walls.bin_starts, self.grid, self.ties), self.sweep, self.crossings, self.raster
         )
+
+    def is_one_wall(self, walls: Integers, wall: int) -> NDArray[np.bool_]:
+        """Tell of `walls` (k,) which are rather one with another one than walls of their own."""
+        ties, tie = self.ties[walls], self.ties[wall]
+        near = 2.0 * np.abs(ties - tie) < math.log(2.0)
+        return np.asarray((walls == wall) | (near & (ties >= 0.0) & (tie >= 0.0)))
 
     @property
     def nbytes(self) -> int:
@@ -214,7 +236,9 @@ class MapIndex:
         ]
         tables.append((self.sweep.runs, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
-        return sum(array.nbytes for array in [self.wall_of_piece, *lines, *(a for table in tables for a in table)])
+        return sum(
+            array.nbytes for array in [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
+        )
 
 
 def _require_time(deadline: Deadline | None) -> None:

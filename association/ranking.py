@@ -75,8 +75,8 @@ class Ranked:
         What lines of sight speak against it, nats, in the score.
     read, passed : float
         Shares of the beams that read the wall they should, and that passed through one; 0 without beams.
-    count : int
-        Rows of the scan that are matched.
+    count : float
+        Rows of the scan that are matched; those that hardly are count in part.
     matches : (n,) of `MATCH`
         By row of the scan.
     """
@@ -94,7 +94,7 @@ class Ranked:
     blocked: float
     read: float
     passed: float
-    count: int
+    count: float
     matches: Records
 
     @classmethod
@@ -102,7 +102,7 @@ class Ranked:
         """Return what a record of `MERIT`, as a tuple, says; its arguments otherwise by name."""
         score, cost, one_step_cost, length, share, reliability, misfit, blocked, read, passed, count = merit
         sums, seen = (cost, one_step_cost), (length, share, reliability, misfit, blocked)
-        return cls(estimate, score, value, inside, *sums, *seen, read, passed, int(count), matches)
+        return cls(estimate, score, value, inside, *sums, *seen, read, passed, count, matches)
 
     @property
     def pose(self) -> RigidTransform:

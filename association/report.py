@@ -111,12 +111,13 @@ def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> As
 def _hinge(context: SearchContext, answer: Answer) -> Hinge | None:
     """Return the wall without which the pose would move most or be free; None where it would hardly move."""
     moves, wall, direction = 0.0, -1, (0.0, 0.0)
-    for w, moved, deviation, dx, dy in answer.settled.hinges.tolist():
+    for w, moved, deviation, dx, dy, _ in answer.settled.hinges.tolist():
         if max(moved, deviation) > moves:
             moves, wall, direction = max(moved, deviation), w, (dx, dy)
     if moves < HINGES:
         return None
-    on_it = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]] == wall
+    walls = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]]
+    on_it = context.index.is_one_wall(walls, wall)
     scan = answer.accepted.pairs[on_it, 0].tolist()
     on_map = sorted({i for i, there in zip(answer.accepted.map_indices(context.index), on_it, strict=True) if there})
     return Hinge(tuple(scan), tuple(on_map), direction, moves)
@@ -135,7 +136,7 @@ def _alternatives(context: SearchContext, others: Iterable[Ranked], *, usable: b
     settled = settle(context, shown)
     shown = shown[: len(settled)]
     poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)
-    measures = paper_measures(context.lines.rows, matches_of(shown), context.index.walls.rows, poses)
+    measures = paper_measures(context.lines.rows, matches_of(shown), context.known_walls, poses)
     return tuple(map(partial(_alternative, context), shown, settled, measures.tolist()))
 
 

@@ -120,7 +120,9 @@ def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settl
     seen, on = context.lines.sightings[on >= 0], on[on >= 0]
     if not len(seen):
         return alone
-    shown, sigma = SeenOnWalls.of(views, seen, context.index.walls.rows, on), context.index.sigma
+    lines, sigma = context.index.walls.rows[on], context.index.sigma
+    lines["offset"] += best.matches["shift"][seen["row"]]
+    shown = SeenOnWalls.of(views, seen, lines, on)
     found = shown.settle(alone.pose, None if sigma is None else max(sigma**2, LEAST_KNOWN_VARIANCE), context.deadline)
     loose = shown.covariance_with(found, max(found.wall_variance, COMMON_WALL_ERROR**2))
     values, vectors = np.linalg.eigh(loose[:2, :2])

@@ -45,7 +45,7 @@ def fit_similarity(context: SearchContext, best: Ranked) -> Similarity | None:
     """Fit a similarity to the sums of a consensus set; None where it does not fix one."""
     solution, covariance, pose = np.zeros(4), np.zeros((4, 4)), np.zeros(1, ESTIMATE)
     variance, more = settle_similarity(
-        context.question_of_a_pose, context.index.walls.rows, best.matches, solution, covariance, context.workspace
+        context.question_of_a_pose, context.known_walls, best.matches, solution, covariance, context.workspace
     )
     if variance < 0.0:
         return None

@@ -70,11 +70,14 @@ class Place(NamedTuple):
     bin_starts : (bins + 1,) where each bin begins
     grid : Grid
         Walls within `REACH` of each cell, in ascending order.
+    ties : (m,) where on its chain each wall is, in minus the log of a correlation: the errors of two walls are
+        correlated by ``exp(-|difference|)``; -1 of one that is tied to none
     """
 
     walls: Records
     bin_starts: Integers
     grid: Grid
+    ties: Floats
 
 
 class Sweep(NamedTuple):
@@ -120,11 +123,13 @@ class Pieces(NamedTuple):
     ----------
     items, starts : wall w consists of segments ``items[starts[w]:starts[w + 1]]``
     ends : (n,) of `ENDS`
+    firsts : (m,) of the chain of each wall, the wall that begins first
     """
 
     items: Integers
     starts: Integers
     ends: Records
+    firsts: Integers
 
 
 class PiecesAlong(NamedTuple):
@@ -132,7 +137,7 @@ class PiecesAlong(NamedTuple):
 
     Attributes
     ----------
-    piece : (k,) which they are, wall by wall
+    piece, wall : (k,) which they are, wall by wall, and of which wall
     low, high : (k,) abscissae between which each lies, metres
     place : (k,) places in these, by where they begin; ties by place
     farthest : (k,) in that order, the place of the one that reaches farthest of those up to each
@@ -140,6 +145,7 @@ class PiecesAlong(NamedTuple):
     """
 
     piece: Indices
+    wall: Indices
     low: Floats
     high: Floats
     place: Indices
@@ -289,12 +295,14 @@ class KnownWalls(NamedTuple):
     Attributes
     ----------
     walls : (m,) of `WALL`
+    ties : (m,) as of `Place`
     variance : float
         Of a wall's own error, m^2; negative where nothing is known of it.
     parallel : (k,) the chi-square of the angles of n matches up to which they are parallel, by n, for all that may be
     """
 
     walls: Records
+    ties: Floats
     variance: float
     parallel: Floats
 
@@ -325,6 +333,9 @@ class Workspace(NamedTuple):
     posed : (k,) of `POSED`, poses to be tried
     near : (n, k) whether each scan line may lie on a wall at each of them
     held : (n,) which wall of each scan line is in the sums, or -1
+    shifts_held : (n,) by how much the line that is in the sums is beside that wall, m
+    weights_held : (n,) with what weight it is
+    listed : (n,) walls, for now
     shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
     """
@@ -337,6 +348,9 @@ class Workspace(NamedTuple):
     posed: Records
     near: Integers
     held: Integers
+    shifts_held: Floats
+    weights_held: Floats
+    listed: Integers
     shares: Records
     scratch: Records
 
@@ -344,8 +358,23 @@ class Workspace(NamedTuple):
     def of(cls, count: int, walls: int) -> Workspace:
         """Return one for a scan of `count` lines and a map of that many walls."""
         spreads, later, possible = np.zeros((3, count))
-        shifts, held = np.zeros((2, count), np.int64)
+        shifts, held, listed = np.zeros((3, count), np.int64)
+        shifts_held, weights_held = np.zeros((2, count))
         held.fill(-1)
         posed, near = np.empty(AT_ONCE, POSED), np.empty((count, AT_ONCE), np.uint8)
         matches, shares, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SHARE), record(SCRATCH)
-        return cls(matches, spreads, shifts, later, possible, posed, near, held, shares, scratch)
+        return cls(
+            matches,
+            spreads,
+            shifts,
+            later,
+            possible,
+            posed,
+            near,
+            held,
+            shifts_held,
+            weights_held,
+            listed,
+            shares,
+            scratch,
+        )

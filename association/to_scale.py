@@ -223,8 +223,8 @@ def _with_what_is_not_known(found: Explained) -> Explained:
     if answer is None or factor is None or similarity is None:
         return found
     settled = replace(answer.settled, pose=similarity.pose, covariance=similarity.covariance)
-    registered = register_accepted(found.context, answer.accepted, settled)
-    assert registered is not None  # of pairs that it was registered of before
-    answer = replace(answer, settled=settled, registered=registered)
+    at_scale = register_accepted(found.context, answer.best, answer.accepted, settled, fitted=False)
+    assert at_scale is not None  # of pairs that it was registered of before
+    answer = replace(answer, settled=settled, registered=at_scale[0])
     factor = Factor(factor.value * similarity.factor, similarity.deviation)
     return replace(found, explanations=replace(found.explanations, answer=answer), factor=factor)

@@ -11,8 +11,26 @@ import math
 
 MAX_EXTENT = 1e5  # m; the contract
 MAX_MAP_SIGMA = 10.0  # m; the contract
+# Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
+ONE_LINE = 1e-4  # m, rounding
+LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is said to be exact
+ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
+# Walls that continue one another are tied: a scan segment may lie on both, and they share their error, the less the
+# farther apart they are: not at all from these distances on.
+WHOLE_GAP = 0.15  # m, geometry: the joint between two pieces of one wall is not wider, and as good as none
+APART_GAP = 0.6  # m, geometry: a doorway is wider
+APART_STEP = 0.08  # m, tables; the gate within which a segment lies on a wall
+# What a step says of how walls were drawn: those with smaller ones are put on a line that they have in common, the less
+# the larger it is, and not at all from here on.
+BLENDED_STEP = 0.045  # m, tables; where nobody says how far the map is off
+BLENDED_SIGMAS = 4.0  # geometry; otherwise, up to the same
+BLENDED_WALLS = 16  # on either side, measured
+LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over what is open between them
+TIE_FREE = 30.0  # minus the log of a correlation that is none
+TIES_BEFORE = 6  # walls before it that one is tied to at most, measured
+# What bases are laid on: lines through what nearly continues one another, and through what does so across doorways.
 MERGE_GAP = 0.3  # m, geometry: a doorway is wider, the joint between two pieces of one wall is not
-RUN_GAP = 1.5  # m, geometry: a scan segment may bridge a doorway
+RUN_GAP = 1.5  # m, geometry: a base segment may bridge a doorway
 MERGE_LATERAL = 0.03  # m, tables
 MERGE_ANGLE = math.radians(2.0)  # tables
 BEGIN_CELL = 1.0  # m, by which begins of pieces are found, at least; measured: little changes near it
@@ -81,10 +99,14 @@ LEAST_OFFSET_GATE = 0.08  # m, tables
 LEAST_ANGLE_GATE = math.radians(4.0)  # tables
 GREATEST_ANGLE_GATE = 0.35  # rad, tables
 LEAST_OVERLAP = 1e-3  # rounding, and as much less than all of a segment: its end may lie on a wall's
-BRIDGING = 3.0  # m, tables; only a longer segment may bridge a gap between walls: a short one may well be clutter there
-MOST_BRIDGED = (
-    2000  # neighbours on their runs that the walls under one scan segment have; in 443 maps a run has up to 14
-)
+# Between these lengths a segment comes to bridge a gap between walls: a short one may well be clutter there.
+SHORT_BRIDGE, LONG_BRIDGE = 2.5, 3.5  # m, tables
+FLAT_STEP = 0.03  # m, tables; between two walls on which a segment lies, up to where both count fully
+FLAT_GATE = 0.9  # of a gate, tables; what lies farther off gains less, and nothing at the gate
+OVERLAP_TAPER = 0.05  # beyond the least overlap, tables; up to there a match gains less, and nothing at the least
+LEAST_COUNT = 1e-9  # rounding; of matches, to divide by
+WHOLE_WORTH = 2.0  # nats, tables; a match that is worth less is a match in part
+MOST_BRIDGED = 2000  # neighbours on their chains that the walls under one scan segment have, measured
 WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
 
 # --- Consensus: growing and shrinking a set of matches at a pose ------------------------------------------------------
@@ -92,6 +114,7 @@ WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wal
 ROUNDS = 3  # tables; of matching and solving
 MAX_STEP = 1.0  # m, tables; a consensus set that moves its pose farther than that, or
 MAX_TURN = 0.2  # rad, tables; is not the one that the pose was proposed for
+SAME_SHIFT = 1e-6  # m, rounding
 SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
 # How far a pose is free before anything fixes it: what a set is charged for fixing it more sharply. Tables.
 FREE_DISTANCE = 0.3  # m
@@ -195,7 +218,7 @@ INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those 
 USUAL_WALL_ERROR = 0.02  # m
 USUAL_WALLS = 2.0
 UNSEEN_ERROR = 1.15  # fitted; variance of walls' errors over that of those which the gates let pass
-LEAST_KNOWN_VARIANCE = 1e-10  # m^2, rounding; of walls whose error the caller knows
+LEAST_KNOWN_VARIANCE = 1e-12  # m^2, rounding; of walls whose error the caller knows
 LEAST_WALL_ERROR = 0.003  # m, tables
 ROUGH_SHARE = 0.1  # of a wall's variance, tables; what differs along it
 SETTLING_ROUNDS = 4  # tables

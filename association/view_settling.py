@@ -83,11 +83,11 @@ class SeenOnWalls:
     origins: Records
 
     @classmethod
-    def of(cls, views: Views, seen: Records, walls: Records, on: NDArray[np.intp]) -> SeenOnWalls:
-        """Take what lies on the walls of a map, `on` which says."""
+    def of(cls, views: Views, seen: Records, lines: Records, on: NDArray[np.intp]) -> SeenOnWalls:
+        """Take what lies on `lines`, (k,) of `WALL`, of the walls that `on` (k,) numbers."""
         _, number = np.unique(on, return_inverse=True)
         origins = as_records(POINT, np.array([(pose.x, pose.y) for pose in views.poses]))
-        return cls(views, seen, walls[on], number, origins)
+        return cls(views, seen, lines, number, origins)
 
     def settle(self, start: RigidTransform, known: float | None, deadline: Deadline) -> ViewsSettled:
         """Solve for the pose and the errors of the views, with the walls' variance or as their residuals show it.

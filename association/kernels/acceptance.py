@@ -8,38 +8,25 @@ from registration.allocating import empty, zeros
 from registration.compiling import inlined, internal, kernel
 from registration.layout import Floats, Record, Records
 
-from ..layout import BLOCKER, PAIR, Indices, Integers
+from ..layout import BLOCKER, PAIR, Indices
 from ..tables import Blockers, Lines, Pieces, PiecesAlong, Place, Sights, Workspace
-from ..tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS, MIN_EXTENT, MOST_UNDER
+from ..tuning import BLOCKING_RAYS, MAX_RIVALS, MIN_EXTENT, MOST_UNDER
 from .ordering import ascending
 from .sight import count_blockers
 
 
 @kernel
-def first_of_run(walls: Records, w: int, known: Integers) -> int:
-    """Return the first wall of the run that wall `w` is on; `known` (m,) keeps 1 + it of every wall that was passed."""
-    first = w
-    while walls[first].before >= 0 and known[first] == 0:
-        first = walls[first].before
-    if known[first] > 0:
-        first = known[first] - 1
-    while w != first and known[w] == 0:
-        known[w] = 1 + first
-        w = walls[w].before
-    return first
-
-
-@kernel
-def pieces_along(w: int, bridging: bool, walls: Records, pieces: Pieces) -> PiecesAlong:
-    """Order the pieces of wall `w`, or of its run from there on where it may bridge doorways, by where they begin."""
+def pieces_along(w: int, walls: Records, pieces: Pieces) -> PiecesAlong:
+    """Order the pieces of a chain, of which `w` is the wall that begins first, by where they begin."""
     dx = walls[w].dx
     dy = walls[w].dy
     count = 0
     v = w
     while v >= 0:
         count += pieces.starts[v + 1] - pieces.starts[v]
-        v = walls[v].after if bridging else -1
+        v = walls[v].after
     piece = empty(count, np.intp)
+    wall = empty(count, np.intp)
     low = empty(count, np.float64)
     high = empty(count, np.float64)
     count = 0
@@ -50,10 +37,11 @@ def pieces_along(w: int, bridging: bool, walls: Records, pieces: Pieces) -> Piec
             one = pieces.ends[p].x1 * dx + pieces.ends[p].y1 * dy
             other = pieces.ends[p].x2 * dx + pieces.ends[p].y2 * dy
             piece[count] = p
+            wall[count] = v
             low[count] = min(one, other)
             high[count] = max(one, other)
             count += 1
-        v = walls[v].after if bridging else -1
+        v = walls[v].after
     place = ascending(low)
     farthest = empty(count, np.intp)
     gaps = zeros(count, np.float64)
@@ -64,7 +52,7 @@ def pieces_along(w: int, bridging: bool, walls: Records, pieces: Pieces) -> Piec
             gaps[k] = gaps[k - 1] + max(0.0, low[place[k]] - high[reach])
             if high[place[k]] <= high[reach]:
                 farthest[k] = reach
-    return PiecesAlong(piece, low, high, place, farthest, gaps)
+    return PiecesAlong(piece, wall, low, high, place, farthest, gaps)
 
 
 @kernel
@@ -91,12 +79,13 @@ def bare_up_to(along: PiecesAlong, x: float) -> float:
 
 
 @kernel
-def pieces_under(along: PiecesAlong, low: float, high: float, named: Indices) -> tuple[int, int]:
+def pieces_under(along: PiecesAlong, low: float, high: float, own: int, named: Indices) -> tuple[int, int]:
     """Find the pieces between two abscissae, and the one of them with the greatest overlap, of equal ones the first.
 
-    Writes the first of them to `named` (`MAX_RIVALS` + 1,). Returns the place of the one with the greatest overlap, or
-    of the nearest one where none overlaps, and how many are named. At most `MOST_UNDER` pieces are compared, and of
-    those that begin before always the one that reaches farthest.
+    Pieces of the wall `own` come before those of others. Writes the first of them to `named` (`MAX_RIVALS` + 1,).
+    Returns the place of the one with the greatest overlap, or of the nearest one where none overlaps, and how many are
+    named. At most `MOST_UNDER` pieces are compared, and of those that begin before always the one that reaches
+    farthest.
     """
     after = begun(along, high)
     before = begun(along, low)
@@ -105,6 +94,7 @@ def pieces_under(along: PiecesAlong, low: float, high: float, named: Indices) ->
     if best < 0.0 and after < len(along.place) and high - along.low[along.place[after]] > best:
         most = along.place[after]
         best = high - along.low[most]
+    is_own = best > 0.0 and along.wall[most] == own
     count = 0
     # Backwards, as long as something before reaches so far.
     k = after - 1
@@ -112,9 +102,12 @@ def pieces_under(along: PiecesAlong, low: float, high: float, named: Indices) ->
         place = along.place[k]
         k -= 1
         overlap = min(along.high[place], high) - max(along.low[place], low)
-        if overlap > best or (overlap == best and along.piece[place] < along.piece[most]):
+        on_own = overlap > 0.0 and along.wall[place] == own
+        longer = overlap > best or (overlap == best and along.piece[place] < along.piece[most])
+        if (on_own and not is_own) or (on_own == is_own and longer):
             best = overlap
             most = place
+            is_own = on_own
         if overlap > 0.0:
             count = insert(named, count, place)
     return most, count
@@ -136,15 +129,12 @@ def insert(ascending_places: Indices, count: int, place: int) -> int:
 
 
 @kernel
-def wall_keys(matches: Records, lines: Lines, walls: Records) -> Floats:
-    """Return (n,) for each scan segment twice the wall that it lies on, -1 for none; of a run 1 + twice its first."""
-    known = zeros(len(walls), np.int64)
+def chain_keys(matches: Records, lines: Lines, pieces: Pieces) -> Floats:
+    """Return (n,) for each scan segment the first wall of the chain that it lies on, -1 for none."""
     keys = empty(len(lines.row_of), np.float64)
     for i in range(len(keys)):
         w = matches[lines.row_of[i]].wall
-        keys[i] = 2.0 * w if w >= 0 else -1.0
-        if w >= 0 and lines.rows[lines.row_of[i]].length > BRIDGING:
-            keys[i] = 2.0 * first_of_run(walls, w, known) + 1.0
+        keys[i] = pieces.firsts[w] if w >= 0 else -1.0
     return keys
 
 
@@ -155,9 +145,9 @@ def accept_matches(
 ) -> tuple[Indices, Floats, Indices, Indices]:
     """Pick for every matched scan segment the piece of its wall that it lies on most, of equal ones the first.
 
-    `pose` (1,). Of a line of several segments those count of which enough lies on the wall. Returns, by scan index,
-    pairs (k, 2) of scan index and piece; the share of each segment that lies on pieces of its wall, or of its run where
-    it may bridge doorways (k,); and the other pieces that it lies on: of pair i
+    Or of the walls of its chain that it lies on. `pose` (1,). Of a line of several segments those count of which enough
+    lies on the wall. Returns, by scan index, pairs (k, 2) of scan index and piece; the share of each segment that lies
+    on pieces of these walls (k,); and the other pieces that it lies on: of pair i
     ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
 
     The pieces of each wall are ordered once, so that the time grows with their number and that of the segments, not
@@ -171,18 +161,18 @@ def accept_matches(
     for i in range(n):
         members[row_of[i]] += 1
         found[i].piece = -1
-    keys = wall_keys(matches, lines, walls)
+    keys = chain_keys(matches, lines, pieces)
     order = ascending(keys)
     k = 0
     while k < n and keys[order[k]] < 0.0:
         k += 1
     while k < n:
-        key = int(keys[order[k]])
-        w = key // 2
-        along = pieces_along(w, key % 2 == 1, walls, pieces)
-        while k < n and keys[order[k]] == key:
+        first = int(keys[order[k]])
+        along = pieces_along(first, walls, pieces)
+        while k < n and keys[order[k]] == first:
             i = order[k]
-            lay_on(scan_ends[i], pose[0], walls[w], along, found[i], rivals_of[i])
+            found[i].piece = matches[row_of[i]].wall
+            lay_on(scan_ends[i], pose[0], walls[first], along, found[i], rivals_of[i])
             if found[i].overlap < lines.least_overlap and members[row_of[i]] > 1:
                 found[i].piece = -1
             k += 1
@@ -191,7 +181,10 @@ def accept_matches(
 
 @kernel
 def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out: Record, rivals: Indices) -> None:
-    """Write to `out`, of `PAIR`, and `rivals` (`MAX_RIVALS`,) on which pieces a scan segment lies at a pose."""
+    """Write to `out`, of `PAIR`, and `rivals` (`MAX_RIVALS`,) on which pieces a scan segment lies at a pose.
+
+    The piece of `out` comes as the wall that is matched, of the chain whose first wall is `wall`.
+    """
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     begin = (c * segment.x1 - s * segment.y1 + pose.x) * wall.dx
@@ -201,7 +194,7 @@ def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out:
     low = min(begin, end)
     high = max(begin, end)
     named = empty(MAX_RIVALS + 1, np.intp)
-    most, count = pieces_under(along, low, high, named)
+    most, count = pieces_under(along, low, high, out.piece, named)
     out.piece = along.piece[most]
     out.overlap = 0.0
     if min(along.high[most], high) > max(along.low[most], low):

@@ -28,6 +28,7 @@ from ..tuning import (
     UNCOUNTED_SHARE,
     USUAL_WALLS,
 )
+from .matching import part_of_match
 from .odds import root_gap, share_between
 
 
@@ -131,19 +132,20 @@ def see_unmatched(scan: Records, matches: Records, facts: Records) -> None:
     fact.longest = 0.0
     fact.unmatched = 0.0
     for i in range(len(scan)):
-        if matches[i].wall < 0:
-            fact.longest = max(fact.longest, scan[i].length)
-            fact.unmatched += scan[i].length
+        left = (1.0 - part_of_match(matches[i])) * scan[i].length
+        fact.longest = max(fact.longest, left)
+        fact.unmatched += left
 
 
 @kernel
 def see_hinges(hinges: Records, facts: Records) -> None:
     """Write to `facts` (1,) how many walls there are, and what the pose comes to at worst without one of them."""
     fact = facts[0]
-    fact.walls = len(hinges)
+    fact.walls = 0.0
     fact.moves = 0.0
     fact.hinge_deviation = 0.0
     for k in range(len(hinges)):
+        fact.walls += hinges[k].own
         fact.moves = max(fact.moves, hinges[k].moves)
         fact.hinge_deviation = max(fact.hinge_deviation, hinges[k].deviation)
 
@@ -156,9 +158,9 @@ def is_thin(facts: Records, matches: Records, with_beams: bool) -> bool:
     where those three fit, so that with them it proves less. `facts` (1,) of its hinges, as `see_hinges` writes them.
     """
     walls = facts[0].walls
-    if walls > FEW_WALLS or not facts[0].hinge_deviation > MAX_DEVIATION:
+    if walls >= FEW_WALLS + 0.5 or not facts[0].hinge_deviation > MAX_DEVIATION:
         return False
-    if walls < FEW_WALLS or with_beams:
+    if walls < FEW_WALLS - 0.5 or with_beams:
         return True
     squares = 0.0
     count = 0

@@ -10,7 +10,22 @@ from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
 from ..tables import Place, Raster
-from ..tuning import BRIDGING, DIRECTION_BINS, MOST_BRIDGED, NARROW_REACH, SECTORS
+from ..tuning import (
+    APART_GAP,
+    APART_STEP,
+    DIRECTION_BINS,
+    FLAT_GATE,
+    FLAT_STEP,
+    LONG_BRIDGE,
+    MOST_BRIDGED,
+    NARROW_REACH,
+    OVERLAP_TAPER,
+    SECTORS,
+    SHORT_BRIDGE,
+    WHOLE_GAP,
+    WHOLE_WORTH,
+)
+from .walls import fade
 
 PER_RADIAN = SECTORS / (2.0 * math.pi)
 BINS_PER_RADIAN = DIRECTION_BINS / (2.0 * math.pi)
@@ -24,6 +39,73 @@ def wrap(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
+@inlined
+def gap_counts(gap: float, length: float) -> tuple[float, float]:
+    """Return how much of a gap counts as covered, metres, and how much what a segment covers behind it counts.
+
+    What is open between two walls speaks against a segment that bridges it, unless it is hardly open; and a short
+    segment does not bridge it.
+    """
+    whole = fade(gap, WHOLE_GAP, APART_GAP)
+    bridges = min(1.0, max(0.0, (length - SHORT_BRIDGE) / (LONG_BRIDGE - SHORT_BRIDGE)))
+    return gap * (2.0 * whole - 1.0), whole + (1.0 - whole) * bridges
+
+
+@kernel
+def follow_chain(
+    walls: Records, w: int, laid: tuple[float, float, float, float, float, float], way: float, reach: float, most: int
+) -> tuple[float, float, float, float, int]:
+    """Add up what a segment covers of the walls that follow wall `w` on its chain, as far as that is to the good.
+
+    `laid` is the segment on the map: midpoint, direction, length, and how far it may be off a wall. `way` is 1 along
+    the walls, -1 against them; that way the segment is covered up to `reach` metres from its midpoint. What lies off a
+    wall counts less, at the gate nothing, and so does what is on a wall that is beside `w`. Returns by how many metres
+    more the segment counts as covered; the length it covers; sums over that of how far the walls are beside `w`, and of
+    the square; and how many walls are left to look at, of `most`.
+    """
+    middle_x, middle_y, dx, dy, length, gate = laid
+    base = walls[w]
+    half = 0.5 * length
+    counts = 1.0
+    net = 0.0
+    covered = 0.0
+    first = 0.0
+    second = 0.0
+    best = (0.0, 0.0, 0.0, 0.0)
+    v = base.after if way > 0.0 else base.before
+    while v >= 0 and reach < half and most > 0:
+        most -= 1
+        wall = walls[v]
+        along = wall.dx * middle_x + wall.dy * middle_y
+        begin = wall.begin - along if way > 0.0 else along - wall.end
+        end = wall.end - along if way > 0.0 else along - wall.begin
+        if begin >= half:
+            break
+        if begin > reach:
+            gap, share = gap_counts(begin - reach, length)
+            counts *= share
+            net += counts * gap
+        start = max(begin, reach)
+        stop = min(end, half)
+        if stop > start:
+            middle = way * 0.5 * (start + stop)
+            x = middle_x + middle * dx
+            y = middle_y + middle * dy
+            off = wall.dx * y - wall.dy * x - wall.offset
+            beside = base.dx * y - base.dy * x - base.offset - off
+            part = counts * fade(abs(off), FLAT_GATE * gate, gate) * (stop - start)
+            part *= fade(abs(beside), FLAT_STEP, APART_STEP)
+            net += part
+            covered += part
+            first += part * beside
+            second += part * beside * beside
+            if net > best[0]:
+                best = (net, covered, first, second)
+            reach = end
+        v = wall.after if way > 0.0 else wall.before
+    return best[0], best[1], best[2], best[3], most
+
+
 @kernel
 def match_scan(
     scan: Records, estimate: Record, place: Place, gates: Record, possible: Floats, threshold: float, matches: Records
@@ -32,11 +114,10 @@ def match_scan(
 
     Gated by the innovation: ``offset^2`` against ``sigma^2 + g' C g`` with the pose's covariance C. Best is least in
     offset over gate plus what the overlap lacks. `possible` (n,) is what each segment can add at most, nats, as of
-    `may_score` or `allow_all`; those below 0 lie on no wall. Writes wall or -1, offset, sine and overlap to `matches`
-    and returns the sum of the gains, weighted by overlap; -1 as soon as `threshold` is out of reach. Of the neighbours
-    on their runs that the walls of a segment have, `MOST_BRIDGED` are looked at.
+    `may_score` or `allow_all`; those below 0 lie on no wall. Writes wall or -1 and the rest to `matches`, but for
+    the worth, and returns the sum of the gains; -1 as soon as `threshold` is out of reach.
 
-    One loop without calls: handing arrays on costs more than the work, Numba counts references to each.
+    One loop with hardly a call: handing arrays on costs more than the work, Numba counts references to each.
     """
     walls = place.walls
     bin_starts = place.bin_starts
@@ -46,13 +127,16 @@ def match_scan(
     c = math.cos(estimate.theta)
     s = math.sin(estimate.theta)
     per_cell = 1.0 / shape.cell
+    overlap_taper = min(OVERLAP_TAPER, 1.0 - gates.least_overlap)
     total = 0.0
     left = SUM_SLACK
     for i in range(len(scan)):
         left += max(0.0, possible[i])
     for i in range(len(scan)):
-        matches[i].wall = -1
-        matches[i].overlap = 0.0
+        match = matches[i]
+        match.wall = -1
+        match.overlap = 0.0
+        match.gain = 0.0
         if possible[i] < 0.0:
             continue
         left -= possible[i]
@@ -97,7 +181,7 @@ def match_scan(
             span = bin_starts[highest + 1] - first
             if highest < lowest:
                 span += len(walls)
-            bridged = 0
+            left_to_follow = MOST_BRIDGED
             for k in range(begin, end):
                 w = items[k]
                 place_in_row = w - first
@@ -114,42 +198,57 @@ def match_scan(
                 low = max(walls[w].begin - along, -half)
                 high = min(walls[w].end - along, half)
                 covered = high - low
-                # What bridges a doorway lies on the walls on both sides of it; the gap between speaks against that.
-                bridging = length > BRIDGING and covered > 0.0
-                v = walls[w].before if low > -half and bridging else -1
-                while v >= 0 and bridged < MOST_BRIDGED:
-                    bridged += 1
-                    along = walls[v].dx * x + walls[v].dy * y
-                    edge = walls[v].end - along
-                    if edge <= -half:
-                        break
-                    covered -= low - edge
-                    low = max(walls[v].begin - along, -half)
-                    covered += edge - low
-                    v = walls[v].before if low > -half else -1
-                v = walls[w].after if high < half and bridging else -1
-                while v >= 0 and bridged < MOST_BRIDGED:
-                    bridged += 1
-                    along = walls[v].dx * x + walls[v].dy * y
-                    edge = walls[v].begin - along
-                    if edge >= half:
-                        break
-                    covered -= edge - high
-                    high = min(walls[v].end - along, half)
-                    covered += high - edge
-                    v = walls[v].after if high < half else -1
+                if covered <= 0.0:
+                    continue
+                # What is on several walls lies on what they make up, each by what is on it.
+                on = covered
+                aside = 0.0
+                squared = 0.0
+                if low > -half and walls[w].before >= 0:
+                    laid = (x, y, dx, dy, length, offset_gate)
+                    more, there, beside, squares, left_to_follow = follow_chain(
+                        walls, w, laid, -1.0, -low, left_to_follow
+                    )
+                    covered += more
+                    on += there
+                    aside += beside
+                    squared += squares
+                if high < half and walls[w].after >= 0:
+                    laid = (x, y, dx, dy, length, offset_gate)
+                    more, there, beside, squares, left_to_follow = follow_chain(
+                        walls, w, laid, 1.0, high, left_to_follow
+                    )
+                    covered += more
+                    on += there
+                    aside += beside
+                    squared += squares
                 overlap = min(1.0, covered / length)
-                cost = abs(offset) / offset_gate + 1.0 - overlap
+                shift = aside / on
+                cost = abs(offset - shift) / offset_gate + 1.0 - overlap
                 if overlap >= gates.least_overlap and cost < best_cost:
                     best_cost = cost
-                    matches[i].wall = w
-                    matches[i].offset = offset
-                    matches[i].sine = dx * wy - dy * wx
-                    matches[i].overlap = overlap
-        total += scan[i].gain * matches[i].overlap
+                    sine = dx * wy - dy * wx
+                    match.wall = w
+                    match.offset = offset - shift
+                    match.sine = sine
+                    match.overlap = overlap
+                    match.shift = shift
+                    match.uneven = max(0.0, squared / on - shift * shift)
+                    match.gain = scan[i].gain * overlap
+                    # Nothing at a gate, so that none decides.
+                    match.gain *= min(1.0, (overlap - gates.least_overlap) / overlap_taper)
+                    match.gain *= fade(abs(offset), FLAT_GATE * offset_gate, offset_gate)
+                    match.gain *= fade(abs(sine), FLAT_GATE * angle_gate, angle_gate)
+        total += match.gain
         if total + left < threshold:
-            return -1.0
+            break
     return -1.0 if total < threshold else total
+
+
+@inlined
+def part_of_match(match: Record) -> float:
+    """Return how much of a match there is, 0 to 1, by what it is worth."""
+    return min(1.0, match.worth / WHOLE_WORTH) if match.wall >= 0 else 0.0
 
 
 @inlined

@@ -9,12 +9,13 @@ from registration.compiling import internal, kernel
 from registration.kernels import keep_alive, one_step_add
 from registration.layout import ONE_STEP_SUMS, Floats, Record, Records
 
-from ..tuning import ROUGHNESS
+from ..tables import KnownWalls
+from .settling import registered_weights
 
 
 @internal
 @kernel
-def paper_measures(scan: Records, matches: Records, walls: Records, poses: Records) -> Floats:
+def paper_measures(scan: Records, matches: Records, known_walls: KnownWalls, poses: Records) -> Floats:
     """Return what the one-step sums of consensus sets cost at poses, and what they say of the reliability, (k, 4).
 
     The translation's cost, ``sum w r^2``, the rotation's by Mitsuta, ``sum w a^2``, and by Wahba,
@@ -22,7 +23,7 @@ def paper_measures(scan: Records, matches: Records, walls: Records, poses: Recor
     """
     measures = empty((len(poses), 4), np.float64)
     for k in range(len(poses)):
-        sums = set_sums(scan, matches[k], walls, poses[k])
+        sums = set_sums(scan, matches[k], known_walls, poses[k])
         value = sums[0]
         determinant = max(0.0, value.x2 * value.y2 - value.xy * value.xy)
         measures[k, 0] = max(0.0, value.gap2)
@@ -34,18 +35,21 @@ def paper_measures(scan: Records, matches: Records, walls: Records, poses: Recor
 
 
 @kernel
-def set_sums(scan: Records, matches: Records, walls: Records, pose: Record) -> Records:
-    """Return the one-step sums of a consensus set about a pose, walls being off one by one."""
+def set_sums(scan: Records, matches: Records, known_walls: KnownWalls, pose: Record) -> Records:
+    """Return the one-step sums of a consensus set about a pose, with the weights that it registers with."""
     sums = zeros(2, ONE_STEP_SUMS)
+    walls = known_walls.walls
+    weights = empty(len(scan), np.float64)
+    registered_weights(scan, matches, known_walls.ties, pose.wall_sigma**2, weights)
     for i in range(len(scan)):
         if matches[i].wall < 0:
             continue
         wall = walls[matches[i].wall]
         middle = 0.5 * (wall.begin + wall.end)
-        on_x = wall.dx * middle - wall.dy * wall.offset
-        on_y = wall.dy * middle + wall.dx * wall.offset
+        offset = wall.offset + matches[i].shift
+        on_x = wall.dx * middle - wall.dy * offset
+        on_y = wall.dy * middle + wall.dx * offset
         gap = wall.dx * (on_y - pose.y) - wall.dy * (on_x - pose.x)
         gap -= scan[i].dx * scan[i].y - scan[i].dy * scan[i].x
-        variance = 1.0 / scan[i].weight - ROUGHNESS * ROUGHNESS + pose.wall_sigma * pose.wall_sigma
-        one_step_add(sums, wall, scan[i], gap, pose.theta, 1.0 / variance, 1.0)
+        one_step_add(sums, wall, scan[i], gap, pose.theta, weights[i], 1.0)
     return sums

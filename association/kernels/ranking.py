@@ -11,9 +11,9 @@ from registration.layout import SYMMETRIC3, Floats, Records
 
 from ..layout import BLOCKER, Integers
 from ..tables import Blockers, Place, Question, Sights, Workspace
-from ..tuning import FAR_BEHIND, START_ANGLE_VARIANCE, START_VARIANCE
+from ..tuning import FAR_BEHIND, LEAST_COUNT, START_ANGLE_VARIANCE, START_VARIANCE
 from .consensus import one_step_cost, refine
-from .matching import allow_all, match_scan, wrap
+from .matching import allow_all, match_scan, part_of_match, wrap
 from .ordering import ascending
 from .sight import count_blockers, sight_penalty
 
@@ -67,15 +67,17 @@ def rank(
         merit.length = 0.0
         merit.misfit = 0.0
         merit.blocked = 0.0
-        count = 0
+        merit.count = 0.0
         for i in range(len(scan)):
-            if matches[k, i].wall >= 0:
-                merit.length += scan[i].length
-                merit.misfit += matches[k, i].offset ** 2 / scan[i].plain_variance
-                count += 1
+            match = matches[k, i]
+            if match.wall >= 0:
+                # What is hardly worth a match is one in part, so that none comes or goes at once.
+                part = part_of_match(match)
+                merit.length += part * scan[i].length
+                merit.misfit += part * match.offset**2 / scan[i].plain_variance
+                merit.count += part
         merit.share = merit.length / length
-        merit.misfit /= max(1, count)
-        merit.count = count
+        merit.misfit /= max(LEAST_COUNT, merit.count)
         # The candidates come best first: what is far behind is no rival, its score may stay too good.
         if sighted and merit.score > best - FAR_BEHIND:
             count = count_blockers(sights, matches[k], one, place, blockers, work.scratch[0].ray)

@@ -10,7 +10,7 @@ from registration.compiling import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
-from ..tables import Question, Workspace
+from ..tables import KnownWalls, Question, Workspace
 from ..tuning import (
     LEAST_WALL_ERROR,
     SETTLING_ROUNDS,
@@ -73,7 +73,7 @@ def solve_similarity(sums: Record, solution: Floats, covariance: Floats) -> bool
 
 @kernel
 def variance_left(
-    solution: Floats, covariance: Floats, of_wall: Integers, wall_variance: float, work: Workspace
+    solution: Floats, covariance: Floats, of_wall: Integers, own: Floats, wall_variance: float, work: Workspace
 ) -> tuple[float, float]:
     """Return the variance of the walls' own errors that their residuals show, as `estimated_variance` does of a pose.
 
@@ -82,8 +82,8 @@ def variance_left(
     shares = work.shares
     found = USUAL_WALLS * USUAL_WALL_ERROR**2
     count = USUAL_WALLS
-    for w in of_wall:
-        share = shares[w]
+    for k in range(len(of_wall)):
+        share = shares[of_wall[k]]
         g = (share.c / share.weight, share.s / share.weight, share.x / share.weight, share.y / share.weight)
         mean = share.one / share.weight
         spread = 0.0
@@ -92,15 +92,15 @@ def variance_left(
             for j in range(4):
                 spread += g[i] * g[j] * covariance[i, j]
         free = max(0.0, 1.0 - spread / (wall_variance + 1.0 / share.weight))
-        found += mean * mean - free / share.weight
-        count += free
+        found += own[k] * (mean * mean - free / share.weight)
+        count += own[k] * free
     unsure = UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0))
     return unsure * max(found / count, LEAST_WALL_ERROR**2), count - USUAL_WALLS
 
 
 @kernel
 def settle_similarity(
-    question: Question, walls: Records, matches: Records, solution: Floats, covariance: Floats, work: Workspace
+    question: Question, known_walls: KnownWalls, matches: Records, solution: Floats, covariance: Floats, work: Workspace
 ) -> tuple[float, float]:
     """Fit a similarity to a consensus set, walls off as their residuals show it.
 
@@ -109,16 +109,16 @@ def settle_similarity(
     """
     scan = question.scan
     sums = work.scratch[0].sums
-    of_wall = walls_of(scan, matches)
+    of_wall, own = walls_of(scan, matches, known_walls.ties)
     wall_variance = USUAL_WALL_ERROR**2
     used = wall_variance
     more = 0.0
     for _ in range(SETTLING_ROUNDS + 1):
-        add_all(scan, matches, walls, wall_variance, work)
+        add_all(scan, matches, known_walls, wall_variance, work)
         if not solve_similarity(sums, solution, covariance):
             return -1.0, 0.0
         used = wall_variance
-        wall_variance, more = variance_left(solution, covariance, of_wall, wall_variance, work)
+        wall_variance, more = variance_left(solution, covariance, of_wall, own, wall_variance, work)
     if solution[0] == 0.0 and solution[1] == 0.0:
         return -1.0, 0.0
     return used, more

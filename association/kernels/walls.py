@@ -4,12 +4,79 @@ import math
 
 import numpy as np
 
-from registration.allocating import zeros
-from registration.compiling import kernel
-from registration.layout import Records
+from registration.allocating import empty, zeros
+from registration.compiling import inlined, kernel
+from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
-from ..tuning import MOST_LOOKS, MOST_STEPS
+from ..tuning import (
+    APART_GAP,
+    BLENDED_WALLS,
+    MOST_LOOKS,
+    MOST_STEPS,
+    TIE_FREE,
+    TIES_BEFORE,
+    WHOLE_GAP,
+)
+
+
+@inlined
+def fade(value: float, whole: float, apart: float) -> float:
+    """Return 1 up to `whole`, 0 from `apart` on, and smoothly less between (Tukey's biweight)."""
+    share = min(1.0, max(0.0, (value - whole) / (apart - whole)))
+    return (1.0 - share * share) ** 2
+
+
+@inlined
+def tie_between(before: Record, after: Record, apart: float) -> float:
+    """Return minus the log of how much two walls of a chain are one, up to `TIE_FREE`; with a step of `apart`, m, none.
+
+    The second one begins behind the begin of the first one. The step is the farthest that the shorter one is off the
+    line of the other, so that walls that bend are not one either.
+    """
+    begin, first = seen_from(before, after, after.begin)
+    _, last = seen_from(before, after, after.end)
+    if before.end - before.begin < after.end - after.begin:
+        _, first = seen_from(after, before, before.begin)
+        _, last = seen_from(after, before, before.end)
+    step = max(abs(first), abs(last))
+    correlation = fade(step, 0.0, apart) * fade(begin - before.end, WHOLE_GAP, APART_GAP)
+    return -math.log(correlation) if correlation > math.exp(-TIE_FREE) else TIE_FREE
+
+
+@inlined
+def seen_from(wall: Record, other: Record, at: float) -> tuple[float, float]:
+    """Return the abscissa on a wall of the place at an abscissa of another, and how far that is to its left, metres."""
+    x = other.dx * at - other.dy * other.offset
+    y = other.dy * at + other.dx * other.offset
+    return wall.dx * x + wall.dy * y, wall.dx * y - wall.dy * x - wall.offset
+
+
+@kernel
+def tie_walls(walls: Records, order: Integers, chain: Integers, apart: float) -> Floats:
+    """Return where on its chain each wall is, (m,), as `Place.ties` says; in `order` they are chain by chain, by begin.
+
+    Each is tied to that of the walls before it to which it is tied best; with a step of `apart`, metres, to none.
+    """
+    ties = empty(len(walls), np.float64)
+    at = 0.0
+    for k in range(len(order)):
+        w = order[k]
+        place = at + TIE_FREE
+        for back in range(1, min(k, TIES_BEFORE) + 1):
+            v = order[k - back]
+            if chain[v] != chain[w]:
+                break
+            here = tie_between(walls[v], walls[w], apart)
+            if here < TIE_FREE and ties[v] + here < place:
+                place = ties[v] + here
+        ties[w] = place
+        at = max(at, place)
+    for k in range(len(order)):
+        first = k == 0 or chain[order[k - 1]] != chain[order[k]]
+        if first and (k + 1 == len(order) or chain[order[k + 1]] != chain[order[k]]):
+            ties[order[k]] = -1.0
+    return ties
 
 
 @kernel
@@ -106,6 +173,48 @@ def label_groups(parent: Integers) -> None:
     """Turn a union-find forest (n,) into labels, the lowest index of each group."""
     for i in range(len(parent)):
         parent[i] = _find(parent, i)
+
+
+@kernel
+def blend_walls(
+    walls: Records, lengths: Floats, order: Integers, chain: Integers, ties: Floats, lines: Records
+) -> None:
+    """Write the line of each wall with those that it is tied to, (m,) of `LINE`: their means, by length and tie.
+
+    `order` as of `tie_walls`.
+    """
+    for k in range(len(order)):
+        w = order[k]
+        dx = lengths[w] * walls[w].dx
+        dy = lengths[w] * walls[w].dy
+        x, y = middle_of(walls[w])
+        x *= lengths[w]
+        y *= lengths[w]
+        total = lengths[w]
+        for way in (-1, 1):
+            j = k + way
+            while 0 <= j < len(order) and abs(j - k) <= BLENDED_WALLS and chain[order[j]] == chain[w]:
+                v = order[j]
+                part = lengths[v] * math.exp(-abs(ties[v] - ties[w]))
+                dx += part * walls[v].dx
+                dy += part * walls[v].dy
+                at_x, at_y = middle_of(walls[v])
+                x += part * at_x
+                y += part * at_y
+                total += part
+                j += way
+        size = math.hypot(dx, dy)
+        line = lines[w]
+        line.dx = dx / size
+        line.dy = dy / size
+        line.offset = (line.dx * y - line.dy * x) / total
+
+
+@inlined
+def middle_of(wall: Record) -> tuple[float, float]:
+    """Return the midpoint of a wall, metres."""
+    middle = 0.5 * (wall.begin + wall.end)
+    return wall.dx * middle - wall.dy * wall.offset, wall.dy * middle + wall.dx * wall.offset
 
 
 @kernel

@@ -98,6 +98,7 @@ def hinges_of(*each: tuple[int, float, float]) -> Records:
     hinges = np.zeros(len(each), HINGE)
     for one, (wall, moves, deviation) in zip(hinges, each, strict=True):
         one["wall"], one["moves"], one["deviation"], one["dx"], one["dy"] = wall, moves, deviation, 0.6, 0.8
+        one["own"] = 1.0
     return hinges
 
 

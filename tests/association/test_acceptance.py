@@ -14,9 +14,10 @@ from association.explain import search_and_explain
 from association.tables import Lines
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
-from .answers import NO_PAIRS, SCAN, registered_room, settled_of
+from .answers import NO_PAIRS, SCAN, ranked, registered_room, settled_of
 from .kernels.drawn import in_pieces
 from .reference import acceptance as twin
+from .reference.consensus import matches_on
 from .scenes import INSIDE, ROOM, context_of, index_of, local, maze, pose, same_pose, scan_of, seen
 
 
@@ -59,8 +60,9 @@ def test_map_indices_are_those_that_were_sent() -> None:
 
 @pytest.mark.parametrize("estimator", ["joint", "one_step"])
 @pytest.mark.parametrize("rotation", ["wahba", "mitsuta"])
-def test_the_pose_is_that_of_registration(estimator: Any, rotation: Any) -> None:
-    """Of the pairs, with the error of the walls; by the joint estimator the settled one, else one of its own."""
+@pytest.mark.parametrize("fixed", [True, False])
+def test_the_pose_is_that_of_registration(estimator: Any, rotation: Any, fixed: bool) -> None:
+    """Of the pairs, with the error of the walls; where that is not fixed the settled one, by the joint estimator."""
     index = index_of(ROOM, 0.03)
     ends = SCAN.measured.segments.endpoints + np.random.default_rng(0).normal(size=(8, 4)) * 0.02
     measured = MeasuredSegments.from_segments(Segments.from_array(ends), 0.05)
@@ -68,15 +70,20 @@ def test_the_pose_is_that_of_registration(estimator: Any, rotation: Any) -> None
     truth = seen(ROOM, INSIDE)[1]
     pairs = np.stack([np.arange(8), truth], axis=1)
     at = pose(3.01, 2.52, 0.71)
-    settled = replace(settled_of(registered_room()), pose=local(index, at), wall_sigma=0.04)
-    got = register_accepted(context, replace(NO_PAIRS, pairs=pairs, overlaps=np.ones(8)), settled)
+    settled = replace(settled_of(registered_room()), pose=local(index, at), wall_sigma=0.04, free=not fixed)
+    walls = np.zeros(8, int)
+    walls[context.lines.row_of] = index.wall_of_piece[truth]
+    best = replace(ranked(), matches=matches_on(walls))
+    found = register_accepted(context, best, replace(NO_PAIRS, pairs=pairs, overlaps=np.ones(8)), settled)
     options = RegistrationOptions(estimator=estimator, rotation=rotation)
-    own = at if estimator == "joint" else None
-    expected = register(Segments.from_array(ROOM), measured, pairs, 0.04, options, own)
-    assert got is not None
+    own = at if estimator == "joint" and not fixed else None
+    expected = register(Segments.from_array(ROOM), measured, pairs, 0.03, options, own)
+    assert found is not None
+    got, registered = found
     assert got.pose == expected.pose
     assert got.pose is not None
-    assert same_pose(got.pose, at, 1e-9, 1e-9) is (estimator == "joint")
+    assert same_pose(context.in_map(registered.pose), got.pose, 1e-12, 1e-12) is (estimator == "joint")
+    assert same_pose(got.pose, at, 1e-9, 1e-9) is (own is not None)
     assert (got.diagnostics, got.weights.tolist()) == (expected.diagnostics, expected.weights.tolist())
 
 
@@ -99,4 +106,5 @@ def test_the_ways_to_register_differ() -> None:
 
 
 def test_without_pairs_there_is_no_pose() -> None:
-    assert register_accepted(context_of(index_of(ROOM), SCAN), NO_PAIRS, settled_of(registered_room())) is None
+    settled = settled_of(registered_room())
+    assert register_accepted(context_of(index_of(ROOM), SCAN), ranked(), NO_PAIRS, settled) is None

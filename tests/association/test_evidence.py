@@ -313,7 +313,8 @@ def test_a_reversed_segment_is_another_side_where_directions_mean_something() ->
     index = index_of(np.vstack([LOBBY, LOBBY[:2, [2, 3, 0, 1]]]))
     there_and_back = np.vstack([CORNER, CORNER[:, [2, 3, 0, 1]]])
     one, other = (answer_of(index, scan_of(ends)) for ends in (CORNER, there_and_back))
-    assert one.diagnostics is not None and other.diagnostics is not None
+    assert one.diagnostics is not None
+    assert other.diagnostics is not None
     assert other.diagnostics.score > one.diagnostics.score + 5.0
 
 

@@ -167,7 +167,7 @@ def on_walls(rng: np.random.Generator, views: Views) -> SeenOnWalls:
             one["spread"], one["variance"] = rng.uniform(0.1, 1.0), rng.uniform(1e-6, 1e-4)
             sights.append((one, w))
     of_wall = np.array([w for _, w in sights])
-    return SeenOnWalls.of(views, np.concatenate([one for one, _ in sights]), walls, of_wall)
+    return SeenOnWalls.of(views, np.concatenate([one for one, _ in sights]), walls[of_wall], of_wall)
 
 
 @pytest.mark.parametrize("chained", [True, False])

@@ -29,19 +29,6 @@ def sent(ends: np.ndarray) -> Records:
     return records
 
 
-def test_first_of_run() -> None:
-    """Each wall is passed once, however many are asked for."""
-    index = index_of([[0.0, 0.0, 2.0, 0.0], [3.0, 0.0, 5.0, 0.0], [6.0, 0.0, 8.0, 0.0], [0.0, 9.0, 2.0, 9.0]])
-    rows, known = index.walls.rows, np.zeros(4, np.int64)
-    alone = int(np.argmax(rows["offset"]))
-    first, middle, last = (int(w) for w in np.argsort(rows["begin"], kind="stable") if w != alone)
-    assert [acceptance.first_of_run(rows, w, known) for w in (middle, last, first, alone)] == [first] * 3 + [alone]
-    assert known[[middle, last]].tolist() == [1 + first] * 2
-    broken = rows.copy()
-    broken["before"][middle] = -1
-    assert acceptance.first_of_run(broken, last, known) == first
-
-
 @given(SEEDS)
 @settings(max_examples=15, deadline=None)
 def test_accept_matches(seed: int) -> None:
@@ -78,14 +65,19 @@ def accepted_on(walls: list[list[float]], *segments: list[float]) -> tuple[np.nd
     )  # fmt: skip
 
 
-def test_only_long_segments_are_accepted_on_both_sides_of_a_doorway() -> None:
+def test_a_segment_is_accepted_on_both_sides_of_a_doorway() -> None:
+    """On the side where most of it lies, and what lies on the other side counts for its overlap."""
     walls = [[0.0, 0.0, 4.0, 0.0], [4.4, 0.0, 8.0, 0.0]]
-    pairs, overlaps, rivals, _ = accepted_on(walls, [2.5, 0.0, 5.5, 0.0])  # 3 m: not long
-    assert (pairs.tolist(), rivals.tolist()) == ([[0, 0]], [])
-    assert overlaps[0] == pytest.approx(1.5 / 3.0)
     pairs, overlaps, rivals, _ = accepted_on(walls, [2.375, 0.0, 5.5, 0.0])
     assert (pairs.tolist(), rivals.tolist()) == ([[0, 0]], [1])
     assert overlaps[0] == pytest.approx((1.625 + 1.1) / 3.125)
+
+
+@pytest.mark.parametrize(("step", "others"), [(0.05, [1]), (0.09, [])])
+def test_a_segment_is_accepted_on_walls_that_are_nearly_one(step: float, others: list[int]) -> None:
+    pairs, overlaps, rivals, _ = accepted_on([[0.0, 0.0, 4.0, 0.0], [4.0, step, 8.0, step]], [1.0, 0.0, 5.0, 0.0])
+    assert (pairs.tolist(), rivals.tolist()) == ([[0, 0]], others)
+    assert overlaps[0] == pytest.approx(1.0 if others else 0.75)
 
 
 def test_segments_of_one_line_are_accepted_one_by_one() -> None:

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 
 from association.kernels.measures import paper_measures
 from association.layout import POSE_AMONG_WALLS, Integers
-from association.tuning import ROUGHNESS
 from registration import Correspondences, MeasuredSegments, OneStepSums, Segments
 from registration.layout import Floats, Records
 
 from ..reference.consensus import matches_on
 from ..reference.geometry import normal
+from ..reference.settling import registering
 from .drawn import SEEDS
-from .test_settling import Set, some
+from .test_settling import Set, known_walls, some
 
 
 def ends(rows: Records, middles: Floats, lengths: Floats) -> Floats:
@@ -33,8 +33,8 @@ def sums_of(one: Set, wall_sigma: float) -> OneStepSums:
     seen = Segments.from_array(ends(lines, np.stack([lines["x"], lines["y"]], axis=1), lines["length"]))
     rows = np.repeat(np.arange(len(lines)), 2).reshape(-1, 2)
     pairs = Correspondences.of(drawn, MeasuredSegments.from_segments(seen, 0.01), rows)
-    variances = 1.0 / lines["weight"] - ROUGHNESS**2 + wall_sigma**2
-    return OneStepSums.of_set(pairs, 1.0 / variances, one.start)
+    weights = registering(one.scan, one.held, wall_sigma**2)["weight"][one.held >= 0]
+    return OneStepSums.of_set(pairs, weights, one.start)
 
 
 def measures_at(one: Set, held: Integers, wall_sigma: float) -> list[float]:
@@ -42,7 +42,7 @@ def measures_at(one: Set, held: Integers, wall_sigma: float) -> list[float]:
     at = one.start
     poses = np.array([(0.0, 0.0, 0.0, 0.01), (at.theta, at.x, at.y, wall_sigma)], POSE_AMONG_WALLS)
     matches = np.stack([matches_on(one.held[::-1]), matches_on(held)])
-    found: list[float] = paper_measures(one.scan, matches, one.walls, poses)[1].tolist()
+    found: list[float] = paper_measures(one.scan, matches, known_walls(one), poses)[1].tolist()
     return found
 
 

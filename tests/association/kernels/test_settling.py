@@ -45,7 +45,7 @@ class Set:
 
 
 def known_walls(one: Set, map_variance: float = -1.0) -> KnownWalls:
-    return KnownWalls(one.walls, map_variance, most_parallel_up_to(len(one.scan)))
+    return KnownWalls(one.walls, np.full(len(one.walls), -1.0), map_variance, most_parallel_up_to(len(one.scan)))
 
 
 def laid_on(walls: Records, held: Integers, at: RigidTransform, d: Drawn, wall_error: float, noise: float) -> Records:

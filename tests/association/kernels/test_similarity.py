@@ -18,7 +18,7 @@ from ..reference.consensus import matches_on
 from ..reference.geometry import direction, normal, point, wrap
 from ..reference.settling import pairs_of
 from .drawn import ASKED, SEEDS
-from .test_settling import Set, some
+from .test_settling import Set, known_walls, some
 
 FACTORS = (0.97, 0.99, 1.0, 1.01, 1.03)
 
@@ -36,7 +36,7 @@ def settled(one: Set) -> tuple[float, Floats, Floats]:
     solution, covariance = np.zeros(4), np.zeros((4, 4))
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = matches_on(one.held)
-    variance, _ = settle_similarity(question, one.walls, matches, solution, covariance, work)
+    variance, _ = settle_similarity(question, known_walls(one), matches, solution, covariance, work)
     return variance, solution, covariance
 
 

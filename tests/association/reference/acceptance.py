@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from association.tables import Lines, Pieces
-from association.tuning import BLOCKING_RAYS, BRIDGING, MAX_RIVALS
+from association.tuning import BLOCKING_RAYS, MAX_RIVALS
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -23,14 +23,12 @@ def pieces_of(pieces: Pieces, wall: int) -> list[int]:
     return [int(piece) for piece in pieces.items[pieces.starts[wall] : pieces.starts[wall + 1]]]
 
 
-def run_of(walls: Records, wall: int) -> list[int]:
-    """List the walls of a run, by the neighbours that they name."""
-    run = [wall]
-    while walls[run[0]]["before"] >= 0:
-        run.insert(0, int(walls[run[0]]["before"]))
-    while walls[run[-1]]["after"] >= 0:
-        run.append(int(walls[run[-1]]["after"]))
-    return run
+def chain_of(walls: Records, first: int) -> list[int]:
+    """List the walls of a chain from its first on, by the neighbours that they name."""
+    chain = [first]
+    while walls[chain[-1]]["after"] >= 0:
+        chain.append(int(walls[chain[-1]]["after"]))
+    return chain
 
 
 def accept_matches(
@@ -43,12 +41,13 @@ def accept_matches(
         wall = int(matched[row])
         if wall < 0:
             continue
-        run = run_of(walls, wall) if lines.rows["length"][row] > BRIDGING else [wall]
-        d = direction(walls[run[0]])
+        chain = chain_of(walls, int(pieces.firsts[wall]))
+        d = direction(walls[chain[0]])
         low, high = sorted(pose.apply(scan_ends[i].reshape(2, 2)) @ d)
-        spans = {p: sorted(piece_ends[p] @ d) for w in run for p in pieces_of(pieces, w)}
+        spans = {p: sorted(piece_ends[p] @ d) for w in chain for p in pieces_of(pieces, w)}
         lies_on = {p: min(last, high) - max(first, low) for p, (first, last) in spans.items()}
-        most = max(spans, key=lambda p: (lies_on[p], -p))
+        own = {p for p in pieces_of(pieces, wall) if lies_on[p] > 0.0}
+        most = max(own or spans, key=lambda p: (lies_on[p], -p))
         points = low + (high - low) * (np.arange(SAMPLES) + 0.5) / SAMPLES
         on_any = np.any([(points >= first) & (points <= last) for first, last in spans.values()], axis=0)
         others = [p for p in spans if p != most and lies_on[p] > 0.0]

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from association.layout import MATCH, MODEL, Integers
 from association.tables import Place
-from association.tuning import MAX_STEP, MAX_TURN, SPRING
+from association.tuning import MAX_STEP, MAX_TURN, SAME_SHIFT, SPRING
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 
@@ -38,14 +38,29 @@ class Pairs:
     covariance: Floats
 
     @classmethod
-    def of(cls, scan: Records, held: Integers, walls: Records, wall_variance: float) -> Pairs:
-        """Take the scan lines on a wall; `held` (n,) is the wall of each or -1."""
+    def of(
+        cls,
+        scan: Records,
+        held: Integers,
+        walls: Records,
+        wall_variance: float,
+        ties: Floats | None = None,
+        shifts: Floats | None = None,
+    ) -> Pairs:
+        """Take the scan lines on a wall; `held` (n,) is the wall of each or -1.
+
+        The errors of walls are correlated by their ties; the line that a scan line lies on is beside its wall by its
+        shift, (n,).
+        """
         on = np.asarray(held) >= 0
         chosen, wall = scan[on], held[on]
         own = np.diag(np.tile(1.0 / chosen["weight"], 2))
         common = np.zeros_like(own)
-        common[: len(wall), : len(wall)] = wall_variance * (wall[:, None] == wall[None, :])
-        return cls(chosen, walls[wall], own + common)
+        common[: len(wall), : len(wall)] = wall_variance * correlations(wall, walls, ties)
+        lines = walls[wall]
+        if shifts is not None:
+            lines["offset"] += shifts[on]
+        return cls(chosen, lines, own + common)
 
     def residuals(self, at: RigidTransform) -> Floats:
         """Return the residuals at a pose, (2 n,) metres."""
@@ -91,6 +106,13 @@ class Pairs:
         return np.asarray(j.T @ np.linalg.solve(self.covariance, j))
 
 
+def correlations(wall: Integers, walls: Records, ties: Floats | None) -> Floats:
+    """Return how the errors of some walls (n,) are correlated, (n, n); without ties only with themselves."""
+    places = (np.full(len(walls), -1.0) if ties is None else ties)[wall]
+    apart = np.where(np.minimum.outer(places, places) < 0.0, np.inf, np.abs(places[:, None] - places))
+    return np.exp(-np.where(wall[:, None] == wall, 0.0, apart))
+
+
 @dataclass(frozen=True)
 class Solved:
     """Where pairs cost least, held by the spring to where the search began."""
@@ -100,9 +122,9 @@ class Solved:
     cost: float
 
 
-def solve(pairs: Pairs, start: RigidTransform) -> Solved:
-    """Minimise cost and spring by the method of Levenberg and Marquardt from `start`."""
-    whitening, spring = np.linalg.inv(np.linalg.cholesky(pairs.covariance)), math.sqrt(SPRING)
+def solve(pairs: Pairs, start: RigidTransform, held: float = SPRING) -> Solved:
+    """Minimise cost and spring by the method of Levenberg and Marquardt from `start`, which that holds so, 1/m^2."""
+    whitening, spring = np.linalg.inv(np.linalg.cholesky(pairs.covariance)), math.sqrt(held)
 
     def residuals(x: Floats) -> Floats:
         return np.concatenate(
@@ -124,16 +146,20 @@ def freedom_taken(information: Floats, model: Record) -> float:
     return 0.5 * float(np.log(np.linalg.det(np.eye(3) + information @ s)))
 
 
-def value_pairs(scan: Records, at: RigidTransform, walls: Records, wall_variance: float, matches: Records) -> float:
+def value_pairs(scan: Records, at: RigidTransform, place: Place, wall_variance: float, matches: Records) -> float:
     """Give each match what the set loses without it at this pose; what is worth nothing is no match."""
     held = matches["wall"].copy()
-    whole = Pairs.of(scan, held, walls, wall_variance).cost(at)
+
+    def cost(held: Integers) -> float:
+        return Pairs.of(scan, held, place.walls, wall_variance, place.ties, matches["shift"]).cost(at)
+
+    whole = cost(held)
     matches["worth"] = 0.0
     total = 0.0
     for i in np.nonzero(held >= 0)[0]:
         others = np.where(np.arange(len(held)) == i, -1, held)
-        gain = float(scan["gain"][i] * matches["overlap"][i])
-        worth = gain - 0.5 * (whole - Pairs.of(scan, others, walls, wall_variance).cost(at))
+        gain = float(matches["gain"][i])
+        worth = gain - 0.5 * (whole - cost(others))
         if worth > 0.0:
             matches["worth"][i] = worth
             total += gain
@@ -173,10 +199,16 @@ def refine(
     variance = float(model["wall_variance"][0])
     pose, covariance = start, spread
     held, cost, information, free = np.full(len(scan), -1), 0.0, np.zeros((3, 3)), False
+    shifts = np.zeros(len(scan))
+
+    def matched() -> Records:
+        found, _ = match_scan(scan, pose, covariance, place, gates)
+        found["gain"] = np.maximum(0.0, found["gain"] - 0.5 * scan["weight"] * found["uneven"])
+        return found
 
     def moved() -> bool:
         nonlocal pose, covariance, cost, information, free
-        pairs = Pairs.of(scan, held, place.walls, variance)
+        pairs = Pairs.of(scan, held, place.walls, variance, place.ties, shifts)
         solved = solve(pairs, pose)
         information, covariance = solved.information, np.asarray(np.linalg.inv(solved.information))
         free = free or bool(np.trace(covariance) > 0.1 / SPRING)
@@ -187,17 +219,18 @@ def refine(
         return near
 
     for _ in range(rounds):
-        matches, _ = match_scan(scan, pose, covariance, place, gates)
-        if (matches["wall"] == held).all():
+        matches = matched()
+        if (matches["wall"] == held).all() and (abs(matches["shift"] - shifts)[held >= 0] <= SAME_SHIFT).all():
             break
-        held = matches["wall"].copy()
+        held, shifts = matches["wall"].copy(), matches["shift"].copy()
         if not (held >= 0).any():
             return Refined(0.0, pose, covariance, matches, free=free)
         if not moved():
             break
-    matches, _ = match_scan(scan, pose, covariance, place, gates)
+    matches = matched()
     before, grown = held, matches["wall"].copy()
-    gain = value_pairs(scan, pose, place.walls, variance, matches)
+    shifts = matches["shift"].copy()
+    gain = value_pairs(scan, pose, place, variance, matches)
     held = matches["wall"].copy()
     if not (held >= 0).any():
         return Refined(0.0, pose, covariance, matches, free=free)
@@ -214,9 +247,11 @@ def model_of(wall_variance: float, free_distance: float, free_angle: float) -> R
     return model
 
 
-def matches_on(walls: Integers) -> Records:
-    """Return whole matches with these walls, or -1."""
+def matches_on(walls: Integers, scan: Records | None = None) -> Records:
+    """Return whole matches with these walls, or -1, of the lines of a scan where they are to gain something."""
     matches = np.zeros(len(walls), MATCH)
     matches["wall"] = walls
     matches["overlap"] = matches["wall"] >= 0
+    if scan is not None:
+        matches["gain"] = scan["gain"] * matches["overlap"]
     return matches

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from association.layout import MATCH, Integers
 from association.tables import Place, Raster
-from association.tuning import BRIDGING, NARROW_REACH, SECTORS
+from association.tuning import (
+    APART_GAP,
+    APART_STEP,
+    FLAT_GATE,
+    FLAT_STEP,
+    LONG_BRIDGE,
+    NARROW_REACH,
+    OVERLAP_TAPER,
+    SECTORS,
+    SHORT_BRIDGE,
+    WHOLE_GAP,
+)
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 
@@ -22,7 +34,7 @@ def match_scan(
     matches = np.zeros(len(scan), MATCH)
     for segment, match in zip(scan, matches, strict=True):
         _match_segment(segment, pose, covariance, place, gates[0], match)
-    return matches, float(scan["gain"] @ matches["overlap"])
+    return matches, float(matches["gain"].sum())
 
 
 def _match_segment(
@@ -41,39 +53,92 @@ def _match_segment(
         offset = float(normal(wall) @ middle - wall["offset"])
         if abs(offset) > offset_gate or direction(wall) @ d < 1.0 - 0.5 * angle_gate**2:
             continue
-        overlap = min(1.0, covered(place.walls, wall, middle, segment["length"]) / segment["length"])
-        cost = abs(offset) / offset_gate + 1.0 - overlap
+        under = Under.of(place.walls, w, middle, d, float(segment["length"]), offset_gate)
+        if under is None:
+            continue
+        overlap = min(1.0, under.covered / segment["length"])
+        cost = abs(offset - under.shift) / offset_gate + 1.0 - overlap
         if overlap >= gate["least_overlap"] and cost < least:
-            least = cost
-            match["wall"], match["offset"], match["overlap"] = w, offset, overlap
-            match["sine"] = n @ direction(wall)
+            least, sine = cost, float(n @ direction(wall))
+            match["wall"], match["offset"], match["overlap"] = w, offset - under.shift, overlap
+            match["sine"], match["shift"], match["uneven"] = sine, under.shift, under.uneven
+            taper = min(OVERLAP_TAPER, 1.0 - gate["least_overlap"])
+            match["gain"] = segment["gain"] * overlap * min(1.0, (overlap - gate["least_overlap"]) / taper)
+            match["gain"] *= fade(abs(offset) / offset_gate, FLAT_GATE, 1.0)
+            match["gain"] *= fade(abs(sine) / angle_gate, FLAT_GATE, 1.0)
+
+
+def fade(value: float, whole: float, apart: float) -> float:
+    """Return Tukey's biweight of what is beyond `whole`."""
+    beyond = min(1.0, max(0.0, value - whole) / (apart - whole))
+    return float((1.0 - beyond**2) ** 2)
 
 
 def _gate(gate: Record, what: str, variance: float) -> float:
     return float(np.clip(gate["sigmas"] * math.sqrt(variance), gate[f"least_{what}"], gate[f"greatest_{what}"]))
 
 
-def covered(walls: Records, wall: Record, middle: Floats, length: float) -> float:
-    """Return how much of a segment lies on a wall, and if it is long on others of the run, less the gaps between."""
-    half = 0.5 * length
+@dataclass(frozen=True)
+class Under:
+    """What lies under a segment on a wall and its chain: what counts as covered, and where the line of these is."""
 
-    def span(one: Record) -> tuple[float, float]:
-        along = direction(one) @ middle
-        return one["begin"] - along, one["end"] - along
+    covered: float
+    shift: float
+    uneven: float
 
-    begin, end = span(wall)
-    total = min(end, half) - max(begin, -half)
-    if length <= BRIDGING or total <= 0.0:
-        return float(total)
-    for neighbour, sign, edge in (("before", -1.0, -begin), ("after", 1.0, end)):
-        w = int(wall[neighbour])
-        while w >= 0:
-            near, far = sorted(sign * x for x in span(walls[w]))
-            if near >= half:
-                break
-            total += min(far, half) - near - (near - edge)
-            edge, w = far, int(walls[w][neighbour])
-    return float(total)
+    @classmethod
+    def of(cls, walls: Records, w: int, middle: Floats, d: Floats, length: float, gate: float) -> Under | None:
+        """Follow the chain both ways; None where nothing of the segment is on the wall itself."""
+        half, wall = 0.5 * length, walls[w]
+        begin, end = _span(wall, middle)
+        own = min(end, half) - max(begin, -half)
+        if own <= 0.0:
+            return None
+        covered, parts = own, [(own, 0.0)]
+        for sign, edge in ((-1.0, -begin), (1.0, end)):
+            more, there = _followed(walls, w, middle, d, length, gate, sign, edge)
+            covered += more
+            parts += there
+        weights, besides = np.array(parts).T
+        shift = float(np.average(besides, weights=weights))
+        return cls(float(covered), shift, float(np.average((besides - shift) ** 2, weights=weights)))
+
+
+def _span(wall: Record, middle: Floats) -> tuple[float, float]:
+    along = direction(wall) @ middle
+    return float(wall["begin"] - along), float(wall["end"] - along)
+
+
+def _followed(
+    walls: Records, w: int, middle: Floats, d: Floats, length: float, gate: float, sign: float, reach: float
+) -> tuple[float, list[tuple[float, float]]]:
+    """Return by how much more is covered that way, as far as it is to the good, and the parts with how far beside."""
+    half, counts, net = 0.5 * length, 1.0, 0.0
+    parts: list[tuple[float, float]] = []
+    best: tuple[float, list[tuple[float, float]]] = 0.0, []
+    bridges = float(np.clip((length - SHORT_BRIDGE) / (LONG_BRIDGE - SHORT_BRIDGE), 0.0, 1.0))
+    v = int(walls[w]["after" if sign > 0.0 else "before"])
+    while v >= 0 and reach < half:
+        near, far = sorted(sign * x for x in _span(walls[v], middle))
+        if near >= half:
+            break
+        if near > reach:
+            whole = fade(near - reach, WHOLE_GAP, APART_GAP)
+            counts *= whole + (1.0 - whole) * bridges
+            net += counts * (near - reach) * (2.0 * whole - 1.0)
+        low, high = max(near, reach), min(far, half)
+        if high > low:
+            at = middle + sign * 0.5 * (low + high) * d
+            off, own = (float(normal(walls[k]) @ at - walls[k]["offset"]) for k in (v, w))
+            part = counts * (high - low) * fade(abs(off) / gate, FLAT_GATE, 1.0)
+            part *= fade(abs(own - off), FLAT_STEP, APART_STEP)
+            net += part
+            parts = [*parts, (part, own - off)]
+            if net > best[0]:
+                best = net, parts
+            reach = far
+        v = int(walls[v]["after" if sign > 0.0 else "before"])
+    return best
 
 
 def gates_about(scan: Records, theta_var: float, pin: Floats, slip: float, gates: Records) -> tuple[Floats, Integers]:

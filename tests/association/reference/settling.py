@@ -24,6 +24,7 @@ from association.tuning import (
 )
 from registration import RigidTransform
 from registration.layout import Floats, Records
+from registration.observability import MAX_DEVIATION, most_parallel
 
 from .consensus import Pairs, solve
 from .geometry import wrap
@@ -113,9 +114,20 @@ def settle(scan: Records, held: Integers, walls: Records, start: RigidTransform,
             variance = estimated_variance(at, scan, held, walls, variance)
     weakest, along = moved(pairs_of(scan, held, walls, max(variance, COMMON_WALL_ERROR**2)), pose).weakest
     at = moved(pairs_of(scan, held, walls, variance), pose)
-    return Settled(
-        at, variance, weakest, along, unlike(scan, held, walls, variance), hinges(scan, held, walls, at, variance)
-    )
+    apart, without = unlike(scan, held, walls, variance), hinges(scan, held, walls, at, variance)
+    if apart > most_parallel(int((held >= 0).sum())) and weakest <= MAX_DEVIATION:
+        found = solve(Pairs.of(registering(scan, held, variance), held, walls, 0.0), at.pose, 0.0)
+        at = Moved(found.pose, np.asarray(np.linalg.inv(found.information)), near=True)
+    return Settled(at, variance, weakest, along, apart, without)
+
+
+def registering(scan: Records, held: Integers, variance: float) -> Records:
+    """Return the lines with the weights that they register with: lines on one wall share its error."""
+    out, alone = scan.copy(), 1.0 / (1.0 / scan["weight"] - ROUGHNESS**2)
+    for w in set(held[held >= 0].tolist()):
+        on = held == w
+        out["weight"][on] = alone[on] / (1.0 + variance * alone[on].sum())
+    return out
 
 
 def hinges(scan: Records, held: Integers, walls: Records, at: Moved, variance: float) -> list[Hinge]:
