@@ -82,10 +82,10 @@ def bare_up_to(along: PiecesAlong, x: float) -> float:
 def pieces_under(along: PiecesAlong, low: float, high: float, own: int, named: Indices) -> tuple[int, int]:
     """Find the pieces between two abscissae, and the one of them with the greatest overlap, of equal ones the first.
 
-    Pieces of the wall `own` come before those of others. Writes the first of them to `named` (`MAX_RIVALS` + 1,).
-    Returns the place of the one with the greatest overlap, or of the nearest one where none overlaps, and how many are
-    named. At most `MOST_UNDER` pieces are compared, and of those that begin before always the one that reaches
-    farthest.
+    One of the wall `own` on which more than half lies comes before those of others. Writes the first of them to `named`
+    (`MAX_RIVALS` + 1,). Returns the place of the one with the greatest overlap, or of the nearest one where none
+    overlaps, and how many are named. At most `MOST_UNDER` pieces are compared, and of those that begin before always
+    the one that reaches farthest.
     """
     after = begun(along, high)
     before = begun(along, low)
@@ -94,7 +94,8 @@ def pieces_under(along: PiecesAlong, low: float, high: float, own: int, named: I
     if best < 0.0 and after < len(along.place) and high - along.low[along.place[after]] > best:
         most = along.place[after]
         best = high - along.low[most]
-    is_own = best > 0.0 and along.wall[most] == own
+    half = 0.5 * (high - low)
+    is_own = best > half and along.wall[most] == own
     count = 0
     # Backwards, as long as something before reaches so far.
     k = after - 1
@@ -102,7 +103,7 @@ def pieces_under(along: PiecesAlong, low: float, high: float, own: int, named: I
         place = along.place[k]
         k -= 1
         overlap = min(along.high[place], high) - max(along.low[place], low)
-        on_own = overlap > 0.0 and along.wall[place] == own
+        on_own = overlap > half and along.wall[place] == own
         longer = overlap > best or (overlap == best and along.piece[place] < along.piece[most])
         if (on_own and not is_own) or (on_own == is_own and longer):
             best = overlap

@@ -46,7 +46,7 @@ def accept_matches(
         low, high = sorted(pose.apply(scan_ends[i].reshape(2, 2)) @ d)
         spans = {p: sorted(piece_ends[p] @ d) for w in chain for p in pieces_of(pieces, w)}
         lies_on = {p: min(last, high) - max(first, low) for p, (first, last) in spans.items()}
-        own = {p for p in pieces_of(pieces, wall) if lies_on[p] > 0.0}
+        own = {p for p in pieces_of(pieces, wall) if lies_on[p] > 0.5 * (high - low)}
         most = max(own or spans, key=lambda p: (lies_on[p], -p))
         points = low + (high - low) * (np.arange(SAMPLES) + 0.5) / SAMPLES
         on_any = np.any([(points >= first) & (points <= last) for first, last in spans.values()], axis=0)
