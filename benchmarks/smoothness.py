@@ -98,7 +98,8 @@ def _room(rng: np.random.Generator) -> Floats:
     x, y = rng.uniform(0.3, 0.6) * width, rng.uniform(0.3, 0.6) * height
     u, v = rng.uniform(0.2, 0.8, 2)
     pillar = [(x, y), (x, y + v), (x + u, y + v), (x + u, y)]
-    return np.round(np.vstack([_outline(corners), _outline(pillar)]), 3)
+    drawn: Floats = np.vstack([_outline(corners), _outline(pillar)])
+    return np.asarray(np.round(drawn, 3), np.float64)
 
 
 def _outline(corners: Iterable[tuple[float, float]]) -> Floats:

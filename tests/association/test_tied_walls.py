@@ -45,7 +45,7 @@ def one_wall(index: MapIndex, first: int = 0, second: int = 1) -> float:
 def test_pieces_of_one_line_are_one_wall_and_others_are_not() -> None:
     assert len(set(index_of(stepped(0.0)).wall_of_piece[:2])) == 1
     assert len(set(index_of(stepped(1e-3)).wall_of_piece[:2])) == 2
-    assert len(set(index_of(stepped(5e-5), 0.0001).wall_of_piece[:2])) == 2, "the map says that it is more exact"
+    assert len(set(index_of(stepped(5e-5), 0.0001).wall_of_piece[:2])) == 2, "the declared deviation is smaller"
 
 
 def test_walls_are_one_the_less_the_larger_the_step_or_the_gap_is() -> None:
@@ -113,7 +113,7 @@ def test_the_correspondences_of_an_answer_register_to_its_pose(seed: int, sigma:
 @pytest.mark.parametrize("sigma", [None, 0.01])
 @pytest.mark.parametrize("seed", range(4))
 def test_with_their_weights_they_do_where_pairs_share_a_wall(seed: int, sigma: float | None) -> None:
-    """Cut, repeated and with steps, and where nobody says how far the map is off."""
+    """Cut, repeated and with steps, and where the error of the map is estimated."""
     rng = np.random.default_rng(seed)
     walls = stepped(0.02)
     ends = of_hall(seed).measured.segments.endpoints
