@@ -92,12 +92,12 @@ class Health:
         if not changed and now - self._beat < 1.0:
             return
         self._beat = now
-        self.publish("localization", stamp, SAID[state], {"state": state.value, **values})
+        values = {"state": state.value, **values}
+        self.publish("localization", stamp, SAID[state], values)
+        prefix, hardware_id = self.names
+        self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, SAID[state], values))
         if changed:
             self._state = state
-            prefix, hardware_id = self.names
-            told = {"state": state.value, **values}
-            self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, SAID[state], told))
             self.log(f"state {state.value}: {SAID[state][1]}")
 
 

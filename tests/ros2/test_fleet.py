@@ -117,8 +117,7 @@ def test_a_pose_that_is_contradicted_is_reported_and_corrected(domain: int, room
             robot.scans.publish(scan_from(there, clock[0]))
             time.sleep(0.1)
 
-        contradicted = robot.until(robot.status, play)
-        assert contradicted.level == 2
+        contradicted = robot.until(robot.status, play, lambda one: one.level == 2)
         assert "contradicted" in contradicted.message
         corrected = robot.until(robot.initial, play)
     assert math.hypot(corrected.pose.pose.position.x - 2.0, corrected.pose.pose.position.y - 4.0) < 0.03
