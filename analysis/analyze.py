@@ -43,8 +43,8 @@ class PlaceVerdict:
         Of the answer; ambiguous where that is another place, however sure the search was.
     usable : bool
         Whether the answer was usable, and this place.
-    probability : float
-        As answered, 0 to 1.
+    probability : float or None
+        As answered, 0 to 1; None where the position stays free along a direction.
     look_alike : RigidTransform or None
         Another place that explains the scan about as well, or was taken for this one.
     unobservable : (float, float) or None
@@ -62,7 +62,7 @@ class PlaceVerdict:
     pose: RigidTransform
     status: Status
     usable: bool
-    probability: float
+    probability: float | None
     look_alike: RigidTransform | None
     unobservable: tuple[float, float] | None
     reasons: tuple[str, ...]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,7 @@ from .tuning import (
     CONTRADICTION,
     DISTINCT_ANGLE,
     DISTINCT_DISTANCE,
+    FAR_BEHIND,
     FEW_BEAMS,
     INSIDE,
     LATE_CANDIDATES,
@@ -193,6 +195,46 @@ def match_again(context: SearchContext, explanations: Sequence[Ranked]) -> Recor
         When the deadline was cancelled.
     """
     return _score(context, poses_of(explanations)).merits
+
+
+def with_lines_of_sight(
+    context: SearchContext, explanations: Sequence[Ranked], others: Iterable[Ranked]
+) -> Iterator[Ranked]:
+    """Yield some of the explanations with what lines of sight speak against them, within the window first, by value.
+
+    The models of the verdict were fitted to scores without it for poses that are far behind. Scores that are returned
+    include it; explanations whose score falls to zero are left out.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    least = max((one.score for one in explanations), default=0.0) - FAR_BEHIND
+    if not len(context.lines_of_sight.seen) or context.too_late_to_look:
+        least = -math.inf
+    waiting: list[Ranked] = []
+    for one in others:
+        # No later value exceeds the one that it has without lines of sight.
+        while waiting and _place(waiting[0]) <= _place(one):
+            yield waiting.pop(0)
+        spared = one.blocked == 0.0 and one.score <= least
+        seen = _charged(context, one) if spared else one
+        if seen.score > 0.0:
+            waiting.append(seen)
+            waiting.sort(key=_place)
+    yield from waiting
+
+
+def _charged(context: SearchContext, one: Ranked) -> Ranked:
+    """Return an explanation with what lines of sight speak against it."""
+    blocked = float(_score(context, one.estimate.copy()).merits["blocked"][0])
+    return replace(one, score=one.score - blocked, value=one.value - blocked, blocked=blocked)
+
+
+def _place(one: Ranked) -> tuple[bool, float]:
+    """Return what orders explanations."""
+    return not one.inside, -one.value
 
 
 def poses_of(explanations: Sequence[Ranked]) -> Records:

@@ -49,9 +49,10 @@ class Standing:
     off_scale: bool = False
 
 
+INCOMPLETE = "search_incomplete"
 SENTENCES: Mapping[str, str] = {
     "prior_contradicted": "The prior and the scan do not agree on where the robot is.",
-    "search_incomplete": "The deadline, or too many walls in one place of the map, ended the search; a better pose may "
+    INCOMPLETE: "The deadline, or too many walls in one place of the map, ended the search; a better pose may "
     "have been missed.",
     "free_direction": "The walls that were seen leave the position free along one direction.",
     "elsewhere": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
@@ -95,7 +96,7 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
     if standing.contradicted:
         codes.append("prior_contradicted")
     if not standing.complete:
-        codes.append("search_incomplete")
+        codes.append(INCOMPLETE)
     if standing.elsewhere or (standing.mirrored and standing.status is Status.AMBIGUOUS):
         codes.append("elsewhere")
     if standing.status is Status.DEGENERATE:

@@ -17,7 +17,7 @@ from .context import SearchContext
 from .explanations import Answer, Explanations
 from .kernels.measures import paper_measures
 from .layout import POSE_AMONG_WALLS
-from .ranking import Ranked, matches_of
+from .ranking import Ranked, matches_of, with_lines_of_sight
 from .result import (
     Alternative,
     AssociationDiagnostics,
@@ -61,7 +61,7 @@ def report(
         missing_map=tuple(i for i in _missing_map(context, answer) if i not in on_map),
         diagnostics=_diagnostics(context, answer, verdict),
         reasons=verdict.reasons,
-        alternatives=_alternatives(context, explanations.others, usable=verdict.usable),
+        alternatives=_alternatives(context, explanations, explanations.others, usable=verdict.usable),
         search=explanations.search,
         warnings=warnings_of(context, explanations.search, verdict, causes, factor),
     )
@@ -90,7 +90,7 @@ def _no_match(
         missing_map=(),
         diagnostics=None,
         reasons=verdict.reasons,
-        alternatives=_alternatives(context, explanations.ranked, usable=False),
+        alternatives=_alternatives(context, explanations, explanations.ranked, usable=False),
         search=explanations.search,
         warnings=warnings_of(context, explanations.search, verdict, causes),
     )
@@ -127,10 +127,12 @@ def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
     return missing_segments(context, answer.best) if "missing_map" in context.options.parts else ()
 
 
-def _alternatives(context: SearchContext, others: Iterable[Ranked], *, usable: bool) -> tuple[Alternative, ...]:
+def _alternatives(
+    context: SearchContext, explanations: Explanations, others: Iterable[Ranked], *, usable: bool
+) -> tuple[Alternative, ...]:
     if usable and "alternatives" not in context.options.parts:
         return ()
-    shown = tuple(islice(others, context.options.max_alternatives))
+    shown = tuple(islice(with_lines_of_sight(context, explanations.ranked, others), context.options.max_alternatives))
     if not shown:
         return ()
     settled = settle(context, shown)

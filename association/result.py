@@ -94,9 +94,10 @@ class AssociationDiagnostics:
         Log-likelihood over that of a scan that is all clutter, nats, by the sums at the estimator's pose. What judges
         and orders is that of the joint estimator, from which `runner_up` and `margin` come.
     runner_up : float or None
-        Score of the best other pose over that of the best, never below 0; None when there is no other.
+        Score of the best other pose over that of the best, never below 0; None where no other pose was found, that is
+        none above `SearchReport.rivals_above` of the score.
     margin : float or None
-        Score of the best less that of the best other pose, nats.
+        Score of the best less that of the best other pose, nats; None likewise.
     significance : float
         Probability that chance scores as high; small is good.
     hinges_on : Hinge or None
@@ -180,8 +181,9 @@ class AssociationResult:
     status : Status
     usable : bool
         The one flag to gate on.
-    probability : float
-        Calibrated chance that the pose is right, 0 to 1.
+    probability : float or None
+        Calibrated probability that the pose is right, 0 to 1; 0 for `no_match`, None for `degenerate`: the position is
+        open along `unobservable`, and the pose is one of a family.
     pose : RigidTransform or None
         None for `no_match`.
     covariance : (3, 3) or None
@@ -205,7 +207,7 @@ class AssociationResult:
 
     status: Status
     usable: bool
-    probability: float
+    probability: float | None
     pose: RigidTransform | None
     covariance: Floats | None
     unobservable: tuple[float, float] | None

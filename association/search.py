@@ -8,6 +8,7 @@ from .candidates import find_candidates
 from .causes import find_causes
 from .context import SearchContext
 from .explain import explain
+from .last_view import search_last_view
 from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, Prior
 from .report import report
@@ -32,7 +33,8 @@ def associate(
     2. Explain: rank the best poses with the lines of sight, the beams and the prior, and work out the best of them.
     3. Search again to scale, where the best explanation says that scan and map differ by a factor near one.
     4. Judge: how likely the best explanation is right, and whether a robot may use it.
-    5. Find causes, where it may not: search the scan without each of a caller's usual mistakes.
+    5. Search the last view of a drive alone, where the drive may not be used: its answer stands where both agree.
+    6. Find causes, where it may not: search the scan without each of a caller's usual mistakes.
 
     Parameters
     ----------
@@ -60,5 +62,9 @@ def associate(
     explanations = explain(context, candidates)
     found = put_to_scale(context, explanations)
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
+    last = search_last_view(found.context, verdict)
+    if last.result is not None:
+        return last.result
+    verdict = verdict if last.complete else verdict.cut_short()
     causes = find_causes(context, found.explanations, verdict, began)
     return report(found.context, found.explanations, verdict, causes, found.factor)

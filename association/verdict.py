@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from registration import RigidTransform
 from registration.compiling import way_in
 from registration.layout import Records
@@ -15,8 +17,8 @@ from .kernels import odds
 from .loosening import loose_twin_share
 from .models import MODELS, USUAL, Model
 from .null import null_of
-from .ranking import Ranked
-from .reasons import Standing, reasons_of
+from .ranking import Ranked, with_lines_of_sight
+from .reasons import INCOMPLETE, SENTENCES, Standing, reasons_of
 from .result import Reason, Status
 from .tuning import (
     CONTRADICTED,
@@ -43,13 +45,14 @@ class Verdict:
     Attributes
     ----------
     status : Status
-    probability : float
-        That the pose is right, 0 to 1.
+    probability : float or None
+        That the pose is right, 0 to 1; None where the position is open along a direction.
     usable : bool
     pose : RigidTransform or None
         In the map frame; of a family the member that is answered.
     margin : float or None
-        Value of the best explanation less that of the next, nats; None when there is no other.
+        Value of the best explanation less that of the next, nats; None where no other was found, which says nothing of
+        poses below `SearchReport.rivals_above` of the score.
     runner_up : float or None
         Value of the next over that of the best, never below 0.
     contradicted : bool
@@ -58,10 +61,12 @@ class Verdict:
         Why it is not usable, the weightiest first.
     complete : bool
         Whether neither the search nor what it was compared with was ended by the deadline.
+    cautious : float
+        Probability that the pose is right where other buildings are included; 0 without an answer.
     """
 
     status: Status
-    probability: float
+    probability: float | None
     usable: bool
     pose: RigidTransform | None
     margin: float | None
@@ -69,6 +74,14 @@ class Verdict:
     contradicted: bool
     reasons: tuple[Reason, ...]
     complete: bool
+    cautious: float = 0.0
+
+    def cut_short(self) -> Verdict:
+        """Return the same, not usable, where something was left undone."""
+        if not self.complete:
+            return self
+        reasons = (Reason(INCOMPLETE, SENTENCES[INCOMPLETE]), *self.reasons)
+        return replace(self, usable=False, complete=False, reasons=reasons)
 
 
 def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool = False) -> Verdict:
@@ -98,17 +111,29 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
         # It was inside before it was registered: the window is narrower than what the scan says.
         contradicted = contradicted or status is not Status.NO_MATCH
     usable, rival = status is Status.OK and complete and not contradicted, next(explanations.rivals, None)
+    nearest = next(with_lines_of_sight(context, explanations.ranked, explanations.rivals), None)
     return Verdict(
         status=status,
-        probability=min(chances.right, CONTRADICTED) if contradicted else chances.right,
+        probability=_probability(status, chances.right, contradicted=contradicted),
         usable=usable,
         pose=pose,
-        margin=None if rival is None else best.value - rival.value,
-        runner_up=None if rival is None or not best.value > 0.0 else max(0.0, rival.value / best.value),
+        margin=None if nearest is None else best.value - nearest.value,
+        runner_up=None if nearest is None or not best.value > 0.0 else max(0.0, nearest.value / best.value),
         contradicted=contradicted,
         reasons=() if usable else _reasons(answer, rival, chances, status, complete, contradicted, off_scale=off_scale),
         complete=complete,
+        cautious=chances.careful,
     )
+
+
+def _probability(status: Status, right: float, *, contradicted: bool) -> float | None:
+    """Return the probability that the pose is right; of a family of poses, of which one is answered, there is none.
+
+    The features say whether the walls that fix the pose are the right ones, and the pose along them is a choice.
+    """
+    if status is Status.DEGENERATE:
+        return None
+    return min(right, CONTRADICTED) if contradicted else right
 
 
 def _reasons(

@@ -49,19 +49,32 @@ def warnings_of(
     factor: Factor | None = None,
 ) -> tuple[AssociationWarning, ...]:
     """List what is strange about the scan, about the search, and about the map; then what mistakes would explain."""
-    found = {
-        "no_segments": _no_segments(context),
-        "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
-        "stuck_ranges": _stuck_ranges(context.scan.beams),
-        "scan_exceeds_map": _exceeding(context),
-        "faces_away": _facing_away(context),
+    found = _of_scan(context) | {
         "prior_contradicted": "A clearly better pose lies where the prior says it should not."
         if verdict.contradicted
         else None,
         "search_incomplete": None if search.complete else _incomplete(context),
         str(Mistake.SCALE): None if factor is None else _off_scale(factor),
     }
-    found |= {str(cause.mistake): _mistaken(cause) for cause in causes}
+    return _listed(found | {str(cause.mistake): _mistaken(cause) for cause in causes})
+
+
+def warnings_of_scan(context: SearchContext) -> tuple[AssociationWarning, ...]:
+    """List what is strange about the scan alone, whatever was found."""
+    return _listed(_of_scan(context))
+
+
+def _of_scan(context: SearchContext) -> dict[str, str | None]:
+    return {
+        "no_segments": _no_segments(context),
+        "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
+        "stuck_ranges": _stuck_ranges(context.scan.beams),
+        "scan_exceeds_map": _exceeding(context),
+        "faces_away": _facing_away(context),
+    }
+
+
+def _listed(found: Mapping[str, str | None]) -> tuple[AssociationWarning, ...]:
     return tuple(AssociationWarning(code, message) for code, message in found.items() if message is not None)
 
 

@@ -20,7 +20,6 @@ def sentence_of(result: AssociationResult) -> str:
     ----------
     result : AssociationResult
     """
-    chance = f"{min(100.0 * result.probability, MOST):.2f} %"
     if result.status is Status.NO_MATCH or result.pose is None or result.diagnostics is None:
         return "Nothing on this map explains the scan."
     least = result.diagnostics.score - AS_WELL
@@ -33,6 +32,7 @@ def sentence_of(result: AssociationResult) -> str:
             return f"The walls that are seen do not fix where the robot is{which}."
         dx, dy = (round(part, 2) + 0.0 for part in result.unobservable)  # no negative zeros
         return f"It cannot be told where along ({dx:.2f}, {dy:.2f}) the robot is{which}."
+    chance = f"{min(100.0 * (result.probability or 0.0), MOST):.2f} %"
     if result.usable:
         return f"The robot is here, with a chance of {chance}."
     if any(reason.code == "twin" for reason in result.reasons) and others:

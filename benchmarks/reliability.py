@@ -26,9 +26,13 @@ def reliability_row(what: str, outcomes: Sequence[Outcome]) -> Row:
 
 
 def reliability(outcomes: Sequence[Outcome]) -> list[tuple[int, float, float]]:
-    """Return the bins of all that was answered with a pose."""
-    answered = [o for o in outcomes if o.result.status is not Status.NO_MATCH]
-    return bins(np.array([o.result.probability for o in answered]), np.array([o.right for o in answered], dtype=bool))
+    """Return the bins of all that was answered with a pose that is not one of a family."""
+    answered = [
+        (o.result.probability, o.right)
+        for o in outcomes
+        if o.result.status is not Status.NO_MATCH and o.result.probability is not None
+    ]
+    return bins(np.array([p for p, _ in answered]), np.array([right for _, right in answered], dtype=bool))
 
 
 def bins(probabilities: np.ndarray, right: np.ndarray) -> list[tuple[int, float, float]]:

@@ -49,7 +49,7 @@ def main() -> None:
     """Find the robot in the room."""
     url = sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:8000"
     answer = call(url, "POST", "/v1/associate", {"map": {"segments": WALLS}, "scan": {"segments": SEEN, "sigma": 0.02}})
-    print(f"{answer['status']}, usable: {answer['usable']}, probability {answer['probability']:.3f}")
+    print(f"{answer['status']}, usable: {answer['usable']}, probability {answer['probability']}")
     if answer["usable"]:  # the one thing to check before moving
         print("x {x:.3f} m, y {y:.3f} m, theta {theta:.4f} rad".format(**answer["pose"]))
     for pair in answer["correspondences"]:

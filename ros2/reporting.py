@@ -113,7 +113,7 @@ def values_of(located: Located, milliseconds: float) -> dict[str, str]:
     return {
         "status": answer.status.value,
         "usable": str(answer.usable).lower(),
-        "probability": f"{answer.probability:.4f}",
+        "probability": "" if answer.probability is None else f"{answer.probability:.4f}",
         "reasons": ", ".join(reason.code for reason in answer.reasons),
         "warnings": ", ".join(warning.code for warning in answer.warnings),
         "milliseconds": f"{milliseconds:.1f}",

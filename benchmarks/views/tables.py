@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..table import Row, print_rows
 from .buildings import drives_of_strangers, lookalike_drives
+from .last_scans import drives_and_last_scans
 from .logs import drives_in_logs, time_of_views
 from .scanners import turning, two_scanners
 
@@ -13,6 +14,7 @@ def views(quick: int) -> list[Row]:
     rows: list[Row] = []
     for title, some in (
         ("Drives in logs", drives_in_logs),
+        ("Drives and their last scans alone", drives_and_last_scans),
         ("Drives in other buildings", drives_of_strangers),
         ("Drives where places look alike", lookalike_drives),
         ("Two scanners", two_scanners),

@@ -47,7 +47,7 @@ class WorldOutcome:
     usable : bool
     reasons : list of str
         Their codes.
-    probability : float
+    probability : float or None
     distance, angle : float or None
         How far the pose is off, metres and degrees.
     read : float or None
@@ -78,7 +78,7 @@ class WorldOutcome:
     status: str
     usable: bool
     reasons: list[str]
-    probability: float
+    probability: float | None
     distance: float | None
     angle: float | None
     read: float | None

@@ -162,7 +162,9 @@ def held(outcome: WorldOutcome) -> bool:
 
 
 def quantile_bins(outcomes: Outcomes, size: int) -> list[tuple[int, float, float]]:
-    """Return answers with a pose in bins of equal count by probability: the count, its mean, the share that is right.
+    """Return answers with a probability in bins of equal count by it: the count, its mean, the share that is right.
+
+    That of a place that is not found is none, as is that of a position that is open along a direction.
 
     Parameters
     ----------
@@ -170,14 +172,17 @@ def quantile_bins(outcomes: Outcomes, size: int) -> list[tuple[int, float, float
     size : int
         Answers in a bin; what is left over goes to the last.
     """
-    answered = sorted((o for o in outcomes if o.pose is not None), key=lambda o: o.probability)
+    answered = sorted(
+        ((o.probability, o.right) for o in outcomes if o.pose is not None and o.probability is not None),
+        key=lambda one: one[0],
+    )
     if not answered:
         return []
     starts = list(range(0, max(1, len(answered) - size + 1), size))
     bins = []
     for start, end in zip(starts, [*starts[1:], len(answered)], strict=True):
         group = answered[start:end]
-        bins.append((len(group), mean(o.probability for o in group), mean(o.right for o in group)))
+        bins.append((len(group), mean(p for p, _ in group), mean(right for _, right in group)))
     return bins
 
 

@@ -66,7 +66,7 @@ def verdict_rows(answer: Json) -> list[tuple[str, str]]:
     """Return what a person wants to know of a pose that was found, or was not."""
     usable = "usable" if answer["usable"] else "not usable"
     told = f"{answer['status']}, {usable}"
-    if "probability" in answer:
+    if answer.get("probability") is not None:
         told += f", probability {answer['probability']:.4f}"
     rows = [("verdict", told), ("pose", pose_text(answer["pose"]))]
     covariance = answer["covariance"]

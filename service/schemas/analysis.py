@@ -74,7 +74,7 @@ class WithAddedAnswer(Answer):
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
-    probability: Share
+    probability: Share | None = Field(description="as of /v1/associate; null for `degenerate`")
 
 
 class AnalyzedPlaceAnswer(Answer):
@@ -85,7 +85,7 @@ class AnalyzedPlaceAnswer(Answer):
         description="as of /v1/associate; `ambiguous`, too, where a sure answer is another place"
     )
     usable: bool = Field(description="whether the answer is usable, and this place")
-    probability: Share
+    probability: Share | None = Field(description="as of /v1/associate; null for `degenerate`")
     look_alike: PoseAnswer | None = Field(description="another place that explains the scan about as well")
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
     reasons: list[str] = Field(description="codes of why it is not usable, as of /v1/associate")

@@ -113,8 +113,13 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
 
     inlier_fraction: float = Field(description="share of the scan's length that is matched")
     score: float = Field(description="log-likelihood over that of a scan that is all clutter, nats")
-    runner_up: float | None = Field(description="score of the best other pose over `score`")
-    margin: float | None = Field(description="`score` minus that of the best other pose, nats")
+    runner_up: float | None = Field(
+        description="score of the best other pose over `score`; null: no other pose above `search.rivals_above` of it"
+    )
+    margin: float | None = Field(
+        description="`score` minus that of the best other pose, nats; null: no other pose above `search.rivals_above` "
+        "of `score`"
+    )
     significance: float = Field(description="probability that chance scores as high; small is good")
     hinges_on: HingeAnswer | None = Field(description="the wall without which the pose would move most or be free")
 
@@ -162,7 +167,10 @@ class FoundAnswer(Answer):
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool = Field(description="the one flag that a robot gates on")
-    probability: Share = Field(description="calibrated chance that the pose is right")
+    probability: Share | None = Field(
+        description="calibrated probability that the pose is right, given that the robot is on this map; 0 for "
+        "`no_match`, null for `degenerate`, whose position is open along `unobservable`"
+    )
     sentence: str = Field(description="the verdict in words, for people")
     pose: PoseAnswer | None
     covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")

@@ -70,6 +70,7 @@ def test_a_corridor_leaves_one_direction_free() -> None:
     assert len(inside) > 10
     for one in inside:
         assert (one.status, one.usable, one.reasons) == (Status.DEGENERATE, False, ("free_direction",))
+        assert one.probability is None
         assert one.unobservable is not None
         assert abs(one.unobservable[0]) == pytest.approx(1.0, abs=1e-3)
 

@@ -339,3 +339,38 @@ def room_estimate(index: MapIndex, k: int) -> Records:
     """Return the pose in the k-th of some equal rooms, (1,) of `ESTIMATE`."""
     at = local(index, room(k))
     return record(ESTIMATE, x=at.x, y=at.y, theta=at.theta)
+
+
+@pytest.mark.parametrize("lacking", [0, 3])
+def test_alternatives_have_their_lines_of_sight_however_far_behind(lacking: int) -> None:
+    """Of two rooms the second has a screen that the scan sees through, and may lack some of the walls."""
+    second = ROOM[: len(ROOM) - lacking] + np.tile([20.0, 0.0], 2)
+    index = index_of(np.vstack([ROOM, second, [[24.0, 0.5, 24.0, 3.5]]]))
+    context = context_of(index, scan_of(ENDPOINTS, viewpoint=(0.0, 0.0)))
+    places = [INSIDE, pose(INSIDE.x + 20.0, INSIDE.y, INSIDE.theta)]
+    both = rank_candidates(context, candidates_of(index, places))
+    alone = rank_candidates(context, candidates_of(index, places[1:]))[0]
+    (other,) = ranking.with_lines_of_sight(context, both, both[1:])
+    assert other.score == pytest.approx(alone.score, abs=1e-6)
+    assert other.value == pytest.approx(alone.value, abs=1e-6)
+    assert (other.score < both[1].score - 1.0) is (lacking > 0)
+
+
+def test_alternatives_stay_in_order_when_lines_of_sight_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those within the window first; what comes to nothing is left out, and what is near the best stays as it is."""
+    best, near = ranked(100.0), ranked(90.0)
+    far = [ranked(70.0, at=pose(1.0)), ranked(60.0, at=pose(2.0)), ranked(5.0, at=pose(3.0))]
+    outside = [ranked(74.0, inside=False, at=pose(4.0)), ranked(8.0, inside=False, at=pose(5.0))]
+
+    def charged(_: SearchContext, one: Ranked) -> Ranked:
+        blocked = {1.0: 20.0, 3.0: 6.0, 4.0: 70.0}.get(one.pose.x, 0.0)
+        return replace(one, score=one.score - blocked, value=one.value - blocked, blocked=blocked)
+
+    monkeypatch.setattr(ranking, "_charged", charged)
+    context = context_of(index_of(ROOM), scan_of(ENDPOINTS, viewpoint=(0.0, 0.0)))
+    others = [near, *far, *outside]
+    found = list(ranking.with_lines_of_sight(context, [best, *others], others))
+    assert [one.score for one in found] == [90.0, 60.0, 50.0, 8.0, 4.0]
+    assert [one.inside for one in found] == [True, True, True, False, False]
+    blind = context_of(index_of(ROOM), ROOM_SCAN)
+    assert list(ranking.with_lines_of_sight(blind, [best, *others], others)) == others

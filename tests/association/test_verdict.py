@@ -81,7 +81,7 @@ def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.
         monkeypatch.setattr(loosening, "LOOSE_RIVALS", tuning.LOOSE_RIVALS)
         got = leading(40.0).verdict
         for unusable in (replace(leading(40.0), thin=True), replace(leading(40.0), degenerate=True)):
-            assert unusable.verdict.probability == pytest.approx(1.0)
+            assert unusable.verdict.cautious == pytest.approx(1.0)
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
     assert got.probability == pytest.approx(0.5)
     assert "twin" in [reason.code for reason in got.reasons]
@@ -129,6 +129,17 @@ def test_what_explains_the_scan_no_better_than_other_buildings_is_no_match(expla
             assert got.reasons[0].code == "elsewhere"
         free = Drawn(room(), LIKELY, degenerate=True).verdict
         assert free.status is (Status.DEGENERATE if status is Status.AMBIGUOUS else status)
+
+
+@pytest.mark.parametrize("with_beams", [False, True])
+def test_a_position_that_is_open_has_no_probability(with_beams: bool) -> None:
+    """However sure the walls are: it is one pose of a family. Contradicted or cut short it has none either."""
+    with judged_by(SURE):
+        free = replace(leading(40.0, with_beams=with_beams), degenerate=True)
+        for one in (free, replace(free, complete=False), replace(free, beyond=((50.0, False),))):
+            got = one.verdict
+            assert (got.status, got.usable, got.probability) == (Status.DEGENERATE, False, None)
+        assert replace(free, degenerate=False).verdict.probability == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("more", [0.01, -0.01])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from association import AssociationResult, SoftPrior, Status
+from association import AssociationResult, SoftPrior, Status, sentence_of
 
 from .scenes import (
     CORRIDOR,
@@ -78,7 +78,7 @@ def test_a_corridor_is_fixed_across_and_free_along() -> None:
     endpoints, _ = seen(CORRIDOR, pose(4.0, 0.8, 0.05), cut=0.5, seed=2)
     result = answer_of(index_of(CORRIDOR), scan_of(endpoints))
     assert result.status is Status.DEGENERATE
-    assert result.covariance is None
+    assert (result.covariance, result.probability) == (None, None)
     assert np.abs(free_of(result)) == pytest.approx([1.0, 0.0], abs=1e-3)
     assert pose_in(result).y == pytest.approx(0.8, abs=0.01) or pose_in(result).y == pytest.approx(1.2, abs=0.01)
 
@@ -94,7 +94,8 @@ def test_of_a_family_of_poses_the_one_nearest_the_prior() -> None:
 def test_a_single_segment_is_degenerate() -> None:
     result = answer_of(index_of(ROOM), scan_of(seen(ROOM[:1], pose(3.0, 2.0, 0.2))[0]))
     assert result.status is Status.DEGENERATE
-    assert not result.usable
+    assert (result.usable, result.probability) == (False, None)
+    assert sentence_of(result).startswith("It cannot be told where along")
 
 
 def test_an_empty_scan_matches_nothing() -> None:

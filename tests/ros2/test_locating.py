@@ -12,6 +12,7 @@ import linefix
 from ros2 import messages
 from ros2.frames import Frames, Mount
 from ros2.locating import Look, locate
+from ros2.reporting import values_of
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
@@ -62,3 +63,19 @@ def test_a_scanner_upside_down_is_known_by_its_mount() -> None:
     assert found is not None
     assert found.flipped
     assert (found.base_from_laser.x, found.base_from_laser.y) == pytest.approx((0.3, -0.1))
+
+
+def test_a_position_that_is_open_is_published_without_a_probability() -> None:
+    corridor = linefix.Segments.from_array(np.array([[-40, 0, 40, 0], [40, 2, -40, 2]], dtype=float))
+    at = linefix.RigidTransform(0.0, 0.8, 0.3)
+    ranges = linefix.simulation.scan(corridor, at, SCANNER, np.random.default_rng(3)).ranges
+    scan = messages.LaserScan(
+        angle_min=SCANNER.angle_min,
+        angle_increment=SCANNER.angle_increment,
+        range_min=0.05,
+        range_max=10.0,
+        ranges=np.where(ranges < 10.0, ranges, np.inf).tolist(),
+    )
+    located = locate(linefix.index_map(corridor), [Look(scan, Mount(MOUNT, flipped=False))])
+    values = values_of(located, 1.0)
+    assert (values["status"], values["usable"], values["probability"]) == ("degenerate", "false", "")

@@ -219,7 +219,7 @@ function drawLikeness(from: Pose, to: Pose): void {
 }
 
 /** What is shown of a place: at once, after a drive, or with what was put up; null where no robot can stand then. */
-export function shownOf(one: Place): { status: Answer["status"]; usable: boolean; probability: number } | null {
+export function shownOf(one: Place): { status: Answer["status"]; usable: boolean; probability: number | null } | null {
   if (state.show === "added") return one.with_added;
   if (state.show === "driven" && one.knows_after !== null) return { ...one, status: "ok", usable: true };
   return one;
@@ -278,8 +278,8 @@ export function placeAt(x: number, y: number): Place | null {
 
 function toldOf(one: Place): string {
   const at = ({ x, y }: Pose) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;
-  const told = ({ status, usable, probability }: { status: string; usable: boolean; probability: number }) =>
-    `${status.replace("_", " ")}, ${usable ? "" : "not "}usable, ${(100 * probability).toFixed(1)} %`;
+  const told = ({ status, usable, probability }: { status: string; usable: boolean; probability: number | null }) =>
+    `${status.replace("_", " ")}, ${usable ? "" : "not "}usable${probability === null ? "" : `, ${(100 * probability).toFixed(1)} %`}`;
   const like = one.look_alike ? `, looks like ${at(one.look_alike)}` : "";
   const drive = one.knows_after ? `; knows after ${one.knows_after} m` : "";
   const added = one.with_added ? `; with the boxes: ${told(one.with_added)}` : "";

@@ -62,6 +62,6 @@ onChange(() => {
   const usable = state.log.filter((one) => one.usable).length;
   const why = line.reasons.map((one) => (typeof one === "string" ? one : one.message)).join(" ");
   told.textContent =
-    `Scan ${state.logAt + 1} of ${count}: ${line.status.replace("_", " ")}, ${line.usable ? "usable" : "not usable"}, ` +
-    `${(100 * line.probability).toFixed(1)} %. ${why} (${usable} of ${count} are usable.)`;
+    `Scan ${state.logAt + 1} of ${count}: ${line.status.replace("_", " ")}, ${line.usable ? "usable" : "not usable"}` +
+    `${line.probability === null ? "" : `, ${(100 * line.probability).toFixed(1)} %`}. ${why} (${usable} of ${count} are usable.)`;
 });

@@ -55,7 +55,7 @@ export interface Reason {
 export interface Answer {
   status: "ok" | "ambiguous" | "degenerate" | "no_match";
   usable: boolean;
-  probability: number;
+  probability: number | null; // null: degenerate
   sentence: string;
   pose: Pose | null;
   covariance: number[][] | null;
@@ -75,11 +75,11 @@ export interface Place {
   pose: Pose;
   status: Answer["status"];
   usable: boolean;
-  probability: number;
+  probability: number | null; // null: degenerate
   look_alike: Pose | null;
   reasons: string[];
   knows_after: number | null;
-  with_added: { status: Answer["status"]; usable: boolean; probability: number } | null;
+  with_added: { status: Answer["status"]; usable: boolean; probability: number | null } | null;
 }
 
 export interface Analysis {
@@ -102,7 +102,7 @@ export interface LogLine {
   stamp: unknown;
   status: Answer["status"];
   usable: boolean;
-  probability: number;
+  probability: number | null; // null: degenerate
   pose: Pose | null;
   reasons: (Reason | string)[];
 }

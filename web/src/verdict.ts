@@ -44,7 +44,7 @@ function numbers(): void {
   const { answer } = state;
   const rows: [string, string][] = [];
   if (answer && !problem) {
-    rows.push(["chance", `${(100 * answer.probability).toFixed(2)} %`]);
+    if (answer.probability !== null) rows.push(["chance", `${(100 * answer.probability).toFixed(2)} %`]);
     if (answer.pose) {
       const { x, y, theta } = answer.pose;
       rows.push(["pose", `${x.toFixed(3)} m, ${y.toFixed(3)} m, ${degrees(theta).toFixed(2)}°`]);

@@ -347,7 +347,7 @@ class WithAddedAnswer(TypedDict):
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
-    probability: float
+    probability: float | None
 
 
 class HardPriorFields(TypedDict):
@@ -576,7 +576,7 @@ class AnalyzedPlaceAnswer(TypedDict):
     pose: PoseAnswer
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
-    probability: float
+    probability: float | None
     look_alike: PoseAnswer | None
     unobservable: list[float] | None
     reasons: list[str]
@@ -832,7 +832,7 @@ class FoundAnswer(TypedDict):
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
-    probability: float
+    probability: float | None
     sentence: str
     pose: PoseAnswer | None
     covariance: list[list[float]] | None
@@ -894,7 +894,7 @@ class AssociateAnswer(TypedDict):
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
-    probability: float
+    probability: float | None
     sentence: str
     pose: PoseAnswer | None
     covariance: list[list[float]] | None

@@ -133,7 +133,7 @@ class Judged:
 
     status: Status
     usable: bool
-    probability: float
+    probability: float | None
     contradicted: bool
     margin: float | None
     runner_up: float | None
@@ -195,7 +195,11 @@ def judge(
         chances,
         status=status,
         usable=status is Status.OK and explanations.search.complete and not contradicted,
-        probability=min(chances.right, tuning.CONTRADICTED) if contradicted else chances.right,
+        probability=None
+        if status is Status.DEGENERATE
+        else min(chances.right, tuning.CONTRADICTED)
+        if contradicted
+        else chances.right,
         contradicted=contradicted,
         margin=best.value - rivals[0].value if rivals else None,
         runner_up=max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,

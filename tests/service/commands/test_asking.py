@@ -117,3 +117,12 @@ def test_it_compiles_once_where_nothing_can_be_kept(
     for _ in range(2):
         answers.ask("vectorize", {"points": POINTS})
     assert capsys.readouterr().err.count("compiling") == 1
+
+
+def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix, folder: Path) -> None:
+    (folder / "corridor.json").write_text(json.dumps({"segments": [[-20, 0, 20, 0], [20, 2, -20, 2]]}))
+    (folder / "walls.json").write_text(json.dumps({"segments": [[-3, -1, 3, -1], [3, 1, -3, 1]]}))
+    ended = linefix("locate", "corridor.json", "walls.json")
+    assert "degenerate, not usable" in ended.out
+    assert "probability" not in ended.out
+    assert json.loads(linefix("locate", "corridor.json", "walls.json", "--json").out)["probability"] is None

@@ -50,6 +50,14 @@ def test_a_room(client: httpx.Client) -> None:
     assert again["map"] is None
 
 
+def test_where_a_direction_is_free_there_is_no_probability(client: httpx.Client) -> None:
+    corridor = [[-20, 0, 20, 0], [20, 2, -20, 2]]
+    answer = analyzed(client, {"map": {"segments": corridor}, "laser": LASER, "spacing": 1.0}, "/v1/analyze")
+    told = {(one["status"], one["probability"] is None) for one in answer["places"]}
+    assert ("degenerate", True) in told
+    assert ("degenerate", False) not in told
+
+
 def test_a_drive_and_something_added(client: httpx.Client) -> None:
     """In a rectangle the robot can be at either of two places, wherever it drives; a box in it tells them apart."""
     rectangle = [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]]

@@ -179,3 +179,35 @@ def test_views_in_a_batch(client: httpx.Client) -> None:
     assert good["result"]["correspondences"][0]["view"] == 0
     assert bad["status_code"] == 422
     assert bad["problem"]["errors"][0]["pointer"] == "/scans/1/views/1/relative_to"
+
+
+def test_the_last_view_answers_for_a_drive_that_saw_much_that_is_on_no_map(client: httpx.Client) -> None:
+    """Its segments are named by its place among the views, here the last one."""
+    rng, views = np.random.default_rng(4), []
+    for k in (3, 2, 1):
+        at = HERE.compose(RigidTransform(-0.3 * k, 0.1 * k, 0.1 * k))
+        begins = rng.uniform(-4.0, 4.0, (20, 2))
+        things = np.hstack([begins, begins + rng.uniform(-1.5, 1.5, (20, 2))]).tolist()
+        step = {"covariance": np.diag([4e-4, 4e-4, 4e-4]).tolist(), "relative_to": 4 - k}
+        views.append({"segments": [*seen_from(at), *things], "pose": pose_json(HERE.inverse().compose(at)), **step})
+    views.append({"segments": seen_from(HERE), "pose": EXACT})
+    alone, answer = asked(client, {"segments": seen_from(HERE)}), asked(client, {"views": views})
+    assert alone["usable"]
+    assert (answer["status"], answer["usable"], answer["reasons"]) == ("ok", True, [])
+    assert "last_view_only" in [one["code"] for one in answer["warnings"]]
+    assert {pair["view"] for pair in answer["correspondences"]} == {3}
+    assert {one["view"] for one in answer["unmatched_scan"]} == {0, 1, 2}
+    assert answer["probability"] == pytest.approx(alone["probability"], abs=1e-6)
+    assert answer["pose"] == pytest.approx(alone["pose"], abs=1e-6)
+
+
+def test_a_position_that_is_open_has_no_probability(client: httpx.Client) -> None:
+    """Of one wall, and of the two of a corridor; as segments, in a batch too."""
+    corridor = {"segments": [[-20.0, 0.0, 20.0, 0.0], [20.0, 2.0, -20.0, 2.0]]}
+    both = {"segments": [[-3.0, -1.0, 3.0, -1.0], [3.0, 1.0, -3.0, 1.0]]}
+    for scan in (both, {"segments": both["segments"][:1]}):
+        answer = asked(client, scan, map=corridor)
+        assert (answer["status"], answer["usable"], answer["probability"]) == ("degenerate", False, None)
+        assert answer["unobservable"] is not None
+    together = client.post("/v1/associate:batch", json={"map": corridor, "scans": [both, {"segments": []}]}).json()
+    assert [one["result"]["probability"] for one in together["results"]] == [None, 0.0]
