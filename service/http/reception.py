@@ -14,6 +14,7 @@ from ..admission.entrance import search_of
 from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
 from ..schemas.errors import RequestError
 from .errors import HttpError, NotHttpError
+from .intake import Intake
 from .problems import INTERNAL, RAISED, problem_of
 from .services import Services
 from .state import RequestState, attach, state_of
@@ -21,6 +22,7 @@ from .state import RequestState, attach, state_of
 logger = logging.getLogger("linefix")
 LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would ask again at once
 OTHER = "unmatched"
+STRANGERS_BYTES = 65_536  # of the rest of a body that is dropped of who has shown no key
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
 NO_HOST = (b"host", b"")  # what the server has in place of a host where none was sent
@@ -70,10 +72,13 @@ class Reception:
         self._services.refusals.count(route, method, kind.code, kind.status)
         problem = problem_of(error)
         assert problem is not None
+        stranger = isinstance(error, STRANGERS)
+        most_bytes = STRANGERS_BYTES if stranger else self._services.settings.max_body_bytes
+        await Intake(receive, scope["headers"]).drop_rest(most_bytes)
 
         async def send_refusal(message: Message) -> None:
             if message["type"] == "http.response.start":
-                _add_headers(message, request_id, close=isinstance(error, STRANGERS))
+                _add_headers(message, request_id, close=stranger)
             await send(message)
 
         await problem.response(request_id)(scope, receive, send_refusal)
@@ -81,6 +86,7 @@ class Reception:
     async def _serve(self, state: RequestState, scope: Scope, receive: Receive, send: Send) -> None:
         started = time.perf_counter()
         state.trail = None if self._services.traces is None else self._services.traces.begin()
+        intake, most_bytes = Intake(receive, scope["headers"]), self._services.settings.max_body_bytes
         status = 0
         # Whoever can be read can be asked for its headers: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
@@ -89,18 +95,19 @@ class Reception:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
+                await intake.drop_rest(most_bytes)
                 _add_headers(message, state.request_id)
             await send(message)
 
         try:
-            await self._app(inner, receive, send_with_id)
+            await self._app(inner, intake.receive, send_with_id)
         except Exception as error:
             problem = problem_of(error)
             if problem is None:
                 logger.exception("a defect", extra={"request_id": state.request_id})
             if status:
                 raise
-            await (problem or INTERNAL).response(state.request_id)(scope, receive, send_with_id)
+            await (problem or INTERNAL).response(state.request_id)(scope, intake.receive, send_with_id)
         finally:
             assert state.ticket is not None
             state.ticket.arrive()

@@ -91,6 +91,17 @@ def test_who_does_not_read_the_answer_is_closed(impatient: RunningService) -> No
     assert 0 < received < 5_000_000
 
 
+@pytest.mark.parametrize("size", [1_000, 60_000, 1_000_000, 8_000_000])
+def test_a_refusal_arrives_though_the_body_was_not_read(service: RunningService, size: int) -> None:
+    """A reset overtook it: the client saw a broken connection."""
+    head = HEAD.replace(b"/v1/associate", b"/nothing").replace(b"5000", b"%d" % size) + b"\r\n"
+    for _ in range(20):
+        with service.connection() as connection:
+            connection.sendall(head)
+            connection.sendall(b" " * size)
+            assert connection.recv(4096)[9:12] == b"404"
+
+
 def test_a_broken_chunk_ends_the_connection_and_nothing_else(service: RunningService) -> None:
     with service.connection() as connection:
         connection.sendall(HEAD.replace(b"Content-Length: 5000", b"Transfer-Encoding: chunked") + b"\r\nzz\r\n")
