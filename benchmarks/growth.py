@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from association import Deadline, MapIndex, Scan, associate
+from association import MapIndex, Scan, associate
 from registration import Correspondences, JointSums, MeasuredSegments, RigidTransform, Segments
-from service.admission.helpers import HelperThreads
 from service.work.warmup import warm_up
 from simulation import OfficePlan
 
@@ -185,28 +184,6 @@ def grow(size: int, queries: int, count: int = SCAN_SEGMENTS, share: float = CLU
     )  # fmt: skip
 
 
-def shared(size: int, queries: int) -> float:
-    """Return the time that searches take with a second thread, over that with one; the answers have to be the same."""
-    rng, segments, alone, helped = np.random.default_rng(SEED), campus(size), 0.0, 0.0
-    index, helpers = MapIndex.build(segments), HelperThreads(1, lambda: 1)
-    for k in range(queries + 1):
-        sent = Scan(MeasuredSegments.from_segments(draw_query(segments, rng)[1], SIGMA))
-        found, times = [], []
-        for who in (None, helpers):
-            deadline = Deadline()
-            deadline.helpers = who
-            began = time.perf_counter()
-            found.append(associate(index, sent, None, OPTIONS, deadline))
-            times.append(time.perf_counter() - began)
-        assert found[0].search == found[1].search
-        assert (found[0].pose, found[0].probability) == (found[1].pose, found[1].probability)
-        if k:
-            alone, helped = alone + times[0], helped + times[1]
-        progress(f"{size:,} segments, two threads", k, queries)
-    helpers.close()
-    return helped / alone
-
-
 def print_growth(title: str, what: str, values: Sequence[str], found: list[Growth]) -> None:
     cells = [
         (value, f"{g.median:.2f}", f"{g.p95:.2f}", f"{g.passed:.2f}", f"{g.hypotheses:,.0f}",
@@ -263,9 +240,6 @@ def growth(queries: int, sizes: tuple[int, ...], pairs: tuple[int, ...] = PAIRS)
     what = f"{SWEPT:,} map segments, {CLUTTERS[-1]:.0%} of clutter: search"
     rows.append(at_most(f"{what}, median ms", most.median, None, median, ".2f"))
     rows.append(at_most(f"{what}, p95 ms", most.p95, None, p95, ".2f"))
-    if SIZES[-1] in sizes:
-        ratio = shared(SIZES[-1], queries)
-        rows.append(at_most(f"{SIZES[-1]:,} map segments: two threads over one, of the time", ratio, None, 0.6, ".2f"))
     print_rows("Growth", rows)
     return rows
 

@@ -74,7 +74,7 @@ class Service:
 
     def memory_mb(self) -> float:
         """Return what the service and its processes hold now, MB."""
-        return sum(_resident(pid) for pid in _family(self.pid)) / 1e6
+        return sum(_resident(pid) for pid in family(self.pid)) / 1e6
 
 
 def one_turn(world: World, rng: np.random.Generator) -> dict[str, object]:
@@ -207,11 +207,11 @@ def large(service: Service, rounds: int) -> list[Row]:
     ]
 
 
-def _family(pid: int) -> Iterator[int]:
+def family(pid: int) -> Iterator[int]:
     yield pid
     for task in Path(f"/proc/{pid}/task").iterdir():
         for child in (task / "children").read_text().split():
-            yield from _family(int(child))
+            yield from family(int(child))
 
 
 def _resident(pid: int) -> float:

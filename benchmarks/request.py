@@ -6,7 +6,6 @@ bare route of the same server that answers a constant. The turns of what is comp
 
 from __future__ import annotations
 
-import os
 import socket
 import subprocess
 import sys
@@ -37,18 +36,24 @@ from service.telemetry.metrics import Metrics
 from service.work.association import Associator
 
 from .open_loop import request_of, without_pause
+from .overload import family
 from .table import Row, at_most, print_rows, print_table
 
 ROUNDS = 15
 BESIDE_MS, CLIENT_MS = 0.7, 1.3  # goals: of the processor, and as a client sees it
 BARE = """
-import sys, uvicorn
+import sys
+from granian import Granian
 ANSWER = b'{"status":"ok"}'
 HEADERS = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(ANSWER))]
 async def answer(scope, receive, send):
     await send({"type": "http.response.start", "status": 200, "headers": HEADERS})
     await send({"type": "http.response.body", "body": ANSWER})
-uvicorn.run(answer, port=int(sys.argv[1]), access_log=False, log_level="warning", loop="uvloop", lifespan="off")
+def load():
+    return answer
+how = dict(interface="asginl", http="1", loop="uvloop", websockets=False, log_enabled=False)
+server = Granian("bare", port=int(sys.argv[1]), **how)
+server.serve(target_loader=load, wrap_loader=False)
 """
 
 
@@ -206,6 +211,6 @@ def _thread_ms(call: Callable[[], object], count: int = 100) -> float:
 
 
 def _processor_seconds(pid: int) -> float:
-    """Return what all threads of a process have had of the processors."""
-    folder = Path(f"/proc/{pid}/task")
-    return 1e-9 * sum(int((folder / task / "schedstat").read_text().split()[0]) for task in os.listdir(folder))
+    """Return what all threads of a process, and of those below it, have had of the processors."""
+    tasks = (task for one in family(pid) for task in Path(f"/proc/{one}/task").iterdir())
+    return 1e-9 * sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)

@@ -14,7 +14,6 @@ from fastapi.routing import APIRoute
 from starlette.middleware.cors import CORSMiddleware
 
 from .admission.budget import ByteBudget
-from .admission.connections import ConnectionLimit, most_connections
 from .admission.entrance import Entrance
 from .admission.gate import Gate
 from .admission.key_file import KeyFile
@@ -48,6 +47,7 @@ from .work.compiling import compile_kernels, compiled_share, is_compiled
 from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
+Started = Callable[[Services], None]
 KEYS_SECONDS = 1.0  # between looks whether keys have changed
 LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries that read files are not loaded
 FIRST_KEYS_SECONDS = (
@@ -57,7 +57,11 @@ PROGRESS_SECONDS = 5.0  # between two lines that say how far compiling is
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
-def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
+def _unattended(services: Services) -> None:
+    """Do nothing when an application starts."""
+
+
+def create_app(settings: Settings, part: Part = WHOLE, started: Started = _unattended) -> FastAPI:
     """Return an application that has not started anything yet.
 
     Parameters
@@ -65,6 +69,8 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
     settings : Settings
     part : Part
         Which of several processes this is.
+    started : callable
+        Called with the application's parts, in its event loop, when it starts.
     """
     services = _services(settings, part)
     app = FastAPI(
@@ -75,7 +81,7 @@ def create_app(settings: Settings, part: Part = WHOLE) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
         telemetry={"tracing": False, "metrics": False, "logs": False},  # it would look for a set-up at each request
-        lifespan=partial(_lifespan, services=services, part=part),
+        lifespan=partial(_lifespan, services=services, part=part, started=started),
     )
     app.state.services = services
     app.state.contract = Contract(partial(describe, app, guarded=settings.guarded), services.parse_threads)
@@ -111,7 +117,7 @@ def _services(settings: Settings, part: Part) -> Services:
     """Put the parts together; of several processes each has its share."""
     metrics = Metrics()
     gate = Gate(part.share(settings.searches), part.share(settings.queue))
-    indexing = Gate(part.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE)
+    indexing = Gate(part.share(settings.searches), settings.max_connections, "indexing", INDEXING_NICE, 0)
     budget = _budget(settings, part, settings.max_bodies_bytes)
     store = MapStore(settings.url, may_make=part.is_first, most_bytes=settings.max_stored_bytes)
     cache = IndexCache(part.share(settings.cache_bytes), metrics)
@@ -119,13 +125,11 @@ def _services(settings: Settings, part: Part) -> Services:
     lookup = MapLookup(cache, store, parser)
     readiness = Readiness()
     keyring = _keyring(settings)
-    connections = ConnectionLimit(most_connections(part.share(settings.max_connections)))
     origins = Origins(settings.hosts, guarded=settings.guarded, named=settings.cors_origins)
     metrics.watch("linefix_workers_ready", "Processes that take requests", lambda: readiness.takes_requests)
     metrics.watch("linefix_searches_running", "Searches that run", lambda: gate.running)
     metrics.watch("linefix_searches_waiting", "Searches that wait", lambda: gate.waiting)
     metrics.watch("linefix_indexing_running", "Large maps that are indexed", lambda: indexing.running)
-    metrics.watch("linefix_connections", "Connections open", lambda: len(connections))
     metrics.watch("linefix_bodies_bytes", "Bytes of requests held", lambda: budget.held)
     metrics.watch("linefix_map_cache_bytes", "Bytes of indexed maps held", lambda: cache.bytes)
     metrics.watch("linefix_map_cache_maps", "Indexed maps held", lambda: len(cache))
@@ -137,11 +141,10 @@ def _services(settings: Settings, part: Part) -> Services:
         entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
         gate=gate,
         # How many wait there is bounded by their bytes.
-        parsing=Gate(1, settings.max_connections, "parsing"),
-        parsing_apart=Gate(1, settings.max_connections, "parsing-apart"),
+        parsing=Gate(1, settings.max_connections, "parsing", long_per_slot=0),
+        parsing_apart=Gate(1, settings.max_connections, "parsing-apart", long_per_slot=0),
         indexing=indexing,
         keyring=keyring,
-        connections=connections,
         answers=_budget(settings, part, settings.max_answers_bytes),
         bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout, guarded=settings.guarded),
         parser=parser,
@@ -150,7 +153,7 @@ def _services(settings: Settings, part: Part) -> Services:
         lookup=lookup,
         documents=_budget(settings, part, settings.max_answers_bytes),
         associator=Associator(lookup, metrics),
-        importing=Gate(1, settings.max_connections, "importing"),
+        importing=Gate(1, settings.max_connections, "importing", long_per_slot=0),
         import_bounds=Bounds(
             max(LEAST_IMPORT_BYTES, part.share(settings.max_import_bytes)),
             settings.max_body_bytes,
@@ -181,13 +184,16 @@ def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
 
 
 @asynccontextmanager
-async def _lifespan(app: FastAPI, services: Services, part: Part) -> AsyncIterator[dict[str, Services]]:
+async def _lifespan(
+    app: FastAPI, services: Services, part: Part, started: Started
+) -> AsyncIterator[dict[str, Services]]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
     following = [
         asyncio.create_task(_follow(services.key_threads, services.keyring.refresh)),
         asyncio.create_task(_follow(services.issuer_threads, services.keyring.refresh_tokens)),
     ]
+    started(services)
     if part.opens_late:
         await getting_ready
     try:

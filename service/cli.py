@@ -51,8 +51,7 @@ def unknown_settings() -> list[str]:
 
 def run(settings: Settings) -> int:
     """Run until a signal comes; return the status to exit with."""
-    from .process.listening import listen
-    from .process.server import serve_alone
+    from .process.server import serve as serve_settings
     from .telemetry.logs import log_config
 
     wrong = cannot_keep_maps(settings)
@@ -61,15 +60,10 @@ def run(settings: Settings) -> int:
         return 1
     logging.config.dictConfig(log_config(settings.log_level))
     try:
-        listener = listen(settings)
+        return serve_settings(settings)
     except OSError as error:
         logger.error("cannot listen on %s port %d: %s", settings.host, settings.port, error.strerror)
         return 1
-    if settings.workers > 1:
-        from .process.workers import supervise
-
-        return supervise(settings, listener)
-    return serve_alone(settings, listener)
 
 
 def cannot_keep_maps(settings: Settings) -> str | None:

@@ -119,7 +119,7 @@ class Settings(BaseSettings):
         1_000_000_000, ge=400_000_000, description="of memory to read one map of another tool; one is read at a time"
     )
     max_connections: int = Field(
-        512, ge=8, le=100_000, description="open at once, of one address half of that; fewer where descriptors are few"
+        512, ge=8, le=100_000, description="open at once; fewer where the system has few descriptors"
     )
     max_map_segments: int = Field(200_000, ge=1, description="of one map")
     max_scan_segments: int = Field(2_000, ge=1, description="of one scan")
@@ -133,7 +133,7 @@ class Settings(BaseSettings):
         gt=0.0,
         le=3600.0,
         allow_inf_nan=False,
-        description="seconds that a request may take to arrive, head and body",
+        description="seconds for a head, at most 60, and as many for a body",
     )
     drain_seconds: Finite = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
     hang_seconds: Finite = Field(
@@ -141,7 +141,7 @@ class Settings(BaseSettings):
         ge=2.0,
         le=3600.0,
         allow_inf_nan=False,
-        description="without a sign of life after which one of several workers is replaced",
+        description="after which a worker whose event loop stands still is replaced",
     )
     log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
 

@@ -54,7 +54,7 @@ HEAVY = (
     "sqlalchemy.dialects.postgresql",
     "sqlalchemy.dialects.sqlite",
     "typer",
-    "uvicorn",
+    "granian",
 )
 """Loaded before the fork, since most tests need one or the other."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
+from collections.abc import Callable
 
 Holder = bytes | None
 """Who asks: the digest of a key, or an address where the service has no keys; None where that is not known."""
@@ -31,14 +32,6 @@ class FairQueue:
         """How many are active."""
         return len(self._used)
 
-    def used_by(self, holder: Holder) -> float:
-        """Return how many seconds an active holder has used; safe from any thread."""
-        return self._used.get(holder, 0.0)
-
-    def standing(self) -> tuple[tuple[Holder, float], ...]:
-        """Return who waits, and how many seconds each has used."""
-        return tuple((holder, self._used[holder]) for holder in self._lines)
-
     def places_of(self, holder: Holder) -> int:
         """Return how many turns of a holder wait, run, or are on their way."""
         return len(self._lines.get(holder, ())) + self._running[holder] + self._coming[holder]
@@ -55,17 +48,12 @@ class FairQueue:
 
     def join(self, holder: Holder, *, fixed: bool) -> Turn:
         """Return a turn at the end of the holder's line; a fixed one is never taken away again."""
-        turn = self._line_of(holder)
-        self._lines[holder].append(turn)
+        self._activate(holder)
+        turn: Turn = asyncio.get_running_loop().create_future()
+        self._lines.setdefault(holder, deque()).append(turn)
+        self.waiting += 1
         if fixed:
             self._fixed.add(turn)
-        return turn
-
-    def join_again(self, holder: Holder) -> Turn:
-        """Return a turn for what runs and is to go on before the holder starts anything else; it is fixed."""
-        turn = self._line_of(holder)
-        self._lines[holder].appendleft(turn)
-        self._fixed.add(turn)
         return turn
 
     def leave(self, holder: Holder, turn: Turn) -> None:
@@ -73,9 +61,9 @@ class FairQueue:
         self._lines[holder].remove(turn)
         self._left(holder, turn)
 
-    def next(self) -> Turn | None:
-        """Take the turn that is next and count it as running; None when nobody waits."""
-        waiting = [holder for holder, line in self._lines.items() if line]
+    def next(self, may_start: Callable[[Holder], bool]) -> Turn | None:
+        """Take the turn that is next and count it as running; None when no holder waits that may start something."""
+        waiting = [holder for holder, line in self._lines.items() if line and may_start(holder)]
         if not waiting:
             return None
         # Of equals the one that has stood in front for longest: lines are kept in the order in which they began.
@@ -100,18 +88,15 @@ class FairQueue:
         self._activate(holder)
         self._running[holder] += 1
 
+    def spent(self, holder: Holder, seconds: float) -> None:
+        """Note that something of a holder has used a slot for so long, and runs on without one."""
+        self._used[holder] += seconds
+
     def finished(self, holder: Holder, seconds: float) -> None:
-        """Note that it ran so long."""
+        """Note that something has ended, which has used a slot for so long since the last note."""
         self._running[holder] -= 1
         self._used[holder] += seconds
         self._forget_idle(holder)
-
-    def _line_of(self, holder: Holder) -> Turn:
-        """Return a turn that is to be put into the holder's line, which there is."""
-        self._activate(holder)
-        self._lines.setdefault(holder, deque())
-        self.waiting += 1
-        return asyncio.get_running_loop().create_future()
 
     def _left(self, holder: Holder, turn: Turn) -> None:
         self._fixed.discard(turn)

@@ -1,98 +1,94 @@
-"""Who may search now: at most one search per core, a short queue shared fairly, and no for the rest.
+"""Admit searches: at most one per core, a short queue shared fairly, and a refusal for the rest.
 
-A turn that has gone on for long rests while somebody waits who has used less: otherwise who asks for what takes seconds
-would have the processor for as long each time, and who asks for milliseconds would get one answer for each of those.
+A search that has run for long goes on in a thread of lower priority and gives its slot back: the operating system runs
+it in the time that short searches leave. The number of these is bounded, for all callers and for each.
 """
 
 from __future__ import annotations
 
 import asyncio
-import os
-import sys
-import threading
 import time
+from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from association import CancelledError, Deadline
 
 from .errors import DeadlinePassedError, QueueFullError, ShareUsedError
 from .fair_queue import FairQueue, Holder, Turn
-from .helpers import HelperThreads
+from .threads import GateThreads, Running
 from .ticket import Ticket
 
 T = TypeVar("T")
 HEARING_SECONDS = 0.5  # s that a search has to notice that it shall end
-LONG_SECONDS = 0.02  # s after which a turn may have to rest: shorter ones are waited for
-LEAD_SECONDS = 0.002  # s by which it has used more than somebody who waits; every look would be too often
-RESTING = 4  # turns that may rest, for each slot: each keeps a thread, and the memory of its search
+LONG_SECONDS = 0.05  # s after which a search is long: most answers take some milliseconds
+LONG_NICE = 10  # of long searches: where short ones want every core, a tenth of one
+LONG_PER_SLOT = 2  # long searches for each slot: each has a thread, and the memory of its search
 
 
 @dataclass(eq=False, slots=True)
 class _Run:
-    """A function that runs, or rests.
+    """A function that runs.
 
     Attributes
     ----------
     holder : Holder
+    running : Running
+        In which thread.
     begun : float
-        `time.monotonic()` seconds; since when it runs, or goes on after a rest.
-    before : float
-        Seconds that it ran before that.
-    awake : Event
-        Clear while it rests.
+        `time.monotonic()` seconds.
+    timer : TimerHandle or None
+        When it counts as long; None where it never does.
+    long : bool
+        True once it has given its slot back.
     """
 
     holder: Holder
+    running: Running
     begun: float
-    before: float = 0.0
-    awake: threading.Event = field(default_factory=threading.Event)
+    timer: asyncio.TimerHandle | None = None
+    long: bool = False
 
 
 class Gate:
     """Runs functions in threads of its own, a bounded number at a time and a bounded number waiting.
-
-    What looks at its deadline may have to rest there, for others to have their turns. While slots are free
-    their threads may take part in what runs: the deadline has them as its helpers.
 
     Belongs to one event loop.
 
     Parameters
     ----------
     slots : int
-        Searches that run at once.
+        Searches that run at once, long ones apart.
     queue : int
-        Searches that may wait.
+        Searches that may wait, or run for long.
     name : str
         Of the threads.
     nice : int
         By how much they go behind other threads.
-
-    Attributes
-    ----------
-    running : int
-        Slots that are taken.
+    long_per_slot : int
+        Long searches that may run next to those that have slots; 0: every function keeps its slot until it returns.
     """
 
-    def __init__(self, slots: int, queue: int, name: str = "search", nice: int = 0) -> None:
+    def __init__(
+        self, slots: int, queue: int, name: str = "search", nice: int = 0, long_per_slot: int = LONG_PER_SLOT
+    ) -> None:
         self.slots = slots
         self._places = slots + queue
-        self._most_resting = RESTING * slots
-        threads = slots + self._most_resting
-        self._executor = ThreadPoolExecutor(threads, name, initializer=_go_behind, initargs=(nice,))
+        self._most_long = long_per_slot * slots
+        self._most_long_of_one = max(1, self._most_long // 2)
+        self._threads = GateThreads(name, nice)
         self._queue = FairQueue()
-        self._helpers = HelperThreads(slots - 1, self._spare) if slots > 1 else None
-        self._waiting: tuple[tuple[Holder, float], ...] = ()
-        self._resting: set[_Run] = set()
-        self._local = threading.local()
-        self._closed = False
+        self._long: Counter[Holder] = Counter()
         self._deadlines: dict[asyncio.Future[Any], Deadline] = {}
-        self.running = 0
+        self._taken = 0
         self._expected = 0
         self._over: asyncio.Future[None] | None = None
+
+    @property
+    def running(self) -> int:
+        """The number of searches that run, long ones included."""
+        return self._taken + self._long.total()
 
     @property
     def waiting(self) -> int:
@@ -130,9 +126,9 @@ class Gate:
     async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool]) -> T:
         """Run a function when its turn comes.
 
-        A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns, so that there
-        are never more running than slots. Cancel the deadline to make it return soon. A further turn of a request that
-        had one is waited for however long the queue is.
+        A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns or is long, so
+        that there are never more running than slots. Cancel the deadline to make it return soon. A further turn of a
+        request that had one is waited for however long the queue is.
 
         Parameters
         ----------
@@ -144,7 +140,7 @@ class Gate:
         Raises
         ------
         QueueFullError, ShareUsedError
-            When the queue is full, or the place went to somebody who has fewer.
+            When the queue is full, or the place went to a holder that has fewer.
         DeadlinePassedError
             When the deadline passes before the turn comes, or before the function heeds it.
         CancelledError
@@ -153,15 +149,14 @@ class Gate:
         ticket.arrive()
         await self._enter(deadline, ticket)
         ticket.admitted = True
-        run = _Run(ticket.holder, time.monotonic())
-        loop = asyncio.get_running_loop()
-        deadline.rest, deadline.helpers = partial(self._may_rest, loop), self._helpers
         try:
-            work = loop.run_in_executor(self._executor, partial(self._working, run, function))
+            run = _Run(ticket.holder, self._threads.start(function), time.monotonic())
         except BaseException:
-            self._leave(ticket.holder, 0.0)
+            self._free_slot(ticket.holder, 0.0)
             raise
+        work: asyncio.Future[T] = asyncio.wrap_future(run.running.result)
         self._deadlines[work] = deadline
+        self._watch(run)
         work.add_done_callback(lambda done: self._finish(done, run))
         return await self._outcome(work, deadline, heeds)
 
@@ -180,7 +175,7 @@ class Gate:
         raise DeadlinePassedError
 
     def cancel_all(self) -> None:
-        """Tell everything that runs to give up, and soon wait no longer for what does not hear, as indexing a map."""
+        """Tell everything that runs to give up, and soon wait no longer for what does not, as indexing a map."""
         for deadline in self._deadlines.values():
             deadline.cancel()
         if self._over is not None:
@@ -188,56 +183,28 @@ class Gate:
 
     def close(self) -> None:
         """Give the threads back; does not wait for them."""
-        self._closed = True
-        self._executor.shutdown(wait=False)
-        if self._helpers is not None:
-            self._helpers.close()
+        self._threads.close()
 
-    def _spare(self) -> int:
-        return 0 if self._closed else self.slots - self.running
+    def _watch(self, run: _Run) -> None:
+        """Look again whether a function is long, once it has run for so long."""
+        if self._most_long:
+            run.timer = asyncio.get_running_loop().call_later(LONG_SECONDS, self._lower, run)
 
-    def _working(self, run: _Run, function: Callable[[], T]) -> T:
-        """Run a function in a thread, which is known by its turn meanwhile."""
-        self._local.run = run
-        try:
-            return function()
-        finally:
-            self._local.run = None
+    def _lower(self, run: _Run) -> None:
+        """Have a long search go on behind short ones, and hand on its slot; later where too many do so."""
+        if self._long.total() >= self._most_long or self._long[run.holder] >= self._most_long_of_one:
+            self._watch(run)
+            return
+        run.long = True
+        run.running.lower(LONG_NICE)
+        self._long[run.holder] += 1
+        self._queue.spent(run.holder, time.monotonic() - run.begun)
+        self._taken -= 1
+        self._fill()
 
-    def _may_rest(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Wait, in the thread of a turn that has run for long, while somebody waits who has used less."""
-        run: _Run | None = getattr(self._local, "run", None)
-        if run is None or self._closed:
-            return
-        spent = time.monotonic() - run.begun
-        if run.before + spent < LONG_SECONDS:
-            return
-        mine = self._queue.used_by(run.holder) + spent - LEAD_SECONDS
-        if all(used >= mine or holder == run.holder for holder, used in self._waiting):
-            return
-        run.awake.clear()
-        try:
-            loop.call_soon_threadsafe(self._rest, run)
-        except RuntimeError:  # the loop has ended
-            return
-        while not run.awake.wait(HEARING_SECONDS) and not self._closed:
-            pass  # the loop may have ended without having put it to rest: then nobody wakes it
-
-    def _rest(self, run: _Run) -> None:
-        """Put a turn that runs back into the queue, where nothing takes its place away, and hand on its slot."""
-        if self._closed or len(self._resting) >= self._most_resting:
-            run.awake.set()
-            return
-        spent = time.monotonic() - run.begun
-        run.before += spent
-        self._resting.add(run)
-        self._queue.join_again(run.holder).add_done_callback(lambda _: self._go_on(run))
-        self._leave(run.holder, spent)
-
-    def _go_on(self, run: _Run) -> None:
-        self._resting.discard(run)
-        run.begun = time.monotonic()
-        run.awake.set()
+    def _may_start(self, holder: Holder) -> bool:
+        """Tell whether a holder may start a search: not while it has its share of the long ones."""
+        return not self._most_long or self._long[holder] < self._most_long_of_one
 
     def _require_share(self, holder: Holder) -> None:
         """Raise unless a holder has less than its share of a full queue."""
@@ -257,14 +224,13 @@ class Gate:
         if deadline.passed:
             raise DeadlinePassedError
         holder = ticket.holder
-        if self.running < self.slots and not self.waiting:
-            self.running += 1
+        if self._taken < self.slots and self._may_start(holder):
+            self._taken += 1
             self._queue.started(holder)
             return
         if not ticket.admitted:
             self._make_room(holder)
         turn = self._queue.join(holder, fixed=ticket.admitted)
-        self._note_waiting()
         try:
             await asyncio.wait({turn}, timeout=_left(deadline))
         except asyncio.CancelledError:
@@ -272,7 +238,6 @@ class Gate:
             raise
         if not turn.done():
             self._queue.leave(holder, turn)
-            self._note_waiting()
             raise DeadlinePassedError
         turn.result()
 
@@ -290,35 +255,34 @@ class Gate:
         """Leave the queue, or hand on the turn that has just come."""
         if not turn.done():
             self._queue.leave(holder, turn)
-            self._note_waiting()
         elif turn.exception() is None:
-            self._leave(holder, 0.0)
+            self._free_slot(holder, 0.0)
 
     def _finish(self, done: asyncio.Future[Any], run: _Run) -> None:
         del self._deadlines[done]
+        if run.timer is not None:
+            run.timer.cancel()
         if not done.cancelled():
             done.exception()  # looked at, also where the caller has gone
-        self._leave(run.holder, time.monotonic() - run.begun)
+        if not run.long:
+            self._free_slot(run.holder, time.monotonic() - run.begun)
+            return
+        self._long[run.holder] -= 1
+        if not self._long[run.holder]:
+            del self._long[run.holder]
+        self._queue.finished(run.holder, 0.0)
+        self._fill()
 
-    def _leave(self, holder: Holder, seconds: float) -> None:
-        """Hand the slot to the next in the queue, or give it back."""
+    def _free_slot(self, holder: Holder, seconds: float) -> None:
         self._queue.finished(holder, seconds)
-        following = self._queue.next()
-        self._note_waiting()
-        if following is None:
-            self.running -= 1
-        else:
-            following.set_result(None)
+        self._taken -= 1
+        self._fill()
 
-    def _note_waiting(self) -> None:
-        """Write down who waits, for threads to look at."""
-        self._waiting = self._queue.standing()
-
-
-def _go_behind(nice: int) -> None:
-    """Have this thread go behind others where threads have priorities of their own."""
-    if nice and sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), nice)
+    def _fill(self) -> None:
+        """Hand free slots to those that wait and may start."""
+        while self._taken < self.slots and (turn := self._queue.next(self._may_start)) is not None:
+            self._taken += 1
+            turn.set_result(None)
 
 
 def _left(deadline: Deadline) -> float | None:

@@ -5,6 +5,7 @@
     HttpError
     ├── NotHttpError           not HTTP at all
     ├── ControlCharacterError  a control character in the path
+    ├── BodyBrokenError        the body ends early, or its chunks are no chunks
     ├── NotFoundError          no such path
     ├── MethodNotAllowedError  the path takes other methods
     ├── MediaTypeError         the body is not of the media type that is taken
@@ -39,6 +40,13 @@ class ControlCharacterError(HttpError):
 
     def __init__(self, character: str) -> None:
         super().__init__(f"the path has the control character U+{ord(character):04X}; expected none: leave it out")
+
+
+class BodyBrokenError(HttpError):
+    """The body ends before the length that its head announces, or its chunks are no chunks."""
+
+    def __init__(self) -> None:
+        super().__init__("the body ends early or its chunks are malformed: send it as its head announces it")
 
 
 class NotFoundError(HttpError):

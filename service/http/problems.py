@@ -54,7 +54,12 @@ class Kind:
 
 TABLE = (
     Kind("invalid_json", 400, "The body is not JSON", (parsing.NotJsonError,)),
-    Kind("invalid_http", 400, "The request is not HTTP", (http.NotHttpError, http.ControlCharacterError)),
+    Kind(
+        "invalid_http",
+        400,
+        "The request is not HTTP",
+        (http.NotHttpError, http.ControlCharacterError, http.BodyBrokenError),
+    ),
     Kind("unauthorized", 401, "A key is needed", (admission.MissingKeyError,)),
     Kind(
         "forbidden",

@@ -10,11 +10,24 @@ import time
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from .problems import INTERNAL, problem_of
+from ..admission.entrance import search_of
+from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
+from ..schemas.errors import RequestError
+from .errors import HttpError, NotHttpError
+from .intake import Intake
+from .problems import INTERNAL, RAISED, problem_of
 from .services import Services
 from .state import RequestState, attach, state_of
 
 logger = logging.getLogger("linefix")
+LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would ask again at once
+OTHER = "unmatched"
+STRANGERS_BYTES = 65_536  # of the rest of a body that is dropped of who has shown no key
+STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
+"""Errors that end the connection: nothing more is served on it."""
+NO_HOST = (b"host", b"")  # what the server has in place of a host where none was sent
+ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
+_HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
 
 
@@ -27,24 +40,53 @@ def taken_or_made(headers: list[tuple[bytes, bytes]]) -> str:
 
 
 class Reception:
-    """Written as plain ASGI: Starlette's `BaseHTTPMiddleware` would hide that a client hung up.
-
-    A request comes with its ticket where the server has admitted it; otherwise it is admitted here.
-    """
+    """Written as plain ASGI: Starlette's `BaseHTTPMiddleware` would hide that a client hung up."""
 
     def __init__(self, app: ASGIApp, services: Services) -> None:
         self._app = app
         self._services = services
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
+        """Admit one request and serve it, or refuse it."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        state = _arrived(scope)
-        state.request_id = taken_or_made(scope["headers"])
+        if NO_HOST in scope["headers"]:
+            scope["headers"] = [field for field in scope["headers"] if field != NO_HOST]
+        state = RequestState(asyncio.get_running_loop().time(), request_id=taken_or_made(scope["headers"]))
+        attach(scope, state)
+        try:
+            _require_framing(scope)
+            state.ticket = self._services.entrance.admit(scope)
+        except (AdmissionError, HttpError, RequestError) as error:
+            await self._refuse(error, state.request_id, scope, receive, send)
+            return
+        await self._serve(state, scope, receive, send)
+
+    async def _refuse(self, error: Exception, request_id: str, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer in place of the application; counted, and logged once a second."""
+        if isinstance(error, ShareUsedError):
+            await asyncio.sleep(LATER)
+        kind, method = RAISED[type(error)], scope["method"]
+        route = search_of(method, scope["path"]) or OTHER
+        self._services.refusals.count(route, method, kind.code, kind.status)
+        problem = problem_of(error)
+        assert problem is not None
+        stranger = isinstance(error, STRANGERS)
+        most_bytes = STRANGERS_BYTES if stranger else self._services.settings.max_body_bytes
+        await Intake(receive, scope["headers"]).drop_rest(most_bytes)
+
+        async def send_refusal(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                _add_headers(message, request_id, close=stranger)
+            await send(message)
+
+        await problem.response(request_id)(scope, receive, send_refusal)
+
+    async def _serve(self, state: RequestState, scope: Scope, receive: Receive, send: Send) -> None:
         started = time.perf_counter()
         state.trail = None if self._services.traces is None else self._services.traces.begin()
+        intake, most_bytes = Intake(receive, scope["headers"]), self._services.settings.max_body_bytes
         status = 0
         # Whoever can be read can be asked for its headers: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
@@ -53,25 +95,22 @@ class Reception:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                identity = (b"x-request-id", state.request_id.encode("ascii"))
-                closing = ((b"connection", b"close"),) if state.is_unread() else ()
-                message["headers"] = [*message.get("headers", ()), identity, *closing]
+                await intake.drop_rest(most_bytes)
+                _add_headers(message, state.request_id)
             await send(message)
 
         try:
-            if state.ticket is None:
-                state.ticket = self._services.entrance.admit(scope)
-            await self._app(inner, receive, send_with_id)
+            await self._app(inner, intake.receive, send_with_id)
         except Exception as error:
             problem = problem_of(error)
             if problem is None:
                 logger.exception("a defect", extra={"request_id": state.request_id})
             if status:
                 raise
-            await (problem or INTERNAL).response(state.request_id)(scope, receive, send_with_id)
+            await (problem or INTERNAL).response(state.request_id)(scope, intake.receive, send_with_id)
         finally:
-            if state.ticket is not None:
-                state.ticket.arrive()
+            assert state.ticket is not None
+            state.ticket.arrive()
             self._tell(inner, scope["method"], status, time.perf_counter() - started)
 
     def _tell(self, scope: Scope, method: str, status: int, seconds: float) -> None:
@@ -94,10 +133,20 @@ class Reception:
             self._services.traces.tell(state.trail, scope["headers"], f"{method} {route}", told)
 
 
-def _arrived(scope: Scope) -> RequestState:
-    """Return the state that the server gave a request, or a new one."""
-    state = state_of(scope)
-    if state is None:
-        state = RequestState(asyncio.get_running_loop().time())
-        attach(scope, state)
-    return state
+def _require_framing(scope: Scope) -> None:
+    """Refuse what two servers could read in two ways and the server takes: RFC 9112, 3.2 and 6.1."""
+    hosts = [value for name, value in scope["headers"] if name == b"host"]
+    if len(hosts) > 1 or (scope["http_version"] == "1.1" and not hosts):
+        raise NotHttpError
+    if hosts and not _HOST.fullmatch(hosts[0]):
+        raise NotHttpError
+    codings = [value.strip().lower() for name, value in scope["headers"] if name == b"transfer-encoding"]
+    if codings not in ([], [b"chunked"]):
+        raise NotHttpError
+
+
+def _add_headers(message: Message, request_id: str, *, close: bool = False) -> None:
+    """Add the headers that all answers have."""
+    closing = ((b"connection", b"close"),) if close else ()
+    own = ((b"x-request-id", request_id.encode("ascii")), *ALWAYS, *closing)
+    message["headers"] = [*message.get("headers", ()), *own]

@@ -13,7 +13,7 @@ from starlette.routing import Match
 
 from ..schemas.errors import InvalidRequestError
 from ..schemas.faults import faults_of
-from .errors import MethodNotAllowedError, NotFoundError, RefusedError
+from .errors import BodyBrokenError, MethodNotAllowedError, NotFoundError, RefusedError
 from .hanging_up import HangUpError
 from .problems import INTERNAL, RAISED, problem_of
 from .state import state_of
@@ -26,8 +26,8 @@ def handle_errors(app: FastAPI) -> None:
     """Have an application answer with problems."""
     for kind in (*RAISED, RequestValidationError, HTTPException):
         app.add_exception_handler(kind, _refuse)
-    for gone in (HangUpError, ClientDisconnect):
-        app.add_exception_handler(gone, _nobody)
+    app.add_exception_handler(HangUpError, _nobody)
+    app.add_exception_handler(ClientDisconnect, _refuse)
 
 
 async def _refuse(request: Request, error: Exception) -> Response:
@@ -46,6 +46,8 @@ def _own(request: Request, error: Exception) -> Exception:
     match error:
         case RequestValidationError():
             return InvalidRequestError(faults_of(error.errors()))
+        case ClientDisconnect():  # while the body was received; from the server, malformed chunks look the same
+            return BodyBrokenError()
         case HTTPException(status_code=404):
             return NotFoundError()
         case HTTPException(status_code=405):

@@ -6,6 +6,7 @@ piece, and what they hold until then is counted: of all together, and of each wh
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 
 from starlette.responses import Response
@@ -14,11 +15,34 @@ from starlette.types import Receive, Scope, Send
 from .services import services_of
 from .state import state_of
 
-PIECE = 65_536  # bytes
+PIECE = 32_768  # bytes; the server holds a few
+LARGE = 65_536  # bytes; smaller answers are handed over in one piece
 JSON = "application/json"
 
 
-class CountedResponse(Response):
+class PiecewiseResponse(Response):
+    """An answer that is handed over piece by piece, as the client takes it.
+
+    A client that takes none of it for `request_timeout` loses the connection.
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send it."""
+        state, seconds = state_of(scope), services_of(scope).settings.request_timeout
+        whole = memoryview(self.body)
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        for begin in range(0, len(whole), PIECE):
+            piece, more = bytes(whole[begin : begin + PIECE]), begin + PIECE < len(whole)
+            try:
+                async with asyncio.timeout(seconds):
+                    await send({"type": "http.response.body", "body": piece, "more_body": more})
+            except TimeoutError:
+                if state is not None:
+                    state.noted["sent_bytes"] = begin
+                return  # the server ends the connection
+
+
+class CountedResponse(PiecewiseResponse):
     """An answer whose bytes count as held until the client has taken them, all but the last few.
 
     Raises
@@ -33,14 +57,10 @@ class CountedResponse(Response):
         holder = None if state is None or state.ticket is None else state.ticket.holder
         with services_of(scope).answers.account(holder) as account:
             account.take(len(self.body))
-            whole = memoryview(self.body)
-            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
-            for begin in range(0, len(whole), PIECE):
-                piece, more = bytes(whole[begin : begin + PIECE]), begin + PIECE < len(whole)
-                await send({"type": "http.response.body", "body": piece, "more_body": more})
+            await super().__call__(scope, receive, send)
 
 
 def json_response(data: bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
     """Return JSON that is encoded already."""
-    kind = Response if len(data) <= PIECE else CountedResponse
+    kind = Response if len(data) <= LARGE else CountedResponse
     return kind(data, status, headers, JSON)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from starlette.types import Scope
 
 from ..admission.budget import ByteBudget
-from ..admission.connections import ConnectionLimit
 from ..admission.entrance import Entrance
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
@@ -44,7 +43,6 @@ class Services:
     parsing, parsing_apart, indexing : Gate
         Where bodies have their turns to be parsed, by a thread and by another process, and large maps to be indexed.
     keyring : Keyring
-    connections : ConnectionLimit
     bodies : BodyReceiver
     answers : ByteBudget
         Bytes of large answers that are being read.
@@ -75,7 +73,6 @@ class Services:
     parsing_apart: Gate
     indexing: Gate
     keyring: Keyring
-    connections: ConnectionLimit
     bodies: BodyReceiver
     answers: ByteBudget
     parser: ParserProcess

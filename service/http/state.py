@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -21,7 +20,7 @@ class RequestState:
     Attributes
     ----------
     arrived : float
-        When its first byte came, by the event loop's clock, seconds.
+        When its head was there, by the event loop's clock, seconds.
     ticket : Ticket, or None
         What was decided about it; None as long as nothing is.
     request_id : str
@@ -30,8 +29,6 @@ class RequestState:
         What the log is to say of it beside the usual.
     trail : Trail, or None
         What it did, where it is traced.
-    is_unread : callable
-        Tells whether more of the body is left than can be read and dropped: then the answer ends the connection.
     """
 
     arrived: float
@@ -39,7 +36,6 @@ class RequestState:
     request_id: str = ""
     noted: dict[str, object] = field(default_factory=dict)
     trail: Trail | None = None
-    is_unread: Callable[[], bool] = bool
 
 
 def attach(scope: Scope, state: RequestState) -> None:

@@ -1,60 +1,88 @@
-"""How the process ends: no longer ready, doors closed, what runs finished, and out in ten seconds whatever happens."""
+"""End the service: no longer ready, then closed, then ended within ten seconds.
+
+The supervisor handles the signal. It notifies the workers, which report on `/readyz` that they take no more requests,
+so that a balancer sends none. `drain_seconds` later it closes them.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
 from typing import TYPE_CHECKING
-
-from uvicorn.server import HANDLED_SIGNALS
 
 if TYPE_CHECKING:
     from ..http.services import Services
 
-GRACE = 6  # s for requests that run when the doors close
-LAST_CALL = 9.5  # s after the signal the process ends whatever still runs
+GRACE = 5.5  # s for requests that run when the doors close
+LAST_CALL = 9.5  # s after the signal a worker ends whatever still runs
+NOTICE = signal.SIGUSR1  # from the supervisor to its workers: the service is about to end
 
 
-def drain_on_signals(services: Services, loop: asyncio.AbstractEventLoop) -> None:
-    """Put a time of draining before what uvicorn does at a signal; its handlers have to be there already.
+def drain_on_signals(seconds: float) -> None:
+    """Drain the workers before the server's own handling of SIGTERM and SIGINT; its handlers have to be there.
 
-    `/readyz` says no for `drain_seconds`, so that a balancer sends nothing more; then uvicorn closes its doors and
-    waits for what runs, `GRACE` seconds at most. A further Ctrl-C goes to uvicorn at once.
+    SIGHUP ends the service as SIGTERM does, unless it was started so as to outlive its terminal. A second SIGINT closes
+    the workers at once.
+
+    Parameters
+    ----------
+    seconds : float
+        For which requests are still answered while `/readyz` reports 503.
     """
-    theirs = {number: signal.getsignal(number) for number in HANDLED_SIGNALS}
+    end = signal.getsignal(signal.SIGTERM)
+    assert callable(end)
+    draining = False
 
-    def close(number: int) -> None:
-        handler = theirs[signal.Signals(number)]
-        assert callable(handler)
-        handler(number, None)
+    def close() -> None:
+        end(signal.SIGTERM, None)
 
-    def handle(number: int, frame: FrameType | None) -> None:
-        if services.readiness.draining:
+    def drain(number: int, frame: FrameType | None) -> None:
+        nonlocal draining
+        if draining:
             if number == signal.SIGINT:
-                close(number)
+                close()
             return
+        draining = True
+        for worker in multiprocessing.active_children():
+            if worker.pid is not None:
+                with suppress(ProcessLookupError):
+                    os.kill(worker.pid, NOTICE)
+        closing = threading.Timer(seconds, close)
+        closing.daemon = True
+        closing.start()
+
+    signal.signal(NOTICE, signal.SIG_IGN)  # workers inherit it: one that still starts is not killed by the notice
+    for ends in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(ends, drain)
+    hang_up = signal.getsignal(signal.SIGHUP)
+    if _ignored_at_start:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    elif hang_up is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, drain)
+
+
+_ignored_at_start = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # as nohup does; the server sets its own handler
+
+
+def drain_on_notice(services: Services, loop: asyncio.AbstractEventLoop) -> None:
+    """Have a worker stop being ready at the supervisor's notice, and end in time.
+
+    SIGINT and SIGHUP reach all processes of a terminal. A worker leaves them to the supervisor.
+    """
+
+    def drain() -> None:
         services.readiness.draining = True
-        loop.call_soon_threadsafe(drain, number)
+        loop.call_later(services.settings.drain_seconds + GRACE, services.give_up)
         # In a thread of its own: it comes even when the loop hangs.
         last = threading.Timer(LAST_CALL, os._exit, (1,))
         last.daemon = True
         last.start()
 
-    def drain(number: int) -> None:
-        seconds = services.settings.drain_seconds
-        loop.call_later(seconds, close, number)
-        loop.call_later(seconds + GRACE, services.give_up)
-
-    for number in HANDLED_SIGNALS:
-        signal.signal(number, handle)
-    drain_on_hang_up(lambda: handle(signal.SIGTERM, None))
-
-
-def drain_on_hang_up(drain: Callable[[], None]) -> None:
-    """Have SIGHUP end the process as SIGTERM does, unless it was started so as to outlive its terminal."""
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, lambda *_: drain())
+    loop.add_signal_handler(NOTICE, drain)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        loop.add_signal_handler(number, lambda: None)

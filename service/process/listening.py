@@ -1,33 +1,42 @@
-"""The socket that the service listens on; light to import, since the process above several workers does it for them."""
+"""The address that the service listens on."""
 
 from __future__ import annotations
 
-import logging
+import resource
 import socket
 
 from ..settings import Settings
 
-logger = logging.getLogger("linefix")
-BACKLOG = 512
-BUFFER = 262_144  # bytes; enough for some megabytes a second across a continent
+RESERVED = 96  # descriptors for everything else: databases, the parser's pipes, files that are being loaded
+FEWEST = 8
 
 
-def listen(settings: Settings) -> socket.socket:
-    """Return a socket that listens on the address that is set.
+def free_address(settings: Settings) -> tuple[str, int]:
+    """Return the IP address and the port of the settings, port 0 replaced by a free one.
+
+    Each worker opens a socket of its own on the port, and the system would let a second service do the same: half of
+    the requests would reach the other. So the port is tried first with a socket that shares it with none.
 
     Raises
     ------
     OSError
-        When the address is taken or is none of this machine's.
+        When the address is in use or does not belong to this machine.
     """
     family, _, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
-    listener = socket.create_server(address[:2], family=family, backlog=BACKLOG)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):
-        # Accepted connections inherit it: an end when a client acknowledges nothing of an answer for so long.
-        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(1e3 * settings.request_timeout))
-    # By itself the system lets each connection have several megabytes of what nobody takes, in both directions.
-    for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
-        listener.setsockopt(socket.SOL_SOCKET, option, BUFFER)
-    host, port = listener.getsockname()[:2]
-    logger.info("listening", extra={"host": host, "port": port})
-    return listener
+    with socket.create_server(address[:2], family=family) as tried:
+        host, port = tried.getsockname()[:2]
+    return host, port
+
+
+def most_connections(wanted: int) -> int:
+    """Return how many of the wanted connections there are descriptors for; raise the process's limit first.
+
+    Past the system's limit not even a file can be opened: the store would seem to be read-only.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    needed = wanted + RESERVED
+    if soft != resource.RLIM_INFINITY and soft < needed:
+        soft = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        return max(FEWEST, min(wanted, soft - RESERVED))
+    return wanted

@@ -1,102 +1,92 @@
-"""The process that serves: uvicorn with limits, and an end within ten seconds of SIGTERM."""
+"""The server: Granian with the service's limits, its worker processes, and an end within ten seconds of SIGTERM.
+
+Granian parses HTTP outside Python. It bounds heads in bytes, in fields and in time, reads one request of a connection
+at a time, and starts a new worker where one has died.
+"""
 
 from __future__ import annotations
 
-import asyncio
-import gc
 import logging
-import math
+import multiprocessing
 import os
-import signal
-import socket
-import sys
-from collections.abc import Callable
+import tempfile
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-import uvicorn
+from granian.constants import HTTPModes, Interfaces, Loops, SSLProtocols
+from granian.http import HTTP1Settings
+from granian.log import LogLevels
+from granian.server import MPServer
 
-from ..memory import return_large_blocks
-from ..part import WHOLE, Part
+from ..database_file import file_of
+from ..maps.database import DatabaseFile
+from ..maps.errors import StoreError
 from ..settings import Settings
 from ..telemetry.logs import log_config
 from .draining import GRACE, drain_on_signals
-from .listening import BACKLOG
+from .listening import free_address, most_connections
+from .worker import build_worker
 
-if TYPE_CHECKING:
-    from fastapi import FastAPI
-
-PROTOCOL = "service.process.protocol:AdmittingProtocol"  # by name: whoever only supervises need not load it
-# What a search thread waits for Python's global lock, each of the many times that it comes back from a kernel, while
-# the event loop is busy; by default it is 5 ms.
-SWITCH_SECONDS = 0.001
-GARBAGE = (20_000, 10, 10)  # little of what a request makes is cyclic; by default Python looks after each 700 objects
-IDLE_SECONDS = 15  # after which a connection without a request is closed
+logger = logging.getLogger("linefix")
+BACKLOG = 512
+MAX_HEAD = 32_768  # bytes that are read of a request's head
+LONGEST_HEAD = 60_000  # ms; the longest that Granian takes for the time of a head
 
 
-def serve_alone(settings: Settings, listener: socket.socket) -> int:
-    """Answer requests in this process until a signal comes; return the status to exit with.
+def serve(settings: Settings) -> int:
+    """Run the workers until a signal comes; return the status to exit with.
 
-    Does not return when a search still runs: a thread that indexes a map cannot be interrupted, and Python would wait
-    for it.
+    The file of the maps is made before any worker runs: one that still starts when it is moved away must not make it
+    again.
+
+    Raises
+    ------
+    OSError
+        When the address is in use or does not belong to this machine.
     """
-    config = config_of(settings, partial(build, settings, WHOLE))
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # When it has ended well uvicorn raises the signal again, for handlers that were there before.
-        signal.signal(number, lambda *_: None)
-    uvicorn.Server(config).run([listener])
-    if config.loaded_app.state.services.working:
-        logging.shutdown()
-        os._exit(0)
+    host, port = free_address(settings)
+    path = file_of(settings.url)
+    if path is not None:
+        with suppress(StoreError):  # the first worker tries again, and reports what is wrong
+            DatabaseFile(path, may_make=True).require()
+    multiprocessing.set_start_method("spawn", force=True)
+    server = server_of(settings, host, port)
+    server.on_startup(partial(drain_on_signals, settings.drain_seconds))
+    server.on_startup(partial(logger.info, "listening", extra={"host": host, "port": port}))
+    # Counts live in memory where there is a file system for that; nothing else need be writable.
+    shared = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="linefix-workers-", dir=shared) as directory:
+        build = partial(build_worker, settings, Path(directory))
+        try:
+            server.serve(target_loader=build, wrap_loader=False)
+        except SystemExit as ended:
+            return int(ended.code or 0)
     return 0
 
 
-def config_of(settings: Settings, factory: Callable[[], FastAPI]) -> uvicorn.Config:
-    """Return how uvicorn is to run what a factory makes; the factory is called in the process that serves."""
-    return uvicorn.Config(
-        factory,
-        factory=True,
-        http=PROTOCOL,
-        ws="none",
-        lifespan="on",
-        log_config=log_config(settings.log_level),
-        access_log=False,
-        proxy_headers=False,
-        server_header=False,
-        ssl_certfile=settings.tls_cert,
-        ssl_keyfile=settings.tls_key,
-        headers=[("X-Content-Type-Options", "nosniff")],
+def server_of(settings: Settings, host: str, port: int) -> MPServer:
+    """Return the server on an address, with the settings' limits."""
+    connections = most_connections(settings.max_connections)
+    return MPServer(
+        "service",
+        address=host,
+        port=port,
+        interface=Interfaces.ASGI,
         workers=settings.workers,
-        timeout_keep_alive=IDLE_SECONDS,
-        timeout_graceful_shutdown=GRACE + 1,
-        timeout_worker_healthcheck=math.ceil(settings.hang_seconds),
+        loop=Loops.uvloop,
+        http=HTTPModes.http1,
+        websockets=False,
         backlog=BACKLOG,
+        backpressure=max(1, connections // settings.workers),
+        http1_settings=HTTP1Settings(
+            header_read_timeout=min(LONGEST_HEAD, int(1e3 * settings.request_timeout)), max_buffer_size=MAX_HEAD
+        ),
+        log_level=LogLevels.warning,
+        log_dictconfig=log_config(settings.log_level),
+        ssl_cert=settings.tls_cert,
+        ssl_key=settings.tls_key,
+        ssl_protocol_min=SSLProtocols.tls12,
+        respawn_failed_workers=True,
+        workers_kill_timeout=round(GRACE) + 1,
     )
-
-
-def build(settings: Settings, part: Part) -> FastAPI:
-    """Prepare this process, and return the application; called by uvicorn in its event loop."""
-    gc.disable()  # until the service is ready
-    # Imported here: the supervisor imports this module, and needs neither Numba nor SciPy.
-    from ..app import create_app
-
-    return_large_blocks()
-    _share_cores()
-    sys.setswitchinterval(SWITCH_SECONDS)
-    gc.set_threshold(*GARBAGE)
-    app = create_app(settings, part)
-    drain_on_signals(app.state.services, asyncio.get_running_loop())
-    return app
-
-
-def _share_cores() -> None:
-    """Have the system not interrupt a search for each packet that comes; Linux only.
-
-    To be woken for each by itself, away from a search, costs several times what it takes to refuse it. In this class a
-    thread that wakes up waits for the one that runs to come to the end of its slice, a few milliseconds, and then the
-    event loop hears all who came meanwhile in one go.
-    """
-    if hasattr(os, "SCHED_BATCH"):
-        with suppress(OSError):  # where a sandbox does not let it
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))

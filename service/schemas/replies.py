@@ -294,7 +294,7 @@ class Limits(Answer):
     max_values: int = Field(description="numbers, strings, arrays and objects in a request")
     max_bodies_bytes: int = Field(description="of all requests being read at once, by one of several workers")
     max_answers_bytes: int = Field(description="of large answers that wait to be read, in one of several workers")
-    max_connections: int = Field(description="open at once, of one address half of that")
+    max_connections: int = Field(description="open at once")
     request_timeout: float = Field(description="seconds that a request may take to arrive, head and body")
     max_map_segments: int
     max_scan_segments: int

@@ -43,8 +43,6 @@ from registration.many_kernels import compiling_many
 from simulation import scan
 from vectorization import LaserScan, vectorize
 
-from ..admission.helpers import HelperThreads
-
 # A room with a niche, seen from inside: free space on the left of every wall.
 ROOM = np.array(
     [
@@ -165,13 +163,8 @@ def warm_up_searching() -> None:
 
 
 def warm_up_searching_long() -> None:
-    """Search as where it takes long: in steps, alone and with a helper."""
-    helpers = HelperThreads(1, lambda: 1)
-    for who in (None, helpers):
-        deadline = Deadline()
-        deadline.helpers = who
-        _search_in_steps(deadline)
-    helpers.close()
+    """Search as where it takes long: in steps."""
+    _search_in_steps(Deadline())
 
 
 def warm_up_searching_late() -> None:

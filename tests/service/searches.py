@@ -59,7 +59,7 @@ def searching(running: RunningService) -> Iterator[None]:
         connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(body) + body)
         until(lambda: running.count("linefix_searches_running") == 1.0)
         yield
-        assert running.count("linefix_searches_running") == 1.0
+        assert running.count("linefix_searches_running") >= 1.0
 
 
 def searched_a_while() -> bytes:

@@ -14,7 +14,10 @@ from ...schemas.analysis import AnalyzeAnswer, AnalyzeRequest, MapAnalyzeRequest
 from ...schemas.parts import InlineMap, StoredMap
 from ...work.analyzing import Tally, analysis_done, begin_analysis, take_looks
 from ...work.job import Done, Job
-from ..exchange import Exchange, searching
+from ..exchange import Exchange, begin_search
+from ..map_stage import index_map, looking_up
+from ..receiving import read
+from ..turns import take_turn, unless_hung_up
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
 
@@ -33,8 +36,8 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
 )
 async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
     """Stand a robot all over a map, and say where it would know where it is, and where not."""
-    exchange = searching(request)
-    asked = await exchange.read(partial(read_model, AnalyzeRequest))
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, AnalyzeRequest))
     return await _answer(exchange, StoredMap(map_id=map_id), asked)
 
 
@@ -48,23 +51,23 @@ async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
 )
 async def post_analyze_inline(request: Request) -> Response:
     """Say it of a map that need not be stored."""
-    exchange = searching(request)
-    asked = await exchange.read(partial(read_model, MapAnalyzeRequest))
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, MapAnalyzeRequest))
     return await _answer(exchange, asked.map, asked)
 
 
 async def _answer(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
     job = exchange.job(asked.deadline_ms)
-    return exchange.answer(await exchange.unless_hung_up(_work(exchange, on, asked, job), job.deadline))
+    return exchange.answer(await unless_hung_up(exchange, _work(exchange, on, asked, job), job.deadline))
 
 
 async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: AnalyzeRequest, job: Job) -> Done:
     """Index the map in one turn at the gate, and try its places in as many short ones as it takes."""
     lookup = exchange.services.lookup
-    async with exchange.looking_up(named, job.deadline, oriented=None) as on:
-        await exchange.index(on, job.deadline, oriented=None)
+    async with looking_up(exchange, named, job.deadline, oriented=None) as on:
+        await index_map(exchange, on, job.deadline, oriented=None)
         work = partial(begin_analysis, lookup, on, asked, job)
-        tally = await exchange.take_turn(work, job.deadline, job.searching.is_set)
+        tally = await take_turn(exchange, work, job.deadline, job.searching.is_set)
     await _take_looks(exchange, tally, job)
     return await exchange.services.parse_threads.run(partial(analysis_done, tally, asked, job))
 
@@ -74,7 +77,7 @@ async def _take_looks(exchange: Exchange, tally: Tally, job: Job) -> None:
     more = not tally.done
     while more:
         try:
-            more = await exchange.take_turn(partial(take_looks, tally, job.deadline), job.deadline)
+            more = await take_turn(exchange, partial(take_looks, tally, job.deadline), job.deadline)
         except DeadlinePassedError:
             return
         await asyncio.sleep(0)

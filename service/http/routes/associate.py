@@ -11,7 +11,10 @@ from ...schemas import examples
 from ...schemas.replies import AssociateAnswer
 from ...schemas.requests import AssociateRequest
 from ...work.job import Done, Job
-from ..exchange import Exchange, searching
+from ..exchange import Exchange, begin_search
+from ..map_stage import index_map, looking_up
+from ..receiving import read
+from ..turns import take_turn, unless_hung_up
 from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
@@ -28,16 +31,16 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
 )
 async def post_associate(request: Request) -> Response:
     """Find where in the map the scan was taken, and say how sure that is."""
-    exchange = searching(request)
-    asked = await exchange.read(partial(read_model, AssociateRequest))
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
-    return exchange.answer(await exchange.unless_hung_up(_work(exchange, asked, job), job.deadline))
+    return exchange.answer(await unless_hung_up(exchange, _work(exchange, asked, job), job.deadline))
 
 
 async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
     """Search in one turn at the gate, in which the map is indexed, too, where that takes no time to speak of."""
     oriented = asked.options.oriented
-    async with exchange.looking_up(asked.map, job.deadline, oriented=oriented) as on:
-        ready = await exchange.index(on, job.deadline, oriented=oriented)
+    async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
+        ready = await index_map(exchange, on, job.deadline, oriented=oriented)
         work = partial(exchange.services.associator.answer, asked, on, job, ready)
-        return await exchange.take_turn(work, job.deadline, job.searching.is_set)
+        return await take_turn(exchange, work, job.deadline, job.searching.is_set)

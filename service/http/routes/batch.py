@@ -19,8 +19,11 @@ from ...schemas.replies import BatchAnswer
 from ...schemas.requests import BatchItem, BatchRequest
 from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
-from ..exchange import Exchange, searching
+from ..exchange import Exchange, begin_search
+from ..map_stage import index_map, looking_up
 from ..problems import INTERNAL, problem_of
+from ..receiving import read
+from ..turns import take_turn, unless_hung_up
 from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
@@ -38,25 +41,25 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
 )
 async def post_batch(request: Request) -> Response:
     """Find several scans in one map; a scan that is wrong is one error item and nothing else."""
-    exchange = searching(request)
-    asked, items = await exchange.read(read_batch)
+    exchange = begin_search(request)
+    asked, items = await read(exchange, read_batch)
     job = exchange.job(asked.options.deadline_ms)
-    return exchange.answer(await exchange.unless_hung_up(_work(exchange, asked, items, job), job.deadline))
+    return exchange.answer(await unless_hung_up(exchange, _work(exchange, asked, items, job), job.deadline))
 
 
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
     """Index the map in one turn, and search for each scan in another."""
     associator, oriented = exchange.services.associator, asked.options.oriented
-    async with exchange.looking_up(asked.map, job.deadline, oriented=oriented) as on:
-        ready = await exchange.index(on, job.deadline, oriented=oriented)
+    async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
+        ready = await index_map(exchange, on, job.deadline, oriented=oriented)
         index = partial(associator.target, on, asked.options, job.deadline, ready)
-        target = await exchange.take_turn(index, job.deadline, heeds=lambda: False)
+        target = await take_turn(exchange, index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
     calls = [
         partial(associator.find_for_batch, target, index, item, asked.options, job.deadline)
         for index, item in enumerate(items)
     ]
-    with exchange.holding_answers() as account:
+    with exchange.services.answers.account(exchange.ticket.holder) as account:
         results = await _answer_all(exchange, calls, job, account)
         job.watch.lap("search")
         return await exchange.services.parse_threads.run(partial(batch_done, asked, target, results, job))
@@ -75,7 +78,7 @@ async def _answer_all(
     async def take_turns() -> None:
         for index, call in todo:
             try:
-                found = await exchange.take_turn(call, job.deadline)
+                found = await take_turn(exchange, call, job.deadline)
             except CancelledError:
                 raise
             except Exception as error:

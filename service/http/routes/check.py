@@ -20,7 +20,10 @@ from ...schemas.parts import StoredMap
 from ...schemas.requests import CheckRequest
 from ...work.checking import check, check_done, conclude, sample
 from ...work.job import Done, Job
-from ..exchange import Exchange, searching
+from ..exchange import Exchange, begin_search
+from ..map_stage import index_map, looking_up
+from ..receiving import read
+from ..turns import take_turn, unless_hung_up
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
 
@@ -43,9 +46,9 @@ async def get_check(
     ] = None,
 ) -> Response:
     """Say what is doubtful in a map: its directions, how it was drawn, its size, and what of it looks alike."""
-    exchange = searching(request)
+    exchange = begin_search(request)
     job = exchange.job(deadline_ms)
-    return exchange.answer(await exchange.unless_hung_up(_work(exchange, map_id, None, job), job.deadline))
+    return exchange.answer(await unless_hung_up(exchange, _work(exchange, map_id, None, job), job.deadline))
 
 
 @router.post(
@@ -58,26 +61,26 @@ async def get_check(
 )
 async def post_check(request: Request, map_id: MapIdPath) -> Response:
     """Say also whether scans taken there would fit better mirrored, undirected, at another scale, or moved."""
-    exchange = searching(request)
-    asked = await exchange.read(partial(read_model, CheckRequest))
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, CheckRequest))
     job = exchange.job(asked.deadline_ms)
-    return exchange.answer(await exchange.unless_hung_up(_work(exchange, map_id, asked, job), job.deadline))
+    return exchange.answer(await unless_hung_up(exchange, _work(exchange, map_id, asked, job), job.deadline))
 
 
 async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Done:
     """Check the map in one turn at the gate, and try each sample in another."""
     lookup = exchange.services.lookup
-    async with exchange.looking_up(StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
+    async with looking_up(exchange, StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
-        await exchange.index(on, job.deadline, oriented=True)
+        await index_map(exchange, on, job.deadline, oriented=True)
         work = partial(check, lookup, on, asked, job)
-        checked = await exchange.take_turn(work, job.deadline, job.searching.is_set)
+        checked = await take_turn(exchange, work, job.deadline, job.searching.is_set)
     judged = None
     if asked is not None:
         calls = [partial(sample, checked, asked, number, job) for number in range(len(asked.scans))]
         samples = await _try_all(exchange, calls, job)
         try:
-            judged = await exchange.take_turn(partial(conclude, checked, samples, job), job.deadline)
+            judged = await take_turn(exchange, partial(conclude, checked, samples, job), job.deadline)
         except DeadlinePassedError:  # no turn is left: it then concludes from what it has, and searches nothing
             judged = await exchange.services.parse_threads.run(partial(conclude, checked, samples, job))
     return await exchange.services.parse_threads.run(partial(check_done, checked, judged, asked, job))
@@ -91,7 +94,7 @@ async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | Non
     async def take_turns() -> None:
         for index, call in todo:
             try:
-                found[index] = await exchange.take_turn(call, job.deadline)
+                found[index] = await take_turn(exchange, call, job.deadline)
             except DeadlinePassedError:
                 return
 

@@ -15,7 +15,9 @@ from ...schemas.parts import InlineMap
 from ...work.importing import answer_import, index_import
 from ...work.job import Done, Job
 from ..bodies import FORM
-from ..exchange import Exchange, searching
+from ..exchange import Exchange, begin_search
+from ..receiving import parse, receive
+from ..turns import take_other_turn, take_turn, unless_hung_up
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems
 
 router = APIRouter(tags=["maps"])
@@ -38,11 +40,11 @@ _TAKES: dict[str, Any] = {
 )
 async def post_import(request: Request) -> Response:
     """Make a map of the files of another tool, say what was done for that and what is doubtful; nothing is stored."""
-    exchange = searching(request)
-    async with exchange.received(form=True) as content:
+    exchange = begin_search(request)
+    async with receive(exchange, form=True) as content:
         job = exchange.job()
         work = _work(exchange, content, request.headers.get("content-type", ""), job)
-        return exchange.answer(await exchange.unless_hung_up(work, job.deadline))
+        return exchange.answer(await unless_hung_up(exchange, work, job.deadline))
 
 
 async def _work(exchange: Exchange, content: bytearray, content_type: str, job: Job) -> Done:
@@ -52,9 +54,9 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     """
     services, deadline = exchange.services, job.deadline
     reading = partial(read_apart, content, content_type, services.import_bounds, deadline)
-    read = await exchange.take_other_turn(services.importing, reading, deadline)
+    read = await take_other_turn(exchange, services.importing, reading, deadline)
     job.watch.lap("read")
-    line_map = await exchange.parse(partial(read_model, InlineMap), read.map, deadline)
+    line_map = await parse(exchange, partial(read_model, InlineMap), read.map, deadline)
     indexing = partial(index_import, services.lookup, line_map, deadline)
-    index = await exchange.take_other_turn(services.indexing, indexing, deadline)
-    return await exchange.take_turn(partial(answer_import, index, line_map, read, job), deadline)
+    index = await take_other_turn(exchange, services.indexing, indexing, deadline)
+    return await take_turn(exchange, partial(answer_import, index, line_map, read, job), deadline)

@@ -15,7 +15,9 @@ from ...schemas.parts import MapDocument
 from ...schemas.replies import MapList, MapSummaryAnswer
 from ...work.answers import outline_json
 from ..etags import demands_of, etag, is_conditional, is_unchanged
-from ..exchange import Exchange, ask_store
+from ..exchange import begin
+from ..map_stage import ask_store
+from ..receiving import read
 from ..sending import json_response
 from .documenting import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 
@@ -54,11 +56,11 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
 )
 async def put_map(request: Request, map_id: MapIdPath) -> Response:
     """Store a map; once answered it survives the loss of process and power."""
-    exchange, demands = Exchange(request), demands_of(request)
+    exchange, demands = begin(request), demands_of(request)
     services = exchange.services
-    asked, document = await exchange.read(read_map)
+    asked, document = await read(exchange, read_map)
     outline = await services.parse_threads.run(partial(outline_of, asked))
-    put = partial(services.store.put, map_id, document, outline, demands, exchange.maps)
+    put = partial(services.store.put, map_id, document, outline, demands, exchange.ticket.maps)
     revision, created = await ask_store(services, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
@@ -79,7 +81,7 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
 )
 async def get_map(request: Request, map_id: MapIdPath) -> Response:
     """Give a map back as it was stored."""
-    services = Exchange(request).services
+    services = begin(request).services
     if is_conditional(request):
         record = await ask_store(services, partial(services.store.record, map_id))
         if is_unchanged(request, record.revision):
@@ -102,9 +104,9 @@ async def list_maps(
     ] = "",
 ) -> Response:
     """List what is stored, by id."""
-    exchange = Exchange(request)
+    exchange = begin(request)
     services = exchange.services
-    page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.maps))
+    page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
     items = [outline_json(item.map_id, item.revision, item.outline) for item in page.maps]
     return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
@@ -121,7 +123,7 @@ async def list_maps(
 )
 async def delete_map(request: Request, map_id: MapIdPath) -> Response:
     """Forget a map."""
-    exchange, demands = Exchange(request), demands_of(request)
+    exchange, demands = begin(request), demands_of(request)
     services = exchange.services
     await ask_store(services, partial(services.store.delete, map_id, demands))
     services.metrics.map_changes.labels("deleted").inc()

@@ -13,6 +13,7 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, Response
 
 from ..errors import NotFoundError
+from ..sending import PiecewiseResponse
 
 router = APIRouter(include_in_schema=False)
 ASSETS = {
@@ -61,7 +62,7 @@ async def part_of_page(name: str) -> Response:
     content = _built("built", name) if name in _PARTS else None
     if content is None:
         raise NotFoundError("there is no such file")
-    return Response(content, media_type=_PARTS[name], headers=_REVALIDATED)
+    return PiecewiseResponse(content, media_type=_PARTS[name], headers=_REVALIDATED)
 
 
 @router.get("/page/examples/{name}")
@@ -70,13 +71,13 @@ async def example(name: str) -> Response:
     content = _built("examples", name) if _EXAMPLE.fullmatch(name) else None
     if content is None:
         raise NotFoundError("there is no such example")
-    return Response(content, media_type="application/json", headers=_REVALIDATED)
+    return PiecewiseResponse(content, media_type="application/json", headers=_REVALIDATED)
 
 
 @router.get("/openapi.json")
 async def contract(request: Request) -> Response:
     """Give the contract; from bytes that all who read it share, however slowly."""
-    return Response(await request.app.state.contract.body(), media_type="application/json")
+    return PiecewiseResponse(await request.app.state.contract.body(), media_type="application/json")
 
 
 @router.get("/docs", response_class=HTMLResponse)
@@ -108,4 +109,4 @@ async def asset(name: str) -> Response:
     media_type = ASSETS.get(name)
     if media_type is None:
         raise NotFoundError("there is no such file")
-    return Response(_content(name), media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})
+    return PiecewiseResponse(_content(name), media_type=media_type, headers={"Cache-Control": "public, max-age=86400"})

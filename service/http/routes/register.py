@@ -11,7 +11,9 @@ from ...schemas import examples
 from ...schemas.replies import RegisterAnswer
 from ...schemas.requests import RegisterRequest
 from ...work.registration import answer_registration
-from ..exchange import searching
+from ..exchange import begin_search
+from ..receiving import read
+from ..turns import search
 from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
@@ -28,7 +30,7 @@ router = APIRouter(tags=["register"], route_class=DirectRoute)
 )
 async def post_register(request: Request) -> Response:
     """Lay scan segments on the map segments that they are known to belong to."""
-    exchange = searching(request)
-    asked = await exchange.read(partial(read_model, RegisterRequest))
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, RegisterRequest))
     job = exchange.job()
-    return exchange.answer(await exchange.search(partial(answer_registration, asked, job), job.deadline))
+    return exchange.answer(await search(exchange, partial(answer_registration, asked, job), job.deadline))

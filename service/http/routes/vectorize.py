@@ -11,7 +11,9 @@ from ...schemas import examples
 from ...schemas.replies import VectorizeAnswer
 from ...schemas.requests import VectorizeRequest
 from ...work.vectorization import answer_vectorization
-from ..exchange import searching
+from ..exchange import begin_search
+from ..receiving import read
+from ..turns import search
 from .direct import DirectRoute
 from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 
@@ -28,7 +30,7 @@ router = APIRouter(tags=["vectorize"], route_class=DirectRoute)
 )
 async def post_vectorize(request: Request) -> Response:
     """Cut a scan into directed segments, as /v1/associate does with a scan that comes as ranges or points."""
-    exchange = searching(request)
-    asked = await exchange.read(partial(read_model, VectorizeRequest))
+    exchange = begin_search(request)
+    asked = await read(exchange, partial(read_model, VectorizeRequest))
     job = exchange.job()
-    return exchange.answer(await exchange.search(partial(answer_vectorization, asked, job), job.deadline))
+    return exchange.answer(await search(exchange, partial(answer_vectorization, asked, job), job.deadline))

@@ -32,8 +32,8 @@ async def until(condition: Callable[[], bool]) -> None:
 class BlockedGate(Gate):
     """A gate, and a search that runs until it is released."""
 
-    def __init__(self, slots: int, queue: int) -> None:
-        super().__init__(slots, queue)
+    def __init__(self, slots: int, queue: int, long_per_slot: int = 0) -> None:
+        super().__init__(slots, queue, long_per_slot=long_per_slot)
         self.release = threading.Event()
         self.asked: list[asyncio.Future[Any]] = []
 
@@ -67,8 +67,8 @@ class BlockedGate(Gate):
 
 
 @asynccontextmanager
-async def gate_of(slots: int, queue: int) -> AsyncIterator[BlockedGate]:
-    gate = BlockedGate(slots, queue)
+async def gate_of(slots: int, queue: int, long_per_slot: int = 0) -> AsyncIterator[BlockedGate]:
+    gate = BlockedGate(slots, queue, long_per_slot)
     try:
         yield gate
     finally:

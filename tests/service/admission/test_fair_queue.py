@@ -17,6 +17,10 @@ def in_loop(scenario: Callable[[FairQueue], None]) -> None:
     asyncio.run(run())
 
 
+def anyone(_: Holder) -> bool:
+    return True
+
+
 def joined(queue: FairQueue, *holders: Holder) -> list[Turn]:
     return [queue.join(holder, fixed=False) for holder in holders]
 
@@ -34,8 +38,8 @@ def test_a_newcomer_starts_where_the_least_served_is() -> None:
         ran(queue, B, 1.0)
         # 5 s and 6 s: from nothing, B would have 1 s and be first for a long time.
         of_b, of_a = joined(queue, B, A)
-        assert queue.next() is of_a
-        assert queue.next() is of_b
+        assert queue.next(anyone) is of_a
+        assert queue.next(anyone) is of_b
 
     in_loop(scenario)
 
@@ -51,17 +55,17 @@ def test_old_use_is_forgotten_with_whoever_has_nothing_left() -> None:
         assert (queue.holders, queue.places_of(A), queue.places_of(B)) == (1, 0, 1)
         # A comes back where B is, and the next after it is whoever has stood in front for longest.
         of_a, of_b = joined(queue, A, B)
-        assert [queue.next(), queue.next()] == [of_a, of_b]
+        assert [queue.next(anyone), queue.next(anyone)] == [of_a, of_b]
 
     in_loop(scenario)
 
 
 def test_each_holder_s_turns_come_in_order_and_nobody_waits_for_nothing() -> None:
     def scenario(queue: FairQueue) -> None:
-        assert queue.next() is None
+        assert queue.next(anyone) is None
         turns = joined(queue, A, A, A)
         assert queue.waiting == 3
-        assert [queue.next() for _ in range(4)] == [*turns, None]
+        assert [queue.next(anyone) for _ in range(4)] == [*turns, None]
         assert (queue.waiting, queue.places_of(A)) == (0, 3)  # they run
         for _ in turns:
             queue.finished(A, 1.0)
@@ -93,7 +97,7 @@ def test_the_greediest_gives_up_its_youngest() -> None:
         assert queue.take_from_the_greediest(2) is last
         assert (queue.waiting, queue.places_of(A)) == (4, 2)
         assert queue.take_from_the_greediest(1) is not None
-        assert queue.next() is first
+        assert queue.next(anyone) is first
 
     in_loop(scenario)
 
@@ -110,6 +114,31 @@ def test_a_fixed_turn_is_never_taken() -> None:
         taken = queue.take_from_the_greediest(1)
         assert taken is not None
         assert taken not in fixed
-        assert [queue.next() for _ in range(4)] == fixed
+        assert [queue.next(anyone) for _ in range(4)] == fixed
+
+    in_loop(scenario)
+
+
+def test_a_holder_that_may_start_nothing_is_passed_over() -> None:
+    def scenario(queue: FairQueue) -> None:
+        of_a, of_b = joined(queue, A, B)
+        assert queue.next(lambda holder: holder != A) is of_b
+        assert queue.next(lambda holder: holder != A) is None
+        assert queue.next(anyone) is of_a
+
+    in_loop(scenario)
+
+
+def test_what_runs_on_without_a_slot_keeps_its_place_and_costs_the_time_in_the_slot() -> None:
+    def scenario(queue: FairQueue) -> None:
+        queue.started(A)
+        queue.started(B)
+        queue.spent(A, 2.0)
+        queue.spent(B, 1.0)
+        assert queue.places_of(A) == 1
+        of_a, of_b = joined(queue, A, B)
+        assert queue.next(anyone) is of_b
+        queue.finished(A, 0.0)
+        assert queue.next(anyone) is of_a
 
     in_loop(scenario)

@@ -240,7 +240,7 @@ def test_what_cannot_be_started_gives_the_slot_back() -> None:
         gate = Gate(1, 0)
         gate.close()
         for _ in range(2):
-            with pytest.raises(RuntimeError, match="shutdown"):
+            with pytest.raises(RuntimeError, match="closed"):
                 await gate.run(lambda: 1, soon(), Ticket(), lambda: True)
         assert gate.running == 0
 

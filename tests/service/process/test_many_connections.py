@@ -6,18 +6,15 @@ import resource
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, suppress
-from http.client import HTTPConnection
+from contextlib import ExitStack, suppress
 
 import httpx
-import orjson
 import pytest
 
 from service.schemas import examples
-from tests.running import RunningService, until
+from tests.running import JSON, RunningService, client_of, until
 from tests.running import running as start_running
 from tests.service.parsing.bodies import large_map
-from tests.service.searches import searched_for, store_hard_map
 
 HEAD = b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 HELD = {
@@ -38,7 +35,7 @@ def few_descriptors(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runnin
     with ExitStack() as stack:
         resource.setrlimit(resource.RLIMIT_NOFILE, (256, before[1]))
         try:
-            started = stack.enter_context(start_running(tmp_path_factory.mktemp("few")))
+            started = stack.enter_context(start_running(tmp_path_factory.mktemp("few"), request_timeout=3.0))
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, before)
         yield started
@@ -49,68 +46,42 @@ def connect(running: RunningService, address: str = "127.0.0.1") -> socket.socke
 
 
 @pytest.mark.parametrize("kind", HELD)
-def test_connections_that_are_held_keep_nobody_out(few_descriptors: RunningService, kind: str) -> None:
+def test_connections_that_are_held_end_in_time(few_descriptors: RunningService, kind: str) -> None:
     """270 of them made `/readyz` 503, PUT read-only, and a PUT that needed the parser a 500."""
     running = few_descriptors
     with ExitStack() as stack:
-        for _ in range(600):
+        for _ in range(400):
             connection = stack.enter_context(connect(running))
             with suppress(ConnectionError):
                 connection.sendall(HELD[kind])
-        for address in ("127.0.0.1", "127.0.0.2"):
-            transport = httpx.HTTPTransport(local_address=address)
-            with httpx.Client(base_url=running.url, transport=transport, timeout=10.0) as client:
-                assert client.get("/readyz").status_code == 200
-                assert client.put("/v1/maps/m", json=examples.MAP).status_code in (200, 201)
-                assert client.put("/v1/maps/l", content=large_map(), headers={"content-type": "application/json"})
-                stored = {"map": {"map_id": "m"}, "scan": {"segments": examples.SEEN}}
-                assert client.post("/v1/associate", json=stored).status_code == 200
+        with client_of(running.url) as client:
+            assert client.get("/readyz").status_code == 200
+            assert client.put("/v1/maps/m", json=examples.MAP).status_code in (200, 201)
+            assert client.put("/v1/maps/l", content=large_map(), headers=JSON).status_code in (200, 201)
+            stored = {"map": {"map_id": "m"}, "scan": {"segments": examples.SEEN}}
+            assert client.post("/v1/associate", json=stored).status_code == 200
     assert "a defect" not in running.log()
 
 
-def test_an_address_keeps_its_connections_beside_another_s_flood(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(max_connections=20)
-    with ExitStack() as stack:
-        mine = stack.enter_context(connect(running, "127.0.0.2"))
-        for _ in range(60):
-            stack.enter_context(connect(running)).sendall(b"GET")
-        mine.sendall(HELD["answered"])
-        assert mine.recv(4096).startswith(b"HTTP/1.1 200")
-        # Asked from that address: an idle connection of the other one is given up even as a request comes over it.
-        mine.sendall(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
-        told = b"".join(iter(lambda: mine.recv(65536), b""))
-        assert float(told.split(b"\nlinefix_connections ")[1].split()[0]) <= 10 + 1
-
-
-def test_heads_that_do_not_end_take_no_connection_that_is_used(start_service: Callable[..., RunningService]) -> None:
-    """Between two requests it was given up before them."""
-    running = start_service(max_connections=20)
-    with ExitStack() as stack:
-        mine = stack.enter_context(closing(HTTPConnection("127.0.0.1", running.port, timeout=10)))
-        mine.connect()
-        mine.auto_open = False
-        for _ in range(60):
-            stack.enter_context(connect(running)).sendall(HELD["in their heads"])
-            mine.request("GET", "/livez")
-            assert mine.getresponse().read() == b'{"status":"ok"}'
-
-
-def test_where_all_are_at_work_a_new_one_is_told_so(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(max_connections=8, queue=16, searches=1)
-    store_hard_map(running)
-    large, small = searched_for(30.0), orjson.dumps({**examples.ASSOCIATE, "options": {}})
-    with ExitStack() as stack:
-        transport = httpx.HTTPTransport(local_address="127.0.0.2")
-        client = stack.enter_context(httpx.Client(base_url=running.url, transport=transport))
-        # Half of the connections are one address's; and its own searches wait for one another.
-        stack.enter_context(connect(running)).sendall(post(large))
-        until(lambda: "linefix_searches_running 1.0" in client.get("/metrics").text)
-        for _ in range(3):
-            stack.enter_context(connect(running)).sendall(post(small))
-        until(lambda: "linefix_searches_waiting 3.0" in client.get("/metrics").text)
-        answer = stack.enter_context(connect(running)).recv(4096)
-        assert answer.startswith(b"HTTP/1.1 503 ")
-        assert b"too many connections" in answer
+def test_beyond_all_that_may_be_open_a_connection_waits(start_service: Callable[..., RunningService]) -> None:
+    running = start_service(max_connections=8, request_timeout=60.0)
+    running.client.get("/livez")  # keeps a connection
+    held = [connect(running) for _ in range(7)]
+    try:
+        for connection in held:
+            connection.sendall(HELD["answered"])
+            assert connection.recv(4096).startswith(b"HTTP/1.1 200")
+        with connect(running) as another:
+            another.sendall(HELD["answered"])
+            another.settimeout(0.5)
+            with pytest.raises(TimeoutError):
+                another.recv(4096)
+            held.pop().close()
+            another.settimeout(30.0)
+            assert another.recv(4096).startswith(b"HTTP/1.1 200")
+    finally:
+        for connection in held:
+            connection.close()
 
 
 def test_answers_that_nobody_reads_are_bounded(start_service: Callable[..., RunningService]) -> None:

@@ -105,22 +105,17 @@ def compiled_by_requests() -> list[str]:
 
 
 def search_long() -> None:
-    """Search as where it takes long: looking at the clock all the time, with helpers, and beyond the deadline."""
+    """Search as where it takes long: looking at the clock all the time, and beyond the deadline."""
     from unittest.mock import patch
 
     from association import AssociationOptions, Deadline, MapIndex, Scan, associate, candidates
     from registration import MeasuredSegments, Segments
-    from service.admission.helpers import HelperThreads
 
     walls = Segments.from_array(WALLS)
     index, scan = MapIndex.build(walls), Scan(MeasuredSegments.from_segments(walls))
-    helpers = HelperThreads(1, lambda: 1)
     with patch.object(candidates, "CHUNK", 1):
-        for at, who in ((None, None), (None, helpers), (0.0, None)):
-            deadline = Deadline(at)
-            deadline.helpers = who
-            associate(index, scan, None, AssociationOptions(exhaustive=True), deadline)
-    helpers.close()
+        for at in (None, 0.0):
+            associate(index, scan, None, AssociationOptions(exhaustive=True), Deadline(at))
 
 
 def signatures() -> dict[str, int]:

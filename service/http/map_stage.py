@@ -1,0 +1,95 @@
+"""The second stage of a request: its map is looked up in the store, and indexed where that takes long."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import TypeVar
+
+from association import Deadline
+
+from ..admission.errors import DeadlinePassedError, ForeignMapError
+from ..admission.ticket import Ticket
+from ..maps.cache import CachedMap
+from ..maps.errors import StoreAwayError
+from ..maps.lookup import FoundMap
+from ..schemas.parts import InlineMap, StoredMap
+from .exchange import Exchange
+from .services import Services
+
+T = TypeVar("T")
+STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others for some seconds
+
+
+@asynccontextmanager
+async def looking_up(
+    exchange: Exchange, asked: InlineMap | StoredMap, deadline: Deadline, *, oriented: bool | None
+) -> AsyncIterator[InlineMap | FoundMap]:
+    """Look a stored map up before its turn at the gate: a database server that hangs delays no other request.
+
+    Its document counts as held until the block ends. `oriented` None is as the map itself says.
+
+    Raises
+    ------
+    ForeignMapError
+        When there is no such map for this caller.
+    StoreError
+        When it cannot be had.
+    TooMuchHeldError, ShareHeldError
+        When too much is held already.
+    DeadlinePassedError
+        When the deadline passes first.
+    """
+    if isinstance(asked, InlineMap):
+        yield asked
+        return
+    if not asked.map_id.startswith(exchange.ticket.maps):
+        raise ForeignMapError
+    services = exchange.services
+    found = services.lookup.find_at_once(asked.map_id, oriented=oriented)
+    if found is not None:
+        yield found
+        return
+    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
+    find = partial(services.lookup.find, asked.map_id, oriented=oriented)
+    try:
+        async with asyncio.timeout(left):
+            found = await ask_store(services, find)
+    except TimeoutError:
+        raise DeadlinePassedError from None
+    with services.documents.account(exchange.ticket.holder) as account:
+        account.take(len(found.document or b""))
+        yield found
+
+
+async def index_map(
+    exchange: Exchange, on: InlineMap | FoundMap, deadline: Deadline, *, oriented: bool | None
+) -> CachedMap | None:
+    """Index a map for which that takes long, in a turn of another kind: its threads go behind all searches.
+
+    None where it is left to the search's own turn.
+    """
+    services = exchange.services
+    if not services.lookup.takes_long(on):
+        return None
+    call = partial(services.lookup.indexed, on, oriented=oriented, deadline=deadline)
+    return await services.indexing.run(call, deadline, Ticket(exchange.ticket.holder), lambda: False)
+
+
+async def ask_store(services: Services, call: Callable[[], T]) -> T:
+    """Return what the store returns, in one of its threads.
+
+    Raises
+    ------
+    StoreError
+        When it cannot do what is asked, or does not answer in `STORE_SECONDS`. What was to be written may have been
+        written all the same.
+    """
+    try:
+        async with asyncio.timeout(STORE_SECONDS):
+            return await services.store_threads.run(call)
+    except TimeoutError:
+        raise StoreAwayError from None

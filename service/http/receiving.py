@@ -1,0 +1,68 @@
+"""The first stage of a request: its body is received, unpacked, parsed and checked."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import TypeVar
+
+from association import Deadline
+
+from ..parsing.parser_process import LARGE
+from ..parsing.unpacking import unpack
+from ..schemas.limits import Limits
+from ..telemetry.traces import stage
+from ..work.job import Stopwatch
+from .exchange import Exchange
+from .turns import take_other_turn, unless_hung_up
+
+T = TypeVar("T")
+Reader = Callable[[bytes | bytearray, Limits], T]
+"""From JSON to what was asked for; a function of a module, so that another process can call it."""
+
+SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
+
+
+async def read(exchange: Exchange, reader: Reader[T]) -> T:
+    """Receive the body and check it, off the event loop where that takes long.
+
+    The deadline counts from the moment when the body is there.
+    """
+    async with receive(exchange) as data:
+        with stage("parse"):
+            if len(data) <= SMALL:
+                return reader(data, exchange.services.settings.limits())
+            deadline = exchange.job().deadline
+            return await unless_hung_up(exchange, parse(exchange, reader, data, deadline), deadline)
+
+
+@asynccontextmanager
+async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[bytearray]:
+    """Receive the body, JSON or a form with files, and unpack it; its bytes count as held until the block ends."""
+    services, holder = exchange.services, exchange.ticket.holder
+    async with services.bodies.receiving(exchange.request, exchange.state.arrived, holder, form=form) as body:
+        exchange.ticket.announce()
+        exchange.watch = Stopwatch()
+        data = body.data
+        if body.gzipped:
+            packed, max_bytes = len(data), services.settings.max_body_bytes
+            call = partial(unpack, data, max_bytes, body.account.take)
+            data = await take_other_turn(exchange, services.parsing_apart, call, exchange.job().deadline)
+            body.data.clear()
+            body.account.give_back(packed)
+        yield data
+
+
+async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray, deadline: Deadline) -> T:
+    """Check a body when its turn comes.
+
+    Turns are shared between callers, as those at the gate are, and are others than these: no search waits for a large
+    body. Nor do bodies for larger ones, which another process parses.
+    """
+    services = exchange.services
+    limits = services.settings.limits()
+    if len(data) <= LARGE:
+        return await take_other_turn(exchange, services.parsing, partial(reader, data, limits), deadline)
+    call = partial(services.parser.call, reader, data, limits)
+    return await take_other_turn(exchange, services.parsing_apart, call, deadline)
