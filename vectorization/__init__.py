@@ -1,7 +1,7 @@
 """Laser ranges and ordered points to directed line segments."""
 
 from .errors import InvalidOptionError, InvalidScanError, VectorizationError
-from .laser import LaserScan, Motion
+from .laser import LaserScan, Motion, require_angle_max
 from .options import VectorizationOptions
 from .vectorizer import Vectorization, vectorize
 
@@ -13,5 +13,6 @@ __all__ = [
     "Vectorization",
     "VectorizationError",
     "VectorizationOptions",
+    "require_angle_max",
     "vectorize",
 ]

@@ -19,6 +19,10 @@ MIN_INCREMENT = 1e-6  # rad; neighbouring beams closer than that are one
 
 MOST_TURN = 0.5  # of the step from beam to beam, that the sensor itself may turn meanwhile
 
+# Beams that angle_max may differ from angle_min + (n - 1) * angle_increment. Drivers set angle_max to n increments
+# (LDS-01, neato: one beam more) or round it down by one; half a beam is left for rounding.
+BEAMS_OFF = 1.5
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -139,6 +143,37 @@ class LaserScan:
         places = self.places[seen]
         a = self.angles[seen] + places[:, 2]
         return places[:, :2] + np.stack([r[seen] * np.cos(a), r[seen] * np.sin(a)], axis=1)
+
+
+def require_angle_max(angle_min: float, angle_max: float, angle_increment: float, beams: int) -> None:
+    """Refuse angles of a LaserScan message that contradict each other; drivers are often off by one beam.
+
+    Parameters
+    ----------
+    angle_min, angle_max, angle_increment : float
+        Of the first beam, of the last one, and from beam to beam; radians.
+    beams : int
+
+    Raises
+    ------
+    InvalidScanError
+        When `angle_max` is more than 1.5 beams from that of the last beam, or the beams make more than a turn.
+    """
+    span = (beams - 1) * angle_increment
+    agree = angle_increment != 0.0 and abs(angle_max - angle_min - span) <= BEAMS_OFF * abs(angle_increment)
+    if agree and abs(span) <= math.tau + abs(angle_increment):
+        return
+    told = f"angle_min {angle_min:g} rad, angle_max {angle_max:g} rad and angle_increment {angle_increment:g} rad"
+    if agree:
+        raise InvalidScanError(
+            f"{told} over {beams} ranges are more than a turn: expected radians, not degrees; correct the driver",
+            argument="angle_increment",
+        )
+    raise InvalidScanError(
+        f"{told} contradict each other over {beams} ranges: expected angle_max near angle_min + {beams - 1} "
+        f"angle_increment = {angle_min + span:g} rad; correct the driver",
+        argument="angle_max",
+    )
 
 
 def _numbers(ranges: ArrayLike) -> Floats:

@@ -69,8 +69,8 @@ LONGEST_CONTOUR = 50_000
 # Least cosine between the z axes of a grid and of its frame: 2.6 degrees, far above the rounding of a quaternion.
 UPRIGHT = 0.999
 
-# Fraction of the cells around obstacles that have the cost of an inflated obstacle, from which on a grid is a costmap,
-# and how many of them have to be known. Maps of slam_toolbox and cartographer have below 0.05, costmaps of Nav2 above
-# 0.9.
+# Fraction of the cells around obstacles that have the cost of an inflated obstacle (99), from which on a grid is a
+# costmap, and how many of them have to be known. By its definition a costmap gives 99 to each cell nearer to an obstacle
+# than the robot's inscribed radius; slam_toolbox writes 0, 100 and -1 only. The value lies in the middle, unmeasured.
 INFLATED = 0.5
 LETHAL_CELLS = 20

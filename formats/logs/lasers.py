@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from registration.limits import MAX_LENGTH
-from vectorization import InvalidScanError, LaserScan
+from vectorization import InvalidScanError, LaserScan, require_angle_max
 
 from ..report import Notes
-from .tuning import BEAMS_OFF
 
 Message = Any  # sensor_msgs/LaserScan, whatever library it comes from
 
@@ -41,7 +40,7 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
     if not len(ranges):
         raise InvalidScanError("expected at least one range, found none", argument="ranges")
     first, last, step = (float(getattr(message, f"angle_{name}")) for name in ("min", "max", "increment"))
-    _check_angles(first, last, step, len(ranges))
+    require_angle_max(first, last, step, len(ranges))
     low, high = _limits(float(message.range_min), float(message.range_max), notes)
     if high == math.inf:
         ranges = np.where(np.isinf(ranges), math.nan, ranges)
@@ -50,26 +49,6 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
         told = f"range_min {low:g} m and range_max {high:g} m"
         notes.add_assumed("no_range_within", f"scans with no range between {told}, such as the last", 1)
     return scan
-
-
-def _check_angles(first: float, last: float, step: float, count: int) -> None:
-    """Raise where the angles of a message contradict each other; drivers are often off by one beam."""
-    span = (count - 1) * step
-    agree = step != 0.0 and abs(last - first - span) <= BEAMS_OFF * abs(step)
-    if agree and abs(span) <= math.tau + abs(step):
-        return
-    if agree:
-        raise InvalidScanError(
-            f"angle_min {first:g} rad, angle_max {last:g} rad and angle_increment {step:g} rad over {count} ranges are "
-            "more than a turn: expected radians, not degrees; correct the driver",
-            argument="angle_increment",
-        )
-    raise InvalidScanError(
-        f"angle_min {first:g} rad, angle_max {last:g} rad and angle_increment {step:g} rad contradict each other over "
-        f"{count} ranges: expected angle_max near angle_min + {count - 1} angle_increment = {first + span:g} rad; "
-        "correct the driver",
-        argument="angle_max",
-    )
 
 
 def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:

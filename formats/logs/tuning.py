@@ -13,7 +13,3 @@ SAID_TILT = math.radians(2.0)  # of a scan plane, from which on it is reported: 
 UNIT = 0.1  # by how much the length of a quaternion may differ from 1: decimals that were cut off, not other numbers
 REFIXED = 0.01  # m and rad; values of a fixed transform that differ by more are different mounts
 SAMPLES = 500  # of a moving transform, at which it is looked whether it moves
-
-# Beams that angle_max may differ from angle_min + (n - 1) * angle_increment. Drivers set angle_max to n increments
-# (LDS-01, neato: one beam more) or round it down by one; half a beam is left for rounding.
-BEAMS_OFF = 1.5

@@ -111,7 +111,7 @@ def _files(path: Path) -> list[Path]:
 
 def _read(file: Path) -> tuple[Key, ...]:
     try:
-        return parse_keys(file.read_text())
+        return parse_keys(file.read_text("utf-8-sig"))
     except OSError as error:
         raise KeyFileError(f"{file}: {error.strerror}") from None
     except ValidationError as error:

@@ -45,7 +45,8 @@ def vectorize(
         for number, (segment, points) in enumerate(zip(answer["segments"], answer["points"], strict=True))
     ]
     print_table(columns, rows)
-    print_rows([("sigma", f"{answer['sigma']:.4f} m")])
+    warnings = [("warning", f"{one['code']}: {one['message']}") for one in answer["warnings"]]
+    print_rows([("sigma", f"{answer['sigma']:.4f} m"), *warnings])
 
 
 def _scan_of(told: Json, answer: Json) -> Json:

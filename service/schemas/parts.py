@@ -160,8 +160,10 @@ class Laser(Strict):
     time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
         None, description="seconds from beam to beam; with a `twist` every beam is taken to where the sensor was"
     )
-    angle_max: Any = Field(None, description="of a LaserScan message; taken and not used, as the next two")
-    scan_time: Any = None
+    angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
+        None, description="radians, of the last beam; has to agree with the other angles within 1.5 beams"
+    )
+    scan_time: Any = Field(None, description="of a LaserScan message; taken and not used, as the next one")
     intensities: Any = None
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Alternative, AssociationResult, Correspondence, Hinge, sentence_of
+from association.warnings import NOT_IN_ORDER
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
 
@@ -199,6 +200,7 @@ def vectorization_json(found: Vectorization) -> Json:
         "sigma": found.sigma,
         "sigmas": measured.sigma.tolist(),
         "rms": found.rms.tolist(),
+        "warnings": [] if found.ordered else [{"code": "points_not_in_order", "message": NOT_IN_ORDER}],
     }
 
 

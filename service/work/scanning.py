@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Scan
-from vectorization import LaserScan, Motion, Vectorization, VectorizationError, VectorizationOptions, vectorize
+from vectorization import (
+    LaserScan,
+    Motion,
+    Vectorization,
+    VectorizationError,
+    VectorizationOptions,
+    require_angle_max,
+    vectorize,
+)
 
 from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.parts import Laser, Twist
@@ -60,6 +68,8 @@ def vectorize_laser(
     if twist is not None and laser.time_increment:
         motion = Motion(laser.time_increment, twist.vx, twist.vy, twist.omega)
     with _placed(f"{places[0]}/laser", places):
+        if laser.angle_max is not None and len(laser.ranges):
+            require_angle_max(laser.angle_min, laser.angle_max, laser.angle_increment, len(laser.ranges))
         scan = LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, motion=motion, **bounds)
         return vectorize(scan, options)
 

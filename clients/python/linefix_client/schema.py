@@ -305,22 +305,6 @@ class SizeAnswer(TypedDict):
     diagonal: float
 
 
-class VectorizeAnswer(TypedDict):
-    """
-    Segments, and what may be sent back with them in a scan.
-    """
-
-    segments: list[list[float]]
-    points: list[int]
-    centroids: list[list[float]]
-    spreads: list[float]
-    sigma: float
-    sigmas: list[float]
-    rms: list[float]
-    request_id: str
-    timing_ms: dict[str, float]
-
-
 class Version(TypedDict):
     """
     What runs here.
@@ -408,7 +392,7 @@ class Laser(TypedDict):
     range_max: NotRequired[float | None]
     header: NotRequired[Header | None]
     time_increment: NotRequired[float | None]
-    angle_max: NotRequired[Any]
+    angle_max: NotRequired[float | None]
     scan_time: NotRequired[Any]
     intensities: NotRequired[Any]
 
@@ -626,6 +610,23 @@ class RegisterAnswer(TypedDict):
     unobservable: list[float] | None
     residuals: list[Residual]
     diagnostics: RegistrationDiagnosticsAnswer
+    request_id: str
+    timing_ms: dict[str, float]
+
+
+class VectorizeAnswer(TypedDict):
+    """
+    Segments, and what may be sent back with them in a scan.
+    """
+
+    segments: list[list[float]]
+    points: list[int]
+    centroids: list[list[float]]
+    spreads: list[float]
+    sigma: float
+    sigmas: list[float]
+    rms: list[float]
+    warnings: list[WarningAnswer]
     request_id: str
     timing_ms: dict[str, float]
 

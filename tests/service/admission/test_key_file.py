@@ -30,6 +30,15 @@ def test_a_new_key_is_good_for_what_was_said(tmp_path: Path, capsys: pytest.Capt
     assert [(grant.roles, grant.maps) for grant in read_keys(path).values()] == [(EVERY_ROLE, "")]
 
 
+def test_a_byte_order_mark_is_no_part_of_a_key(tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    path.write_text(key_lines("sesame", ["read"]), encoding="utf-8-sig")
+    assert [grant.roles for grant in read_keys(path).values()] == [{Role.READ}]
+    path.write_text(key_lines("sesame", ["read"]), encoding="utf-16")
+    with pytest.raises(KeyFileError, match="not UTF-8"):
+        read_keys(path)
+
+
 @pytest.mark.parametrize("arguments", [["", "--maps", "x"], ["robots", "--maps", "hq/"], ["robots", "--role", "all"]])
 def test_a_key_for_nothing_is_not_made(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
     assert run(["key", *arguments]) == 2

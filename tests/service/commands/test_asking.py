@@ -74,6 +74,20 @@ def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None
     assert linefix("locate", "room.json", "found.json").code == 0
 
 
+def test_vectorize_says_that_points_are_in_no_order(linefix: Linefix, folder: Path) -> None:
+    points = [[x / 20, -1.0] for x in range(60)]
+    (folder / "mixed.json").write_text(json.dumps({"points": [points[k * 23 % 60] for k in range(60)]}))
+    assert "points_not_in_order: " in linefix("vectorize", "mixed.json").out
+    assert "points_not_in_order" not in linefix("vectorize", "points.json").out
+
+
+def test_a_scan_whose_angles_contradict_each_other_is_refused(linefix: Linefix, folder: Path) -> None:
+    laser = {"angle_min": -3.1, "angle_max": 3.1, "angle_increment": 0.05, "ranges": [2.0] * 63}
+    (folder / "laser.json").write_text(json.dumps(laser))
+    for command in (("locate", "room.json", "laser.json"), ("vectorize", "laser.json")):
+        assert "angle_max 3.1 rad and angle_increment 0.05 rad contradict" in refused(linefix(*command), 3)
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [

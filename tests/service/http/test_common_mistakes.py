@@ -88,6 +88,39 @@ def test_a_laser_scan_message_is_taken_with_all_its_fields(client: httpx.Client)
     assert plain["segments"] == full["segments"]
 
 
+@pytest.mark.parametrize("angle_max", [None, 0.4, 0.5, 0.3, 0])
+def test_the_last_angle_may_be_off_by_a_beam(client: httpx.Client, angle_max: float | None) -> None:
+    first = -0.8 if angle_max == 0 else -0.4
+    laser = {"angle_min": first, "angle_max": angle_max, "angle_increment": 0.1, "ranges": [2.0] * 9, "range_max": 30.0}
+    assert client.post("/v1/vectorize", json={"laser": laser}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"angle_max": -0.4},
+        {"angle_max": 22.9},
+        {"angle_max": 0.6},
+        {"angle_increment": -0.1},
+        {"angle_increment": 0.05},
+        {"ranges": [2.0] * 18},
+    ],
+)
+def test_angles_that_contradict_each_other_are_named(client: httpx.Client, changed: dict[str, Any]) -> None:
+    """A driver that sets one of the angles wrong turns, mirrors or stretches its scans."""
+    laser = {"angle_min": -0.4, "angle_max": 0.4, "angle_increment": 0.1, "ranges": [2.0] * 9, "range_max": 30.0}
+    view = {"laser": laser | changed, "pose": {"x": 0.0, "y": 0.0, "theta": 0.0}}
+    for path, body, place in (
+        ("/v1/vectorize", {"laser": laser | changed}, "/laser/angle_max"),
+        ("/v1/associate", associate_body(scan={"laser": laser | changed}), "/scan/laser/angle_max"),
+        ("/v1/associate", associate_body(scan={"views": [view]}), "/scan/views/0/laser/angle_max"),
+    ):
+        (error,) = refused(client.post(path, json=body), 422, "invalid_request")["errors"]
+        assert error["pointer"] == place
+        assert "angle_min" in error["message"]
+        assert "angle_increment" in error["message"]
+
+
 def test_a_laser_scan_s_header_fills_stamp_and_frame(client: httpx.Client) -> None:
     laser = {"angle_min": -0.4, "angle_increment": 0.1, "ranges": [2.0] * 9, "range_max": 30.0}
     stamp = {"sec": 12, "nanosec": 5}

@@ -54,6 +54,21 @@ def test_both_routes_cut_a_scan_alike(client: httpx.Client) -> None:
         assert client.post("/v1/associate", json=asked).json()["segments"] == cut
 
 
+def test_points_in_no_order_are_warned_of(client: httpx.Client) -> None:
+    points = np.array(contour()) - np.array([2.0, 2.5])
+    points = points[np.argsort(np.arctan2(points[:, 1], points[:, 0]))]
+    mixed = np.random.default_rng(3).permutation(points)
+    for body, codes in (
+        ({"points": points.tolist()}, []),
+        ({"points": points.tolist(), "viewpoint": None}, []),
+        ({"laser": laser(2)}, []),
+        ({"points": mixed.tolist()}, ["points_not_in_order"]),
+        ({"points": mixed.tolist(), "viewpoint": None}, ["points_not_in_order"]),
+    ):
+        warnings = client.post("/v1/vectorize", json=body).json()["warnings"]
+        assert [one["code"] for one in warnings] == codes
+
+
 def test_a_contour_runs_as_it_was_drawn_where_it_is_from_no_one_place(client: httpx.Client) -> None:
     """Seen from the origin every wall was turned to face it; of a contour that is no place where a sensor stood."""
     shifted = (np.array(contour()) + np.array([20.0, 0.0])).tolist()  # the origin is outside of the room
