@@ -23,6 +23,7 @@ RUN python3 -m venv /opt/tools \
     && $COMPILE /opt/linefix/lib
 COPY .ci/materials.py .ci/
 COPY pyproject.toml README.md ./
+COPY compiled compiled
 COPY registration registration
 COPY vectorization vectorization
 COPY association association
@@ -40,10 +41,10 @@ RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir 
     && /opt/tools/bin/python .ci/materials.py /opt/linefix/sbom.cdx.json /opt/linefix/bin/python \
     && find /opt/linefix/bin -mindepth 1 ! -name 'python*' ! -name linefix -delete \
     && rm -rf /opt/linefix/include /opt/linefix/share
-# For any processor of its kind, x86-64 or arm64: its name is part of a kernel's key, so it has to be the same at run time.
-ENV NUMBA_CACHE_DIR=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
+# Kernels for any processor of its kind, x86-64 or arm64. Its name is part of their digest, so it is the same at run time.
+ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES=""
 WORKDIR /
-RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.warmup import warm_up; warm_up()"
+RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
     && $COMPILE registration vectorization association simulation analysis formats fleet linefix ros2 service \
     && chmod -R u=rwX,go=rX /opt/linefix
@@ -59,7 +60,7 @@ RUN useradd --system --uid 10001 --user-group --home-dir /data --no-create-home 
 COPY --from=build /opt/linefix /opt/linefix
 ENV PATH=/opt/linefix/bin:$PATH \
     PYTHONUNBUFFERED=1 \
-    NUMBA_CACHE_DIR=/opt/linefix/kernels \
+    LINEFIX_KERNELS=/opt/linefix/kernels \
     NUMBA_CPU_NAME=generic \
     NUMBA_CPU_FEATURES="" \
     LINEFIX_HOST=0.0.0.0 \

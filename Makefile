@@ -127,7 +127,7 @@ lock: $(VENV)/.ready  ## pin the dependencies anew, by hash where the image is m
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group peers -o requirements/peers.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group docs -o requirements/docs.txt
 
-# Where LINEFIX_KERNELS or NUMBA_CACHE_DIR name a directory, whoever named it removes it: it may hold other things.
+# A directory that LINEFIX_KERNELS names stays: it may hold other things.
 clean:  ## remove what the other targets made, compiled kernels too
 	rm -rf $(VENV) $(VENV)-peers $(VENV)-clients out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

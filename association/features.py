@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from registration.compiling import way_in
 from registration.layout import Records
 
 from .context import SearchContext
@@ -86,13 +85,13 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
-_describe = way_in(kernels.describe)
-_weigh = way_in(kernels.weigh)
-_see_hinges = way_in(kernels.see_hinges)
-_see_unmatched = way_in(kernels.see_unmatched)
-_is_thin = way_in(kernels.is_thin)
-_take_null = way_in(odds.take_null)
-twin_share = way_in(kernels.twin_share)
+_describe = kernels.describe
+_weigh = kernels.weigh
+_see_hinges = kernels.see_hinges
+_see_unmatched = kernels.see_unmatched
+_is_thin = kernels.is_thin
+_take_null = odds.take_null
+twin_share = kernels.twin_share
 
 
 def facts_of(context: SearchContext, answer: Answer) -> Records:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from registration.compiling import way_in
 from registration.values import value
 
 from .candidates import Effort, allowed_by, find_candidates
@@ -28,7 +27,7 @@ from .tuning import (
     NULL_SHARE,
 )
 
-_mirrored_share = way_in(symmetry.mirrored_share)
+_mirrored_share = symmetry.mirrored_share
 
 
 @value(frozen=True, slots=True)

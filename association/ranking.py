@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration import RigidTransform
-from registration.compiling import way_in
 from registration.layout import Records
 from registration.values import value
 
@@ -44,7 +43,7 @@ from .tuning import (
 Floats = NDArray[np.float64]
 NOTHING = np.zeros(0)
 
-_rank, _distinct_places = way_in(kernels.rank), way_in(kernels.distinct)
+_rank, _distinct_places = kernels.rank, kernels.distinct
 
 
 @value(frozen=True, slots=True)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration import MeasuredSegments
-from registration.compiling import way_in
 from registration.layout import Records
 from registration.values import value
 
@@ -37,8 +36,8 @@ from .tuning import (
     VIEW_SIGMAS,
 )
 
-_describe_view, _mirror_lines = way_in(kernels.describe_view), way_in(kernels.mirror_lines)
-_set_map_sigma = way_in(kernels.set_map_sigma)
+_describe_view, _mirror_lines = kernels.describe_view, kernels.mirror_lines
+_set_map_sigma = kernels.set_map_sigma
 
 
 @value(frozen=True, slots=True)

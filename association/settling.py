@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from registration import RigidTransform
-from registration.compiling import way_in
 from registration.layout import Floats, Records
 from registration.observability import MAX_DEVIATION
 from registration.values import value
@@ -26,7 +25,7 @@ from .view_settling import SeenOnWalls, ViewsSettled
 
 NO_HINGES = np.zeros(0, HINGE)
 
-_settle = way_in(kernels.settle)
+_settle = kernels.settle
 
 
 @value(frozen=True, slots=True)

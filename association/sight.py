@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from registration.compiling import way_in
 from registration.layout import Records
 from registration.values import value
 
@@ -44,7 +43,7 @@ class BeamShares:
 
 NO_BEAMS = BeamShares()
 
-_agreement = way_in(agreement_kernels.agreement)
+_agreement = agreement_kernels.agreement
 
 
 def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:

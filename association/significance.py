@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from registration.compiling import way_in
-
 from .context import SearchContext
 from .kernels import chance
 
 EXPONENTS = np.geomspace(0.01, 2.0, 40)  # of Chernoff's bound
 
-_significance = way_in(chance.significance)
+_significance = chance.significance
 
 
 def significance(context: SearchContext, score: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from registration import RigidTransform
-from registration.compiling import way_in
 from registration.layout import Records
 from registration.values import value
 
@@ -34,8 +33,8 @@ from .tuning import (
     USABLE_PROBABILITY,
 )
 
-_allowed_null = way_in(odds.allowed_null)
-_chance = way_in(odds.chance)
+_allowed_null = odds.allowed_null
+_chance = odds.chance
 
 
 @value(frozen=True, slots=True)

@@ -13,6 +13,8 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.middleware.cors import CORSMiddleware
 
+from compiled import compiled_fraction, is_complete
+
 from .admission.budget import ByteBudget
 from .admission.entrance import Entrance
 from .admission.gate import Gate
@@ -43,7 +45,7 @@ from .telemetry.traces import traces_of_environment
 from .threads import Threads
 from .version import VERSION
 from .work.association import Associator
-from .work.compiling import compile_kernels, compiled_share, is_compiled
+from .work.compiling import compile_kernels
 from .work.warmup import warm_up
 
 logger = logging.getLogger("linefix")
@@ -224,7 +226,7 @@ async def _prepare(services: Services) -> None:
         logger.error("the store does not open: %s", error, extra={"store": where})
     threads, parser = services.parse_threads, services.parser
     await threads.run(remove_abandoned)
-    if not is_compiled():
+    if not is_complete():
         await _compile(services)
     await asyncio.gather(threads.run(warm_up), threads.run(parser.start), _fetch_first_keys(services))
     # What was made until now lives as long as the process: the garbage collector need not look through it, ever. It has
@@ -245,8 +247,8 @@ async def _fetch_first_keys(services: Services) -> None:
 
 async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and say how far it is."""
-    logger.info("compiling, which takes half a minute, or two where cores are busy; it is kept for the next start")
-    services.readiness.compiled = compiled_share
+    logger.info("compiling the kernels, which takes about a minute; later starts load them from the cache")
+    services.readiness.compiled = compiled_fraction
     telling = asyncio.create_task(_tell_progress())
     try:
         with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
@@ -260,7 +262,7 @@ async def _compile(services: Services) -> None:
 async def _tell_progress() -> None:
     while True:
         await asyncio.sleep(PROGRESS_SECONDS)
-        logger.info("compiling", extra={"share": round(compiled_share(), 2)})
+        logger.info("compiling", extra={"share": round(compiled_fraction(), 2)})
 
 
 async def _follow(threads: Threads, refresh: Callable[[], None]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import faulthandler
-import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,11 +11,9 @@ import httpx
 import pytest
 from hypothesis import HealthCheck, settings
 
-from registration.compiling import CHECKED
 from tests.running import RunningService, running
 
 TESTS = Path(__file__).parent
-os.environ[CHECKED] = "1"  # for the services that are started, too
 EXIT_SECONDS = 30.0
 ROOMS = ("faults", "service", "experiments", "benchmarks")  # whose files take long
 

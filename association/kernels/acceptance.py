@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import inlined, internal, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import BLOCKER, PAIR, Indices
@@ -25,10 +24,10 @@ def pieces_along(w: int, walls: Records, pieces: Pieces) -> PiecesAlong:
     while v >= 0:
         count += pieces.starts[v + 1] - pieces.starts[v]
         v = walls[v].after
-    piece = empty(count, np.intp)
-    wall = empty(count, np.intp)
-    low = empty(count, np.float64)
-    high = empty(count, np.float64)
+    piece = np.empty(count, np.intp)
+    wall = np.empty(count, np.intp)
+    low = np.empty(count, np.float64)
+    high = np.empty(count, np.float64)
     count = 0
     v = w
     while v >= 0:
@@ -43,8 +42,8 @@ def pieces_along(w: int, walls: Records, pieces: Pieces) -> PiecesAlong:
             count += 1
         v = walls[v].after
     place = ascending(low)
-    farthest = empty(count, np.intp)
-    gaps = zeros(count, np.float64)
+    farthest = np.empty(count, np.intp)
+    gaps = np.zeros(count, np.float64)
     for k in range(count):
         farthest[k] = place[k]
         if k > 0:
@@ -114,7 +113,7 @@ def pieces_under(along: PiecesAlong, low: float, high: float, own: int, named: I
     return most, count
 
 
-@inlined
+@kernel
 def insert(ascending_places: Indices, count: int, place: int) -> int:
     """Insert a place among the first `count` of some, in order; the last one is left out where there is no room."""
     if count == len(ascending_places):
@@ -132,14 +131,13 @@ def insert(ascending_places: Indices, count: int, place: int) -> int:
 @kernel
 def chain_keys(matches: Records, lines: Lines, pieces: Pieces) -> Floats:
     """Return (n,) for each scan segment the first wall of the chain that it lies on, -1 for none."""
-    keys = empty(len(lines.row_of), np.float64)
+    keys = np.empty(len(lines.row_of), np.float64)
     for i in range(len(keys)):
         w = matches[lines.row_of[i]].wall
         keys[i] = pieces.firsts[w] if w >= 0 else -1.0
     return keys
 
 
-@internal
 @kernel
 def accept_matches(
     matches: Records, lines: Lines, scan_ends: Records, pose: Records, walls: Records, pieces: Pieces
@@ -156,9 +154,9 @@ def accept_matches(
     """
     row_of = lines.row_of
     n = len(row_of)
-    members = zeros(len(matches), np.int64)
-    found = empty(n, PAIR)
-    rivals_of = empty((n, MAX_RIVALS), np.intp)
+    members = np.zeros(len(matches), np.int64)
+    found = np.empty(n, PAIR)
+    rivals_of = np.empty((n, MAX_RIVALS), np.intp)
     for i in range(n):
         members[row_of[i]] += 1
         found[i].piece = -1
@@ -194,7 +192,7 @@ def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out:
     end += (s * segment.x2 + c * segment.y2 + pose.y) * wall.dy
     low = min(begin, end)
     high = max(begin, end)
-    named = empty(MAX_RIVALS + 1, np.intp)
+    named = np.empty(MAX_RIVALS + 1, np.intp)
     most, count = pieces_under(along, low, high, out.piece, named)
     out.piece = along.piece[most]
     out.overlap = 0.0
@@ -217,10 +215,10 @@ def by_scan_index(found: Records, rivals_of: Indices) -> tuple[Indices, Floats, 
         if found[i].piece >= 0:
             count += 1
             others += found[i].rivals
-    pairs = empty((count, 2), np.intp)
-    overlaps = empty(count, np.float64)
-    rivals = empty(others, np.intp)
-    rival_starts = zeros(count + 1, np.intp)
+    pairs = np.empty((count, 2), np.intp)
+    overlaps = np.empty(count, np.float64)
+    rivals = np.empty(others, np.intp)
+    rival_starts = np.zeros(count + 1, np.intp)
     pair = 0
     for i in range(len(found)):
         one = found[i]
@@ -235,7 +233,6 @@ def by_scan_index(found: Records, rivals_of: Indices) -> tuple[Indices, Floats, 
     return pairs, overlaps, rivals, rival_starts
 
 
-@internal
 @kernel
 def missing_pieces(
     sights: Sights, matches: Records, pose: Records, place: Place, pieces: Pieces, work: Workspace
@@ -246,7 +243,7 @@ def missing_pieces(
     """
     items = pieces.items
     piece_starts = pieces.starts
-    blockers = Blockers(zeros(len(place.walls), BLOCKER), empty(len(place.walls), np.int64))
+    blockers = Blockers(np.zeros(len(place.walls), BLOCKER), np.empty(len(place.walls), np.int64))
     counts = blockers.counts
     touched = blockers.touched
     passed = count_blockers(sights, matches, pose[0], place, blockers, work.scratch[0].ray)
@@ -260,7 +257,7 @@ def missing_pieces(
         w = touched[k]
         if 2 * counts[w].to_matched >= BLOCKING_RAYS:
             count += piece_starts[w + 1] - piece_starts[w]
-    missing = empty(count, np.intp)
+    missing = np.empty(count, np.intp)
     count = 0
     for k in range(passed):
         w = touched[k]

@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import borrowed, kernel
+from compiled import kernel
 from registration.layout import Record, Records
 
 from ..planning_tables import Plan
@@ -45,13 +45,6 @@ def advance(
     find meanwhile is not known, so that what may have to be kept is only noted there, for `merge`. It is `BUDGET` until
     that base is done, or the room used up.
     """
-    question = borrowed(question)
-    tables = borrowed(tables)
-    plan = borrowed(plan)
-    found = borrowed(found)
-    tried = borrowed(tried)
-    progress = borrowed(progress)
-    work = borrowed(work)
     state = progress[0]
     allowed = how[0].allowed
     budget = how[0].budget
@@ -122,11 +115,6 @@ def merge(
 
     `found` and `progress` are then what they would be if the base had been gone through now.
     """
-    question = borrowed(question)
-    plan = borrowed(plan)
-    tried = borrowed(tried)
-    found = borrowed(found)
-    work = borrowed(work)
     state = progress[0]
     state.hypotheses += ahead[0].hypotheses
     state.bases += 1

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats, Records
 
 from ..layout import Flags
@@ -95,8 +94,8 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
     shape = place.grid.shape[0]
     ray = work.scratch[0].ray
     at = pose[0]
-    distances = empty(RAYS, np.float64)
-    looked = empty(RAYS, np.bool_)
+    distances = np.empty(RAYS, np.float64)
+    looked = np.empty(RAYS, np.bool_)
     c = math.cos(at.theta)
     s = math.sin(at.theta)
     agree = 0.0

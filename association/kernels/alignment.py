@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
@@ -22,7 +21,7 @@ from ..tuning import (
 )
 
 
-@inlined
+@kernel
 def overlap_middle(one: Record, other: Record) -> tuple[float, float]:
     """Return the abscissa on `other`, from its middle, of the middle of what both cover, and how much that is."""
     middle = other.dx * (one.x - other.x) + other.dy * (one.y - other.y)
@@ -31,21 +30,21 @@ def overlap_middle(one: Record, other: Record) -> tuple[float, float]:
     return 0.5 * (low + high), high - low
 
 
-@inlined
+@kernel
 def offset_at(one: Record, other: Record, x: float, y: float) -> float:
     """Return how far `one` lies to the left of `other`, metres, beside a place on that."""
     along = one.dx * (x - one.centroid_x) + one.dy * (y - one.centroid_y)
     return other.dx * (one.centroid_y + along * one.dy - y) - other.dy * (one.centroid_x + along * one.dx - x)
 
 
-@inlined
+@kernel
 def variance_at(line: Record, x: float, y: float) -> float:
     """Return the variance of a line's offset beside a place, m^2."""
     along = line.dx * (x - line.centroid_x) + line.dy * (y - line.centroid_y)
     return ROUGHNESS**2 + line.variance * (1.0 + along * along / max(line.spread, LEAST_SPREAD))
 
 
-@inlined
+@kernel
 def angle_variance(line: Record) -> float:
     """Return the variance of a line's angle, rad^2."""
     return MODEL_ANGLE**2 + line.variance / max(line.spread, LEAST_SPREAD)
@@ -56,7 +55,7 @@ def step_variance(
     covariance: Floats, one: int, other: int, line: Record, x: float, y: float, places: Records
 ) -> tuple[float, float]:
     """Return the variances of an offset from `line` at a place, and of an angle, by what is not known of two views."""
-    g = empty(6, np.float64)
+    g = np.empty(6, np.float64)
     for k in range(2):
         v = one if k == 0 else other
         sign = 1.0 if k == 0 else -1.0
@@ -89,7 +88,7 @@ def pair_lines(lines: Records, starts: Integers, places: Records, covariance: Fl
     places : (v,) of `POINT`, of the views
     covariance : (3 v, 3 v) of additive x, y, theta of the views' poses
     """
-    pairs = empty((len(lines), 2), np.int64)
+    pairs = np.empty((len(lines), 2), np.int64)
     count = 0
     for v in range(1, len(starts) - 1):
         for i in range(starts[v], starts[v + 1]):

@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import borrowed, inlined, internal, kernel
+from compiled import kernel
 from registration.kernels import joint_add, joint_solve
 from registration.layout import Record, Records
 
@@ -25,7 +25,7 @@ from .consensus import clear, hold
 from .sight import first_hit
 
 
-@inlined
+@kernel
 def across_wall(
     ray: Record, distance: float, walls: Records, starts: Integers, items: Integers, shape: Record
 ) -> tuple[float, int]:
@@ -39,7 +39,7 @@ def across_wall(
     return (distance - expected) * max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx)), w
 
 
-@inlined
+@kernel
 def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> None:
     """Let a ray go where a beam did; `c` and `s` are cosine and sine of the pose's heading."""
     ray.x = c * beam.x - s * beam.y + pose.x
@@ -80,7 +80,6 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
     evidence.passed = passed / n
 
 
-@internal
 @kernel
 def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
     """Return the shares of the beams that read farther, and nearer, than the map shows from the first pose.
@@ -165,16 +164,12 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
     pose.y = ty
 
 
-@internal
 @kernel
 def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Workspace, out: Records) -> None:
     """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.
 
     The first `refined` poses are moved to where the beams fit best, if they fit better there.
     """
-    rays = borrowed(rays)
-    place = borrowed(place)
-    work = borrowed(work)
     moved = work.scratch[0].estimate
     evidence = work.scratch[0].evidence
     for k in range(len(poses)):

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import inlined, internal, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import HARD_PRIOR, NO_PRIOR
@@ -32,11 +31,10 @@ def prior_value(prior: Record, pose: Record) -> float:
     return max(SOFT_FLOOR, -0.5 * square)
 
 
-@internal
 @kernel
 def prior_values(prior: Records, poses: Records) -> Floats:
     """Return what the prior (1,) says of each of the poses (k,), nats."""
-    values = empty(len(poses), np.float64)
+    values = np.empty(len(poses), np.float64)
     for k in range(len(poses)):
         values[k] = prior_value(prior[0], poses[k])
     return values
@@ -81,7 +79,7 @@ def keep(found: Records, progress: Record, rules: Record, pose: Record, score: f
         progress.least_kept = least
 
 
-@inlined
+@kernel
 def floor_of(rules: Record, progress: Record, bonus: float) -> float:
     """Return the score that a pose must reach to be kept, given what the prior says of it."""
     return max(rules.kept_share * progress.best_value, progress.least_kept) - bonus

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats, Records
 
 from ..tables import WallLengths
@@ -21,7 +20,7 @@ def chance_matches(scan: Records, walls: WallLengths, gates: Records) -> Floats:
     gate = gates[0]
     lengths = walls.ascending
     beyond = walls.beyond
-    chances = empty(len(scan), np.float64)
+    chances = np.empty(len(scan), np.float64)
     for i in range(len(scan)):
         # The walls that are long enough: the first of them by bisection.
         least = gate.least_overlap * scan[i].length

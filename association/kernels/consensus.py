@@ -9,7 +9,7 @@ of a copy of the sums before it is solved.
 
 import math
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.kernels import invert3, joint_add, joint_cost, joint_information, joint_solve
 from registration.layout import Floats, Record, Records
 
@@ -32,7 +32,7 @@ def turning(theta_var: float, gx: float, gy: float, covariance: Record) -> None:
     covariance.tt = theta_var
 
 
-@inlined
+@kernel
 def hold(sums: Record, x: float, y: float, sign: float) -> None:
     """Add or remove the weak spring that holds a translation where it is."""
     sums.xx += sign * SPRING
@@ -65,7 +65,7 @@ def clear(sums: Record) -> None:
     sums.count = 0.0
 
 
-@inlined
+@kernel
 def forget(share: Record) -> None:
     """Set a wall's share to that of no pair."""
     share.c = 0.0
@@ -171,7 +171,7 @@ def list_walls(work: Workspace, ties: Floats) -> tuple[int, int]:
     return alone, count
 
 
-@inlined
+@kernel
 def take_out(sums: Record, share: Record, k: float) -> None:
     """Take the square of a share, times k, out of the sums."""
     sums.cc -= k * share.c * share.c
@@ -191,7 +191,7 @@ def take_out(sums: Record, share: Record, k: float) -> None:
     sums.one -= k * share.one * share.one
 
 
-@inlined
+@kernel
 def absorb(common: Record, share: Record, factor: float) -> None:
     """Set what is known of an error to `factor` times what was known of the one before, and add a wall's share."""
     common.c = factor * common.c + share.c
@@ -280,7 +280,7 @@ def know_others(work: Workspace, ties: Floats, wall_variance: float, estimate: R
         shares[listed[k]].other_sum += total
 
 
-@inlined
+@kernel
 def together(share: Record, c: float, s: float, estimate: Record) -> float:
     """Return how far the pairs of a wall are off it, times their weights, 1/m, at a pose of cosine c and sine s."""
     return share.c * c + share.s * s + share.x * estimate.x + share.y * estimate.y + share.one
@@ -419,7 +419,7 @@ def value_pairs(
     return total
 
 
-@inlined
+@kernel
 def discount_uneven(scan: Records, matches: Records) -> None:
     """Take from each gain what it costs that the walls under one straight line are beside one another."""
     for i in range(len(scan)):

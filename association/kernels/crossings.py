@@ -9,8 +9,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import CROSSING, Integers
@@ -21,7 +20,7 @@ PER_CELL = 1.0 / CROSSING_CELL
 STEPS = 127  # of a byte of a code
 
 
-@inlined
+@kernel
 def crossing_of(a: Record, b: Record) -> tuple[float, float, float, float]:
     """Return where the lines of two runs cross, as abscissae along each, and sine and cosine of the angle between them.
 
@@ -32,7 +31,7 @@ def crossing_of(a: Record, b: Record) -> tuple[float, float, float, float]:
     return (a.offset * cosine - b.offset) / sine, (a.offset - b.offset * cosine) / sine, sine, cosine
 
 
-@inlined
+@kernel
 def reach_to(a: Record, b: Record) -> float:
     """Return how far from where two lines cross the nearest point of a run is, the farther of both; inf if parallel."""
     if abs(a.dx * b.dy - a.dy * b.dx) < MIN_CROSSING:
@@ -41,13 +40,13 @@ def reach_to(a: Record, b: Record) -> float:
     return max(max(a.begin - on_a, on_a - a.end), max(b.begin - on_b, on_b - b.end))
 
 
-@inlined
+@kernel
 def cell_of(abscissa: float, reach: float, columns: int) -> int:
     """Return the cell of a place on a line, counted from the crossing."""
     return int(min(columns - 0.5, max(0.0, (abscissa + reach) * PER_CELL)))
 
 
-@inlined
+@kernel
 def cells_of(a: Record, b: Record, reach: float, columns: int) -> tuple[int, int, int, int]:
     """Return the first and last cell of a run, and those of one that crosses it."""
     on_a, on_b, _, _ = crossing_of(a, b)
@@ -59,13 +58,13 @@ def cells_of(a: Record, b: Record, reach: float, columns: int) -> tuple[int, int
     )
 
 
-@inlined
+@kernel
 def step_of(abscissa: float, per_metre: float) -> int:
     """Return a place on a line in the steps of a code; what is beyond the lists is where they end."""
     return int(min(float(STEPS), max(0.0, abscissa * per_metre + 0.5 * STEPS)))
 
 
-@inlined
+@kernel
 def code_of(first_begin: float, first_end: float, second_begin: float, second_end: float, reach: float) -> int:
     """Return where two runs begin and end as a number of four bytes, each from 0 to 127.
 
@@ -77,13 +76,13 @@ def code_of(first_begin: float, first_end: float, second_begin: float, second_en
     return low | (STEPS | STEPS << 16) - high << 8
 
 
-@inlined
+@kernel
 def away_from(band: Record, box: Record) -> float:
     """Return how far at least the boxes of a band are from a box, in y; below 0 where they may lie beside it."""
     return max(band.low - box.y2, box.y1 - band.high)
 
 
-@inlined
+@kernel
 def first_from(boxes: Records, begin: int, end: int, at: int) -> int:
     """Return from where on the boxes of a band, in ascending order of x1, come after another: no pair comes twice."""
     low = begin
@@ -107,7 +106,7 @@ def sample_crossings(
     `reaches` (k,) in descending order; the others as of `find_crossings`. Stops after `most` looks at a pair of runs.
     Returns for each reach (k, 3) crossings, their entries in all lists, and looks.
     """
-    counts = zeros((len(reaches), 3), np.float64)
+    counts = np.zeros((len(reaches), 3), np.float64)
     sampled = 0
     looks = 0
     at = 0
@@ -151,7 +150,7 @@ def find_crossings(
     near one another. Stops after `most` looks at a pair. Returns how many there are, and looks.
     """
     m = len(runs)
-    place = empty(m, np.int32)
+    place = np.empty(m, np.int32)
     for k in range(m):
         place[order[k]] = k
     found = 0
@@ -189,7 +188,7 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
     reach = shape[0].reach
     columns = shape[0].columns
     bins = np.full(CROSSING_ANGLES, -1, dtype=np.int32)
-    of_angle = empty(len(found), np.uint8)
+    of_angle = np.empty(len(found), np.uint8)
     for k in range(len(found)):
         a = runs[found[k].first]
         b = runs[found[k].second]
@@ -202,8 +201,8 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
         if bins[b] >= 0:
             bins[b] = grids
             grids += 1
-    starts = zeros(grids * columns * columns + 1, np.int32)
-    entries = empty(0, CROSSING)
+    starts = np.zeros(grids * columns * columns + 1, np.int32)
+    entries = np.empty(0, CROSSING)
     for counting in (True, False):
         if not counting:
             total = 0
@@ -211,7 +210,7 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
                 here = starts[c]
                 starts[c] = total
                 total += here
-            entries = empty(total, CROSSING)
+            entries = np.empty(total, CROSSING)
         for k in range(len(found)):
             left, right, bottom, top = cells_of(runs[found[k].first], runs[found[k].second], reach, columns)
             for column in range(left, right + 1):

@@ -2,11 +2,10 @@
 
 import math
 
-from registration.compiling import internal, kernel
+from compiled import kernel
 from registration.layout import Records
 
 
-@internal
 @kernel
 def extent_along(ends: Records, directions: Records) -> float:
     """Return how wide segments lie apart in that of some directions in which that is most, metres; 0 without any.
@@ -28,7 +27,6 @@ def extent_along(ends: Records, directions: Records) -> float:
     return most
 
 
-@internal
 @kernel
 def facing_away(ends: Records, seen_from: Records, least: float) -> int:
     """Count the segments, (n,) of `ENDS`, that have the place they were seen from on their right, by over `least` m.

@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.kernels import MAX_DEVIATION
 from registration.layout import Record, Records
 
@@ -32,7 +32,7 @@ from .matching import part_of_match
 from .odds import root_gap, share_between
 
 
-@inlined
+@kernel
 def by_segments(merit: Record) -> float:
     """Return a score without the beams' part, nats."""
     return merit.score - BEAMS_READ * merit.read + BEAMS_PASSED * merit.passed

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Record, Records
 
 from ..tables import Crossings
@@ -20,7 +19,7 @@ TOP_BITS = 0x80808080  # of the four bytes of a code
 LEAST_AT_ONCE = 64  # entries; where there is less room the crossings that were met are gone on with first
 
 
-@inlined
+@kernel
 def asked_for(low: float, high: float, half: float, reach: float) -> float:
     """Return which place of a segment is asked for, from its midpoint, which lies between two abscissae.
 
@@ -115,7 +114,7 @@ def on_crossings(
     columns = crossings.shape[0].columns
     half_a = figure.half_a - CROSSING_MARGIN
     half_b = figure.half_b - CROSSING_MARGIN
-    near = empty(len(met), np.int32)
+    near = np.empty(len(met), np.int32)
     n = 0
     at = 0
     for j in range(count):

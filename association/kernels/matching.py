@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
@@ -33,13 +32,13 @@ SUM_SLACK = 1e-9  # nats, rounding
 GATE_MARGIN = 1.01  # over a gate: angles are tested by a cosine to the second order
 
 
-@inlined
+@kernel
 def wrap(angle: float) -> float:
     """Return the angle in [-pi, pi]."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@inlined
+@kernel
 def gap_counts(gap: float, length: float) -> tuple[float, float]:
     """Return how much of a gap counts as covered, metres, and how much what a segment covers behind it counts.
 
@@ -245,13 +244,13 @@ def match_scan(
     return -1.0 if total < threshold else total
 
 
-@inlined
+@kernel
 def part_of_match(match: Record) -> float:
     """Return how much of a match there is, 0 to 1, by what it is worth."""
     return min(1.0, match.worth / WHOLE_WORTH) if match.wall >= 0 else 0.0
 
 
-@inlined
+@kernel
 def allow_all(scan: Records, possible: Floats) -> None:
     """Write that every scan segment may lie on a wall."""
     for i in range(len(scan)):
@@ -309,13 +308,13 @@ def may_score(
     columns = shape.columns
     rows = shape.rows
     per_cell = 1.0 / shape.cell
-    cosines = empty(count, np.float64)
-    sines = empty(count, np.float64)
-    lefts = empty(count, np.float64)
-    bottoms = empty(count, np.float64)
-    turned = empty(count, np.float64)
-    lacking = empty(count, np.float64)
-    open_ones = empty(count, np.int32)
+    cosines = np.empty(count, np.float64)
+    sines = np.empty(count, np.float64)
+    lefts = np.empty(count, np.float64)
+    bottoms = np.empty(count, np.float64)
+    turned = np.empty(count, np.float64)
+    lacking = np.empty(count, np.float64)
+    open_ones = np.empty(count, np.int32)
     for p in range(count):
         one = posed[p]
         cosines[p] = one.cosine * per_cell
@@ -360,7 +359,7 @@ def may_score(
         posed[open_ones[k]].possible = 1
 
 
-@inlined
+@kernel
 def sectors_about(middle: float, spread: float) -> int:
     """Return which sectors there are within `spread` of `middle`, both in sectors, as bits."""
     first = math.floor(middle - spread)

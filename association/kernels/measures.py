@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import internal, kernel
+from compiled import kernel
 from registration.kernels import keep_alive, one_step_add
 from registration.layout import ONE_STEP_SUMS, Floats, Record, Records
 
@@ -13,7 +12,6 @@ from ..tables import KnownWalls
 from .settling import registered_weights
 
 
-@internal
 @kernel
 def paper_measures(scan: Records, matches: Records, known_walls: KnownWalls, poses: Records) -> Floats:
     """Return what the one-step sums of consensus sets cost at poses, and what they say of the reliability, (k, 4).
@@ -21,7 +19,7 @@ def paper_measures(scan: Records, matches: Records, known_walls: KnownWalls, pos
     The translation's cost, ``sum w r^2``, the rotation's by Mitsuta, ``sum w a^2``, and by Wahba,
     ``2 sum w (1 - cos a)``, and Eq. (28). `matches` (k, n); `poses` (k,) of `POSE_AMONG_WALLS`.
     """
-    measures = empty((len(poses), 4), np.float64)
+    measures = np.empty((len(poses), 4), np.float64)
     for k in range(len(poses)):
         sums = set_sums(scan, matches[k], known_walls, poses[k])
         value = sums[0]
@@ -37,9 +35,9 @@ def paper_measures(scan: Records, matches: Records, known_walls: KnownWalls, pos
 @kernel
 def set_sums(scan: Records, matches: Records, known_walls: KnownWalls, pose: Record) -> Records:
     """Return the one-step sums of a consensus set about a pose, with the weights that it registers with."""
-    sums = zeros(2, ONE_STEP_SUMS)
+    sums = np.zeros(2, ONE_STEP_SUMS)
     walls = known_walls.walls
-    weights = empty(len(scan), np.float64)
+    weights = np.empty(len(scan), np.float64)
     registered_weights(scan, matches, known_walls.ties, pose.wall_sigma**2, weights)
     for i in range(len(scan)):
         if matches[i].wall < 0:

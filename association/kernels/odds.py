@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Records
 
 from ..tables import Odds
@@ -13,7 +13,7 @@ from ..tuning import MAX_GAP, MOST_NULL, NULL_SHARE, NULL_SHARES, SYMMETRIC, UNL
 ROUNDING = 1e-9  # of a chance
 
 
-@inlined
+@kernel
 def share_between(value: float, start: float, full: float) -> float:
     """Return how far a value is on the way from `start` to `full`, 0 to 1."""
     return min(1.0, max(0.0, (value - start) / (full - start)))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats
 
 from ..layout import Indices

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import borrowed, inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import BASE, FIGURE, LINE_COST, LISTED
@@ -43,8 +42,8 @@ def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats
     longest = runs.longest
     summed = runs.summed
     bins = len(bin_starts) - 1
-    slides = zeros((count, bins), np.float64)
-    fitting = zeros(count, np.float64)
+    slides = np.zeros((count, bins), np.float64)
+    fitting = np.zeros(count, np.float64)
     for i in range(count):
         need = least_length(scan[i].length)
         for b in range(bins):
@@ -84,7 +83,7 @@ def middle_of(scan: Records) -> tuple[float, float, float]:
     return x, y, square / gain
 
 
-@inlined
+@kernel
 def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool:
     """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
 
@@ -106,14 +105,14 @@ def costs_of(count: int, runs: Walls, area: float, crossings: Crossings) -> Cost
     bins = len(runs.bin_starts) - 1
     return Costs(
         crossings,
-        empty(1, FIGURE),
-        empty(0, LISTED),
+        np.empty(1, FIGURE),
+        np.empty(0, LISTED),
         runs,
-        zeros(1, np.uint8),
-        empty(count, LINE_COST),
-        empty((count, bins), np.float64),
-        empty((count, 2 * bins), np.float64),
-        empty((count, bins), np.int64),
+        np.zeros(1, np.uint8),
+        np.empty(count, LINE_COST),
+        np.empty((count, bins), np.float64),
+        np.empty((count, 2 * bins), np.float64),
+        np.empty((count, bins), np.int64),
         HYPOTHESIS_SCALE / area,
     )
 
@@ -121,7 +120,6 @@ def costs_of(count: int, runs: Walls, area: float, crossings: Crossings) -> Cost
 @kernel
 def know_sweeps(scan: Records, costs: Costs) -> None:
     """Write what it costs to sweep bases, as far as that is of one segment each, once the first of them is."""
-    costs = borrowed(costs)
     costs.known[0] = 1
     lines = costs.lines
     smooth = costs.smooth
@@ -153,10 +151,10 @@ def pair_up(scan: Records, count: int) -> Records:
     Beyond the first `BASE_SEGMENTS` only those that tell enough. None is weighed.
     """
     middle = middle_of(scan)
-    tells = empty(count, np.float64)
+    tells = np.empty(count, np.float64)
     for i in range(count):
         tells[i] = GAIN_POWER * math.log(scan[i].gain) - math.log(COST_BASE)
-    bases = empty(count * (count - 1) // 2, BASE)
+    bases = np.empty(count * (count - 1) // 2, BASE)
     k = 0
     for i in range(count):
         for j in range(i + 1, count):
@@ -176,7 +174,6 @@ def pair_up(scan: Records, count: int) -> Records:
 @kernel
 def weigh(base: Record, scan: Records, gates: Record, costs: Costs) -> None:
     """Take what it costs to go through a base off its merit, once, and tell how: by lists or by a sweep."""
-    costs = borrowed(costs)
     figure = costs.figure[0]
     measure(scan[base.sliding], scan[base.crossing], gates, figure)
     _, base.listed = look_up(figure, costs.crossings, costs.no_lists)
@@ -229,8 +226,6 @@ def next_base(question: Question, plan: Plan) -> int:
     What a base is worth before it is weighed it is worth at most, so that few of them need be: one is left unweighed
     that is not worth `TIMES_BETTER` what another is. Ties go to the pair that comes first, of the longest segments.
     """
-    question = borrowed(question)
-    plan = borrowed(plan)
     bases = plan.bases
     uses = plan.uses
     best = -1
@@ -265,9 +260,9 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     state.done = 0
     state.bound = 0.0
     state.missed = 1.0
-    residual = empty(len(scan), np.float64)
-    freedoms = empty(len(scan), np.float64)
-    losses = empty(n, np.float64)
+    residual = np.empty(len(scan), np.float64)
+    freedoms = np.empty(len(scan), np.float64)
+    losses = np.empty(n, np.float64)
     for i in range(n):
         losses[i] = -scan[i].gain
     for i in range(len(scan)):
@@ -275,14 +270,14 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
         freedoms[i] = -scan[i].freedom
         state.bound += scan[i].gain
     # All of these have sets that may have missed all bases.
-    found = empty(count, np.uint8)
-    undecided = empty(count + 1, np.int32)
+    found = np.empty(count, np.uint8)
+    undecided = np.empty(count + 1, np.int32)
     for s in range(count):
         found[s] = n
         undecided[s] = s
     undecided[count] = count
     samples = Samples(
-        planning.orders, planning.ranks, found, zeros(count, np.uint8), zeros(count, np.float64), undecided
+        planning.orders, planning.ranks, found, np.zeros(count, np.uint8), np.zeros(count, np.float64), undecided
     )
     costs = costs_of(n, planning.runs, planning.area, tables.crossings)
     bases = pair_up(scan, n)
@@ -291,7 +286,7 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     return Plan(
         bases,
         costs,
-        zeros(n, np.float64),
+        np.zeros(n, np.float64),
         residual,
         residual[ascending(losses)],
         ascending(freedoms),

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Record, Records
 
 from ..layout import HARD_PRIOR, LAID, LISTED, MET, SWEPT
@@ -19,7 +18,7 @@ from .trying import is_about, try_poses
 LITTLE = 0.3  # rad; up to there the series that are used are exact to rounding
 
 
-@inlined
+@kernel
 def turn_a_little(c: float, s: float, angle: float) -> tuple[float, float]:
     """Return the cosine and sine of what is turned by a further angle, to rounding.
 
@@ -165,11 +164,11 @@ def sweep_base(
     b = question.scan[base.crossing]
     measure(a, b, gates, figure)
     gates_about(question.scan, figure, gates, work.spreads, work.shifts, work.later)
-    anchor_list = empty(len(runs), np.int32)
+    anchor_list = np.empty(len(runs), np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
-    laid = empty(AT_ONCE, LAID)
-    swept = empty(AT_ONCE, SWEPT)
-    met = empty(AT_ONCE, MET)
+    laid = np.empty(AT_ONCE, LAID)
+    swept = np.empty(AT_ONCE, SWEPT)
+    met = np.empty(AT_ONCE, MET)
     spent = TESTS_BASE
     while progress.anchor < n_anchors:
         begin = progress.anchor
@@ -229,8 +228,8 @@ def search_listed(
     a = question.scan[base.sliding]
     b = question.scan[base.crossing]
     measure(a, b, gates, figure)
-    lists = empty(MOST_LISTS, LISTED)
-    met = empty(AT_ONCE, MET)
+    lists = np.empty(MOST_LISTS, LISTED)
+    met = np.empty(AT_ONCE, MET)
     count, entries = look_up(figure, tables.crossings, lists)
     spent = TESTS_BASE
     gated = False
@@ -254,7 +253,7 @@ def search_listed(
     return spent
 
 
-@inlined
+@kernel
 def search_base(
     question: Question,
     tables: MapTables,

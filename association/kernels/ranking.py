@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import borrowed, kernel
+from compiled import kernel
 from registration.kernels import invert3, keep_alive
 from registration.layout import SYMMETRIC3, Floats, Records
 
@@ -33,16 +32,11 @@ def rank(
     The poses come best first. Writes their covariances, `merits` (k,) and `matches` (k, n). Where there are no sights
     there are no lines of sight.
     """
-    question = borrowed(question)
-    place = borrowed(place)
-    sights = borrowed(sights)
-    matches = borrowed(matches)
-    work = borrowed(work)
     scan = question.scan
     terms = question.terms[0]
     sums = work.scratch[0].sums
     sighted = len(sights.seen) > 0
-    blockers = Blockers(zeros(len(place.walls), BLOCKER), empty(len(place.walls), np.int64))
+    blockers = Blockers(np.zeros(len(place.walls), BLOCKER), np.empty(len(place.walls), np.int64))
     best = 0.0
     length = 0.0
     for i in range(len(scan)):
@@ -106,13 +100,13 @@ def distinct(
     what does not score is no explanation. The value is the score and what is `beside` it (k,), or (0,) where that is
     nothing; ties by place. Returns the places in them.
     """
-    losses = empty(len(poses), np.float64)
+    losses = np.empty(len(poses), np.float64)
     for k in range(len(poses)):
         value = merits[k].score + (beside[k] if len(beside) > 0 else 0.0)
         losses[k] = -value if merits[k].score > 0.0 else math.inf
-    kept = empty(min(most, len(poses)), np.int64)
-    informations = empty(len(kept), SYMMETRIC3)
-    known = empty(len(kept), np.bool_)
+    kept = np.empty(min(most, len(poses)), np.int64)
+    informations = np.empty(len(kept), SYMMETRIC3)
+    known = np.empty(len(kept), np.bool_)
     count = 0
     for i in ascending(losses):
         if count == len(kept) or losses[i] == math.inf:

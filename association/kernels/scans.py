@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, LEAST_POINTS, Floats, Record, Records
 
@@ -40,7 +39,7 @@ def as_lines(measured: Measured) -> Records:
     spreads = measured.spreads
     sigma = measured.sigma
     points = measured.points
-    lines = zeros(len(lengths), LINE_PARTS)
+    lines = np.zeros(len(lengths), LINE_PARTS)
     for i in range(len(lengths)):
         line = lines[i]
         line.dx = directions[i].x
@@ -61,7 +60,7 @@ def as_lines(measured: Measured) -> Records:
 @kernel
 def longest_first(lines: Records) -> Integers:
     """Order lines by length, ties by index, (n,)."""
-    lengths = empty(len(lines), np.float64)
+    lengths = np.empty(len(lines), np.float64)
     for i in range(len(lines)):
         lengths[i] = -lines[i].length
     return ascending(lengths)
@@ -78,9 +77,9 @@ def collinear_lines(given: Records, order: Integers, lateral: float, least_cosin
     """
     n = len(order)
     labels = np.full(n, -1)
-    near = empty(n, np.int64)
-    lows = empty(n, np.float64)
-    highs = empty(n, np.float64)
+    near = np.empty(n, np.int64)
+    lows = np.empty(n, np.float64)
+    highs = np.empty(n, np.float64)
     lines = 0
     for k in range(n):
         i = order[k]
@@ -132,9 +131,9 @@ def join_labelled(given: Records, order: Integers, labels: Integers, counted: bo
     count = 0
     for i in range(n):
         count = max(count, labels[i] + 1)
-    lines = empty(count, LINE_PARTS)
-    members = empty(n, np.int64)
-    starts = zeros(count + 1, np.int64)
+    lines = np.empty(count, LINE_PARTS)
+    members = np.empty(n, np.int64)
+    starts = np.zeros(count + 1, np.int64)
     for k in range(n):
         starts[labels[order[k]] + 1] += 1
     for k in range(count):
@@ -176,9 +175,9 @@ def union_length(lows: Floats, highs: Floats, count: int) -> float:
 @kernel
 def shares_of(given: Records, members: Integers, line: Record) -> Floats:
     """Return (m,) the share of each part along a line that those before it do not cover; write `covered`."""
-    lows = empty(len(members), np.float64)
-    highs = empty(len(members), np.float64)
-    shares = empty(len(members), np.float64)
+    lows = np.empty(len(members), np.float64)
+    highs = np.empty(len(members), np.float64)
+    shares = np.empty(len(members), np.float64)
     line.covered = 0.0
     for k in range(len(members)):
         i = members[k]
@@ -251,7 +250,7 @@ def join(given: Records, members: Integers, line: Record) -> None:
     line.variance = 0.0 if exact else 1.0 / information
 
 
-@inlined
+@kernel
 def freedom_alone(line: Record, model: Record, information: Record) -> float:
     """Return the freedom that a line takes from a pose by itself, nats: no set with it takes less."""
     weight = line.weight / (1.0 + line.weight * model.wall_variance)
@@ -270,8 +269,8 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
     """Return the `lines` of a scan in `order`, (n,) of `SCAN_LINE`; `variances` and `model` (1,)."""
     given = variances[0]
     n = len(order)
-    out = zeros(n, SCAN_LINE)
-    alone = zeros(1, INFORMATION)
+    out = np.zeros(n, SCAN_LINE)
+    alone = np.zeros(1, INFORMATION)
     later = 0.0
     for k in range(n - 1, -1, -1):
         line = lines[order[k]]
@@ -346,10 +345,10 @@ def lines_of_a_view(measured: Measured, counted: bool, directed: bool) -> tuple[
 def describe_labelled(labels: Integers, lines: Records, variances: Records, model: Records) -> tuple[Indices, Records]:
     """Order lines by what they tell; return the row of each part that is labelled, and the rows."""
     order = longest_first(lines)
-    place = empty(len(order), np.int64)
+    place = np.empty(len(order), np.int64)
     for k in range(len(order)):
         place[order[k]] = k
-    row_of = empty(len(labels), np.int64)
+    row_of = np.empty(len(labels), np.int64)
     for i in range(len(labels)):
         row_of[i] = place[labels[i]]
     return row_of, describe_lines(lines, order, variances, model)
@@ -358,7 +357,7 @@ def describe_labelled(labels: Integers, lines: Records, variances: Records, mode
 @kernel
 def seen_at_once(rows: Records) -> Records:
     """Return what one view shows of the rows: each of them, in their order, (n,) of `SIGHTING`."""
-    seen = zeros(len(rows), SIGHTING)
+    seen = np.zeros(len(rows), SIGHTING)
     for i in range(len(rows)):
         seen[i].row = i
         seen[i].dx = rows[i].dx

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import borrowed, internal, kernel
+from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import Records
 
@@ -18,7 +17,6 @@ from .sliding import search_slides, sliding_segments
 from .stopping import missed_share
 
 
-@internal
 @kernel
 def search(
     question: Question,
@@ -41,7 +39,7 @@ def search(
         progress[0].missed = 0.0  # walls of which no two cross are slid
     else:
         of_bases = found[: how[0].kept]
-        why = advance(question, tables, plan, of_bases, empty(0, TRIED), progress, work, how)
+        why = advance(question, tables, plan, of_bases, np.empty(0, TRIED), progress, work, how)
         if why == BUDGET:
             return why, plan
         if why == EXHAUSTED and not plan.random:
@@ -53,7 +51,6 @@ def search(
     return why, None
 
 
-@internal
 @kernel
 def go_on(
     question: Question,
@@ -85,7 +82,6 @@ def finish(
     where `progress` stands, and stops when ``budget`` tests are used up for one of the segments: it is not ``done``
     then.
     """
-    found = borrowed(found)
     state = progress[0]
     limits = how[0]
     if state.sliding < 0:
@@ -117,8 +113,8 @@ def put_in_order(found: Records, progress: Records, how: Records) -> None:
         state.of_bases = state.count
         state.count = 0
     n = state.of_bases + state.count
-    losses = empty(n, np.float64)
-    together = empty(n, FOUND)
+    losses = np.empty(n, np.float64)
+    together = np.empty(n, FOUND)
     for k in range(n):
         together[k] = found[k if k < state.of_bases else how[0].kept + k - state.of_bases]
         losses[k] = -together[k].value

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import borrowed, inlined, kernel
+from compiled import kernel
 from registration.kernels import MAX_DEVIATION, invert3, joint_information, joint_solve, keep_alive
 from registration.layout import Floats, Record, Records
 
@@ -26,7 +25,7 @@ from ..tuning import (
 from .consensus import change, solve, start_over, take_out_errors
 
 
-@inlined
+@kernel
 def settled_weight(line: Record, wall_variance: float) -> float:
     """Return the weight of a scan line, 1/m^2, on walls that are so rough along themselves."""
     return 1.0 / (1.0 / line.weight - ROUGHNESS * ROUGHNESS + ROUGH_SHARE * wall_variance)
@@ -72,7 +71,7 @@ def add_without(
     take_out_errors(work, ties, wall_variance)
 
 
-@inlined
+@kernel
 def sameness(ties: Floats, one: int, other: int) -> float:
     """Return how much two walls are one, 0 to 1: the square of the correlation of their errors."""
     if one == other:
@@ -157,8 +156,8 @@ def walls_of(scan: Records, matches: Records, ties: Floats) -> tuple[Integers, F
 
     As far as it is not one with a wall before it in that order, 0 to 1.
     """
-    of_wall = empty(len(scan), np.int64)
-    own = empty(len(scan), np.float64)
+    of_wall = np.empty(len(scan), np.int64)
+    own = np.empty(len(scan), np.float64)
     count = 0
     for i in range(len(scan)):
         w = matches[i].wall
@@ -186,7 +185,6 @@ def settle(
     `matches` (k, n). Writes `settled` (k,) and, for each wall that holds a match of the first set, `hinges`, unless
     that has no room for any; returns how many walls that are.
     """
-    matches = borrowed(matches)
     count = 0
     for k in range(len(starts)):
         of_wall = find_pose(question.scan, known_walls, matches[k], starts[k], settled[k], work)
@@ -221,7 +219,7 @@ def find_pose(
             break
         if known < 0.0:
             out.wall_variance = estimated_variance(pose, of_wall, own, out.wall_variance, USUAL_WALL_ERROR**2, work)
-    other = zeros(1, ESTIMATE)
+    other = np.zeros(1, ESTIMATE)
     add_all(scan, matches, known_walls, max(out.wall_variance, COMMON_WALL_ERROR**2), work)
     copy_estimate(pose, other[0])
     solve(sums, other[0], information, value)
@@ -257,7 +255,7 @@ def registered_weights(scan: Records, matches: Records, ties: Floats, wall_varia
         weights[i] = 1.0 / (plain_variance(scan[i]) * (1.0 + wall_variance * known))
 
 
-@inlined
+@kernel
 def plain_variance(line: Record) -> float:
     """Return the variance of the offset of a scan line by its sigma, m^2, without any of the walls."""
     return max(1.0 / line.weight - ROUGHNESS * ROUGHNESS, LEAST_KNOWN_VARIANCE**2)
@@ -270,7 +268,7 @@ def register_settled(scan: Records, known_walls: KnownWalls, matches: Records, o
     if out.parallel or out.weakest > MAX_DEVIATION:
         return
     walls = known_walls.walls
-    weights = empty(len(scan), np.float64)
+    weights = np.empty(len(scan), np.float64)
     registered_weights(scan, matches, known_walls.ties, out.wall_variance, weights)
     start_over(work)
     for i in range(len(scan)):
@@ -302,7 +300,7 @@ def leave_each_out(
     sums = work.scratch[0].sums
     pose = settled[0].pose
     wall_variance = settled[0].wall_variance
-    one = zeros(1, ESTIMATE)
+    one = np.zeros(1, ESTIMATE)
     without = one[0]
     _, own = walls_of(scan, matches, known_walls.ties)
     for k in range(len(of_wall)):

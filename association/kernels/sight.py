@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Record, Records
 
 from ..layout import Integers
@@ -136,7 +136,7 @@ def count_blockers(
     return count
 
 
-@inlined
+@kernel
 def is_another(blocker: Record, sighting: Record) -> bool:
     """Count a ray through a wall; tell whether no view before sent as many through it to that line of the scan."""
     if blocker.row != sighting.row + 1:

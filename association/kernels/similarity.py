@@ -6,7 +6,7 @@ a pose, but without its ``a^2 + b^2 = 1``, so that they cost least at the soluti
 
 import math
 
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import Integers

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import borrowed, kernel
+from compiled import kernel
 from registration.layout import Floats, Records
 
 from ..layout import HARD_PRIOR, TRIED, Integers
@@ -23,7 +22,7 @@ def sliding_segments(scan: Records, count: int, floor: float, most: int) -> Inte
 
     More than `floor` nats, with all that are parallel to them; at most `most`.
     """
-    chosen = empty(most, np.int64)
+    chosen = np.empty(most, np.int64)
     n = 0
     for i in range(count):
         if n == most:
@@ -78,17 +77,13 @@ def search_slides(
     a base with the segment has been looked for so, and what does not has to be enough by itself. Goes on from the
     anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
     """
-    question = borrowed(question)
-    tables = borrowed(tables)
-    found = borrowed(found)
-    work = borrowed(work)
     state = progress[0]
     runs = tables.sweep.runs
     prior = question.terms[0].prior
     posed = work.posed
     a = question.scan[sliding]
     variance = a.angle_variance
-    nothing = empty(0, TRIED)
+    nothing = np.empty(0, TRIED)
     figure = work.scratch[0].figure
     figure.angle_variance = variance
     figure.pin_x = a.x
@@ -96,7 +91,7 @@ def search_slides(
     figure.slip = 0.0
     gates_about(question.scan, figure, question.terms[0].gates, work.spreads, work.shifts, work.later)
     leave_out_bases(question.scan, sliding, work.shifts, work.later)
-    anchor_list = empty(len(runs), np.int32)
+    anchor_list = np.empty(len(runs), np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
     left = budget
     n = 0

@@ -1,6 +1,6 @@
 """Compiled stop of the search: when enough bases have been gone through, by a bound and by sampled consensus sets."""
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Records
 
 from ..layout import Integers
@@ -110,7 +110,7 @@ def fewest_segments(best_gains: Floats, beyond: float, needed: float) -> int:
     return max(len(best_gains), 2)
 
 
-@inlined
+@kernel
 def drawn_chance(fewest: int, count: int) -> float:
     """Return the chance that both segments of a base drawn among `count` are among `fewest` inliers."""
     return min(1.0, fewest * (fewest - 1) / max(1, count * (count - 1)))

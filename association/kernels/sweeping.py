@@ -5,7 +5,7 @@ In stages, each for many runs at once: a processor waits where what it does next
 
 import math
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import HARD_PRIOR, Integers
@@ -14,19 +14,19 @@ from ..tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SE
 from .matching import PER_RADIAN, sectors_about, wrap
 
 
-@inlined
+@kernel
 def end_slack(length: float) -> float:
     """Return how far a scan segment, as part of a base, may stick out at each end of its wall."""
     return BASE_SLACK + BASE_SLACK_SHARE * length
 
 
-@inlined
+@kernel
 def least_length(length: float) -> float:
     """Return how long a wall is at least under a scan segment of a base."""
     return length - 2.0 * end_slack(length)
 
 
-@inlined
+@kernel
 def angle_tolerance(a: Record, b: Record, gates: Record) -> float:
     """Return by how much the angle between two scan segments may differ from that between their runs."""
     variance = a.angle_variance + b.angle_variance

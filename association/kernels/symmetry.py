@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import MATCH, SCAN_LINE
@@ -58,7 +57,7 @@ def mirror_walls(pose: Record, walls: Records, lows: Floats, highs: Floats) -> R
     for w in range(len(walls)):
         if highs[w] - lows[w] > SHORTEST_SHOWN:
             count += 1
-    out = zeros(count, SCAN_LINE)
+    out = np.zeros(count, SCAN_LINE)
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     k = 0
@@ -112,12 +111,12 @@ def mirrored_share(
     for v in range(len(views)):
         shown_walls(views[v], pose[0], place, reach, work.scratch[0].ray, lows, highs)
     lines = mirror_walls(pose[0], place.walls, lows, highs)
-    matches = zeros(len(lines), MATCH)
+    matches = np.zeros(len(lines), MATCH)
     total = 0.0
     for k in range(len(lines)):
         total += lines[k].gain
     if total == 0.0:
         return 0.0
-    possible = empty(len(lines), np.float64)
+    possible = np.empty(len(lines), np.float64)
     allow_all(lines, possible)
     return match_scan(lines, null[0], place, gates[0], possible, 0.0, matches) / total

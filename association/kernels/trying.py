@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Record, Records
 
 from ..layout import HARD_PRIOR
@@ -67,7 +67,7 @@ def try_poses(
     return spent, False
 
 
-@inlined
+@kernel
 def is_about(prior: Record, pose: Record) -> bool:
     """Tell whether a pose may be refined into the window of a hard prior."""
     near = math.hypot(pose.x - prior.x, pose.y - prior.y) <= prior.radius + WINDOW_MARGIN

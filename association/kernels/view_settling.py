@@ -2,7 +2,7 @@
 
 import math
 
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats, Records
 
 from ..tables import SeenByViews

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from registration.allocating import empty, zeros
-from registration.compiling import inlined, kernel
+from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ..layout import Integers
@@ -20,14 +19,14 @@ from ..tuning import (
 )
 
 
-@inlined
+@kernel
 def fade(value: float, whole: float, apart: float) -> float:
     """Return 1 up to `whole`, 0 from `apart` on, and smoothly less between (Tukey's biweight)."""
     share = min(1.0, max(0.0, (value - whole) / (apart - whole)))
     return (1.0 - share * share) ** 2
 
 
-@inlined
+@kernel
 def tie_between(before: Record, after: Record, apart: float) -> float:
     """Return minus the log of how much two walls of a chain are one, up to `TIE_FREE`; with a step of `apart`, m, none.
 
@@ -44,7 +43,7 @@ def tie_between(before: Record, after: Record, apart: float) -> float:
     return -math.log(correlation) if correlation > math.exp(-TIE_FREE) else TIE_FREE
 
 
-@inlined
+@kernel
 def seen_from(wall: Record, other: Record, at: float) -> tuple[float, float]:
     """Return the abscissa on a wall of the place at an abscissa of another, and how far that is to its left, metres."""
     x = other.dx * at - other.dy * other.offset
@@ -58,7 +57,7 @@ def tie_walls(walls: Records, order: Integers, chain: Integers, apart: float) ->
 
     Each is tied to that of the walls before it to which it is tied best; with a step of `apart`, metres, to none.
     """
-    ties = empty(len(walls), np.float64)
+    ties = np.empty(len(walls), np.float64)
     at = 0.0
     for k in range(len(order)):
         w = order[k]
@@ -210,7 +209,7 @@ def blend_walls(
         line.offset = (line.dx * y - line.dy * x) / total
 
 
-@inlined
+@kernel
 def middle_of(wall: Record) -> tuple[float, float]:
     """Return the midpoint of a wall, metres."""
     middle = 0.5 * (wall.begin + wall.end)
@@ -252,8 +251,8 @@ def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, 
     x0, y0, cell = shape[0].x0, shape[0].y0, shape[0].cell
     columns, rows = shape[0].columns, shape[0].rows
     places = columns * rows
-    starts = zeros(places + 1, np.int32)
-    items = zeros(0, np.int32)
+    starts = np.zeros(places + 1, np.int32)
+    items = np.zeros(0, np.int32)
     for counting in (True, False):
         if not counting:
             total = 0
@@ -261,7 +260,7 @@ def grid_cells(ends: Records, radius: float, shape: Records) -> tuple[Integers, 
                 here = starts[c]
                 starts[c] = total
                 total += here
-            items = zeros(total, np.int32)
+            items = np.zeros(total, np.int32)
         for i in range(len(ends)):
             x1 = ends[i].x1
             y1 = ends[i].y1

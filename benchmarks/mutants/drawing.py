@@ -20,7 +20,7 @@ LEFT_OUT = ("tuning.py", "layout.py", "benchmarks", "migrations", "examples.py")
 READ_WHEN_RUN = ("service/schemas/", "service/settings.py", "service/http/routes/")
 """Where annotations are more than words: pydantic and FastAPI read them."""
 
-ONLY_FASTER = ("kernel", "inlined", "cache", "lru_cache")
+ONLY_FASTER = ("kernel", "cache", "lru_cache")
 """Decorators that change nothing but the time that a function takes."""
 
 

@@ -28,7 +28,7 @@ class Suite:
 
 
 SUITES = {
-    "registration/compiling.py": Suite(("tests/registration/test_compiling.py",)),
+    "compiled/": Suite(("tests/compiled",)),
     "registration/kernels/": Suite(
         tuple(
             f"tests/registration/test_{name}.py"
@@ -42,7 +42,6 @@ SUITES = {
             for name in (
                 "beams",
                 "degenerate",
-                "interpreting",
                 "joint",
                 "observability",
                 "one_step",

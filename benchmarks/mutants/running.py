@@ -184,7 +184,7 @@ class Runner:
         for name in HEAVY:
             import_module(name)
         # Not LINEFIX_KERNELS, which tests take from the services that they start.
-        os.environ.setdefault("NUMBA_CACHE_DIR", str(place.absolute() / "kernels"))
+        os.environ.setdefault("LINEFIX_KERNELS", str(place.absolute() / "kernels"))
 
     def baseline(self, suite: Suite) -> Ran:
         """Return what the tests take without any mistake, and what fails all the same; kept until a file changes."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats
 
 Indices = NDArray[np.int64]

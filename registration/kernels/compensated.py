@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import Records
 
 

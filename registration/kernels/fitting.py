@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from ..allocating import empty, zeros
-from ..compiling import internal, kernel
+from compiled import kernel
+
 from ..layout import INFORMATION, PAIR, Floats, Record, Records
 from .joint import joint_information, joint_solve, joint_sums_compensated
 from .matrices import carried, invert3_scaled, sandwich
@@ -29,7 +29,6 @@ from .pairs import angle_chi_square, middles, move_origins, residuals
 from .records import keep_alive
 
 
-@internal
 @kernel
 def fit(
     pairs: Records, used: Floats, information: Floats, noise: Floats, how: Records, fitted: Records
@@ -52,8 +51,8 @@ def fit(
     """
     out = fitted[0]
     map_x, map_y, scan_x, scan_y, out.count = middles(pairs, used)
-    local = empty(len(pairs), PAIR)
-    centred = empty(len(pairs), PAIR)
+    local = np.empty(len(pairs), PAIR)
+    centred = np.empty(len(pairs), PAIR)
     move_origins(pairs, map_x, map_y, 0.0, 0.0, local)
     move_origins(local, 0.0, 0.0, scan_x, scan_y, centred)
     out.unique = 1
@@ -193,12 +192,12 @@ def covariance(centred: Records, sums: Records, used: Floats, information: Float
     invert3_scaled(out.covariance, out.covariance)
     if informed:
         return
-    weights = zeros(len(used), np.float64)
+    weights = np.zeros(len(used), np.float64)
     for i in range(len(used)):
         if used[i] > 0.0:
             weights[i] = used[i] * used[i] / information[i]
     scatter_sums = joint_sums_compensated(centred, weights)
-    scatter = empty(1, INFORMATION)
+    scatter = np.empty(1, INFORMATION)
     joint_information(scatter_sums[0], out.pose.theta, scatter[0])
     keep_alive(scatter_sums)
     sandwich(out.covariance, scatter[0], out.covariance)

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from ..allocating import zeros
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import JOINT_SUMS, Floats, Record, Records
 from .compensated import accumulated
 from .matrices import PARALLEL_RATIO
@@ -185,7 +185,7 @@ def joint_information(sums: Record, theta: float, out: Record) -> None:
 @kernel
 def joint_add_compensated(sums: Records, line: Record, seen: Record, weight: float, sign: float) -> None:
     """Do as `joint_add` on compensated sums."""
-    terms = zeros(1, JOINT_SUMS)
+    terms = np.zeros(1, JOINT_SUMS)
     joint_add(terms[0], line, seen, weight, 1.0)
     what = terms.view(np.float64)
     into = sums.view(np.float64)
@@ -197,7 +197,7 @@ def joint_add_compensated(sums: Records, line: Record, seen: Record, weight: flo
 @kernel
 def joint_sums_compensated(pairs: Records, weights: Floats) -> Records:
     """Return the compensated sums of pairs; those of weight 0 do not count."""
-    sums = zeros(2, JOINT_SUMS)
+    sums = np.zeros(2, JOINT_SUMS)
     for i in range(len(pairs)):
         if weights[i] > 0.0:
             joint_add_compensated(sums, pairs[i].map, pairs[i].scan, weights[i], 1.0)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import Record
 
 # Below this ratio of the smaller to the larger eigenvalue rounding alone decides the smaller one's direction.

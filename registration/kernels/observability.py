@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ..allocating import empty
-from ..compiling import kernel
+import numpy as np
+
+from compiled import kernel
+
 from ..layout import INFORMATION, Records
 from .joint import joint_information
 from .matrices import PARALLEL_RATIO, eigen2, is_regular3
@@ -43,7 +45,7 @@ def freedom(
     if with_noise and parallel:
         _, _, x, y = eigen2(f.xx, f.xy, f.yy)
         return PARALLEL, x, y, _slack(noise, x, y)
-    out = empty(1, INFORMATION)
+    out = np.empty(1, INFORMATION)
     joint_information(used[0], theta, out[0])
     regular = is_regular3(out[0], PARALLEL_RATIO)
     least = math.inf

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..allocating import empty
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import INFORMATION, Floats, Records
 from .joint import joint_cost, joint_information, joint_solve
 from .matrices import invert3_scaled
@@ -16,7 +16,7 @@ from .one_step import determinant_and_reliability, one_step_solve
 def full_matrix(symmetric: Records) -> Floats:
     """Return an array of one SYMMETRIC3 as (3, 3)."""
     m = symmetric[0]
-    out = empty((3, 3), np.float64)
+    out = np.empty((3, 3), np.float64)
     out[0, 0] = m.xx
     out[0, 1] = m.xy
     out[0, 2] = m.xt
@@ -44,7 +44,7 @@ def cost(sums: Records, theta: float, tx: float, ty: float) -> float:
 @kernel
 def information(sums: Records, theta: float) -> Floats:
     """Return the information of (x, y, theta), (3, 3); see `joint_information`."""
-    out = empty(1, INFORMATION)
+    out = np.empty(1, INFORMATION)
     joint_information(sums[0], theta, out[0])
     return full_matrix(out)
 
@@ -52,7 +52,7 @@ def information(sums: Records, theta: float) -> Floats:
 @kernel
 def covariance(sums: Records, theta: float) -> Floats:
     """Return the inverse of the information of (x, y, theta), (3, 3); see `invert3_scaled`."""
-    out = empty(1, INFORMATION)
+    out = np.empty(1, INFORMATION)
     joint_information(sums[0], theta, out[0])
     invert3_scaled(out[0], out[0])
     return full_matrix(out)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 
-from ..allocating import zeros
-from ..compiling import kernel
+import numpy as np
+
+from compiled import kernel
+
 from ..layout import ONE_STEP_SUMS, Floats, Record, Records
 from .compensated import accumulated
 from .matrices import PARALLEL_RATIO
@@ -86,7 +88,7 @@ def translation_cost(pairs: Records, weights: Floats, x: float, y: float) -> flo
 @kernel
 def one_step_sums(pairs: Records, x: float, y: float, alpha_ref: float, weights: Floats) -> Records:
     """Return the compensated sums of pairs about a reference; those of weight 0 do not count."""
-    sums = zeros(2, ONE_STEP_SUMS)
+    sums = np.zeros(2, ONE_STEP_SUMS)
     for i in range(len(pairs)):
         if weights[i] > 0.0:
             line = pairs[i].map

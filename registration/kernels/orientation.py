@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import Floats, Records
 from .joint import joint_cost, joint_solve, joint_sums_compensated
 from .pairs import relative_angles

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..allocating import empty
-from ..compiling import internal, kernel
+from compiled import kernel
+
 from ..layout import Floats, Record, Records, X, Y
 from ..tables import Drawn, Points
 
@@ -29,7 +29,6 @@ def first_outside(indices: NDArray[np.intp], scan_count: int, map_count: int) ->
     return -1, 0
 
 
-@internal
 @kernel
 def fill_in(
     pairs: Records, indices: NDArray[np.intp], on_map: Drawn, scan: Drawn, points: Points
@@ -75,11 +74,10 @@ def offset_of(line: Record) -> float:
     return -line.dy * line.x + line.dx * line.y
 
 
-@internal
 @kernel
 def inverse_variances(pairs: Records, map_variance: float) -> tuple[Floats, bool]:
     """Return 1 / variance of each pair's offset (n,), and whether all pairs have a variance."""
-    inverses = empty(len(pairs), np.float64)
+    inverses = np.empty(len(pairs), np.float64)
     for i in range(len(pairs)):
         variance = pairs[i].scan.variance + map_variance
         if not variance > 0.0:
@@ -148,7 +146,7 @@ def relative_angles(pairs: Records, theta: float) -> Floats:
     """Return ``wrap(angle(d_map) - angle(d_scan) - theta)``, (n,) radians."""
     c = math.cos(theta)
     s = math.sin(theta)
-    angles = empty(len(pairs), np.float64)
+    angles = np.empty(len(pairs), np.float64)
     for i in range(len(pairs)):
         line = pairs[i].map
         seen = pairs[i].scan
@@ -178,7 +176,7 @@ def residuals(
     c = math.cos(theta)
     s = math.sin(theta)
     angles = relative_angles(pairs, theta)
-    offsets = empty(len(pairs), np.float64)
+    offsets = np.empty(len(pairs), np.float64)
     chi2 = 0.0
     squared_offsets = 0.0
     squared_angles = 0.0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import Records
 
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..allocating import empty
-from ..compiling import kernel
+from compiled import kernel
+
 from ..layout import Floats, X, Y
 
 X2, Y2 = 2, 3  # columns of (n, 4) end points, behind `X` and `Y` of the begin
@@ -28,11 +28,11 @@ def are_within(values: Floats, low: float, high: float) -> bool:
 def lines_of(endpoints: Floats) -> Lines:
     """Return of segments (n, 4) the directions and normals (n, 2), offsets and lengths (n,), and midpoints (n, 2)."""
     count = len(endpoints)
-    directions = empty((count, 2), np.float64)
-    normals = empty((count, 2), np.float64)
-    offsets = empty(count, np.float64)
-    lengths = empty(count, np.float64)
-    midpoints = empty((count, 2), np.float64)
+    directions = np.empty((count, 2), np.float64)
+    normals = np.empty((count, 2), np.float64)
+    offsets = np.empty(count, np.float64)
+    lengths = np.empty(count, np.float64)
+    midpoints = np.empty((count, 2), np.float64)
     for i in range(count):
         along_x = endpoints[i, X2] - endpoints[i, X]
         along_y = endpoints[i, Y2] - endpoints[i, Y]

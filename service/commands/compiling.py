@@ -9,9 +9,11 @@ from contextlib import suppress
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
+from compiled import compiled_fraction
+
 from ..parsing.errors import ParserEndedError
 from ..parsing.parser_process import ParserProcess
-from ..work.compiling import compile_kernels, compiled_share
+from ..work.compiling import compile_kernels
 
 LOOK_SECONDS = 0.3
 
@@ -21,7 +23,7 @@ def compile_in(parser: ParserProcess) -> None:
 
     A person who looks on sees how far it is.
     """
-    print("linefix: compiling, which takes half a minute; what comes of it is kept for the next time", file=sys.stderr)
+    print("linefix: compiling the kernels for about a minute; later runs load them from the cache", file=sys.stderr)
     columns = TextColumn("kernels"), BarColumn(), TaskProgressColumn()
     bar = Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True)
     with ThreadPoolExecutor(1) as threads, bar:
@@ -31,7 +33,7 @@ def compile_in(parser: ParserProcess) -> None:
             try:
                 compiling = threads.submit(parser.call, compile_kernels)
                 while wait([compiling], LOOK_SECONDS).not_done:
-                    bar.update(shown, completed=compiled_share())
+                    bar.update(shown, completed=compiled_fraction())
                 compiling.result()
             finally:
                 parser.close()

@@ -13,6 +13,7 @@ import orjson
 from pydantic import ValidationError
 
 from association import Deadline, MapIndex
+from compiled import is_complete
 
 from ..http.problems import problem_of
 from ..importing.bounded import ReadMap
@@ -31,7 +32,6 @@ from ..work.analyzing import analysis_json, analysis_of, reference_to
 from ..work.answers import outline_json
 from ..work.association import Associator
 from ..work.checking import check, check_done, conclude, sample
-from ..work.compiling import is_compiled
 from ..work.importing import answer_import, index_import
 from ..work.job import Done, Job, Stopwatch
 from ..work.registration import answer_registration
@@ -166,7 +166,7 @@ class InProcess:
 
     def _compile(self) -> None:
         """Compile what is not kept from before; once: where nothing can be kept this process compiles what it needs."""
-        if self._has_compiled or is_compiled():
+        if self._has_compiled or is_complete():
             return
         self._has_compiled = True
         compile_in(self._parser)

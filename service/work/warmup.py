@@ -39,7 +39,6 @@ from registration import (
     Segments,
     register,
 )
-from registration.many_kernels import compiling_many
 from simulation import scan
 from vectorization import LaserScan, vectorize
 
@@ -85,6 +84,23 @@ def warm_up() -> None:
     index = MapIndex.build(room, 0.0)
     for sample in (_with_beams(), _one_wall()):
         try_sample(index, sample, Deadline(), oriented=True)
+
+
+def warm_up_first_half() -> None:
+    """Compile about half of the kernels: those of the search, of registration and of the analysis of maps."""
+    warm_up_registering()
+    warm_up_searching()
+    warm_up_analyzing()
+
+
+def warm_up_second_half() -> None:
+    """Compile the other kernels, in an order in which the two halves seldom meet at the same kernel."""
+    warm_up_indexing()
+    warm_up_vectorizing()
+    warm_up_explaining()
+    warm_up_searching_late()
+    warm_up_searching_long()
+    warm_up_simulating()
 
 
 def warm_up_analyzing() -> None:
@@ -226,10 +242,4 @@ def _end_with_the_other() -> None:
 
 if __name__ == "__main__":
     threading.Thread(target=_end_with_the_other, daemon=True).start()
-    with compiling_many():
-        warm_up_indexing()
-        warm_up_vectorizing()
-        warm_up_explaining()
-        warm_up_searching_late()
-        warm_up_searching_long()
-        warm_up_simulating()
+    warm_up_second_half()

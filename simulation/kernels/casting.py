@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.compiling import kernel
+from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import SEGMENT, Floats
 

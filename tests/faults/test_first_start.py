@@ -16,7 +16,7 @@ from tests.service.process.test_workers import ready, workers_of
 def test_what_a_first_start_compiles_is_not_kept_in_memory(
     start_service: Callable[..., RunningService], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path / "kernels"))
     running = start_service(probe="/livez", workers=2, searches=2)
     begun = time.monotonic()
     until(lambda: ready(running) == 2, patience=300.0)

@@ -12,7 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from fleet import associate_many
-from tests.formats.test_log_frames import SECOND, Robots
+from tests.formats.test_log_frames import Robots
+from tests.formats.test_logs import SECOND
 from tests.service.commands.test_replay_bags import (
     BEAMS,
     MOUNT,

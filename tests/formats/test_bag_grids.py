@@ -85,7 +85,7 @@ def test_a_bag_without_a_grid_names_its_topics(tmp_path: Path) -> None:
         read_map(recording.done())
 
 
-def placed(tmp_path: Path, position: tuple[float, ...], orientation: tuple[float, ...]) -> ImportedMap:
+def placed(tmp_path: Path, position: tuple[float, float, float], orientation: tuple[float, ...]) -> ImportedMap:
     recording = Recording(tmp_path / "a.mcap")
     recording.put("/map", BEGUN, grid_bytes(MAP, position, orientation), GRID)
     return read_map(recording.done())
@@ -118,7 +118,7 @@ def test_a_turned_grid_is_turned(tmp_path: Path) -> None:
     ],
 )
 def test_an_origin_that_is_none_is_refused(
-    tmp_path: Path, position: tuple[float, ...], orientation: tuple[float, ...], message: str
+    tmp_path: Path, position: tuple[float, float, float], orientation: tuple[float, ...], message: str
 ) -> None:
     with pytest.raises(MalformedFileError, match=message):
         placed(tmp_path, position, orientation)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zstandard
@@ -84,7 +85,7 @@ def test_a_scan_in_another_encoding_is_named(tmp_path: Path) -> None:
 )
 @pytest.mark.parametrize("compression", list(CompressionType))
 def test_an_mcap_without_a_part_of_its_summary(
-    tmp_path: Path, options: dict[str, bool], compression: CompressionType
+    tmp_path: Path, options: dict[str, Any], compression: CompressionType
 ) -> None:
     recording = Recording(tmp_path / "a.mcap", compression=compression, **options)
     recording.scans(7)

@@ -33,7 +33,7 @@ def seen(seed: int = 0, x: float = 2.0, y: float = 1.4, theta: float = 0.3) -> t
 
 def counts(name: str, n: int) -> NDArray[np.int64]:
     rng = np.random.default_rng(1)
-    return {
+    counts_by_name: dict[str, NDArray[np.int64]] = {
         "twice": np.full(n, 2),
         "thrice": np.full(n, 3),
         "seven times": np.full(n, 7),
@@ -41,7 +41,8 @@ def counts(name: str, n: int) -> NDArray[np.int64]:
         "a third of them twice": 1 + (np.arange(n) % 3 == 0),
         "some": rng.integers(1, 4, n),
         "one": 1 + (np.arange(n) == 9),
-    }[name]
+    }
+    return counts_by_name[name]
 
 
 NAMES = ["twice", "thrice", "seven times", "every second twice", "a third of them twice", "some", "one"]

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from registration.allocating import empty
-from registration.compiling import kernel
+from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
@@ -93,8 +92,8 @@ def share(points: Records, lines: Records, k: int, at: Corner, scanner: Record) 
         last -= 1
     if last == one.last and last + 1 == other.first:
         return False
-    own = empty(len(points), np.bool_)
-    fitted = empty(2, FITTED)
+    own = np.empty(len(points), np.bool_)
+    fitted = np.empty(2, FITTED)
     fitted[0] = one
     fitted[1] = other
     good = fit_line(points, a, last + 1, scanner, fitted[0], own)
@@ -112,7 +111,7 @@ def share(points: Records, lines: Records, k: int, at: Corner, scanner: Record) 
 @kernel
 def leave_seam(points: Records, one: Record, other: Record, at: Corner, scanner: Record) -> None:
     """Take from the last and the first line of a closed scan the points beyond their corner, and fit what is left."""
-    own = empty(len(points), np.bool_)
+    own = np.empty(len(points), np.bool_)
     a = other.first
     b = one.last
     while a < other.last - 2 and a < other.first + BREAK_REACH and is_before(points[a], one, other, at):

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.allocating import empty
-from registration.compiling import kernel
+from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
@@ -193,9 +192,9 @@ def bridge(
     Pieces of fewer than three points are left out. Returns the pieces, and the sums of the points that are their own.
     """
     bounds = np.empty_like(pieces)
-    totals = empty(len(pieces), SUMS)
-    scratch = empty(2, SUMS)
-    lines = empty(1, FITTED)
+    totals = np.empty(len(pieces), SUMS)
+    scratch = np.empty(2, SUMS)
+    lines = np.empty(1, FITTED)
     own = scratch[0]
     joint = scratch[1]
     count = 0
@@ -235,8 +234,8 @@ def rejoin(points: Records, lines: Records, scanner: Record) -> int:
     The running sums take the noise for the same all along a piece and sometimes break a wall for it. Returns how many
     lines are left.
     """
-    own = empty(len(points), np.bool_)
-    scratch = empty(1, FITTED)
+    own = np.empty(len(points), np.bool_)
+    scratch = np.empty(1, FITTED)
     joint = scratch[0]
     count = 0
     for k in range(len(lines)):

@@ -1,6 +1,6 @@
 """Compiled selection. Numba takes seconds to compile `np.partition`, most of it for the words of its errors."""
 
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats
 
 

@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.allocating import empty, zeros
-from registration.compiling import kernel
+from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
@@ -31,7 +30,7 @@ Indices = NDArray[np.int64]
 @kernel
 def running_sums(points: Records) -> Records:
     """Return the running totals (n + 1,) of the points: element i is the sums of the first i."""
-    sums = zeros(len(points) + 1, SUMS)
+    sums = np.zeros(len(points) + 1, SUMS)
     for i in range(len(points)):
         point = points[i]
         before = sums[i]
@@ -112,7 +111,7 @@ def find_gaps(points: Records, scanner: Record) -> Indices:
     Neighbouring rays may be as far from each other on a wall as where it is seen under `GRAZING`; without rays the
     scanner's `default_gap` decides. No gap is above its `max_gap`.
     """
-    starts = empty(len(points), np.int64)
+    starts = np.empty(len(points), np.int64)
     farthest = math.sin(min(0.5 * math.pi, MISSING_STEPS * scanner.increment))
     count = 0
     for i in range(len(points)):
@@ -209,8 +208,8 @@ def place_of_break(points: Records, sums: Records, piece: Record, scanner: Recor
 def split(points: Records, sums: Records, starts: Indices, scanner: Record) -> Records:
     """Split every stretch until each piece is straight; return the pieces."""
     n = len(points)
-    pieces = empty(n, PIECE)
-    stack = empty(2 * n + 2, PIECE)
+    pieces = np.empty(n, PIECE)
+    stack = np.empty(2 * n + 2, PIECE)
     count = 0
     for s in range(len(starts)):
         stack[0].first = starts[s]
@@ -241,7 +240,7 @@ def merge(pieces: Records, sums: Records, gaps: Indices, scanner: Record) -> Rec
     """
     left = np.empty_like(pieces)
     count = 0
-    joint = empty(len(pieces), np.float64)
+    joint = np.empty(len(pieces), np.float64)
     a = 0
     for g in range(len(gaps)):
         end = gaps[g + 1] if g + 1 < len(gaps) else len(sums) - 1

@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.allocating import empty, zeros
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import Floats, Records, X, Y
 
 from ..layout import POINT
@@ -49,7 +48,7 @@ def gather(
     a line in both directions.
     """
     n = len(cleaned)
-    order = empty(n, np.int64)
+    order = np.empty(n, np.int64)
     count = 0
     farthest = 0
     for k in range(n):
@@ -62,7 +61,7 @@ def gather(
     if closed:
         order = np.concatenate((order[farthest:count], order[:farthest]))
     order = order[:count]
-    points = empty(count, POINT)
+    points = np.empty(count, POINT)
     for k in range(count):
         i = order[k]
         point = points[k]
@@ -77,7 +76,7 @@ def gather(
 @kernel
 def place(places: Floats, ranges: Floats) -> Records:
     """Return the points at `places` (n, 2) about the sensor; one whose range is 0 has no ray."""
-    points = zeros(len(places), POINT)
+    points = np.zeros(len(places), POINT)
     for i in range(len(places)):
         point = points[i]
         point.x = places[i, X]
@@ -113,7 +112,7 @@ def ray_noise(points: Records, increment: float) -> float:
     ``sin(c - b) / r_a + sin(b - a) / r_c = sin(c - a) / r_b`` whatever the wall; what is missing is noise.
     """
     n = len(points)
-    z = empty(max(0, n - 2), np.float64)
+    z = np.empty(max(0, n - 2), np.float64)
     widest = TRIPLE_STEPS * increment
     count = 0
     for i in range(1, n - 1):
@@ -149,7 +148,7 @@ def window_noise(points: Records) -> float:
     windows = len(points) - WINDOW + 1
     if windows < LEAST_TRIPLES:
         return 0.0
-    squares = empty(windows, np.float64)
+    squares = np.empty(windows, np.float64)
     for a in range(windows):
         mx = 0.0
         my = 0.0

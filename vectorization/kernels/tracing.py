@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from registration.allocating import empty, zeros
-from registration.compiling import kernel
+from compiled import kernel
 from registration.layout import SEGMENT, Floats, Record, Records, X, Y
 
 from ..layout import FITTED
@@ -89,9 +88,9 @@ def acceptable(line: Record, rays: bool) -> bool:
 @kernel
 def fit_all(points: Records, bounds: Records, totals: Records, min_points: int, scanner: Record) -> Records:
     """Fit every piece of at least `min_points` and extend it over the points around that no such piece has."""
-    taken = zeros(len(points), np.bool_)
-    own = zeros(len(points), np.bool_)
-    lines = empty(len(bounds), FITTED)
+    taken = np.zeros(len(points), np.bool_)
+    own = np.zeros(len(points), np.bool_)
+    lines = np.empty(len(bounds), FITTED)
     for k in range(len(bounds)):
         if totals[k].count >= min_points:
             taken[bounds[k].first : bounds[k].end] = True
@@ -179,10 +178,10 @@ def describe(lines: Records, x: float, y: float) -> tuple[Floats, Floats, Floats
     Sigma is such that count / sigma^2 is the weight, and widened where the points lie worse than chance lets them.
     """
     m = len(lines)
-    segments = empty(m, SEGMENT)
-    sigmas = empty(m, np.float64)
-    centroids = empty((m, 2), np.float64)
-    rms = empty(m, np.float64)
+    segments = np.empty(m, SEGMENT)
+    sigmas = np.empty(m, np.float64)
+    centroids = np.empty((m, 2), np.float64)
+    rms = np.empty(m, np.float64)
     for k in range(m):
         line = lines[k]
         foot_x = x + line.p * line.nx

@@ -105,7 +105,7 @@ def test_a_client_that_hangs_up_frees_its_place(start_service: Callable[..., Run
 def test_before_the_kernels_are_there_nothing_is_searched(
     start_service: Callable[..., RunningService], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path / "kernels"))
     running = start_service(probe="/livez")
 
     def told(detail: str) -> bool:

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import grp
-import logging
 import os
-import pickle
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from registration import kept_kernels
-from registration.trusted_folders import is_trusted_file, why_untrusted
+from compiled.trusted_folders import is_trusted_file, why_untrusted
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners here")
 as_root = pytest.mark.skipif(os.name == "nt" or os.geteuid() != 0, reason="only root gives files away")
@@ -96,48 +91,3 @@ def test_files(own: Path) -> None:
     assert not is_trusted_file(own)
     with pytest.raises(FileNotFoundError):
         is_trusted_file(own / "none")
-
-
-class Planted:
-    """Leaves a mark where it is unpickled."""
-
-    def __init__(self, mark: Path) -> None:
-        self.mark = mark
-
-    def __reduce__(self) -> tuple[object, tuple[str]]:
-        return os.system, (f"touch {self.mark}",)
-
-
-@pytest.mark.parametrize("variable", ["LINEFIX_KERNELS", "NUMBA_CACHE_DIR"])
-def test_kernels_come_from_no_folder_of_others(own: Path, tmp_path: Path, variable: str) -> None:
-    """Files there are not loaded, and no file is stored there."""
-    own.chmod(0o777)
-    program = (
-        "import os, registration.kernels, sys; from pathlib import Path; from registration import kept_kernels as k;"
-        "print(k.cache_directory('registration'))"
-    )
-    environment = {**os.environ, variable: str(own), "HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    environment.pop({"LINEFIX_KERNELS": "NUMBA_CACHE_DIR", "NUMBA_CACHE_DIR": "LINEFIX_KERNELS"}[variable], None)
-    ran = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True, cwd=Path.cwd()
-    )
-    assert not ran.stdout.startswith(str(own))
-    assert "chmod go-w" in ran.stderr
-    own.chmod(0o755)
-    ran = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True, cwd=Path.cwd()
-    )
-    assert ran.stdout.startswith(str(own))
-    assert ran.stderr == ""
-
-
-def test_a_file_that_others_may_write_to_is_compiled_anew(
-    own: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    mark, file = tmp_path / "mark", own / "kernel.nbc"
-    file.write_bytes(pickle.dumps(Planted(mark)))
-    file.chmod(0o666)
-    with caplog.at_level(logging.WARNING, "linefix"):
-        assert kept_kernels.read_trusted(file) is None
-    assert "other users may write" in caplog.text
-    assert not mark.exists()

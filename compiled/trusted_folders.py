@@ -37,11 +37,6 @@ def why_untrusted(folder: Path) -> str | None:
     return None
 
 
-def is_trusted_folder(folder: Path) -> bool:
-    """Return whether a folder, without those above, is this user's or root's and no other user can write to it."""
-    return not hasattr(os, "geteuid") or _found(folder.stat(), is_parent=False) is None
-
-
 def is_trusted_file(path: Path) -> bool:
     """Return whether a file is this user's or root's and no other user can write; raises `FileNotFoundError`."""
     if not hasattr(os, "geteuid"):

@@ -1,7 +1,7 @@
-"""Kernels as plain Python, where ``NUMBA_DISABLE_JIT`` is set: for a debugger, for coverage, for tests of mistakes.
+"""Kernels as plain Python, where ``NUMBA_DISABLE_JIT`` is set: for debuggers, coverage and mutation tests.
 
-A compiled kernel reads the fields of a record as attributes. Plain elements of structured arrays have none: here they
-are made `numpy.record`, on which it works the same way.
+A compiled kernel reads the fields of a record as attributes. Plain elements of structured arrays have none; as
+`numpy.record` they have.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def interpreted(function: Function) -> Function:
-    """Return a kernel that is not compiled, with records as it expects them."""
+    """Return a kernel that is not compiled and takes the arguments of a compiled one."""
 
     @functools.wraps(function)
     def run(*arguments: Any) -> Any:
@@ -29,7 +29,7 @@ def interpreted(function: Function) -> Function:
 
 
 def with_attributes(value: Any) -> Any:
-    """Return arrays of records, single ones, and tuples of both, as what has its fields as attributes; no copies."""
+    """Return records, arrays of them and tuples of both with their fields as attributes, without a copy."""
     if isinstance(value, np.ndarray | np.void) and value.dtype.names is not None:
         return value.view(_record_type(value.dtype))
     if isinstance(value, tuple):

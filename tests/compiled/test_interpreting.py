@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from compiled.interpreting import interpreted
 from registration import MeasuredSegments, Segments, register
-from registration.interpreting import interpreted
 from registration.layout import Records
-
-from .scenes import diagonal, pose_of
+from tests.registration.scenes import diagonal, pose_of
 
 ROOT = Path(__file__).parents[2]
 INNER = np.dtype([("a", "f8"), ("b", "i8")])
@@ -23,7 +22,7 @@ OUTER = np.dtype([("inner", INNER), ("c", "f8")])
 ROOM = [[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 2.0], [4.0, 2.0, 4.0, 5.0], [0.0, 5.0, 0.0, 0.0]]
 REGISTER = """
 import numba
-from tests.registration.test_interpreting import answer
+from tests.compiled.test_interpreting import answer
 print(numba.config.DISABLE_JIT, *map(float.hex, answer()))
 """
 
