@@ -46,7 +46,7 @@ ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE registration vectorization association simulation analysis formats fleet linefix ros2 service \
+    && $COMPILE compiled registration vectorization association simulation analysis formats fleet linefix ros2 service \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}
@@ -67,7 +67,7 @@ ENV PATH=/opt/linefix/bin:$PATH \
     LINEFIX_PORT=8000 \
     LINEFIX_DATA_DIR=/data
 # Once through as at a start: leaves the bytecode of what is used of Python itself, which its slim image comes without.
-RUN python -c "import service.process.protocol, service.app; from service.work.warmup import warm_up; warm_up()"
+RUN python -c "import service.process.server, service.process.worker, service.app; from service.work.warmup import warm_up; warm_up()"
 ENV PYTHONDONTWRITEBYTECODE=1
 USER linefix
 WORKDIR /data

@@ -263,9 +263,9 @@ class Answered:
 
     @property
     def difference(self) -> float:
-        """Of the probabilities."""
+        """Of the probabilities; 0 where there is none, as for a degenerate pose."""
         one, other = self.answers
-        return abs(one.probability - other.probability)
+        return abs((one.probability or 0.0) - (other.probability or 0.0))
 
     @property
     def flips(self) -> bool:

@@ -43,6 +43,7 @@ def test_a_room_like_no_other_is_told_everywhere() -> None:
     assert len(far_from_walls) > 8
     for one in far_from_walls:
         assert (one.status, one.usable, one.look_alike, one.reasons) == (Status.OK, True, None, ())
+        assert one.probability is not None
         assert one.probability > 0.99
     assert sum(one.usable for one in found) > 0.8 * len(found)
 
@@ -95,6 +96,7 @@ def test_a_sure_answer_that_is_another_place_is_a_look_alike() -> None:
     for number in sure[::6]:
         one = mistaken.look(number)
         assert one is not None
+        assert one.probability is not None
         assert one.probability > 0.9
         assert (one.status, one.usable, one.reasons) == (Status.AMBIGUOUS, False, ("twin",))
         assert one.look_alike is not None

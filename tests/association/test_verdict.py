@@ -325,6 +325,7 @@ def test_a_prior_that_is_far_off_contradicts(said: float, contradicted: bool) ->
 def test_a_contradicted_answer_may_be_less_likely_than_a_half() -> None:
     unlikely = replace(Drawn(room(with_beams=True), LIKELY._replace(rival=109.9)), prior=-12.0)
     assert unlikely.verdict.contradicted
+    assert unlikely.verdict.probability is not None
     assert unlikely.verdict.probability == pytest.approx(unlikely.expected.right)
     assert unlikely.verdict.probability < 0.5
 

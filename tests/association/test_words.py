@@ -25,6 +25,7 @@ def searched(world: World, seen: Segments | None = None) -> AssociationResult:
 
 def test_one_place() -> None:
     result = searched(l_room())
+    assert result.probability is not None
     assert sentence_of(result) == f"The robot is here, with a chance of {100 * min(result.probability, 0.9999):.2f} %."
 
 
