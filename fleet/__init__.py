@@ -14,6 +14,7 @@ The extra ``linefix[batch]`` brings the libraries, ``linefix[ray]`` Ray besides.
 
 from .engine import Engine, Lost
 from .errors import FleetError, OtherRunError, UnreadableMapsError, UnreadableScansError
+from .logs import LogNote
 from .on_ray import OnRay
 from .processes import Processes
 from .running import Progress, Summary, associate_many
@@ -25,6 +26,7 @@ __all__ = [
     "Engine",
     "FleetError",
     "FleetOptions",
+    "LogNote",
     "Lost",
     "OnRay",
     "OtherRunError",

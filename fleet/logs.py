@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import orjson
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -16,8 +17,12 @@ from .blocks import Block
 from .errors import UnreadableScansError
 from .tables import FORMS, LASER, MOTION, SCANS
 
+if TYPE_CHECKING:
+    from formats import Log, LoggedScan
+
 PARQUET = (".parquet", ".pq")
 WORDS = ("map_id", "error")
+NOTES = b"linefix.notes"  # in the metadata of a file that a log is laid out in
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,51 @@ class Layout:
             stop += count
         return [*found, Block(self.number, self.log, self.path, start, stop)] if stop > start else found
 
+    def notes(self) -> list[LogNote]:
+        """Return what was assumed of a log of another tool, and what of it was left out."""
+        if Path(self.log).suffix.lower() in PARQUET:
+            return []
+        told = (pq.read_metadata(self.path).metadata or {}).get(NOTES, b"[]")
+        return [LogNote(self.log, **note) for note in orjson.loads(told)]
+
+
+@dataclass(frozen=True, slots=True)
+class LogNote:
+    """A note of logs: an assumption, or something that is left out.
+
+    Attributes
+    ----------
+    log : str
+        The first log that it was noted of, as the caller named it.
+    kind : str
+        ``assumed`` or ``dropped``.
+    code, message : str
+        As in the report of `formats.read_log`; the message is that of the first log.
+    count : int
+        Number of scans or messages in all logs; 0 where they are not counted.
+    logs : int
+        Number of logs that have a note with this code.
+    """
+
+    log: str
+    kind: str
+    code: str
+    message: str
+    count: int
+    logs: int = 1
+
+
+def merged_notes(layouts: Iterable[Layout]) -> tuple[LogNote, ...]:
+    """Return one note for each kind and code, with the sums over all logs."""
+    found: dict[tuple[str, str], LogNote] = {}
+    for note in (note for layout in layouts for note in layout.notes()):
+        key = note.kind, note.code
+        first = found.get(key)
+        found[key] = (
+            note if first is None else replace(first, count=first.count + note.count, logs=first.logs + note.logs)
+        )
+    return tuple(found.values())
+
 
 def layout_of(number: int, log: str, folder: Path, block: int) -> Layout:
     """Return where a log is, or is to be, laid out.
@@ -90,8 +140,10 @@ def lay_out(layout: Layout) -> None:
                 writer.write_batch(batch, layout.block)
     else:
         with pq.ParquetWriter(begun, SCANS) as writer:
-            for rows in _filled(_scans(layout.log), layout.block):
+            reading = _Reading(layout.log)
+            for rows in _filled(reading.rows(), layout.block):
                 writer.write_table(pa.Table.from_pylist(rows, schema=SCANS))
+            writer.add_key_value_metadata({NOTES: orjson.dumps(reading.notes())})
     begun.rename(target)
 
 
@@ -106,32 +158,50 @@ def _filled(rows: Iterator[dict[str, Any]], count: int) -> Iterator[list[dict[st
         yield kept
 
 
-def _scans(log: str) -> Iterator[dict[str, Any]]:
-    """Yield the scans of a log of another tool; at the end a row for each that is none, and for what ends it."""
-    from formats import UNUSABLE, read_log
+@dataclass(slots=True)
+class _Reading:
+    """A log of another tool while it is laid out."""
 
-    try:
-        opened = read_log(log)
-        for scan in opened:
-            laser, motion = scan.laser, scan.laser.motion
-            yield {
-                "stamp": scan.stamp_ns,
-                "angle_min": laser.angle_min,
-                "angle_increment": laser.angle_increment,
-                "ranges": laser.ranges,
-                "range_min": laser.range_min,
-                "range_max": laser.range_max,
-                "flipped": scan.flipped,
-                "time_increment": scan.time_increment,
-                "vx": None if motion is None else motion.vx,
-                "vy": None if motion is None else motion.vy,
-                "omega": None if motion is None else motion.omega,
-            }
-        for note in opened.report.dropped:
-            if note.code in UNUSABLE:
-                yield from ({"error": note.message} for _ in range(note.count))
-    except InputError as error:
-        yield {"error": f"the log could not be read any further: {error}"}
+    log: str
+    _opened: Log | None = None
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield the scans; at the end a row for each that cannot be used, and for what ends the log."""
+        from formats import UNUSABLE, read_log
+
+        try:
+            self._opened = read_log(self.log)
+            yield from map(_row, self._opened)
+            for note in self._opened.report.dropped:
+                if note.code in UNUSABLE:
+                    yield from ({"error": note.message} for _ in range(note.count))
+        except InputError as error:
+            yield {"error": f"the log could not be read any further: {error}"}
+
+    def notes(self) -> list[dict[str, Any]]:
+        """Return what was assumed and what was left out so far."""
+        if self._opened is None:
+            return []
+        report = self._opened.report
+        noted = (("assumed", report.assumed), ("dropped", report.dropped))
+        return [{"kind": kind, **asdict(note)} for kind, notes in noted for note in notes]
+
+
+def _row(scan: LoggedScan) -> dict[str, Any]:
+    laser, motion = scan.laser, scan.laser.motion
+    return {
+        "stamp": scan.stamp_ns,
+        "angle_min": laser.angle_min,
+        "angle_increment": laser.angle_increment,
+        "ranges": laser.ranges,
+        "range_min": laser.range_min,
+        "range_max": laser.range_max,
+        "flipped": scan.flipped,
+        "time_increment": scan.time_increment,
+        "vx": None if motion is None else motion.vx,
+        "vy": None if motion is None else motion.vy,
+        "omega": None if motion is None else motion.omega,
+    }
 
 
 def _checked(path: Path) -> pq.FileMetaData:

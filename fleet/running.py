@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,7 +14,7 @@ import pyarrow as pa
 from .blocks import Block
 from .engine import Engine, Lost
 from .errors import UnreadableScansError
-from .logs import Layout, lay_out, layout_of
+from .logs import Layout, LogNote, lay_out, layout_of, merged_notes
 from .maps import MapShelf
 from .parts import Parts, opened
 from .processes import Processes
@@ -55,6 +55,8 @@ class Summary:
         Rows with an error.
     statuses : dict of str to int
         How many of each; those with an error have none.
+    notes : tuple of LogNote
+        Assumptions and omissions of logs of other tools.
     """
 
     scans: int
@@ -62,6 +64,7 @@ class Summary:
     usable: int
     errors: int
     statuses: dict[str, int]
+    notes: tuple[LogNote, ...] = ()
 
 
 def associate_many(
@@ -115,7 +118,8 @@ def associate_many(
         left = parts.left(blocks)
         total, searched = _scans(blocks), _scans(left)
         _search(left, BlockSearch(shelf, options), engine, parts, _counting(watch, total - searched, total))
-        return _summary(parts.assemble(target), total - searched)
+        notes = merged_notes(layouts)  # before the parts are removed
+        return replace(_summary(parts.assemble(target), total - searched), notes=notes)
 
 
 def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], None]) -> None:

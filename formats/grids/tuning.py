@@ -70,7 +70,8 @@ LONGEST_CONTOUR = 50_000
 UPRIGHT = 0.999
 
 # Fraction of the cells around obstacles that have the cost of an inflated obstacle (99), from which on a grid is a
-# costmap, and how many of them have to be known. By definition a costmap gives 99 to each cell nearer to an obstacle
-# than the robot's inscribed radius; slam_toolbox writes 0, 100 and -1 only. The value lies in the middle, unmeasured.
+# costmap, and how many of them have to be known. By its definition a costmap gives 99 to each cell nearer to an
+# obstacle than the robot's inscribed radius; slam_toolbox writes 0, 100 and -1 only. The value lies in the middle and
+# is not measured.
 INFLATED = 0.5
 LETHAL_CELLS = 20

@@ -21,10 +21,10 @@ from registration import InputError
 from ..work.compiling import compile_kernels
 from .errors import RefusedError, WrongUseError
 from .options import AsJson
-from .printing import print_json, print_rows
+from .printing import noted, print_json, print_rows
 
 if TYPE_CHECKING:
-    from fleet import Engine, FleetOptions, Progress, Summary
+    from fleet import Engine, FleetOptions, LogNote, Progress, Summary
 
 
 def batch(
@@ -98,7 +98,14 @@ def _rows(summary: Summary, seconds: float) -> list[tuple[str, str]]:
     rows = [("scans", f"{summary.scans:,}, of which {summary.taken_over:,} were done before")]
     rows += [(status, f"{count:,}") for status, count in sorted(summary.statuses.items())]
     rows += [("usable", f"{summary.usable:,}"), ("errors", f"{summary.errors:,}")]
+    rows += [(note.kind, _noted(note)) for note in summary.notes]
     return [*rows, ("speed", f"{searched / max(seconds, 1e-9):,.0f} scans/s")]
+
+
+def _noted(note: LogNote) -> str:
+    """Return a note, with the log that it is of."""
+    more = f" and {note.logs - 1:,} more" if note.logs > 1 else ""
+    return f"{noted({'message': note.message, 'count': note.count})}, {Path(note.log).name}{more}"
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +17,11 @@ from ..parsing.reading import parse
 from ..schemas.errors import TooManyError
 from ..schemas.limits import Limits
 from .errors import NOTHING, Asked, RefusedError, WrongUseError
+from .printing import noted, plain
 from .service import Json, answering
 
 if TYPE_CHECKING:
-    from formats import LineMap
+    from formats import ImportReport, LineMap
 
 STDIN = "-"
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # that some editors put in front of UTF-8
@@ -28,6 +30,8 @@ MAX_BYTES = 1_000_000_000  # of a file; what a request may hold is the service's
 _ANY = Limits(MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES, MAX_BYTES)
 MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
 FILES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv", ".bag", ".mcap", ".db3")  # never meant as ids
+RECORDINGS = ("rosbag1", "rosbag2", "mcap")
+CHOICE = ("grids", "topic", "costmap", "orientation")  # codes of notes of the grid that was read
 _FORMS = ("laser", "points", "segments", "views")
 
 
@@ -92,7 +96,11 @@ def document_at(name: str, server: str | None) -> Json:
     WrongUseError, RefusedError
         When there is none, or it is not taken.
     """
-    on = read_map_or_id(name)
+    return whole_map(read_map_or_id(name), server)
+
+
+def whole_map(on: Json, server: str | None) -> Json:
+    """Return the map of a request itself, also where the request has its id; raises `RefusedError` where it is gone."""
     if "map_id" not in on:
         return on
     with answering(server) as service:
@@ -116,13 +124,25 @@ def read_map_file(name: str) -> Json:
         with needing_formats(f"reading {path.name}"):
             from formats import read_map
 
-            return document_of(read_map(path).map)
+            imported = read_map(path)
+        _print_choice(imported.report)
+        return document_of(imported.map)
     told = read_json(name)
     if isinstance(told, list):
         return {"segments": told}
     if not isinstance(told, dict):
         raise RefusedError(f'{name}: expected {{"segments": [[x1, y1, x2, y2], ...]}}')
     return told
+
+
+def _print_choice(report: ImportReport) -> None:
+    """Print on stderr which grid of a recording is the map, and what of the recording was left out."""
+    if report.format not in RECORDINGS:
+        return
+    for kind in ("read", "assumed", "dropped"):
+        for note in getattr(report, kind):
+            if kind == "dropped" or note.code in CHOICE:
+                print(f"{'map':10}{plain(noted(asdict(note)))}", file=sys.stderr)
 
 
 def document_of(line_map: LineMap) -> Json:

@@ -19,8 +19,13 @@ from pathlib import Path
 from typing import IO
 
 import orjson
+from pydantic import BaseModel, ValidationError
 
 from ..importing.fields import Fields
+from ..schemas.analysis import AnalyzeAnswer
+from ..schemas.checks import CheckAnswer
+from ..schemas.imports import ImportAnswer
+from ..schemas.replies import AssociateAnswer, MapList, MapSummaryAnswer, RegisterAnswer, Row4, VectorizeAnswer
 from .errors import NOTHING, Asked, NoServerError, WrongUseError, error_of
 from .service import KEY, Json, Progress, Question, id_of
 
@@ -28,7 +33,20 @@ SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a 
 MAX_ANSWER_BYTES = 256 * 2**20  # eight times what the largest map may have by default
 MAX_PAGES = 100_000  # of a list of maps
 CHUNK = 2**20  # bytes
+ANSWERS: dict[Question, type[BaseModel]] = {
+    "associate": AssociateAnswer,
+    "register": RegisterAnswer,
+    "vectorize": VectorizeAnswer,
+}
 _HEADER = re.compile(r"[!-~]+")
+
+
+class _StoredMap(BaseModel):
+    """The fields of a stored map that commands use."""
+
+    segments: list[Row4]
+    sigma: float | None = None
+    oriented: bool | None = None
 
 
 class RemoteService:
@@ -63,7 +81,7 @@ class RemoteService:
     def ask(self, question: Question, body: Json) -> Json:
         """Return the answer of ``POST /v1/<question>``."""
         asked = Asked(map_id=id_of(body.get("map")))
-        return self._json(self._send("POST", f"/v1/{question}", orjson.dumps(body), asked))
+        return self._answer(ANSWERS[question], self._send("POST", f"/v1/{question}", orjson.dumps(body), asked))
 
     def import_map(self, files: Sequence[Path], fields: Fields) -> Json:
         """Return the answer of ``POST /v1/maps:import``."""
@@ -71,7 +89,7 @@ class RemoteService:
         asked = Asked(files=tuple(file.name for file in files))
         content = _form(files, fields, boundary.encode())
         media_type = f"multipart/form-data; boundary={boundary}"
-        return self._json(self._send("POST", "/v1/maps:import", content, asked, media_type))
+        return self._answer(ImportAnswer, self._send("POST", "/v1/maps:import", content, asked, media_type))
 
     def check(self, on: Json, samples: Json | None) -> Json:
         """Return the answer of ``/v1/maps/{map_id}:check``, which is for stored maps."""
@@ -79,21 +97,21 @@ class RemoteService:
         if map_id is None:
             raise WrongUseError("a server checks stored maps: linefix map put it first, or leave --server out")
         method, body = ("GET", None) if samples is None else ("POST", orjson.dumps(samples))
-        return self._json(self._send(method, f"/v1/maps/{map_id}:check", body, Asked(map_id)))
+        return self._answer(CheckAnswer, self._send(method, f"/v1/maps/{map_id}:check", body, Asked(map_id)))
 
     def put(self, map_id: str, document: Json) -> Json:
         """Store a map."""
-        return self._json(self._send("PUT", f"/v1/maps/{map_id}", orjson.dumps(document)))
+        return self._answer(MapSummaryAnswer, self._send("PUT", f"/v1/maps/{map_id}", orjson.dumps(document)))
 
     def get(self, map_id: str) -> Json:
         """Return a stored map."""
-        return self._json(self._send("GET", f"/v1/maps/{map_id}", asked=Asked(map_id)))
+        return self._answer(_StoredMap, self._send("GET", f"/v1/maps/{map_id}", asked=Asked(map_id)))
 
     def maps(self) -> Iterator[Json]:
         """Give what is told of each stored map, page by page."""
         cursor = ""
         for _ in range(MAX_PAGES):
-            page = self._json(self._send("GET", f"/v1/maps?cursor={urllib.parse.quote(cursor)}"))
+            page = self._answer(MapList, self._send("GET", f"/v1/maps?cursor={urllib.parse.quote(cursor)}"))
             yield from page["maps"]
             if page["next"] is None:
                 return
@@ -106,7 +124,28 @@ class RemoteService:
 
     def analyze(self, body: Json, progress: Progress) -> Json:
         """Return the answer of ``POST /v1/analyze``; nothing is known of its progress."""
-        return self._json(self._send("POST", "/v1/analyze", orjson.dumps(body)))
+        return self._answer(AnalyzeAnswer, self._send("POST", "/v1/analyze", orjson.dumps(body)))
+
+    def _answer(self, model: type[BaseModel], content: bytes) -> Json:
+        """Return an answer whose fields are those of its route; further fields may be of a later version.
+
+        Raises
+        ------
+        NoServerError
+            When a field is missing, or of another type.
+        """
+        answer = self._json(content)
+        try:
+            model.model_validate(answer)
+        except ValidationError as error:
+            wrong = [fault for fault in error.errors(include_url=False) if fault["type"] != "extra_forbidden"]
+            if wrong:
+                place = "/" + "/".join(map(str, wrong[0]["loc"]))
+                raise NoServerError(
+                    f"the answer of {self._url} is not that of this version of Linefix: {place}: {wrong[0]['msg']}; "
+                    "check the URL and the version of the server"
+                ) from None
+        return answer
 
     def _json(self, content: bytes) -> Json:
         try:
@@ -165,7 +204,12 @@ class RemoteService:
         problem = self._json(content)
         if status in (401, 403):
             return NoServerError(f"{self._url} asks for a key: set {KEY} in the environment to one that it knows")
-        faults = problem.get("errors") or []
+        listed = problem.get("errors")
+        faults = [
+            fault
+            for fault in (listed if isinstance(listed, list) else [])
+            if isinstance(fault, dict) and isinstance(fault.get("pointer"), str) and "message" in fault
+        ]
         return error_of(status, str(problem.get("code")), f"{self._url}: {problem.get('detail')}", faults, asked)
 
 

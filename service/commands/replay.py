@@ -22,7 +22,7 @@ from registration import RigidTransform
 
 from .errors import CommandError, NoSuchMapError, RefusedError
 from .frames import Frames, odometry_of
-from .inputs import document_at, line_map_of, needing_formats, read_map_or_id
+from .inputs import line_map_of, needing_formats, read_map_or_id, whole_map
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
 from .options import AsJson, Server
@@ -127,7 +127,7 @@ def replay(
 
         write_tum(tally.usable, out)
     if picture is not None:
-        _draw(document_at(on, server), tally, picture)
+        _draw(whole_map(told, server), tally, picture)
     _tell_log(source, frames, sys.stderr if as_json else sys.stdout)
     if not as_json:
         _tell(tally)

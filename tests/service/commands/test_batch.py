@@ -28,7 +28,7 @@ def test_batch_writes_one_row_a_scan_and_tells_what_is_in_them(tmp_path: Path, l
         (k, "ok") for k in range(30)
     ]
     told = json.loads(linefix(*asked, "--workers", "1", "--json").out)
-    assert told == {"scans": 30, "taken_over": 0, "usable": 30, "errors": 0, "statuses": {"ok": 30}}
+    assert told == {"scans": 30, "taken_over": 0, "usable": 30, "errors": 0, "statuses": {"ok": 30}, "notes": []}
 
 
 def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> None:

@@ -99,6 +99,39 @@ def test_what_is_no_json_is_no_linefix(linefix: Linefix, body: bytes) -> None:
             client.version()
 
 
+@pytest.mark.parametrize("body", [b"{}", b'{"status": "ok"}', b'{"segments": 5, "maps": 3, "findings": null}'])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("locate", "hall", "scan.json"),
+        ("vectorize", "points.json"),
+        ("map", "list"),
+        ("map", "get", "hall"),
+        ("map", "put", "hall", "room.json"),
+        ("map", "check", "hall"),
+        ("map", "import", "room.csv", "--units", "m"),
+        ("analyze", "hall"),
+    ],
+)
+def test_an_answer_of_another_shape_is_named(
+    linefix: Linefix, folder: Path, body: bytes, command: tuple[str, ...]
+) -> None:
+    (folder / "points.json").write_text(json.dumps({"points": [[0.1 * k, -1.0] for k in range(20)]}))
+    (folder / "room.csv").write_text("x1,y1,x2,y2\n0,0,6,0\n6,0,6,4\n")
+    head = b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
+    with sending(head % len(body) + body, b"") as url:
+        line = refused(linefix(*command, "--server", url), 4)
+        assert f"the answer of {url} is not that of this version of Linefix: /" in line
+        assert "check the URL" in line
+
+
+@pytest.mark.parametrize("body", [b"{}", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b'{"detail": []}'])
+def test_a_refusal_of_another_shape_ends_a_command(linefix: Linefix, body: bytes) -> None:
+    head = b"HTTP/1.1 422 No\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
+    with sending(head % len(body) + body, b"") as url:
+        refused(linefix("locate", "hall", "scan.json", "--server", url), 3)
+
+
 @pytest.mark.parametrize("body", [b"[]", b'{"errors": 5}', b'{"errors": [1, {"pointer": "/a"}]}', b"<html>"])
 def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
     head = b"HTTP/1.1 429 No\r\nRetry-After: \xb2\r\nContent-Length: %d\r\n\r\n"
@@ -110,7 +143,7 @@ def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
 
 def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(remote, "MAX_PAGES", 5)
-    body = b'{"maps": [], "next": "a b\\r\\n"}'
+    body = b'{"maps": [], "corrupt": [], "next": "a b\\r\\n"}'
     with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
         assert "lists more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)
 

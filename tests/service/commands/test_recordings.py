@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import linefix as library
-from tests.formats.recorded import BEGUN, SECOND, Laser, Recording, scan_bytes
+from tests.formats.recorded import BEGUN, GRID, SECOND, Laser, Recording, grid_bytes, scan_bytes
 
 from .running import Linefix, refused
 
@@ -72,9 +72,42 @@ def test_some_scans_that_cannot_be_used_cost_no_others(linefix: Linefix, folder:
     assert ended.code == 0
     assert "ok, usable      3" in ended.out
     assert "(1)" in next(line for line in ended.out.splitlines() if "angle_increment 0 rad" in line)
-    assert json.loads(linefix(*BATCH, "--json").out) == {
-        "scans": 4, "taken_over": 0, "usable": 3, "errors": 1, "statuses": {"ok": 3},
-    }  # fmt: skip
+    summary = json.loads(linefix(*BATCH, "--json").out)
+    notes = {note["code"]: (note["kind"], note["count"]) for note in summary.pop("notes")}
+    assert notes == {"no_odometry": ("assumed", 0), "broken_scan": ("dropped", 1)}
+    assert summary == {"scans": 4, "taken_over": 0, "usable": 3, "errors": 1, "statuses": {"ok": 3}}
+
+
+def test_a_batch_keeps_what_was_assumed_of_its_logs(linefix: Linefix, folder: Path) -> None:
+    write(folder, [laser.but(range_max=0.0) for laser in seen(3)])
+    (folder / "drive.mcap").rename(folder / "one.mcap")
+    write(folder, [laser.but(range_max=0.0) for laser in seen(2)])
+    ended = linefix(*BATCH[:1], "one.mcap", *BATCH[1:])
+    assert ended.code == 0, ended.err
+    line = next(line for line in ended.out.splitlines() if "range_max is 0 m" in line)
+    assert line.startswith("assumed")
+    assert line.endswith("(5), one.mcap and 1 more")
+
+
+def test_the_grid_of_a_recording_that_is_the_map_is_named(linefix: Linefix, folder: Path) -> None:
+    write(folder, seen(2))
+    cells = np.full((120, 140), -1)
+    for x1, y1, x2, y2 in ((9, 9, 131, 51), (9, 9, 91, 111)):
+        cells[y1:y2, x1:x2] = 100
+    for x1, y1, x2, y2 in ((10, 10, 130, 50), (10, 10, 90, 110)):
+        cells[y1:y2, x1:x2] = 0
+    recording = Recording(folder / "maps.mcap")
+    for topic in ("/map", "/local_costmap/costmap"):
+        recording.put(topic, BEGUN, grid_bytes(cells), GRID)
+    recording.done()
+    (folder / "points.json").write_text(json.dumps({"segments": [[0, -1, 2, -1], [2, -1, 2, 1]]}))
+    replay = ("replay", "drive.mcap", "--map", "maps.mcap", "--picture", "poses.png")
+    for command in (("locate", "maps.mcap", "points.json"), replay):
+        ended = linefix(*command)
+        assert ended.code == 0, ended.err
+        assert ended.err.count("the grid of /map (140 x 120 cells of 0.1 m) is the map; not /local_costmap") == 1
+        assert ended.err.count("grids of /map, of which the last is taken (1)") == 1
+    assert "the grid of" not in linefix("locate", "room.json", "points.json").err
 
 
 def test_poses_of_scans_without_stamps_have_the_times_of_the_recorder(linefix: Linefix, folder: Path) -> None:
