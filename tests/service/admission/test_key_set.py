@@ -150,6 +150,24 @@ def private_jwk() -> dict[str, Any]:
 SECRET = base64.urlsafe_b64encode(b"x" * 32).decode()
 
 
+# Keys are drawn, so that their text cannot name a test: each process of a test run draws others.
+UNFIT = (
+    "encryption",
+    "use_is_a_list",
+    "encrypts",
+    "operations_are_no_list",
+    "short",
+    "short_for_signatures",
+    "private",
+    "symmetric",
+    "no_point",
+    "new_type",
+    "number_as_name",
+    "list",
+    "null",
+)
+
+
 @pytest.mark.parametrize(
     "unfit",
     [
@@ -167,7 +185,7 @@ SECRET = base64.urlsafe_b64encode(b"x" * 32).decode()
         [],
         None,
     ],
-    ids=str,
+    ids=UNFIT,
 )
 def test_only_what_verifies_signatures_is_a_key(tmp_path: Path, unfit: Any) -> None:
     if isinstance(unfit, dict) and unfit.get("kid") != 5:
