@@ -98,7 +98,8 @@ def compiled_fraction() -> float:
 def digest() -> str:
     """Return a digest of everything that the machine code depends on."""
     versions = (platform.python_implementation(), platform.python_version(), numba.__version__, llvmlite.__version__)
-    text = hashlib.sha256(repr((versions, np.__version__, *_processor())).encode())
+    # Numba caches by the path of a function's file, so that another checkout cannot use what this one has compiled.
+    text = hashlib.sha256(repr((__file__, versions, np.__version__, *_processor())).encode())
     for path in sources():
         content = path.read_bytes()
         text.update(f"{path.name} {len(content)}\n".encode() + content)
