@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,6 +51,20 @@ class RunningService:
             return self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             raise AssertionError(f"does not end: {self.log()}") from None
+
+    @property
+    def worker(self) -> int:
+        """The process that answers, where it is one: what the supervisor has started besides Python's own tracker."""
+        started = children_of(self.process.pid)
+        (worker,) = (pid for pid in started if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes())
+        return worker
+
+    def kill(self) -> None:
+        """Kill all of its processes, as a machine does that goes down."""
+        for pid in family_of(self.process.pid):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self.process.wait()
 
     def memory_mb(self) -> float:
         """Return what the service and its processes hold now, MB."""

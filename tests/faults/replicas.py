@@ -129,8 +129,7 @@ class Replicas:
 
     def kill(self, number: int) -> None:
         """End a replica with what it is at."""
-        self.services[number].process.kill()
-        self.services[number].process.wait()
+        self.services[number].kill()
 
 
 @contextmanager

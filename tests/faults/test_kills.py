@@ -111,8 +111,7 @@ def test_nothing_acknowledged_is_lost(start_service: Callable[..., Any], tmp_pat
         while sum(writer.acknowledged for writer in writers) < enough and all(thread.is_alive() for thread in threads):
             time.sleep(0.001)
         time.sleep(draw.uniform(0.0, 0.05))
-        running.process.kill()
-        running.process.wait()
+        running.kill()
         running.client.close()
         for thread in threads:
             thread.join(30)

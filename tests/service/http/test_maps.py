@@ -157,7 +157,7 @@ def test_a_changed_map_is_searched_in_its_new_form(client: httpx.Client) -> None
 def test_an_acknowledged_map_survives_a_kill(start_service: Callable[..., Any]) -> None:
     first = start_service()
     assert first.client.put("/v1/maps/kept", json=examples.MAP).status_code == 201
-    first.process.kill()
+    first.kill()
     first.process.wait()
     again = start_service(first.data_dir)
     assert again.client.get("/v1/maps/kept").json() == examples.MAP
