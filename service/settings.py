@@ -127,7 +127,7 @@ class Settings(BaseSettings):
     max_correspondences: int = Field(200_000, ge=1, description="of one registration")
     max_batch: int = Field(256, ge=1, description="scans of one batch")
     max_deadline_ms: Finite = Field(30_000.0, gt=0.0, le=3.6e6, description="and the deadline where none is asked for")
-    cache_bytes: int = Field(96_000_000, ge=0, description="of indexed maps kept in memory")
+    cache_bytes: int = Field(112_000_000, ge=0, description="of indexed maps kept in memory")
     request_timeout: Finite = Field(
         9.0,
         gt=0.0,

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from ..problems import KINDS, MEDIA_TYPE, Kind
 from ..sending import JSON
 
-EVERYWHERE = ("unauthorized", "forbidden", "internal")
+EVERYWHERE = ("invalid_http", "unauthorized", "forbidden", "internal")
 READS_BODY = ("invalid_json", "request_timeout", "too_large", "unsupported_media_type", "invalid_request")
 SEARCHES = ("not_ready", "overloaded", "rate_limited", "deadline_exceeded")
 

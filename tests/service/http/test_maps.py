@@ -135,7 +135,7 @@ def test_a_listing_has_pages(start_service: Callable[..., Any]) -> None:
     assert client.get("/v1/maps", params={"limit": 0}).json()["code"] == "invalid_request"
 
 
-@pytest.mark.parametrize("name", ["a b", "x" * 129, "ä", "a:b", "%00"])
+@pytest.mark.parametrize("name", ["a b", "x" * 129, "ä", "a:b"])
 def test_ids_have_a_form(client: httpx.Client, name: str) -> None:
     response = client.put(f"/v1/maps/{name}", json=examples.MAP)
     assert response.status_code == 422

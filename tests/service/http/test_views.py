@@ -186,8 +186,8 @@ def test_the_last_view_answers_for_a_drive_that_saw_much_that_is_on_no_map(clien
     rng, views = np.random.default_rng(4), []
     for k in (3, 2, 1):
         at = HERE.compose(RigidTransform(-0.3 * k, 0.1 * k, 0.1 * k))
-        begins = rng.uniform(-4.0, 4.0, (20, 2))
-        things = np.hstack([begins, begins + rng.uniform(-1.5, 1.5, (20, 2))]).tolist()
+        begins = rng.uniform(-4.0, 4.0, (14, 2))
+        things = np.hstack([begins, begins + rng.uniform(-1.5, 1.5, (14, 2))]).tolist()
         step = {"covariance": np.diag([4e-4, 4e-4, 4e-4]).tolist(), "relative_to": 4 - k}
         views.append({"segments": [*seen_from(at), *things], "pose": pose_json(HERE.inverse().compose(at)), **step})
     views.append({"segments": seen_from(HERE), "pose": EXACT})

@@ -25,7 +25,7 @@ BOUNDS = Bounds(1_000_000_000, 32_000_000, 200_000)
         ({"deep.json": b"[" * 100_000}, (), "/files/0: is no JSON"),
         ({"a.csv": SQUARE}, (("unit", "m"),), "/unit: expected one of"),
         ({"a.csv": SQUARE}, (("point", "99 99"),), "/point/0: lies on a line or outside"),
-        ({"a.db3": b"no database", "metadata.yaml": b"rosbag2_bagfile_information: {"}, (), "/files: has a broken"),
+        ({"a.db3": b"no database", "metadata.yaml": b"rosbag2_bagfile_information: {"}, (), "/files: is a broken bag"),
     ],
     ids=["none", "two maps", "no picture", "empty picture", "deep JSON", "field", "point", "bag"],
 )
