@@ -95,7 +95,8 @@ def client_of(url: str, timeout: float = PATIENCE, **headers: str) -> httpx.Clie
 
 def start(data_dir: Path, *, probe: str = "/readyz", port: int | None = None, **settings: object) -> RunningService:
     port = port or free_port()
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    environment = kept | {name: os.environ[name] for name in ("LINEFIX_KERNELS",) if name in os.environ}
     environment |= {f"LINEFIX_{name.upper()}": str(value) for name, value in settings.items()}
     command = [sys.executable, "-m", "service", "--port", str(port), "--data-dir", str(data_dir)]
     with (data_dir / "log").open("ab") as log:
