@@ -149,16 +149,20 @@ class Gate:
         ticket.arrive()
         await self._enter(deadline, ticket)
         ticket.admitted = True
+        return await self._outcome(self._start(function, deadline, ticket.holder), deadline, heeds)
+
+    def _start(self, function: Callable[[], T], deadline: Deadline, holder: Holder) -> asyncio.Future[T]:
+        """Start a function in a thread, in the slot that its holder has."""
         try:
-            run = _Run(ticket.holder, self._threads.start(function), time.monotonic())
+            run = _Run(holder, self._threads.start(function), time.monotonic())
         except BaseException:
-            self._free_slot(ticket.holder, 0.0)
+            self._free_slot(holder, 0.0)
             raise
         work: asyncio.Future[T] = asyncio.wrap_future(run.running.result)
         self._deadlines[work] = deadline
         self._watch(run)
         work.add_done_callback(lambda done: self._finish(done, run))
-        return await self._outcome(work, deadline, heeds)
+        return work
 
     async def _outcome(self, work: asyncio.Future[T], deadline: Deadline, heeds: Callable[[], bool]) -> T:
         """Wait for what runs, as long as it is waited for."""
@@ -169,7 +173,14 @@ class Gate:
         if not ended and heeds():
             await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
         if work.done():
-            return work.result()
+            try:
+                return work.result()
+            finally:
+                del work, either, ended  # else a cycle: the traceback of an error holds this frame
+                    work,
+                    either,
+                    ended,
+                )  # an error's traceback holds this frame, and would be in a cycle with what holds it
         if self._over.done():
             raise CancelledError
         raise DeadlinePassedError

@@ -45,6 +45,7 @@ class Running:
             self.result.set_result(result)
         else:
             self.result.set_exception(error)
+        del self, result, error  # else a cycle: an error holds this frame, and everything that the function worked with
         return usual
 
     def lower(self, nice: int) -> None:
@@ -100,9 +101,10 @@ class GateThreads:
         if self._nice:
             _go_behind(threading.get_native_id(), self._nice)
         while (running := self._waiting.get()) is not None:
-            if not running.run() or self._closed:
-                return
+            usual = running.run()
             del running
+            if not usual or self._closed:
+                return
             self._free.release()
 
 

@@ -8,12 +8,14 @@ import os
 import sys
 import threading
 import time
+import weakref
+from contextlib import suppress
 
 import pytest
 
 from association import CancelledError, Deadline
 from service.admission.errors import DeadlinePassedError, QueueFullError
-from service.admission.gate import HEARING_SECONDS, Gate
+from service.admission.gate import HEARING_SECONDS, LONG_SECONDS, Gate
 from service.admission.ticket import Ticket
 
 from .gates import PATIENCE, gate_of, in_loop, soon, until
@@ -339,3 +341,34 @@ def test_threads_may_go_behind_others() -> None:
             gate.close()
 
     in_loop(scenario)
+
+
+@pytest.mark.parametrize("long_per_slot", [0, 1])
+def test_an_error_keeps_nothing_that_the_function_worked_with(long_per_slot: int) -> None:
+    """Refused requests kept 144 MB of maps until the garbage collector came by: an error was in a cycle."""
+
+    class Worked:
+        pass
+
+    kept: list[weakref.ref[Worked]] = []
+
+    def fail() -> None:
+        worked = Worked()
+        kept.append(weakref.ref(worked))
+        time.sleep(2.0 * LONG_SECONDS * long_per_slot)
+        raise ValueError
+
+    async def refused(gate: Gate) -> None:
+        with suppress(ValueError):  # pytest.raises keeps the error itself
+            await gate.run(fail, soon(), Ticket(None), lambda: True)
+
+    async def scenario() -> None:
+        async with gate_of(1, 1, long_per_slot) as gate:
+            await refused(gate)
+            await until(lambda: kept[0]() is None)
+
+    gc.disable()
+    try:
+        in_loop(scenario)
+    finally:
+        gc.enable()

@@ -20,7 +20,7 @@ def test_a_compiler_that_is_killed_takes_the_other_with_it(tmp_path: Path, monke
     """It went on for as long as its half took, 20 s of a core, with whoever waited for its output waiting as well."""
     monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path))
     with subprocess.Popen([sys.executable, "-c", COMPILE]) as compiler:
-        until(lambda: len(family_of(compiler.pid)) == 2 and any(tmp_path.rglob("vectorization*.nbc")))
+        until(lambda: len(family_of(compiler.pid)) == 2 and any(tmp_path.rglob("walls.*.nbc")))
         (beside,) = set(family_of(compiler.pid)) - {compiler.pid}
         compiler.kill()
     until(lambda: not is_running(beside), SOON)
