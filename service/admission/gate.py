@@ -177,10 +177,6 @@ class Gate:
                 return work.result()
             finally:
                 del work, either, ended  # else a cycle: the traceback of an error holds this frame
-                    work,
-                    either,
-                    ended,
-                )  # an error's traceback holds this frame, and would be in a cycle with what holds it
         if self._over.done():
             raise CancelledError
         raise DeadlinePassedError
