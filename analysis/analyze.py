@@ -45,17 +45,17 @@ class PlaceVerdict:
         Whether the answer was usable, and this place.
     probability : float or None
         As answered, 0 to 1; None where the position stays free along a direction.
-    look_alike : RigidTransform or None
+    similar_pose : RigidTransform or None
         Another place that explains the scan about as well, or was taken for this one.
     unobservable : (float, float) or None
         Along which the position stays free; a unit vector in the map frame.
     reasons : tuple of str
         Codes of why it is not usable, the weightiest first.
-    knows_after : float or None
+    resolved_after : float or None
         How far it drives until it knows where it is, metres, on the better of the two ways of `analysis.drive`; 0
         where it knows at once, None where it does not within what was asked for, or nothing was.
-    with_added : PlaceVerdict or None
-        What it would know with what was added; None where nothing was, or it stands in the way.
+    with_landmark : PlaceVerdict or None
+        What it would know with the landmark; None where there is none, or it stands in the way.
     """
 
     number: int
@@ -63,11 +63,11 @@ class PlaceVerdict:
     status: Status
     usable: bool
     probability: float | None
-    look_alike: RigidTransform | None
+    similar_pose: RigidTransform | None
     unobservable: tuple[float, float] | None
     reasons: tuple[str, ...]
-    knows_after: float | None = None
-    with_added: PlaceVerdict | None = None
+    resolved_after: float | None = None
+    with_landmark: PlaceVerdict | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +88,8 @@ class Analysis:
         Of the noise.
     drive : float
         How far the robot may drive from a place where it does not know where it is, metres; 0: not at all.
-    added : Analysis or None
-        The same of a map with something added.
+    landmark : Analysis or None
+        The same of a map with the landmark.
     """
 
     index: MapIndex
@@ -99,20 +99,20 @@ class Analysis:
     oriented: bool = True
     seed: int = 0
     drive: float = 0.0
-    added: Analysis | None = None
+    landmark: Analysis | None = None
 
-    def with_segments(self, added: Segments) -> Analysis:
+    def with_segments(self, landmark: Segments) -> Analysis:
         """Return the same, which also says what would be known with more segments, on the map and in the building.
 
         Parameters
         ----------
-        added : Segments
+        landmark : Segments
             In the map frame; such as a box, its free side outside.
         """
-        ends = np.vstack([self.segments.endpoints, added.endpoints])
+        ends = np.vstack([self.segments.endpoints, landmark.endpoints])
         segments = Segments.derived(ends)
         index = MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
-        return replace(self, added=replace(self, index=index, segments=segments, drive=0.0, added=None))
+        return replace(self, landmark=replace(self, index=index, segments=segments, drive=0.0, landmark=None))
 
     def look(self, number: int, deadline: Deadline | None = None) -> PlaceVerdict | None:
         """Take a scan at one of the poses and search it; None where a robot cannot stand there.
@@ -145,10 +145,10 @@ class Analysis:
         found = _verdict(number, pose, self._search(seen, deadline))
         if self.drive:
             metres = 0.0 if found.usable else (yield from self._knows_after(number, pose, seen, deadline))
-            found = replace(found, knows_after=metres)
-        if self.added is not None:
+            found = replace(found, resolved_after=metres)
+        if self.landmark is not None:
             yield
-            found = replace(found, with_added=self.added.look(number, deadline))
+            found = replace(found, with_landmark=self.landmark.look(number, deadline))
         return found
 
     def _search(self, seen: Scan, deadline: Deadline | None) -> AssociationResult:
@@ -186,7 +186,7 @@ def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> Pl
     codes = tuple(reason.code for reason in result.reasons)
     other = None
     mistaken = result.usable and result.pose is not None and not _is_same(result.pose, pose)
-    if mistaken or "twin" in codes:
+    if mistaken or "similar_place" in codes:
         poses = [result.pose, *(one.pose for one in result.alternatives)]
         other = next((one for one in poses if one is not None and not _is_same(one, pose)), None)
     return PlaceVerdict(
@@ -195,9 +195,9 @@ def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> Pl
         status=Status.AMBIGUOUS if mistaken else result.status,
         usable=result.usable and not mistaken,
         probability=result.probability,
-        look_alike=other,
+        similar_pose=other,
         unobservable=result.unobservable,
-        reasons=("twin",) if mistaken else codes,
+        reasons=("similar_place",) if mistaken else codes,
     )
 
 

@@ -19,15 +19,17 @@ from .result import (
     AssociationResult,
     AssociationWarning,
     Correspondence,
-    Hinge,
+    CriticalWall,
     Reason,
+    ReasonCode,
     SearchReport,
     Status,
+    WarningCode,
 )
 from .scan import Scan, Views, mirrored
 from .search import associate
 from .views import MAX_VIEWS, View, assemble
-from .words import AS_WELL, sentence_of
+from .words import AS_WELL, message_of
 
 __all__ = [
     "AS_WELL",
@@ -42,23 +44,25 @@ __all__ = [
     "Beams",
     "CancelledError",
     "Correspondence",
+    "CriticalWall",
     "Deadline",
     "HardPrior",
-    "Hinge",
     "IndexingEndedError",
     "InvalidMapError",
     "InvalidSearchError",
     "MapIndex",
     "Prior",
     "Reason",
+    "ReasonCode",
     "Scan",
     "SearchReport",
     "SoftPrior",
     "Status",
     "View",
     "Views",
+    "WarningCode",
     "assemble",
     "associate",
+    "message_of",
     "mirrored",
-    "sentence_of",
 ]

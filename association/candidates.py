@@ -137,7 +137,7 @@ def find_candidates(context: SearchContext, effort: Effort | None = None, *, chu
         verified=one.verified + other.verified,
         seed=one.seed,
         sampling=one.sampling,
-        rivals_above=max(one.rivals_above, other.rivals_above),
+        complete_above=max(one.complete_above, other.complete_above),
     )
     return Candidates(np.concatenate([within.poses, everywhere.poses]), report)
 
@@ -227,7 +227,7 @@ def _found(
         verified=state[VERIFIED],
         seed=context.options.seed,
         sampling=context.options.sampling,
-        rivals_above=effort.rival_share,
+        complete_above=effort.rival_share,
     )
     return Candidates(found[: state[COUNT]], report if stopped != BUDGET and slid else report.cut_short())
 

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 
@@ -80,7 +81,12 @@ class Mistake(StrEnum):
 
     MIRRORED = "mirrored"
     REVERSED = "reversed"
-    SCALE = "scale"
+    UNIT_SCALE = "unit_scale"
+
+    @property
+    def code(self) -> Literal["mirrored", "reversed", "unit_scale"]:
+        """The code of the warning."""
+        return self.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,12 +175,12 @@ def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, SearchCont
         yield Mistake.REVERSED, 1.0, _with_scan(context, turned_round(scan))
     yield Mistake.MIRRORED, 1.0, _with_scan(context, mirrored(scan))
     for factor in _likely_map_units(context):
-        yield Mistake.SCALE, factor, _with_smaller_map(context, factor)
+        yield Mistake.UNIT_SCALE, factor, _with_smaller_map(context, factor)
     for factor in _likely_units(context):
-        yield Mistake.SCALE, factor, _with_scan(context, scaled(scan, factor))
+        yield Mistake.UNIT_SCALE, factor, _with_scan(context, scaled(scan, factor))
     near = scale_near_one(context)
     if near is not None:
-        yield Mistake.SCALE, near, _with_scan(context, scaled(scan, near))
+        yield Mistake.UNIT_SCALE, near, _with_scan(context, scaled(scan, near))
 
 
 def _with_scan(context: SearchContext, scan: Scan) -> SearchContext:

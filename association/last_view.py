@@ -130,7 +130,7 @@ def _measured(measured: MeasuredSegments, own: Indices) -> MeasuredSegments:
     return MeasuredSegments(
         Segments.derived(measured.segments.endpoints[own]),
         measured.sigma[own],
-        measured.points[own],
+        measured.point_counts[own],
         measured.centroids[own],
         measured.spreads[own],
         measured.counted,
@@ -160,9 +160,9 @@ def _of_the_drive(context: SearchContext, result: AssociationResult, own: Indice
     unmatched[own] = False
     unmatched[own[list(result.unmatched_scan)]] = True
     diagnostics = result.diagnostics
-    if diagnostics is not None and diagnostics.hinges_on is not None:
-        wall = replace(diagnostics.hinges_on, scan=tuple(own[list(diagnostics.hinges_on.scan)].tolist()))
-        diagnostics = replace(diagnostics, hinges_on=wall)
+    if diagnostics is not None and diagnostics.critical_wall is not None:
+        wall = replace(diagnostics.critical_wall, scan=tuple(own[list(diagnostics.critical_wall.scan)].tolist()))
+        diagnostics = replace(diagnostics, critical_wall=wall)
     of_drive = {one.code: one for one in (*result.warnings, *warnings_of_scan(context))}
     return replace(
         result,

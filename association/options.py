@@ -108,7 +108,7 @@ class AssociationOptions:
         Share of a scan segment's length that must lie on the map, 0 to 1.
     parts : tuple of str
         Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
-        them a usable answer has no alternatives; any other has, for `sentence_of` tells how many there are.
+        them a usable answer has no alternatives; any other has, for `message_of` tells how many there are.
     causes : bool
         Whether to look for a mistake of the caller's where the answer is not usable, for twice the time at most.
     estimator, rotation : str

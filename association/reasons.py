@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
 from registration.values import value
 
 from .features import Features
 from .models import USUAL, Model
-from .result import Reason, Status
+from .result import Reason, ReasonCode, Status
 from .tuning import NO_TWIN, TELLING_REASON
 
 
@@ -49,17 +50,17 @@ class Standing:
     off_scale: bool = False
 
 
-INCOMPLETE = "search_incomplete"
-SENTENCES: Mapping[str, str] = {
+INCOMPLETE: Literal["search_incomplete"] = "search_incomplete"
+SENTENCES: Mapping[ReasonCode, str] = {
     "prior_contradicted": "The prior and the scan do not agree on where the robot is.",
     INCOMPLETE: "The deadline, or too many walls in one place of the map, ended the search; a better pose may "
     "have been missed.",
-    "free_direction": "The walls that were seen leave the position free along one direction.",
-    "elsewhere": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
-    "twin": "Another pose explains the scan about as well.",
-    "one_wall_decides": "Without one of the walls the pose would be another, or free.",
-    "unexplained": "Much is seen that the map does not show, or the map shows much that is not seen.",
-    "too_little": "Too little of what was seen tells this place from others.",
+    "unobservable_direction": "The walls that were seen leave the position free along one direction.",
+    "not_on_map": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
+    "similar_place": "Another pose explains the scan about as well.",
+    "single_wall": "Without one of the walls the pose would be another, or free.",
+    "map_mismatch": "Much is seen that the map does not show, or the map shows much that is not seen.",
+    "insufficient_evidence": "Too little of what was seen tells this place from others.",
 }
 
 MIRRORED = "The scan fits this map better with left and right exchanged: is the laser upside down, or this another map?"
@@ -69,15 +70,15 @@ OFF_SCALE = (
 )
 
 # What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
-FEATURES_OF: Mapping[str, tuple[str, ...]] = {
-    "twin": ("lead", "solitude", "squared_solitude"),
-    "one_wall_decides": ("hinge_moves", "hinge_deviation", "deviation"),
-    "unexplained": (
+FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
+    "similar_place": ("lead", "solitude", "squared_solitude"),
+    "single_wall": ("hinge_moves", "hinge_deviation", "deviation"),
+    "map_mismatch": (
         "share", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
         "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
     ),
-    "too_little": ("root_count", "inverse_count", "root_length", "chance", "root_score", "walls"),
-    "elsewhere": ("null", "null_gap", "null_better"),
+    "insufficient_evidence": ("root_count", "inverse_count", "root_length", "chance", "root_score", "walls"),
+    "not_on_map": ("null", "null_gap", "null_better"),
 }  # fmt: skip
 
 
@@ -92,29 +93,29 @@ def reasons_of(standing: Standing, features: Features | None, cautious: Model | 
     cautious : Model or None
         Whose odds fall short.
     """
-    codes = []
+    codes: list[ReasonCode] = []
     if standing.contradicted:
         codes.append("prior_contradicted")
     if not standing.complete:
         codes.append(INCOMPLETE)
     if standing.elsewhere or (standing.mirrored and standing.status is Status.AMBIGUOUS):
-        codes.append("elsewhere")
+        codes.append("not_on_map")
     if standing.status is Status.DEGENERATE:
-        codes.append("free_direction")
+        codes.append("unobservable_direction")
     elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
-        codes += ["too_little", "one_wall_decides"] if standing.thin else []
-        codes += ["unexplained"] if standing.out_of_step or standing.off_scale else []
-        codes += ["twin"] if standing.twin else []
+        codes += ["insufficient_evidence", "single_wall"] if standing.thin else []
+        codes += ["map_mismatch"] if standing.out_of_step or standing.off_scale else []
+        codes += ["similar_place"] if standing.twin else []
         codes += [code for code in _weighed(features, cautious, alone=standing.alone) if code not in codes]
     sentences = dict(SENTENCES)
     if standing.mirrored:
-        sentences["elsewhere"] = MIRRORED
+        sentences["not_on_map"] = MIRRORED
     if standing.off_scale:
-        sentences["unexplained"] = OFF_SCALE
+        sentences["map_mismatch"] = OFF_SCALE
     return tuple(Reason(code, sentences[code]) for code in codes)
 
 
-def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[str]:
+def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[ReasonCode]:
     """Order the reasons by what their features take from the logarithm of the odds; at least the first of them.
 
     `alone`: whether there is no other explanation; then the lead is the answer's own score.
@@ -122,7 +123,7 @@ def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[str]:
     lacking = {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
     if alone or features.lead > NO_TWIN:
         # Many places explain a little of the scan, and none explains it about as well.
-        lacking["too_little"] += max(0.0, lacking.pop("twin"))
+        lacking["insufficient_evidence"] += max(0.0, lacking.pop("similar_place"))
     ordered = sorted(lacking, key=lambda code: -lacking[code])
     return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]
 

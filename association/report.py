@@ -23,7 +23,7 @@ from .result import (
     AssociationDiagnostics,
     AssociationResult,
     Correspondence,
-    Hinge,
+    CriticalWall,
     Status,
 )
 from .settling import Settled, settle
@@ -104,11 +104,11 @@ def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> As
         runner_up=verdict.runner_up,
         margin=verdict.margin,
         significance=answer.significance,
-        hinges_on=_hinge(context, answer),
+        critical_wall=_hinge(context, answer),
     )
 
 
-def _hinge(context: SearchContext, answer: Answer) -> Hinge | None:
+def _hinge(context: SearchContext, answer: Answer) -> CriticalWall | None:
     """Return the wall without which the pose would move most or be free; None where it would hardly move."""
     moves, wall, direction = 0.0, -1, (0.0, 0.0)
     for w, moved, deviation, dx, dy, _ in answer.settled.hinges.tolist():
@@ -120,7 +120,7 @@ def _hinge(context: SearchContext, answer: Answer) -> Hinge | None:
     on_it = context.index.is_one_wall(walls, wall)
     scan = answer.accepted.pairs[on_it, 0].tolist()
     on_map = sorted({i for i, there in zip(answer.accepted.map_indices(context.index), on_it, strict=True) if there})
-    return Hinge(tuple(scan), tuple(on_map), direction, moves)
+    return CriticalWall(tuple(scan), tuple(on_map), direction, moves)
 
 
 def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:

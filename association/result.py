@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,30 @@ from registration import Ambiguity, RegistrationDiagnostics, RigidTransform
 from registration.values import value
 
 Floats = NDArray[np.float64]
+ReasonCode = Literal[
+    "prior_contradicted",
+    "search_incomplete",
+    "not_on_map",
+    "unobservable_direction",
+    "similar_place",
+    "single_wall",
+    "map_mismatch",
+    "insufficient_evidence",
+]
+WarningCode = Literal[
+    "no_segments",
+    "points_not_in_order",
+    "stuck_ranges",
+    "scan_exceeds_map",
+    "faces_away",
+    "prior_contradicted",
+    "search_incomplete",
+    "map_scale",
+    "last_view_only",
+    "mirrored",
+    "reversed",
+    "unit_scale",
+]
 
 
 class Status(StrEnum):
@@ -53,8 +78,8 @@ class Correspondence:
 
 
 @dataclass(frozen=True, slots=True)
-class Hinge:
-    """The wall that the pose hinges on: without it the pose would move most, or not be fixed.
+class CriticalWall:
+    """The wall whose removal would move the pose most, or leave it unobservable.
 
     Attributes
     ----------
@@ -62,21 +87,21 @@ class Hinge:
         Indices of the segments seen on it and of the map segments that they lie on, as sent.
     direction : (float, float)
         Unit vector in the map frame along which the pose would move, or be free.
-    moves : float
+    displacement : float
         Metres; by how much, or the standard deviation along that direction where that is more.
     """
 
     scan: tuple[int, ...]
     map: tuple[int, ...]
     direction: tuple[float, float]
-    moves: float
+    displacement: float
 
 
 @dataclass(frozen=True, slots=True)
 class Reason:
     """Why an answer is not usable: a stable code and a plain sentence."""
 
-    code: str
+    code: ReasonCode
     message: str
 
 
@@ -95,12 +120,12 @@ class AssociationDiagnostics:
         and orders is that of the joint estimator, from which `runner_up` and `margin` come.
     runner_up : float or None
         Score of the best other pose over that of the best, never below 0; None where no other pose was found, that is
-        none above `SearchReport.rivals_above` of the score.
+        none above `SearchReport.complete_above` of the score.
     margin : float or None
         Score of the best less that of the best other pose, nats; None likewise.
     significance : float
         Probability that chance scores as high; small is good.
-    hinges_on : Hinge or None
+    critical_wall : CriticalWall or None
         None where the pose stays within `HINGES` metres without any one wall.
     """
 
@@ -110,7 +135,7 @@ class AssociationDiagnostics:
     runner_up: float | None
     margin: float | None
     significance: float
-    hinges_on: Hinge | None
+    critical_wall: CriticalWall | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +168,7 @@ class SearchReport:
         Bases drawn, poses they gave, poses that were scored to the end.
     seed : int
     sampling : "ordered" or "random"
-    rivals_above : float
+    complete_above : float
         Share of the best score, by segments, above which no other pose was missed, with that confidence; 1 where the
         search is not complete. Of poses whose matches agree with one another within their tolerances: one at which they
         do not, and which is a compromise between them, may be missed.
@@ -157,18 +182,18 @@ class SearchReport:
     verified: int
     seed: int
     sampling: str
-    rivals_above: float
+    complete_above: float
 
     def cut_short(self) -> SearchReport:
         """Return the report of the same search where something was left undone: nothing is claimed of the rest."""
-        return replace(self, complete=False, exhaustive=False, rivals_above=1.0)
+        return replace(self, complete=False, exhaustive=False, complete_above=1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class AssociationWarning:
     """Something that the caller should know, as a stable code and a sentence."""
 
-    code: str
+    code: WarningCode
     message: str
 
 

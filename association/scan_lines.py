@@ -100,7 +100,7 @@ def _given(measured: MeasuredSegments) -> Measured:
     segments = measured.segments
     return Measured(
         as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
-        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.points,
+        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.point_counts,
     )  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def _taken(measured: MeasuredSegments, rows: NDArray[np.intp]) -> MeasuredSegmen
         measured,
         segments=measured.segments.take(rows),
         sigma=measured.sigma[rows],
-        points=measured.points[rows],
+        point_counts=measured.point_counts[rows],
         centroids=measured.centroids[rows],
         spreads=measured.spreads[rows],
     )

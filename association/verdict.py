@@ -51,7 +51,7 @@ class Verdict:
         In the map frame; of a family the member that is answered.
     margin : float or None
         Value of the best explanation less that of the next, nats; None where no other was found, which says nothing of
-        poses below `SearchReport.rivals_above` of the score.
+        poses below `SearchReport.complete_above` of the score.
     runner_up : float or None
         Value of the next over that of the best, never below 0.
     contradicted : bool

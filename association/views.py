@@ -137,7 +137,7 @@ def _joined(parts: Sequence[MeasuredSegments]) -> MeasuredSegments:
     segments = Segments.derived(np.concatenate([part.segments.endpoints for part in parts]))
     counted = all(part.counted for part in parts if len(part))
     return MeasuredSegments(
-        segments, column("sigma"), column("points"), column("centroids"), column("spreads"), counted
+        segments, column("sigma"), column("point_counts"), column("centroids"), column("spreads"), counted
     )
 
 

@@ -13,7 +13,7 @@ from .context import SearchContext
 from .extents import extent, inner_extent
 from .kernels.extents import facing_away
 from .layout import POINT, as_records
-from .result import AssociationWarning, SearchReport
+from .result import AssociationWarning, SearchReport, WarningCode
 from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .verdict import Verdict
@@ -54,9 +54,9 @@ def warnings_of(
         if verdict.contradicted
         else None,
         "search_incomplete": None if search.complete else _incomplete(context),
-        str(Mistake.SCALE): None if factor is None else _off_scale(factor),
+        "map_scale": None if factor is None else _off_scale(factor),
     }
-    return _listed(found | {str(cause.mistake): _mistaken(cause) for cause in causes})
+    return _listed(found | {cause.mistake.code: _mistaken(cause) for cause in causes})
 
 
 def warnings_of_scan(context: SearchContext) -> tuple[AssociationWarning, ...]:
@@ -64,7 +64,7 @@ def warnings_of_scan(context: SearchContext) -> tuple[AssociationWarning, ...]:
     return _listed(_of_scan(context))
 
 
-def _of_scan(context: SearchContext) -> dict[str, str | None]:
+def _of_scan(context: SearchContext) -> dict[WarningCode, str | None]:
     return {
         "no_segments": _no_segments(context),
         "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
@@ -74,12 +74,12 @@ def _of_scan(context: SearchContext) -> dict[str, str | None]:
     }
 
 
-def _listed(found: Mapping[str, str | None]) -> tuple[AssociationWarning, ...]:
+def _listed(found: Mapping[WarningCode, str | None]) -> tuple[AssociationWarning, ...]:
     return tuple(AssociationWarning(code, message) for code, message in found.items() if message is not None)
 
 
 def _mistaken(cause: Cause) -> str:
-    if cause.mistake is not Mistake.SCALE:
+    if cause.mistake is not Mistake.UNIT_SCALE:
         return SENTENCES[cause.mistake]
     unit, taken = None if cause.of_map else UNITS.get(cause.factor), unit_mistake(cause.factor)
     what = "the scan or the map is not to scale"

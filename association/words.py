@@ -13,7 +13,7 @@ MOST = 99.99  # %; nothing is certain
 OTHER_WAY_ROUND = 0.5 * math.pi  # rad
 
 
-def sentence_of(result: AssociationResult) -> str:
+def message_of(result: AssociationResult) -> str:
     """Return the verdict in words.
 
     Parameters
@@ -35,7 +35,7 @@ def sentence_of(result: AssociationResult) -> str:
     chance = f"{min(100.0 * (result.probability or 0.0), MOST):.2f} %"
     if result.usable:
         return f"The robot is here, with a chance of {chance}."
-    if any(reason.code == "twin" for reason in result.reasons) and others:
+    if any(reason.code == "similar_place" for reason in result.reasons) and others:
         many = "1 other place explains" if len(others) == 1 else f"{len(others)} other places explain"
         return f"{many} the scan about as well: the robot cannot know which is right."
     return f"Most likely the robot is here, with a chance of {chance}, but that is not to be relied on."

@@ -164,7 +164,7 @@ def drains() -> list[Row]:
     lost = 0
     for number in range(TRIES):
         workers = 1 + number % 2
-        with running_service(workers=workers, searches=2, drain_seconds=1) as (url, pid), ThreadPoolExecutor(4) as some:
+        with running_service(workers=workers, searches=2, drain_s=1) as (url, pid), ThreadPoolExecutor(4) as some:
             port = int(url.rsplit(":", 1)[1])
             asked = [some.submit(ask, port, heavy(seed=k)) for k in range(2)]
             time.sleep(0.5)

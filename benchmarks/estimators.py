@@ -138,7 +138,7 @@ def twin_rows() -> list[Row]:
 
 def _twin_difference(name: str, map: Segments, scan: MeasuredSegments) -> float:
     pairs = np.repeat(np.arange(len(scan)), 2).reshape(-1, 2)
-    weights, s = scan.points / scan.sigma**2, scan.segments
+    weights, s = scan.point_counts / scan.sigma**2, scan.segments
     rotation = "mitsuta" if name.endswith("Mitsuta") else "wahba"
     estimator = "joint" if name == "joint" else "one_step"
     options = RegistrationOptions(estimator=estimator, rotation=rotation)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
-from association import AssociationResult, MapIndex, Scan, associate
+from association import AssociationResult, MapIndex, Scan, WarningCode, associate
 from association.scan import mirrored, scaled, turned_round
 
 from .collection import Collection, MapKey, Query
@@ -17,7 +17,7 @@ from .table import Row, at_most, mean, print_table, quantile
 
 EVERY = 5  # of the plans' scans one in so many
 MOST_TIMES, LEAST_SECONDS = 2.0, 0.02  # of the search, for causes; where it took nearly none
-NAMES = ("mirrored", "reversed", "scale")
+NAMES: tuple[WarningCode, ...] = ("mirrored", "reversed", "unit_scale")
 MADE: dict[str, Callable[[Scan], Scan]] = {
     "none": lambda scan: scan,
     "mirrored": mirrored,

@@ -86,7 +86,7 @@ def draw_request(rng: np.random.Generator) -> Request:
     shown = np.bincount(on[few], measured.segments.lengths[few], len(walls))
     seen = np.argsort(-shown, kind="stable")[: max(1, min(3, int((shown > 0.0).sum())))]
     sigma, ends = SIGMAS[rng.integers(len(SIGMAS))], measured.segments.endpoints[few]
-    return Request(walls, sigma, ends, 0.01, measured.points[few], seen)
+    return Request(walls, sigma, ends, 0.01, measured.point_counts[few], seen)
 
 
 def _room(rng: np.random.Generator) -> Floats:

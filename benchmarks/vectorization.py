@@ -114,7 +114,7 @@ def judge(seen: SimulatedScan, map: Segments, found: Vectorization) -> dict[str,
     met = np.zeros(len(walls), dtype=bool)
     for s in range(len(segments)):
         centroid = found.measured.centroids[s]
-        slack = 3.0 * found.measured.sigma[s] / math.sqrt(found.measured.points[s] * found.measured.spreads[s])
+        slack = 3.0 * found.measured.sigma[s] / math.sqrt(found.measured.point_counts[s] * found.measured.spreads[s])
         first, last = found.spans[s]
         held = np.arange(first, last + 1) if first <= last else np.r_[first : len(angles), 0 : last + 1]
         good = [k for k in np.unique(seen.hits[held]) if k >= 0 and on_wall(local, k, segments, s, centroid, slack)]
@@ -168,7 +168,7 @@ def over_bound(
 def claimed(local: Segments, k: int, found: Vectorization, s: int) -> float:
     """Chi-square (2 degrees of freedom) of offset and angle by what the segment itself claims."""
     m = found.measured
-    weight = m.points[s] / m.sigma[s] ** 2
+    weight = m.point_counts[s] / m.sigma[s] ** 2
     off = local.normals[k] @ m.centroids[s] - local.offsets[k]
     d = m.segments.directions[s]
     turn = math.remainder(math.atan2(*local.directions[k][::-1]) - math.atan2(*d[::-1]), math.pi)
@@ -234,7 +234,7 @@ def logs() -> None:
             laser = LaserScan(a[0], a[1] - a[0], ranges, 0.1001, float(log["range_max_valid"]) - 1e-3)
             found = vectorize(laser)
             returns = max(1, int(np.isfinite(laser.cleaned).sum()))
-            rows.append((found.sigma, len(found.measured), found.measured.points.sum() / returns))
+            rows.append((found.sigma, len(found.measured), found.measured.point_counts.sum() / returns))
         sigma, segments, share = np.median(np.array(rows), axis=0)
         print(f"{name:16s} sigma {sigma:.4f} m, {segments:.0f} segments a scan, {share:.2f} of the points on segments")
 

@@ -144,7 +144,7 @@ def draw(scene: Scene, scan_axes: Axes, map_axes: Axes) -> None:
         _lay(map_axes, sent, answer.pose, colour, 1.8)
         if answer.unobservable is not None:
             _arrow(map_axes, answer.pose, answer.unobservable, 3.0, colour)
-        hinge = None if answer.diagnostics is None else answer.diagnostics.hinges_on
+        hinge = None if answer.diagnostics is None else answer.diagnostics.critical_wall
         if hinge is not None and not answer.usable and answer.unobservable is None:
             wall = scene.walls[list(hinge.map)].reshape(-1, 2, 2)
             map_axes.add_collection(LineCollection(list(wall), colors=BLUE, linewidths=6.0, alpha=0.35))

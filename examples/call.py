@@ -28,7 +28,7 @@ def call(url: str, method: str, path: str, body: Any = None) -> dict[str, Any]:
     Raises
     ------
     RefusedError
-        With the code, the detail and the places at fault of the problem document.
+        With the code and the detail of the problem document.
     """
     headers = {"Content-Type": "application/json"}
     if key := os.environ.get("LINEFIX_KEY"):
@@ -41,8 +41,7 @@ def call(url: str, method: str, path: str, body: Any = None) -> dict[str, Any]:
             return answer
     except urllib.error.HTTPError as error:
         problem = json.load(error)
-        places = "".join(f"\n  {item['pointer']}: {item['message']}" for item in problem.get("errors", []))
-        raise RefusedError(f"{error.code} {problem['code']}: {problem['detail']}{places}") from error
+        raise RefusedError(f"{error.code} {problem['code']}: {problem['detail']}") from error
 
 
 def main() -> None:

@@ -45,7 +45,7 @@ def running_service(**settings: object) -> Iterator[tuple[str, int]]:
         command = [sys.executable, "-m", "service", "--host", "127.0.0.1", "--port", str(port)]
         with log.open("wb") as sink:
             process = subprocess.Popen(
-                [*command, "--data-dir", folder, "--drain-seconds", "0"], env=environment, stdout=sink, stderr=sink
+                [*command, "--data-dir", folder, "--drain-s", "0"], env=environment, stdout=sink, stderr=sink
             )
         try:
             _wait_until_ready(url, process, log)

@@ -20,8 +20,8 @@ def equals(answer: Answer) -> list[dict[str, Any]]:
 
 def verdict_in_words(answer: Answer) -> str:
     """Say what the answer means for a robot, in the service's own words."""
-    sentence: str = answer["sentence"]
-    return sentence
+    message: str = answer["message"]
+    return message
 
 
 def pose_in_words(pose: dict[str, float] | RigidTransform | None) -> str:

@@ -84,7 +84,7 @@ class Measurement:
             return s
         ends = by.apply(s.segments.endpoints.reshape(-1, 2, 2)).reshape(-1, 4)
         moments = by.apply(s.centroids), s.spreads
-        return MeasuredSegments.from_segments(Segments.from_array(ends), s.sigma, s.points, moments)
+        return MeasuredSegments.from_segments(Segments.from_array(ends), s.sigma, s.point_counts, moments)
 
 
 def take(

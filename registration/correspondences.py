@@ -51,7 +51,7 @@ class Correspondences:
         chosen, m, s = _as_pairs(pairs), map_segments, scan.segments
         rows = np.empty(len(chosen), PAIR)
         on_map, of_scan = Drawn(m.directions, m.midpoints, m.lengths), Drawn(s.directions, s.midpoints, s.lengths)
-        points = Points(scan.centroids, scan.spreads, scan.sigma, scan.points)
+        points = Points(scan.centroids, scan.spreads, scan.sigma, scan.point_counts)
         row, column, fewest = kernels.fill_in(rows, chosen, on_map, of_scan, points)
         if row >= 0:
             count, what = (len(s), "scan") if column == kernels.SCAN else (len(m), "map")
@@ -63,7 +63,7 @@ class Correspondences:
                 index=row,
             )
         if not scan.counted and fewest < LEAST_POINTS:
-            together = np.bincount(chosen[:, 1], scan.points[chosen[:, 0]])[chosen[:, 1]]
+            together = np.bincount(chosen[:, 1], scan.point_counts[chosen[:, 0]])[chosen[:, 1]]
             rows["scan"]["variance"] *= np.minimum(1.0, together / LEAST_POINTS)
         return cls(rows)
 

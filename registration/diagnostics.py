@@ -73,6 +73,6 @@ def result_of(
             dof=dof,
             rms_offset=rms_offset,
             rms_angle=rms_angle,
-            n=count,
+            pairs=count,
         ),
     )

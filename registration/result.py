@@ -44,7 +44,7 @@ class RegistrationDiagnostics:
         2 n - 3, or 2 n - 2 when all lines are parallel.
     rms_offset, rms_angle : float
         Root mean squares over those n pairs of the offsets, metres, and angles, radians.
-    n : int
+    pairs : int
         Number of pairs with a weight over 0.
     """
 
@@ -58,7 +58,7 @@ class RegistrationDiagnostics:
     dof: int
     rms_offset: float
     rms_angle: float
-    n: int
+    pairs: int
 
 
 @dataclass(frozen=True, slots=True)

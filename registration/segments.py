@@ -146,7 +146,7 @@ class MeasuredSegments:
     ----------
     segments : Segments
     sigma : (n,) standard deviation of single points normal to the wall, metres
-    points : (n,) number of points behind each segment; below 1 where nobody counted them and it is short
+    point_counts : (n,) number of points behind each segment; below 1 where nobody counted them and it is short
     centroids : (n, 2) mean of those points, metres
     spreads : (n,) their second moment along the segment, m^2
     counted : bool
@@ -155,14 +155,14 @@ class MeasuredSegments:
 
     segments: Segments
     sigma: Floats
-    points: Floats
+    point_counts: Floats
     centroids: Floats = field(repr=False)
     spreads: Floats = field(repr=False)
     counted: bool = True
 
     def __post_init__(self) -> None:
         # For a kernel an array that may be written to is another type, and each type is compiled anew.
-        for name in ("sigma", "points", "centroids", "spreads"):
+        for name in ("sigma", "point_counts", "centroids", "spreads"):
             array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, _frozen(array.view()))
 
@@ -171,7 +171,7 @@ class MeasuredSegments:
         cls,
         segments: Segments,
         sigma: ArrayLike = 0.02,
-        points: ArrayLike | None = None,
+        point_counts: ArrayLike | None = None,
         moments: tuple[ArrayLike, ArrayLike] | None = None,
         *,
         argument: str = "scan",
@@ -183,7 +183,7 @@ class MeasuredSegments:
         segments : Segments
         sigma : float or (n,)
             Standard deviation of single points normal to the wall, metres, 0 to 1e3.
-        points : (n,), optional
+        point_counts : (n,), optional
             Number of points behind each segment, at least 1; default ``length / 0.05``, and 2 at least behind all that
             is seen of one wall.
         moments : ((n, 2) centroids, (n,) spreads), optional
@@ -201,16 +201,16 @@ class MeasuredSegments:
         given = np.full(n, sigma, dtype=np.float64) if np.ndim(sigma) == 0 else sigma
         sigmas = _checked(given, (n,), 0.0, MAX_SIGMA, f"{argument}.sigma")
         # What is derived of segments was checked with them.
-        if points is None:
+        if point_counts is None:
             counts = _frozen(segments.lengths / DEFAULT_POINT_SPACING)
         else:
-            counts = _checked(points, (n,), 1.0, MAX_POINTS, f"{argument}.points")
+            counts = _checked(point_counts, (n,), 1.0, MAX_POINTS, f"{argument}.point_counts")
         if moments is None:
             means, along = segments.midpoints, _frozen(segments.lengths**2 / 12.0)
         else:
             means = _checked(moments[0], (n, 2), -MAX_COORDINATE, MAX_COORDINATE, f"{argument}.centroids")
             along = _checked(moments[1], (n,), 0.0, MAX_LENGTH**2, f"{argument}.spreads")
-        return cls(segments, sigmas, counts, means, along, points is not None)
+        return cls(segments, sigmas, counts, means, along, point_counts is not None)
 
     def __len__(self) -> int:
         return len(self.segments)

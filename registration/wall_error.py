@@ -50,7 +50,7 @@ def register_estimating(
     """
     result, sigma = register(map_segments, scan, pairs, USUAL_WALL_ERROR, options), USUAL_WALL_ERROR
     # A caller's own weights say all that there is to say.
-    if result.diagnostics.n and options.weights is None:
+    if result.diagnostics.pairs and options.weights is None:
         how = RegistrationOptions(oriented=options.oriented)
         for _ in range(ROUNDS):
             sigma = _wall_error(map_segments, scan, np.asarray(pairs), sigma, how)
@@ -70,7 +70,7 @@ def _wall_error(
     assert result.pose is not None
     walls, wall_of_pair = np.unique(pairs[:, 1], return_inverse=True)
     seen = pairs[:, 0]
-    weights = 1.0 / np.maximum(scan.sigma[seen] ** 2 / np.maximum(scan.points[seen], 1.0), MIN_SIGMA**2)
+    weights = 1.0 / np.maximum(scan.sigma[seen] ** 2 / np.maximum(scan.point_counts[seen], 1.0), MIN_SIGMA**2)
     summed = np.bincount(wall_of_pair, weights)
 
     def mean(values: np.ndarray) -> np.ndarray:

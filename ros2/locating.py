@@ -57,7 +57,7 @@ class Located:
         answer = self.answer
         if answer.status not in (linefix.Status.OK, linefix.Status.AMBIGUOUS) or answer.diagnostics is None:
             return False
-        unlisted = (1.0 - answer.search.rivals_above) * answer.diagnostics.score
+        unlisted = (1.0 - answer.search.complete_above) * answer.diagnostics.score
         listed = len(answer.alternatives) < OPTIONS.max_alternatives
         return listed and answer.search.complete and unlisted >= INCONCLUSIVE_NATS
 

@@ -148,7 +148,7 @@ def _services(settings: Settings, part: Part) -> Services:
         indexing=indexing,
         keyring=keyring,
         answers=_budget(settings, part, settings.max_answers_bytes),
-        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout, guarded=settings.guarded),
+        bodies=BodyReceiver(settings.max_body_bytes, budget, settings.request_timeout_s, guarded=settings.guarded),
         parser=parser,
         store=store,
         probe=StoreProbe(store),

@@ -92,7 +92,7 @@ class Settings(BaseSettings):
     jwt_algorithms: Annotated[tuple[str, ...], NoDecode] = Field(
         ("RS256", "ES256", "EdDSA"), description="of their signatures, comma separated"
     )
-    jwt_leeway: Finite = Field(30.0, ge=0.0, le=600.0, description="seconds that the issuer's clock may differ")
+    jwt_leeway_s: Finite = Field(30.0, ge=0.0, le=600.0, description="seconds that the issuer's clock may differ")
     hosts: Annotated[tuple[str, ...], NoDecode] = Field(
         (), description="without keys: names under which the service is asked for, comma separated"
     )
@@ -128,15 +128,15 @@ class Settings(BaseSettings):
     max_batch: int = Field(256, ge=1, description="scans of one batch")
     max_deadline_ms: Finite = Field(30_000.0, gt=0.0, le=3.6e6, description="and the deadline where none is asked for")
     cache_bytes: int = Field(112_000_000, ge=0, description="of indexed maps kept in memory")
-    request_timeout: Finite = Field(
+    request_timeout_s: Finite = Field(
         9.0,
         gt=0.0,
         le=3600.0,
         allow_inf_nan=False,
         description="seconds for a head, at most 60, and as many for a body",
     )
-    drain_seconds: Finite = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
-    hang_seconds: Finite = Field(
+    drain_s: Finite = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
+    hang_s: Finite = Field(
         30.0,
         ge=2.0,
         le=3600.0,
@@ -186,7 +186,7 @@ class Settings(BaseSettings):
         """Whose tokens are taken."""
         if self.jwt_issuer is None or self.jwt_audience is None or self.jwt_keys is None:
             return None
-        return Issuer(self.jwt_issuer, self.jwt_audience, self.jwt_keys, self.jwt_algorithms, self.jwt_leeway)
+        return Issuer(self.jwt_issuer, self.jwt_audience, self.jwt_keys, self.jwt_algorithms, self.jwt_leeway_s)
 
     @property
     def url(self) -> URL:

@@ -32,7 +32,7 @@ def pair_rows(
         offset = np.sum(TURN @ m.directions[j] * m.midpoints[j])
         row["map"] = (*m.directions[j], offset, *m.midpoints[j], m.lengths[j])
         measured = (*s.directions[i], *scan.centroids[i], scan.spreads[i])
-        row["scan"] = (*measured, *s.midpoints[i], s.lengths[i], sigma**2 / scan.points[i])
+        row["scan"] = (*measured, *s.midpoints[i], s.lengths[i], sigma**2 / scan.point_counts[i])
     return rows
 
 

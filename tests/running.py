@@ -132,7 +132,7 @@ def stop(service: RunningService) -> None:
 @contextmanager
 def running(data_dir: Path, **settings: Any) -> Iterator[RunningService]:
     """Start a service that ends with the block."""
-    service = start(data_dir, **{"drain_seconds": 0, **settings})
+    service = start(data_dir, **{"drain_s": 0, **settings})
     try:
         yield service
     finally:

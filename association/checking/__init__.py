@@ -5,13 +5,14 @@ Everything here works on a `MapIndex` and uses the search as a caller would.
 
 from .check import check_map
 from .judging import judge_samples
-from .result import Advice, Finding, MapCheck, Place, SampleReport, Size
+from .result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .samples import Sample, try_sample
 from .thickness import find_thickness, fit_better_mirrored, thickness_finding
 
 __all__ = [
     "Advice",
     "Finding",
+    "FindingCode",
     "MapCheck",
     "Place",
     "Sample",

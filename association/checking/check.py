@@ -51,7 +51,7 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
     findings += likeness_findings(index, likeness)
     if until.cancelled:
         raise CancelledError
-    return MapCheck(size, tuple(findings), advice, likeness.places, likeness.looked_from, not until.passed)
+    return MapCheck(size, tuple(findings), advice, likeness.places, likeness.viewpoints, not until.passed)
 
 
 def _directed(sides: Sides, findings: list[Finding]) -> bool | None:

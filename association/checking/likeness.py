@@ -44,7 +44,7 @@ class View:
 class Likeness:
     """From how many places it was looked, and which of them look like others; `walls` are what is seen from those."""
 
-    looked_from: int
+    viewpoints: int
     places: tuple[Place, ...]
     walls: tuple[int, ...]
 
@@ -76,7 +76,7 @@ def likeness_findings(index: MapIndex, likeness: Likeness) -> Iterator[Finding]:
     if likeness.places:
         yield Finding(
             "looks_alike",
-            f"From {len(likeness.places)} of {likeness.looked_from} places a laser that sees {REACH:g} m far sees the "
+            f"From {len(likeness.places)} of {likeness.viewpoints} places a laser that sees {REACH:g} m far sees the "
             "same as elsewhere on the map: such scans cannot be told apart without a prior, or metres of driving.",
             segments_of(index, np.array(likeness.walls, dtype=np.intp)),
         )
@@ -140,7 +140,7 @@ def look_about(looker: Looker, pose: RigidTransform, deadline: Deadline | None =
 
 def _look_alike(result: AssociationResult, truth: RigidTransform) -> RigidTransform | None:
     """Return another pose that explains a view as well, if there is one."""
-    if not any(reason.code == "twin" for reason in result.reasons):
+    if not any(reason.code == "similar_place" for reason in result.reasons):
         return None
     poses = [result.pose, *(other.pose for other in result.alternatives)]
     return next((pose for pose in poses if pose is not None and not _is_near(pose, truth)), None)

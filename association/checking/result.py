@@ -3,15 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from registration import RigidTransform
+
+FindingCode = Literal[
+    "unlikely_size",
+    "reversed",
+    "mixed_directions",
+    "short_pieces",
+    "doubled_faces",
+    "both_ways",
+    "overlaps",
+    "gaps",
+    "looks_alike",
+    "centre_lines",
+    "thickness",
+    "undirected",
+    "mirrored",
+    "scale",
+    "moved",
+]
+"""Codes of findings: the first nine of a map alone, the others of sample scans."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
     """Something doubtful: a stable code, a plain sentence, and the indices of the map segments that it is about."""
 
-    code: str
+    code: FindingCode
     message: str
     segments: tuple[int, ...] = ()
 
@@ -22,7 +42,7 @@ class Size:
 
     Attributes
     ----------
-    segments : int
+    segment_count : int
         As sent.
     walls : int
         What they come to where collinear ones are one.
@@ -32,7 +52,7 @@ class Size:
         Of the box around them, metres.
     """
 
-    segments: int
+    segment_count: int
     walls: int
     length: float
     diagonal: float
@@ -46,12 +66,12 @@ class Place:
     ----------
     pose : RigidTransform
         In the map frame.
-    look_alike : RigidTransform
+    similar_pose : RigidTransform
         Where it shows about the same.
     """
 
     pose: RigidTransform
-    look_alike: RigidTransform
+    similar_pose: RigidTransform
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +101,7 @@ class MapCheck:
         The weightiest first.
     advice : Advice
     places : tuple of Place
-    looked_from : int
+    viewpoints : int
         From how many places it was looked for others that are alike.
     complete : bool
         False when the deadline ended it.
@@ -91,7 +111,7 @@ class MapCheck:
     findings: tuple[Finding, ...]
     advice: Advice
     places: tuple[Place, ...]
-    looked_from: int
+    viewpoints: int
     complete: bool
 
 

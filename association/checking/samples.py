@@ -129,7 +129,7 @@ def try_sample(
         now = time.monotonic()
         until = context.deadline.within(now + max(LADDER_SECONDS, now - began))
         factor = _any_factor(replace(context, deadline=until), known)
-    mistakes = tuple(cause.mistake for cause in causes if cause.mistake is not Mistake.SCALE)
+    mistakes = tuple(cause.mistake for cause in causes if cause.mistake is not Mistake.UNIT_SCALE)
     moved = None if said is None or not result.usable or result.pose is None else result.pose.compose(said.inverse())
     return Sample(result, trials, other, mistakes, factor, moved)
 
@@ -181,7 +181,7 @@ def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> fl
     Rooms between lines along the middle of walls look too large by as much as the walls are thick, at any scale.
     """
     least = BETTER_SCALED * known
-    told = next((cause for cause in causes if cause.mistake is Mistake.SCALE), None)
+    told = next((cause for cause in causes if cause.mistake is Mistake.UNIT_SCALE), None)
     if told is not None:
         return told.factor if told.score > least else None
     if not len(context.scan.measured) or context.deadline.passed:

@@ -124,7 +124,7 @@ class WorldOutcome:
     @property
     def said_elsewhere(self) -> bool:
         """Whether the answer says that the robot is somewhere that is not on the map."""
-        return self.status == Status.NO_MATCH or "elsewhere" in self.reasons
+        return self.status == Status.NO_MATCH or "not_on_map" in self.reasons
 
     def _within(self, distance: float, angle: float) -> bool:
         off = self.distance, self.angle

@@ -69,7 +69,7 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
     points = 0
     for contour in wall_contours(cells):
         lines = vectorize(contour * grid.resolution, options, viewpoint=None).measured
-        points += len(contour) - int(lines.points.sum())
+        points += len(contour) - int(lines.point_counts.sum())
         if len(lines):
             found.append(lines.segments.endpoints - np.tile(lines.segments.normals * depth * grid.resolution, 2))
         if sum(map(len, found)) > MAX_SEGMENTS:

@@ -35,8 +35,8 @@ class Task:
         The map as sent, metres.
     sigma, oriented, robot, standing, seed, drive
         As in `MapIndex` and `Analysis`.
-    added : (k, 4)
-        Segments to be added, metres.
+    landmark : (k, 4)
+        Segments of the landmark, metres.
     ends_at : float or None
         Of the machine's monotonic clock.
     """
@@ -48,7 +48,7 @@ class Task:
     standing: Standing
     seed: int
     drive: float
-    added: NDArray[np.float64]
+    landmark: NDArray[np.float64]
     ends_at: float | None
 
 
@@ -76,9 +76,9 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
     # Spawned, never forked: this process has threads.
     context = multiprocessing.get_context("spawn")
     own = analysis.segments.endpoints
-    added = np.empty((0, 4)) if analysis.added is None else analysis.added.segments.endpoints[len(own) :]
+    landmark = np.empty((0, 4)) if analysis.landmark is None else analysis.landmark.segments.endpoints[len(own) :]
     task = Task(own, analysis.index.sigma, analysis.oriented, analysis.robot, analysis.standing, analysis.seed,
-                analysis.drive, added, deadline.at)  # fmt: skip
+                analysis.drive, landmark, deadline.at)  # fmt: skip
     with ProcessPoolExecutor(min(cores, len(portions)), context, _begin, (task,)) as pool:
         todo, running = iter(portions), set[Future[Looks]]()
         while True:
@@ -109,8 +109,8 @@ def _begin(task: Task) -> None:
     segments = Segments.derived(task.endpoints)
     index = MapIndex.build(segments, task.sigma, oriented=task.oriented)
     _analysis = Analysis(index, segments, task.robot, task.standing, task.oriented, task.seed, task.drive)
-    if len(task.added):
-        _analysis = _analysis.with_segments(Segments.derived(task.added))
+    if len(task.landmark):
+        _analysis = _analysis.with_segments(Segments.derived(task.landmark))
     _deadline = Deadline(task.ends_at)
 
 

@@ -45,8 +45,9 @@ class FurtherOptions:
     drive: Annotated[
         float, typer.Option(metavar="METRES", help="How far it may drive until it knows where it is, 30 at most.")
     ] = 0.0
-    added: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Walls that might be put up; what would be known with them?")
+    landmark: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Walls of a landmark: each place is also tried with it."),
     ] = None
 
 
@@ -75,8 +76,8 @@ def analyze(
         raise WrongUseError("--picture: it is drawn over the map of a file; name one instead of an id")
     body: Json = {"map": target, "laser": asdict(scanner), "spacing": spacing, "deadline_ms": deadline_ms}
     body["drive"] = further.drive
-    if further.added is not None:
-        body["added"] = read_map_file(further.added)["segments"]
+    if further.landmark is not None:
+        body["landmark"] = read_map_file(further.landmark)["segments"]
     if point is not None:
         body["point"] = list(point)
     with answering(server) as service, _progress() as progress:
@@ -139,13 +140,13 @@ def _rows(answer: Json) -> Iterator[tuple[str, str]]:
     share = 100.0 * counts["usable"] / counts["places"] if counts["places"] else 0.0
     yield "places", f"{counts['places']} poses, {answer['spacing']:g} m apart, {counts['not_free']} more are not free"
     yield "usable", f"{counts['usable']} ({share:.0f} %)"
-    if counts.get("knows_within") is not None:
-        yield "driven", f"{counts['knows_within']} know where they are at once or on the way"
-    if counts.get("usable_with_added") is not None:
-        yield "added", f"{counts['usable_with_added']} usable with what is added"
+    if counts.get("resolved_within") is not None:
+        yield "driven", f"{counts['resolved_within']} know where they are at once or on the way"
+    if counts.get("usable_with_landmark") is not None:
+        yield "landmark", f"{counts['usable_with_landmark']} usable with the landmark"
     for status in ("ambiguous", "degenerate", "no_match"):
         if counts[status]:
-            twins = f", {counts['look_alike']} of them look like another" if status == "ambiguous" else ""
+            twins = f", {counts['similar_pose']} of them look like another" if status == "ambiguous" else ""
             yield status, f"{counts[status]}{twins}"
     if not answer["complete"]:
         yield "left out", f"{counts['left_out']}, for which there was no time"

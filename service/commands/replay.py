@@ -223,7 +223,7 @@ def _tell(tally: Tally) -> None:
         print_table(("why not usable", "scans"), tally.reasons.most_common())
     if tally.warnings:
         print_table(("warning", "scans"), tally.warnings.most_common())
-    if len(tally.usable) < FEW * tally.count or "scale" in tally.warnings:
+    if len(tally.usable) < FEW * tally.count or "map_scale" in tally.warnings:
         print_rows([("hint", HINT)])
     if tally.refused is not None:
         print_rows([("refused", str(tally.refused))])

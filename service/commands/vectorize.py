@@ -42,7 +42,7 @@ def vectorize(
     columns = ("", "x1", "y1", "x2", "y2", "length", "points")
     rows = [
         (number, *segment, math.hypot(segment[2] - segment[0], segment[3] - segment[1]), points)
-        for number, (segment, points) in enumerate(zip(answer["segments"], answer["points"], strict=True))
+        for number, (segment, points) in enumerate(zip(answer["segments"], answer["point_counts"], strict=True))
     ]
     print_table(columns, rows)
     warnings = [("warning", f"{one['code']}: {one['message']}") for one in answer["warnings"]]
@@ -52,5 +52,5 @@ def vectorize(
 def _scan_of(told: Json, answer: Json) -> Json:
     """Return the segments as a scan, with what was said of it."""
     kept: Json = {name: told[name] for name in ("frame_id", "stamp", "viewpoint") if name in told}
-    found = {name: answer[name] for name in ("segments", "points", "centroids", "spreads")}
+    found = {name: answer[name] for name in ("segments", "point_counts", "centroids", "spreads")}
     return {**kept, **found, "sigma": answer["sigmas"]}

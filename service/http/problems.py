@@ -19,8 +19,9 @@ from ..admission import errors as admission
 from ..importing import errors as importing
 from ..maps import errors as maps
 from ..parsing import errors as parsing
-from ..schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
+from ..schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError, in_one_line
 from ..schemas.limits import MAX_FAULTS
+from ..schemas.replies import ProblemCode
 from . import errors as http
 from .etags import etag
 
@@ -38,7 +39,7 @@ class Kind:
 
     Attributes
     ----------
-    code : str
+    code : ProblemCode
         Stable; what a program looks at.
     status : int
     title : str
@@ -46,7 +47,7 @@ class Kind:
         What becomes this problem.
     """
 
-    code: str
+    code: ProblemCode
     status: int
     title: str
     raised_as: tuple[type[Exception], ...] = ()
@@ -129,19 +130,17 @@ class Problem:
 
     def as_json(self, request_id: str, move: Callable[[str], str] = str) -> dict[str, object]:
         """Return the problem document; `move` turns each pointer into the one to be sent."""
+        faults = [Fault(move(one.pointer)[:MAX_POINTER], one.message[:MAX_MESSAGE]) for one in self.faults[:MAX_FAULTS]]
         document: dict[str, object] = {
             "type": f"urn:linefix:problem:{self.kind.code}",
             "title": self.kind.title,
             "status": self.kind.status,
-            "detail": self.detail[:MAX_DETAIL],
+            "detail": in_one_line(faults) if faults else self.detail[:MAX_DETAIL],
             "code": self.kind.code,
             "request_id": request_id,
         }
-        if self.faults:
-            document["errors"] = [
-                {"pointer": move(fault.pointer)[:MAX_POINTER], "message": fault.message[:MAX_MESSAGE]}
-                for fault in self.faults[:MAX_FAULTS]
-            ]
+        if faults:
+            document["errors"] = [{"pointer": one.pointer, "message": one.message} for one in faults]
         return document
 
     def response(self, request_id: str) -> Response:

@@ -23,12 +23,12 @@ JSON = "application/json"
 class PiecewiseResponse(Response):
     """An answer that is handed over piece by piece, as the client takes it.
 
-    A client that takes none of it for `request_timeout` loses the connection.
+    A client that takes none of it for `request_timeout_s` loses the connection.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send it."""
-        state, seconds = state_of(scope), services_of(scope).settings.request_timeout
+        state, seconds = state_of(scope), services_of(scope).settings.request_timeout_s
         whole = memoryview(self.body)
         await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
         for begin in range(0, len(whole), PIECE):

@@ -1,7 +1,7 @@
 """End the service: no longer ready, then closed, then ended within ten seconds.
 
 The supervisor handles the signal. It notifies the workers, which report on `/readyz` that they take no more requests,
-so that a balancer sends none. `drain_seconds` later it closes them.
+so that a balancer sends none. `drain_s` later it closes them.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def drain_on_notice(services: Services, loop: asyncio.AbstractEventLoop) -> None
 
     def drain() -> None:
         services.readiness.draining = True
-        loop.call_later(services.settings.drain_seconds + GRACE, services.give_up)
+        loop.call_later(services.settings.drain_s + GRACE, services.give_up)
         # In a thread of its own: it comes even when the loop hangs.
         last = threading.Timer(LAST_CALL, os._exit, (1,))
         last.daemon = True

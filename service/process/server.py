@@ -52,7 +52,7 @@ def serve(settings: Settings) -> int:
             DatabaseFile(path, may_make=True).require()
     multiprocessing.set_start_method("spawn", force=True)
     server = server_of(settings, host, port)
-    server.on_startup(partial(drain_on_signals, settings.drain_seconds))
+    server.on_startup(partial(drain_on_signals, settings.drain_s))
     server.on_startup(partial(logger.info, "listening", extra={"host": host, "port": port}))
     # Counts live in memory where there is a file system for that; nothing else need be writable.
     shared = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -80,7 +80,7 @@ def server_of(settings: Settings, host: str, port: int) -> MPServer:
         backlog=BACKLOG,
         backpressure=max(1, connections // settings.workers),
         http1_settings=HTTP1Settings(
-            header_read_timeout=min(LONGEST_HEAD, int(1e3 * settings.request_timeout)), max_buffer_size=MAX_HEAD
+            header_read_timeout=min(LONGEST_HEAD, int(1e3 * settings.request_timeout_s)), max_buffer_size=MAX_HEAD
         ),
         log_level=LogLevels.warning,
         log_dictconfig=log_config(settings.log_level),

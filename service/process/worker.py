@@ -69,7 +69,7 @@ def _look_after(services: Services) -> None:
     """Have the application drain at the supervisor's notice, and its event loop watched."""
     loop = asyncio.get_running_loop()
     drain_on_notice(services, loop)
-    watch_loop(loop, services.settings.hang_seconds)
+    watch_loop(loop, services.settings.hang_s)
 
 
 def take_part(directory: Path, workers: int) -> tuple[Part, FileLock]:

@@ -7,14 +7,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
+from association import ReasonCode
+
 from .errors import TooManyError
 from .limits import Limits
 from .parts import AnyMap
-from .replies import Index, MapReference, Milliseconds, PoseAnswer, Row2, Share
+from .replies import Index, MapReference, PoseAnswer, Row2, Share, TimingAnswer
 from .strict import Answer, Coordinate, FreeJson, Point, Strict, in_radians
 
 Row = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
-MOST_ADDED = 100
+MOST_LANDMARK = 100
 MOST_DRIVE = 30.0
 
 
@@ -44,9 +46,9 @@ class AnalyzeRequest(Strict):
     drive: Annotated[float, Field(ge=0.0, le=MOST_DRIVE)] = Field(
         0.0, description="metres that the robot may drive from where it does not know where it is; 0: not at all"
     )
-    added: Annotated[list[Row], Field(max_length=MOST_ADDED)] = Field(
+    landmark: Annotated[list[Row], Field(max_length=MOST_LANDMARK)] = Field(
         default=[],
-        description="segments of what might be put up, in the map frame: each place is also tried with these, "
+        description="segments of a landmark that may be put up, in the map frame: each place is also tried with it, "
         "in the building and on the map; the free side of a box is outside",
     )
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of the scanner's noise")
@@ -69,8 +71,8 @@ class MapAnalyzeRequest(AnalyzeRequest):
     map: AnyMap
 
 
-class WithAddedAnswer(Answer):
-    """What a robot would know with what was added."""
+class WithLandmarkAnswer(Answer):
+    """What a robot would know with the landmark."""
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
@@ -86,15 +88,15 @@ class AnalyzedPlaceAnswer(Answer):
     )
     usable: bool = Field(description="whether the answer is usable, and this place")
     probability: Share | None = Field(description="as of /v1/associate; null for `degenerate`")
-    look_alike: PoseAnswer | None = Field(description="another place that explains the scan about as well")
+    similar_pose: PoseAnswer | None = Field(description="another place that explains the scan about as well")
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
-    reasons: list[str] = Field(description="codes of why it is not usable, as of /v1/associate")
-    knows_after: float | None = Field(
+    reasons: list[ReasonCode] = Field(description="codes of why it is not usable, as of /v1/associate")
+    resolved_after: float | None = Field(
         description="metres to drive until it knows where it is: 0 where it knows at once, null where it does not "
         "within `drive`, or none was asked for"
     )
-    with_added: WithAddedAnswer | None = Field(
-        description="null where nothing was added, or it leaves the robot no room there"
+    with_landmark: WithLandmarkAnswer | None = Field(
+        description="null where there is no landmark, or it leaves the robot no room there"
     )
 
 
@@ -107,11 +109,11 @@ class AnalysisSummaryAnswer(Answer):
     ambiguous: Index
     degenerate: Index
     no_match: Index
-    look_alike: Index = Field(description="places for which another one is named")
-    knows_within: Index | None = Field(
+    similar_pose: Index = Field(description="places for which another one is named")
+    resolved_within: Index | None = Field(
         description="places at which it knows where it is at once or within `drive`; null where none was asked for"
     )
-    usable_with_added: Index | None = Field(description="null where nothing was added")
+    usable_with_landmark: Index | None = Field(description="places usable with the landmark; null where there is none")
     not_free: Index = Field(description="poses of the grid at which no robot can stand")
     left_out: Index = Field(description="poses of the grid for which no time was left")
 
@@ -126,4 +128,4 @@ class AnalyzeAnswer(Answer):
     map: MapReference | None = Field(description="null where the map came with the request")
     client_ref: Any = Field(description="as sent")
     request_id: str
-    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+    timing_ms: TimingAnswer

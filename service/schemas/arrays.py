@@ -60,7 +60,7 @@ def _row_fault(row: Any, width: int, types: frozenset[type], low: float, high: f
     if type(row) is not list:
         return f"expected an array of {width} numbers"
     if len(row) != width:
-        return f"expected {width} numbers, got {len(row)}"
+        return f"expected {width} numbers, found {len(row)}"
     return next((fault for item in row if (fault := _number_fault(item, types, low, high))), None)
 
 

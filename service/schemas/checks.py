@@ -6,15 +6,17 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from .replies import Index, MapReference, Milliseconds, PoseAnswer
+from association.checking import FindingCode
+
+from .replies import Index, MapReference, PoseAnswer, TimingAnswer
 from .strict import Answer
 
 
 class FindingAnswer(Answer):
     """Something doubtful."""
 
-    code: str
-    message: str
+    code: FindingCode = Field(description="stable; further ones may come")
+    message: str = Field(description="what is doubtful and what to do, for people")
     segments: list[Index] = Field(description="indices of the map's segments, the first 1,000")
     count: Index = Field(description="of all of them")
 
@@ -22,7 +24,7 @@ class FindingAnswer(Answer):
 class SizeAnswer(Answer):
     """How much of a map there is."""
 
-    segments: Index
+    segment_count: Index
     walls: Index = Field(description="what they come to where collinear ones are one")
     length: float = Field(description="of the walls together, metres")
     diagonal: float = Field(description="of the box around them, metres")
@@ -39,7 +41,7 @@ class PlaceAnswer(Answer):
     """A place from which the map shows what it shows elsewhere, too."""
 
     pose: PoseAnswer
-    look_alike: PoseAnswer = Field(description="from where it shows about the same")
+    similar_pose: PoseAnswer = Field(description="from where it shows about the same")
 
 
 class SampleAnswer(Answer):
@@ -56,7 +58,9 @@ class SamplesAnswer(Answer):
 
     usable: Index = Field(description="of them, in the map as it is")
     usable_as_advised: Index = Field(description="with the map's properties as advised")
-    thicker: float | None = Field(description="metres by which walls are thicker than drawn; null: nothing says so")
+    wall_thickness: float | None = Field(
+        description="metres by which walls are thicker than drawn; null: nothing says so"
+    )
     scans: list[SampleAnswer]
 
 
@@ -67,7 +71,7 @@ class MapCheckAnswer(Answer):
     size: SizeAnswer
     advice: AdviceAnswer
     places: list[PlaceAnswer] = Field(description="from which it looks like elsewhere")
-    looked_from: Index = Field(description="places, to see whether the map looks alike elsewhere")
+    viewpoints: Index = Field(description="places, to see whether the map looks alike elsewhere")
     complete: bool = Field(description="false where the deadline left something out")
 
 
@@ -78,4 +82,4 @@ class CheckAnswer(MapCheckAnswer):
     map: MapReference
     client_ref: Any = Field(description="as sent")
     request_id: str
-    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+    timing_ms: TimingAnswer

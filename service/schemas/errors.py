@@ -23,6 +23,16 @@ class Fault:
     pointer: str
     message: str
 
+    def __str__(self) -> str:
+        """Return both in one line."""
+        return f"{self.pointer}: {self.message}" if self.pointer else self.message
+
+
+def in_one_line(faults: Sequence[Fault]) -> str:
+    """Return the first of some faults, at least one, and how many more there are."""
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{faults[0]}{more}"
+
 
 class RequestError(Exception):
     """A request is not what the contract takes."""
@@ -42,9 +52,8 @@ class InvalidRequestError(RequestError):
         self.faults = tuple(faults)
 
     def __str__(self) -> str:
-        """Count the places."""
-        count = "one place is" if len(self.faults) == 1 else f"{len(self.faults)} places are"
-        return f"{count} wrong; see errors"
+        """Name the first place."""
+        return in_one_line(self.faults)
 
 
 class TooManyError(RequestError):

@@ -43,7 +43,7 @@ ANALYZE: dict[str, Any] = {
     "laser": {"fov": 4.7, "beams": 540, "range_max": 12.0, "sigma": 0.02},
     "spacing": 1.0,
     "drive": 3.0,
-    "added": [[1.0, 0.0, 1.0, 0.5], [1.0, 0.5, 1.6, 0.5], [1.6, 0.5, 1.6, 0.0], [1.6, 0.0, 1.0, 0.0]],
+    "landmark": [[1.0, 0.0, 1.0, 0.5], [1.0, 0.5, 1.6, 0.5], [1.6, 0.5, 1.6, 0.0], [1.6, 0.0, 1.0, 0.0]],
     "deadline_ms": 5000,
 }
 ANALYZE_ROOM: dict[str, Any] = {"map": {"segments": WALLS}, "spacing": 1.0}

@@ -14,7 +14,7 @@ from .strict import Answer
 class NoteAnswer(Answer):
     """One thing that an import did."""
 
-    code: str
+    code: str = Field(description="stable; part of it may name an entity of the file, as in `entity_hatch`")
     message: str
     count: Index = Field(description="cells, entities, segments that it is about; 0 where nothing is counted")
 
@@ -40,6 +40,14 @@ class ImportedMapAnswer(Answer):
     meta: Any
 
 
+class ImportTimingAnswer(Answer):
+    """Duration of an import, milliseconds."""
+
+    read: Milliseconds = Field(description="reading the files, waiting for that included")
+    check: Milliseconds = Field(description="indexing and checking the map")
+    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
+
+
 class ImportAnswer(Answer):
     """A map of another tool."""
 
@@ -47,7 +55,7 @@ class ImportAnswer(Answer):
     report: ReportAnswer
     check: MapCheckAnswer
     request_id: str
-    timing_ms: Milliseconds = Field(description="read, check and total, milliseconds")
+    timing_ms: ImportTimingAnswer
 
 
 FORM: dict[str, Any] = {

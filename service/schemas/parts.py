@@ -110,7 +110,7 @@ class MeasuredFields(Strict):
     sigma: SigmaOrSigmas = Field(
         0.02, description="standard deviation of single points normal to the wall, metres; of all or of each segment"
     )
-    points: PointCounts | None = Field(
+    point_counts: PointCounts | None = Field(
         None, description="points behind each segment; default length / 0.05, and 2 behind all of one wall"
     )
     centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
@@ -228,7 +228,7 @@ def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None
     if "laser" in value:
         return None if "segments" in value or "points" in value else BY_LASER
     if "segments" in value:
-        return BY_SEGMENTS  # `points` beside it are counts
+        return None if "points" in value else BY_SEGMENTS
     if "points" in value:
         return BY_POINTS
     if "ranges" in value:

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from association import ReasonCode, WarningCode
+
 from .strict import Answer
 
 Row4 = Annotated[list[float], Field(min_length=4, max_length=4)]
@@ -14,7 +16,39 @@ Row2 = Annotated[list[float], Field(min_length=2, max_length=2)]
 Matrix = Annotated[list[Row3], Field(min_length=3, max_length=3)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Index = Annotated[int, Field(ge=0)]
-Milliseconds = dict[str, float]
+Milliseconds = Annotated[float, Field(ge=0.0)]
+ProblemCode = Literal[
+    "invalid_json",
+    "invalid_http",
+    "unauthorized",
+    "forbidden",
+    "not_found",
+    "unknown_map",
+    "method_not_allowed",
+    "request_timeout",
+    "map_corrupt",
+    "revision_conflict",
+    "too_large",
+    "unsupported_media_type",
+    "invalid_request",
+    "rate_limited",
+    "internal",
+    "not_ready",
+    "overloaded",
+    "read_only",
+    "deadline_exceeded",
+    "storage_full",
+]
+
+
+class TimingAnswer(Answer):
+    """Duration of the request, milliseconds."""
+
+    decode: Milliseconds = Field(
+        description="from the arrival of the body until the search: reading, waiting, indexing"
+    )
+    search: Milliseconds = Field(description="the search, or what the request asks for in its place")
+    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
 
 
 class PoseAnswer(Answer):
@@ -46,7 +80,7 @@ class RegistrationDiagnosticsAnswer(Answer):
     dof: int
     rms_offset: float = Field(description="metres")
     rms_angle: float = Field(description="radians")
-    n: Index = Field(description="pairs")
+    pairs: Index = Field(description="number of pairs")
 
 
 class Residual(Answer):
@@ -70,7 +104,7 @@ class RegisterAnswer(Answer):
     residuals: list[Residual]
     diagnostics: RegistrationDiagnosticsAnswer
     request_id: str
-    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+    timing_ms: TimingAnswer
 
 
 class SegmentOfView(Answer):
@@ -99,13 +133,15 @@ class AlternativeAnswer(Answer):
     inlier_fraction: float
 
 
-class HingeAnswer(Answer):
-    """The wall that a pose hinges on."""
+class CriticalWallAnswer(Answer):
+    """The wall whose removal would move the pose most, or leave it unobservable."""
 
     scan: list[Index] | list[SegmentOfView]
     map: list[Index]
     direction: Row2 = Field(description="unit vector in the map frame")
-    moves: float = Field(description="metres")
+    displacement: float = Field(
+        description="metres by which the pose would move, or the standard deviation where that is more"
+    )
 
 
 class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
@@ -114,14 +150,16 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
     inlier_fraction: float = Field(description="share of the scan's length that is matched")
     score: float = Field(description="log-likelihood over that of a scan that is all clutter, nats")
     runner_up: float | None = Field(
-        description="score of the best other pose over `score`; null: no other pose above `search.rivals_above` of it"
+        description="score of the best other pose over `score`; null: no other pose above `search.complete_above` of it"
     )
     margin: float | None = Field(
-        description="`score` minus that of the best other pose, nats; null: no other pose above `search.rivals_above` "
-        "of `score`"
+        description="`score` minus that of the best other pose, nats; null: no other pose above "
+        "`search.complete_above` of `score`"
     )
     significance: float = Field(description="probability that chance scores as high; small is good")
-    hinges_on: HingeAnswer | None = Field(description="the wall without which the pose would move most or be free")
+    critical_wall: CriticalWallAnswer | None = Field(
+        description="the wall without which the pose would move most or be free"
+    )
 
 
 class SearchAnswer(Answer):
@@ -135,24 +173,24 @@ class SearchAnswer(Answer):
     verified: Index
     seed: int
     sampling: Literal["ordered", "random"]
-    rivals_above: float = Field(
+    complete_above: float = Field(
         description="share of the best score above which no pose was missed whose matches agree within their "
         "tolerances; 1 where the search is not complete"
     )
 
 
 class WarningAnswer(Answer):
-    """Something to know."""
+    """Something to know about the scan, the map or the search."""
 
-    code: str
-    message: str
+    code: WarningCode = Field(description="stable; further ones may come")
+    message: str = Field(description="what is wrong and what to do, for people")
 
 
 class ReasonAnswer(Answer):
     """Why an answer is not usable."""
 
-    code: str
-    message: str
+    code: ReasonCode = Field(description="stable; further ones may come")
+    message: str = Field(description="the reason in one sentence, for people")
 
 
 class MapReference(Answer):
@@ -171,7 +209,7 @@ class FoundAnswer(Answer):
         description="calibrated probability that the pose is right, given that the robot is on this map; 0 for "
         "`no_match`, null for `degenerate`, whose position is open along `unobservable`"
     )
-    sentence: str = Field(description="the verdict in words, for people")
+    message: str = Field(description="the verdict in words, for people")
     pose: PoseAnswer | None
     covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is not fixed")
@@ -199,7 +237,7 @@ class AssociateAnswer(FoundAnswer):
     map: MapReference | None
     client_ref: Any = Field(description="as sent")
     request_id: str
-    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+    timing_ms: TimingAnswer
 
 
 class Place(Answer):
@@ -215,8 +253,8 @@ class Problem(Answer):
     type: str
     title: str
     status: Annotated[int, Field(ge=400, le=599)]
-    detail: str
-    code: str = Field(description="stable; what a program should look at")
+    detail: str = Field(description="what is wrong; where `errors` are, the pointer and message of the first")
+    code: ProblemCode = Field(description="stable, for programs; further ones may come")
     request_id: str
     errors: Annotated[list[Place], Field(max_length=20)] = Field([])
 
@@ -237,14 +275,14 @@ class BatchAnswer(Answer):
     map: MapReference | None
     client_ref: Any = Field(description="as sent")
     request_id: str
-    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+    timing_ms: TimingAnswer
 
 
 class VectorizeAnswer(Answer):
     """Segments, and what may be sent back with them in a scan."""
 
     segments: list[Row4] = Field(description="`[x1, y1, x2, y2]`, metres, free space on the left")
-    points: list[int] = Field(description="points behind each")
+    point_counts: list[int] = Field(description="points behind each")
     centroids: list[Row2] = Field(description="of those points, metres")
     spreads: list[float] = Field(description="their second moment along the segment, m^2")
     sigma: float = Field(description="of single ranges or points, metres; given or estimated")
@@ -252,7 +290,7 @@ class VectorizeAnswer(Answer):
     rms: list[float] = Field(description="of the points' distances from their segment, metres")
     warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, as of a scan of /v1/associate")
     request_id: str
-    timing_ms: Milliseconds = Field(description="decode, search and total, milliseconds")
+    timing_ms: TimingAnswer
 
 
 class MapSummaryAnswer(Answer):
@@ -260,7 +298,7 @@ class MapSummaryAnswer(Answer):
 
     map_id: str
     revision: Annotated[int, Field(ge=1)]
-    segments: Index
+    segment_count: Index
     bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
     sigma: float | None = Field(description="of its lines, metres; null where the map says nothing")
     oriented: bool | None = Field(description="whether directions mean anything; null where the map says nothing")
@@ -296,7 +334,7 @@ class Limits(Answer):
     max_bodies_bytes: int = Field(description="of all requests being read at once, by one of several workers")
     max_answers_bytes: int = Field(description="of large answers that wait to be read, in one of several workers")
     max_connections: int = Field(description="open at once")
-    request_timeout: float = Field(description="seconds that a request may take to arrive, head and body")
+    request_timeout_s: float = Field(description="seconds that a request may take to arrive, head and body")
     max_map_segments: int
     max_scan_segments: int
     max_beams: int = Field(description="ranges or points of one scan, or view")

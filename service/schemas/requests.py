@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, SkipValidation, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from .arrays import PairRows, PointRows, Weights
@@ -73,8 +73,10 @@ class BatchRequest(Strict):
     """Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else."""
 
     map: AnyMap
-    scans: list[Any] = Field(min_length=1, description="as `scan` of /v1/associate")
-    priors: list[Any] | None = Field(None, description="as `prior` of /v1/associate or null, one per scan")
+    scans: list[Annotated[AnyScan, SkipValidation]] = Field(min_length=1, description="as `scan` of /v1/associate")
+    priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = Field(
+        None, description="as `prior` of /v1/associate or null, one per scan"
+    )
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="given back as it was sent")
 

@@ -64,7 +64,7 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     AnalysisError
         When the places asked for cannot be had.
     InputError
-        When a segment that is added is too short or too long.
+        When a segment of the landmark is too short or too long.
     """
     # Of a map without directions the index holds each segment twice.
     index = cached.index
@@ -73,9 +73,9 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
     standing = standing_places(segments, robot, asked.spacing, asked.point)
     analysis = Analysis(index, segments, robot, standing, cached.oriented, asked.seed, asked.drive)
-    if not asked.added:
+    if not asked.landmark:
         return analysis
-    return analysis.with_segments(Segments.from_array(asked.added, argument="added"))
+    return analysis.with_segments(Segments.from_array(asked.landmark, argument="landmark"))
 
 
 def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:
@@ -88,7 +88,7 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
     ParserEndedError
         When it is large and could not be read.
     AnalysisError, InputError
-        When the places asked for cannot be had, or what is added is none.
+        When the places asked for cannot be had, or the landmark is none.
     DeadlinePassedError
         When the deadline has passed before.
     """
@@ -149,10 +149,10 @@ def analysis_json(analysis: Analysis, found: dict[int, PlaceVerdict | None]) -> 
         "places": [_place_json(one) for one in verdicts],
         "summary": {
             **_counts(verdicts),
-            "knows_within": sum(one.knows_after is not None for one in verdicts) if analysis.drive else None,
-            "usable_with_added": None
-            if analysis.added is None
-            else sum(one.with_added is not None and one.with_added.usable for one in verdicts),
+            "resolved_within": sum(one.resolved_after is not None for one in verdicts) if analysis.drive else None,
+            "usable_with_landmark": None
+            if analysis.landmark is None
+            else sum(one.with_landmark is not None and one.with_landmark.usable for one in verdicts),
             "not_free": len(found) - len(verdicts),
             "left_out": tried - len(found),
         },
@@ -169,7 +169,7 @@ def _counts(verdicts: Iterable[PlaceVerdict]) -> Json:
         "usable": sum(one.usable for one in listed),
         **{str(status): by_status[status] for status in (Status.OK, Status.AMBIGUOUS, Status.DEGENERATE)},
         str(Status.NO_MATCH): by_status[Status.NO_MATCH],
-        "look_alike": sum(one.look_alike is not None for one in listed),
+        "similar_pose": sum(one.similar_pose is not None for one in listed),
     }
 
 
@@ -179,15 +179,15 @@ def _place_json(one: PlaceVerdict) -> Json:
         "status": str(one.status),
         "usable": one.usable,
         "probability": one.probability,
-        "look_alike": pose_json(one.look_alike),
+        "similar_pose": pose_json(one.similar_pose),
         "unobservable": direction_json(one.unobservable),
         "reasons": list(one.reasons),
-        "knows_after": one.knows_after,
-        "with_added": _with_added_json(one.with_added),
+        "resolved_after": one.resolved_after,
+        "with_landmark": _with_landmark_json(one.with_landmark),
     }
 
 
-def _with_added_json(one: PlaceVerdict | None) -> Json | None:
+def _with_landmark_json(one: PlaceVerdict | None) -> Json | None:
     if one is None:
         return None
     return {"status": str(one.status), "usable": one.usable, "probability": one.probability}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Alternative, AssociationResult, Correspondence, Hinge, sentence_of
+from association import Alternative, AssociationResult, Correspondence, CriticalWall, message_of
 from association.warnings import NOT_IN_ORDER
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
@@ -57,7 +57,7 @@ def diagnostics_json(diagnostics: RegistrationDiagnostics) -> Json:
         "dof": diagnostics.dof,
         "rms_offset": diagnostics.rms_offset,
         "rms_angle": diagnostics.rms_angle,
-        "n": diagnostics.n,
+        "pairs": diagnostics.pairs,
     }
 
 
@@ -119,15 +119,15 @@ def alternative_json(other: Alternative) -> Json:
     }
 
 
-def hinge_json(hinge: Hinge | None, named: _Names) -> Json | None:
-    """Return the wall that a pose hinges on."""
-    if hinge is None:
+def critical_wall_json(wall: CriticalWall | None, named: _Names) -> Json | None:
+    """Return the wall whose removal would move the pose most."""
+    if wall is None:
         return None
     return {
-        "scan": named.listed(hinge.scan),
-        "map": list(hinge.map),
-        "direction": list(hinge.direction),
-        "moves": hinge.moves,
+        "scan": named.listed(wall.scan),
+        "map": list(wall.map),
+        "direction": list(wall.direction),
+        "displacement": wall.displacement,
     }
 
 
@@ -150,7 +150,7 @@ def association_json(result: AssociationResult, include: frozenset[str], starts:
         "status": str(result.status),
         "usable": result.usable,
         "probability": result.probability,
-        "sentence": sentence_of(result),
+        "message": message_of(result),
         "pose": pose_json(result.pose),
         "covariance": matrix_json(result.covariance),
         "unobservable": direction_json(result.unobservable),
@@ -164,7 +164,7 @@ def association_json(result: AssociationResult, include: frozenset[str], starts:
             "runner_up": diagnostics.runner_up,
             "margin": diagnostics.margin,
             "significance": diagnostics.significance,
-            "hinges_on": hinge_json(diagnostics.hinges_on, named),
+            "critical_wall": critical_wall_json(diagnostics.critical_wall, named),
         },
         "reasons": [{"code": reason.code, "message": reason.message} for reason in result.reasons],
         "search": {
@@ -176,7 +176,7 @@ def association_json(result: AssociationResult, include: frozenset[str], starts:
             "verified": search.verified,
             "seed": search.seed,
             "sampling": search.sampling,
-            "rivals_above": search.rivals_above,
+            "complete_above": search.complete_above,
         },
         "warnings": [{"code": warning.code, "message": warning.message} for warning in result.warnings],
     }
@@ -194,7 +194,7 @@ def vectorization_json(found: Vectorization) -> Json:
     measured = found.measured
     return {
         "segments": measured.segments.endpoints.tolist(),
-        "points": measured.points.astype(int).tolist(),
+        "point_counts": measured.point_counts.astype(int).tolist(),
         "centroids": measured.centroids.tolist(),
         "spreads": measured.spreads.tolist(),
         "sigma": found.sigma,
@@ -209,7 +209,7 @@ def outline_json(map_id: str, revision: int, outline: MapOutline) -> Json:
     return {
         "map_id": map_id,
         "revision": revision,
-        "segments": outline.segments,
+        "segment_count": outline.segments,
         "bounds": outline.bounds,
         "sigma": outline.sigma,
         "oriented": outline.oriented,

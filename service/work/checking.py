@@ -117,18 +117,18 @@ class Judged:
     samples : sequence of Sample or None
         None where no time was left for one.
     report : SampleReport
-    thicker : float or None
+    wall_thickness : float or None
         By how much walls are thicker than drawn, metres; None where nothing speaks for it.
     """
 
     samples: Sequence[Sample | None]
     report: SampleReport
-    thicker: float | None
+    wall_thickness: float | None
 
     @property
     def findings(self) -> list[Finding]:
         """The weightiest first."""
-        thick = [] if self.thicker is None else [thickness_finding(self.thicker, oriented=self.directed)]
+        thick = [] if self.wall_thickness is None else [thickness_finding(self.wall_thickness, oriented=self.directed)]
         return [*thick, *self.report.findings]
 
     @property
@@ -147,14 +147,14 @@ def conclude(checked: Checked, samples: Sequence[Sample | None], job: Job) -> Ju
     if codes & HIDES_THICKNESS or job.deadline.passed:
         return judged
     scans = [scan for scan, one in zip(checked.scans, samples, strict=True) if one is not None]
-    thicker = find_thickness(index, scans, job.deadline, oriented=judged.directed)
-    if thicker is None or "mirrored" not in codes:
-        return replace(judged, thicker=thicker)
+    wall_thickness = find_thickness(index, scans, job.deadline, oriented=judged.directed)
+    if wall_thickness is None or "mirrored" not in codes:
+        return replace(judged, wall_thickness=wall_thickness)
     # What fits badly may fit a little better mirrored.
     if not judged.directed or fit_better_mirrored(index, scans, job.deadline):
         return judged
     others = tuple(one for one in report.findings if one.code != "mirrored")
-    return Judged(samples, replace(report, findings=others), thicker)
+    return Judged(samples, replace(report, findings=others), wall_thickness)
 
 
 def check_done(checked: Checked, judged: Judged | None, asked: CheckRequest | None, job: Job) -> Done:
@@ -171,7 +171,7 @@ def check_done(checked: Checked, judged: Judged | None, asked: CheckRequest | No
         told = {
             "usable": report.usable,
             "usable_as_advised": report.usable_as_advised,
-            "thicker": judged.thicker,
+            "wall_thickness": judged.wall_thickness,
             "scans": scans,
         }
     answer = {
@@ -187,10 +187,10 @@ def check_json(found: MapCheck) -> Json:
     """Return what was found of a map by itself."""
     return {
         "findings": [_finding_json(one) for one in found.findings],
-        "size": {name: getattr(found.size, name) for name in ("segments", "walls", "length", "diagonal")},
+        "size": {name: getattr(found.size, name) for name in ("segment_count", "walls", "length", "diagonal")},
         "advice": {"sigma": found.advice.sigma, "oriented": found.advice.oriented},
-        "places": [{"pose": pose_json(one.pose), "look_alike": pose_json(one.look_alike)} for one in found.places],
-        "looked_from": found.looked_from,
+        "places": [{"pose": pose_json(one.pose), "similar_pose": pose_json(one.similar_pose)} for one in found.places],
+        "viewpoints": found.viewpoints,
         "complete": found.complete,
     }
 

@@ -35,7 +35,7 @@ def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegment
     moments = None
     if scan.centroids is not None and scan.spreads is not None:
         moments = (scan.centroids, scan.spreads)
-    return MeasuredSegments.from_segments(segments, scan.sigma, scan.points, moments, argument=argument)
+    return MeasuredSegments.from_segments(segments, scan.sigma, scan.point_counts, moments, argument=argument)
 
 
 def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan) -> Scanned:

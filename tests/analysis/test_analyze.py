@@ -42,7 +42,7 @@ def test_a_room_like_no_other_is_told_everywhere() -> None:
     far_from_walls = [one for one in found if 1.0 < one.pose.x < 4.5 and 1.0 < one.pose.y < 5.0]
     assert len(far_from_walls) > 8
     for one in far_from_walls:
-        assert (one.status, one.usable, one.look_alike, one.reasons) == (Status.OK, True, None, ())
+        assert (one.status, one.usable, one.similar_pose, one.reasons) == (Status.OK, True, None, ())
         assert one.probability is not None
         assert one.probability > 0.99
     assert sum(one.usable for one in found) > 0.8 * len(found)
@@ -52,17 +52,17 @@ def test_two_equal_rooms_look_alike() -> None:
     found = looks(analyzed(two_rooms()))
     assert len(found) > 40
     for one in found:
-        assert (one.status, one.usable, one.reasons[0]) == (Status.AMBIGUOUS, False, "twin")
-        assert one.look_alike is not None
+        assert (one.status, one.usable, one.reasons[0]) == (Status.AMBIGUOUS, False, "similar_place")
+        assert one.similar_pose is not None
         there = one.pose.x + (20.0 if one.pose.x < 10.0 else -20.0)
-        assert one.look_alike.x == pytest.approx(there, abs=0.1)
-        assert (one.look_alike.y, one.look_alike.theta) == pytest.approx((one.pose.y, one.pose.theta), abs=0.1)
+        assert one.similar_pose.x == pytest.approx(there, abs=0.1)
+        assert (one.similar_pose.y, one.similar_pose.theta) == pytest.approx((one.pose.y, one.pose.theta), abs=0.1)
 
 
 def test_a_rectangle_is_its_own_look_alike() -> None:
     one = next(iter(looks(analyzed(rectangle_room().segments))))
-    assert one.look_alike is not None
-    assert (one.look_alike.x, one.look_alike.y) == pytest.approx((-one.pose.x, -one.pose.y), abs=0.1)
+    assert one.similar_pose is not None
+    assert (one.similar_pose.x, one.similar_pose.y) == pytest.approx((-one.pose.x, -one.pose.y), abs=0.1)
 
 
 def test_a_corridor_leaves_one_direction_free() -> None:
@@ -70,7 +70,7 @@ def test_a_corridor_leaves_one_direction_free() -> None:
     inside = [one for one in found if abs(one.pose.x) < 20.0]
     assert len(inside) > 10
     for one in inside:
-        assert (one.status, one.usable, one.reasons) == (Status.DEGENERATE, False, ("free_direction",))
+        assert (one.status, one.usable, one.reasons) == (Status.DEGENERATE, False, ("unobservable_direction",))
         assert one.probability is None
         assert one.unobservable is not None
         assert abs(one.unobservable[0]) == pytest.approx(1.0, abs=1e-3)
@@ -98,9 +98,9 @@ def test_a_sure_answer_that_is_another_place_is_a_look_alike() -> None:
         assert one is not None
         assert one.probability is not None
         assert one.probability > 0.9
-        assert (one.status, one.usable, one.reasons) == (Status.AMBIGUOUS, False, ("twin",))
-        assert one.look_alike is not None
-        assert one.look_alike.x == pytest.approx(one.pose.x + 3.0, abs=0.1)
+        assert (one.status, one.usable, one.reasons) == (Status.AMBIGUOUS, False, ("similar_place",))
+        assert one.similar_pose is not None
+        assert one.similar_pose.x == pytest.approx(one.pose.x + 3.0, abs=0.1)
 
 
 def test_without_directions_a_place_is_free_by_what_is_seen_alone() -> None:

@@ -43,9 +43,9 @@ def test_who_drives_to_what_is_like_no_other_place_knows_then() -> None:
     found = {one.pose.x: one for one in looks(hall(10.0)) if one.pose.y < 2.0}
     at_once = [x for x, one in found.items() if one.usable]
     assert at_once
-    assert all(found[x].knows_after == 0.0 for x in at_once)
+    assert all(found[x].resolved_after == 0.0 for x in at_once)
     assert min(at_once) > NICHE - REACH
-    driven = {x: one.knows_after for x, one in found.items() if one.knows_after}
+    driven = {x: one.resolved_after for x, one in found.items() if one.resolved_after}
     nearer = [driven[x] for x in sorted(driven) if x < NICHE]
     assert len(nearer) > 2
     assert nearer == sorted(nearer, reverse=True)
@@ -56,18 +56,18 @@ def test_who_drives_to_what_is_like_no_other_place_knows_then() -> None:
         assert abs(NICHE + 1.0 - x) - metres < REACH  # it has come to see the niche
     far = [x for x in found if x < NICHE - REACH - 10.0]
     assert len(far) > 5
-    assert all(found[x].knows_after is None for x in far)
+    assert all(found[x].resolved_after is None for x in far)
 
 
 def test_a_corridor_is_driven_along_in_vain() -> None:
     analysis = analyzed(corridor().segments, 4.0, 3.0, Robot(range_max=8.0))
     inside = [one for one in looks(analysis) if abs(one.pose.x) < 15.0]
     assert inside
-    assert all(one.knows_after is None for one in inside)
+    assert all(one.resolved_after is None for one in inside)
 
 
 def test_nothing_is_said_of_drives_that_nobody_asked_for() -> None:
-    assert {one.knows_after for one in looks(hall(0.0))} == {None}
+    assert {one.resolved_after for one in looks(hall(0.0))} == {None}
 
 
 def test_a_drive_keeps_from_walls_and_ends_where_there_is_no_room() -> None:
@@ -124,26 +124,26 @@ def test_a_deadline_ends_a_drive() -> None:
     number = next(one.number for one in looks(hall(0.0)) if not one.usable)
     found = analysis.look(number, Deadline(0.0))
     assert found is not None
-    assert found.knows_after is None
+    assert found.resolved_after is None
 
 
 def test_a_box_in_a_corner_tells_the_halves_of_a_room_apart() -> None:
     room = rectangle_room().segments
     plain = analyzed(room, 0.7)
     found = looks(plain.with_segments(Segments.from_array(BOX)))
-    assert [replace(one, with_added=None) for one in found] == looks(plain)
-    assert {one.with_added for one in looks(plain)} == {None}
-    seen = [one for one in found if one.with_added is not None]
+    assert [replace(one, with_landmark=None) for one in found] == looks(plain)
+    assert {one.with_landmark for one in looks(plain)} == {None}
+    seen = [one for one in found if one.with_landmark is not None]
     assert len(seen) > 20
     assert not any(one.usable for one in seen)
-    assert sum(one.with_added.usable for one in seen if one.with_added) > 0.8 * len(seen)
+    assert sum(one.with_landmark.usable for one in seen if one.with_landmark) > 0.8 * len(seen)
     for one in found:
         inside = -2.5 < one.pose.x < -1.0 and -1.5 < one.pose.y < 0.0
-        assert not (inside and one.with_added), "a robot does not stand in the box"
+        assert not (inside and one.with_landmark), "a robot does not stand in the box"
 
 
 def test_what_is_added_far_away_changes_nothing() -> None:
     far: Floats = BOX + 500.0
     for one in looks(analyzed(rectangle_room().segments, 2.0).with_segments(Segments.from_array(far)))[:5]:
-        assert one.with_added is not None
-        assert (one.with_added.status, one.with_added.usable) == (Status.AMBIGUOUS, False)
+        assert one.with_landmark is not None
+        assert (one.with_landmark.status, one.with_landmark.usable) == (Status.AMBIGUOUS, False)

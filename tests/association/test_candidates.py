@@ -112,7 +112,7 @@ def test_how_bases_are_drawn_is_told() -> None:
     window = HardPrior(INSIDE, 0.5, 0.3)
     for prior in (None, window):
         told = found(ROOM_INDEX, ROOM_SCAN, prior=prior, seed=7).report
-        assert (told.seed, told.sampling, told.rivals_above) == (7, "ordered", RIVAL_SHARE)
+        assert (told.seed, told.sampling, told.complete_above) == (7, "ordered", RIVAL_SHARE)
         assert found(ROOM_INDEX, ROOM_SCAN, prior=prior, sampling="random").report.sampling == "random"
 
 
@@ -322,7 +322,7 @@ def test_a_stopped_search_says_so() -> None:
     assert sum(report.bases == reports[-1].bases for report in reports) > 1, (
         "parallel walls are looked at after all bases"
     )
-    assert [report.rivals_above for report in reports] == [1.0] * whole + [RIVAL_SHARE]
+    assert [report.complete_above for report in reports] == [1.0] * whole + [RIVAL_SHARE]
 
 
 def test_a_search_of_a_window_is_complete_when_both_are() -> None:

@@ -31,7 +31,7 @@ def told(scan: Scan, index: MapIndex = INDEX, **options: Any) -> dict[str, str]:
     verdict = judge(context, explanations)
     causes = find_causes(context, explanations, verdict, time.monotonic() - 60.0)  # time enough
     found = warnings_of(context, explanations.search, verdict, causes)
-    return {one.code: one.message for one in found if one.code in ("mirrored", "reversed", "scale")}
+    return {one.code: one.message for one in found if one.code in ("mirrored", "reversed", "unit_scale")}
 
 
 def test_nothing_is_told_of_a_scan_that_is_usable() -> None:
@@ -55,22 +55,22 @@ def test_begins_and_ends_exchanged() -> None:
 @pytest.mark.parametrize("factor", UNITS)
 def test_other_units(factor: float) -> None:
     """What was multiplied is to be divided again."""
-    assert list(told(scaled(SCAN, factor))) == ["scale"]
-    assert f"times {1.0 / factor:.4g} the scan" in told(scaled(SCAN, factor))["scale"]
+    assert list(told(scaled(SCAN, factor))) == ["unit_scale"]
+    assert f"times {1.0 / factor:.4g} the scan" in told(scaled(SCAN, factor))["unit_scale"]
 
 
 def test_feet_are_named() -> None:
-    assert "seems to be in feet" in told(scaled(SCAN, 1.0 / 0.3048))["scale"]
+    assert "seems to be in feet" in told(scaled(SCAN, 1.0 / 0.3048))["unit_scale"]
 
 
 @pytest.mark.parametrize(("factor", "said"), [(25.4, "millimetres taken for inches"), (0.01, "metres taken for centi")])
 def test_a_map_of_another_unit(factor: float, said: str) -> None:
     """The scan is as large as scans are: the map is divided, for gates of the search are metres."""
     found = told(SCAN, index_of(ROOM * factor))
-    assert list(found) == ["scale"]
+    assert list(found) == ["unit_scale"]
     assert (
         f"With all lengths times {factor:.4g} the scan fits much better: the map seems to be in {said}"
-        in found["scale"]
+        in found["unit_scale"]
     )
 
 

@@ -29,7 +29,7 @@ def assert_judged(one: Drawn) -> None:
         assert getattr(got, name) == pytest.approx(getattr(expected, name)), name
     assert (got.reasons == ()) is got.usable
     codes = [reason.code for reason in got.reasons]
-    assert ("elsewhere" in codes) >= (expected.explained < tuning.ELSEWHERE_PROBABILITY)
+    assert ("not_on_map" in codes) >= (expected.explained < tuning.ELSEWHERE_PROBABILITY)
     assert ("search_incomplete" in codes) is not one.complete
     assert ("prior_contradicted" in codes) is expected.contradicted
 

@@ -133,7 +133,7 @@ def building() -> tuple[MapIndex, tuple[Scan, ...]]:
         angles = case.scan.angles
         laser = LaserScan(float(angles[0]), float(angles[1] - angles[0]), case.scan.ranges)
         measured = vectorize(laser).measured
-        even = MeasuredSegments.from_segments(measured.segments, measured.sigma, measured.points)
+        even = MeasuredSegments.from_segments(measured.segments, measured.sigma, measured.point_counts)
         scans.append(Scan(even, (0.0, 0.0)))
     return MapIndex.build(walls), tuple(scans)
 
@@ -142,7 +142,7 @@ def cut_evenly(rng: np.random.Generator, scan: Scan) -> Scan:
     """Cut segments into equal pieces, with their share of the points, or send them twice."""
     ends, sigma, points = [], [], []
     measured = scan.measured
-    for one, s, n in zip(measured.segments.endpoints, measured.sigma, measured.points, strict=True):
+    for one, s, n in zip(measured.segments.endpoints, measured.sigma, measured.point_counts, strict=True):
         count, again = int(rng.integers(1, min(MOST_PIECES, int(n)) + 1)), int(rng.integers(1, 3))
         shares = np.linspace(0.0, 1.0, count + 1)
         pieces = [(one[:2] + t * (one[2:] - one[:2])) for t in shares]

@@ -86,7 +86,7 @@ def test_its_indices_are_those_of_the_drive() -> None:
     assert list(found.unmatched_scan) == [*range(before), *left]
     assert found.diagnostics is not None
     assert alone.diagnostics is not None
-    for one, other in ((found.diagnostics.hinges_on, alone.diagnostics.hinges_on),):
+    for one, other in ((found.diagnostics.critical_wall, alone.diagnostics.critical_wall),):
         assert (one is None) == (other is None)
         if one is not None and other is not None:
             assert one.scan == tuple(k + before for k in other.scan)
@@ -171,7 +171,7 @@ def test_the_last_view_is_the_scan_that_was_sent(with_beams: bool) -> None:
     sent = views[0].scan
     assert own.tolist() == list(range(len(sent.measured)))
     np.testing.assert_allclose(found.measured.segments.endpoints, sent.measured.segments.endpoints, atol=1e-12)
-    np.testing.assert_array_equal(found.measured.points, sent.measured.points)
+    np.testing.assert_array_equal(found.measured.point_counts, sent.measured.point_counts)
     assert found.views is None
     assert found.viewpoint == pytest.approx(sent.viewpoint)
     assert (found.beams is None) is not with_beams

@@ -66,7 +66,7 @@ def test_a_scan_that_is_mirrored_twice_is_itself(seed: int) -> None:
     once, twice = mirrored(scan), mirrored(mirrored(scan))
     assert twice.viewpoint == scan.viewpoint
     assert once.viewpoint == (0.3, 0.2)
-    for name in ("sigma", "points", "centroids", "spreads"):
+    for name in ("sigma", "point_counts", "centroids", "spreads"):
         np.testing.assert_array_equal(getattr(twice.measured, name), getattr(scan.measured, name))
     np.testing.assert_array_equal(twice.measured.segments.endpoints, scan.measured.segments.endpoints)
     assert twice.beams is not None

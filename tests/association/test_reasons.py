@@ -29,8 +29,13 @@ from .scenes import (
 USUAL_ONE = Features(*([0.0] * len(Features._fields)))
 # One feature of each reason, from which every unit takes a nat.
 MODEL = as_model({name: [-1.0] for name in ("lead", "hinge_moves", "share", "root_count", "null")})
-ONE_OF = {"twin": "lead", "one_wall_decides": "hinge_moves", "unexplained": "share", "too_little": "root_count"}
-ONE_OF["elsewhere"] = "null"
+ONE_OF = {
+    "similar_place": "lead",
+    "single_wall": "hinge_moves",
+    "map_mismatch": "share",
+    "insufficient_evidence": "root_count",
+}
+ONE_OF["not_on_map"] = "null"
 NOTHING: Mapping[str, float] = {}
 
 
@@ -68,8 +73,14 @@ def test_what_takes_from_the_odds_is_the_reason(code: str) -> None:
 
 def test_the_weightiest_comes_first_and_what_weighs_little_is_not_told() -> None:
     just, less = TELLING_REASON + 0.01, TELLING_REASON - 0.01
-    taken = {"twin": 2.0, "unexplained": 7.0, "too_little": just, "one_wall_decides": less, "elsewhere": -4.0}
-    assert codes_of(taken=taken) == ["unexplained", "twin", "too_little"]
+    taken = {
+        "similar_place": 2.0,
+        "map_mismatch": 7.0,
+        "insufficient_evidence": just,
+        "single_wall": less,
+        "not_on_map": -4.0,
+    }
+    assert codes_of(taken=taken) == ["map_mismatch", "similar_place", "insufficient_evidence"]
 
 
 def test_several_features_of_a_reason_count_together() -> None:
@@ -80,7 +91,7 @@ def test_several_features_of_a_reason_count_together() -> None:
     model = as_model({"lead": [-1.0], "solitude": [-1.0], "share": [-1.0]})
     features = USUAL_ONE._replace(lead=0.8, solitude=0.8, share=1.2)
     told = reasons_of(Standing(Status.AMBIGUOUS, True, False, False, False, False), features, model)
-    assert [reason.code for reason in told] == ["twin", "unexplained"]
+    assert [reason.code for reason in told] == ["similar_place", "map_mismatch"]
 
 
 def test_what_is_far_behind_is_no_twin() -> None:
@@ -91,40 +102,46 @@ def test_what_is_far_behind_is_no_twin() -> None:
         features = USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0)
         return [reason.code for reason in reasons_of(replace(standing, alone=alone), features, model)]
 
-    assert codes_at(NO_TWIN) == ["twin", "too_little"]
-    assert codes_at(NO_TWIN + 0.01) == ["too_little"]
-    assert codes_at(NO_TWIN, alone=True) == ["too_little"]
+    assert codes_at(NO_TWIN) == ["similar_place", "insufficient_evidence"]
+    assert codes_at(NO_TWIN + 0.01) == ["insufficient_evidence"]
+    assert codes_at(NO_TWIN, alone=True) == ["insufficient_evidence"]
 
 
 def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:
     """The prior, the deadline, another building, a thin answer; nothing twice."""
     everything = codes_of(
-        complete=False, contradicted=True, strange=True, thin=True, taken={"twin": 3.0, "too_little": 4.0}
+        complete=False,
+        contradicted=True,
+        strange=True,
+        thin=True,
+        taken={"similar_place": 3.0, "insufficient_evidence": 4.0},
     )
-    thin = ["too_little", "one_wall_decides"]
-    assert everything == ["prior_contradicted", "search_incomplete", "elsewhere", *thin, "twin"]
-    assert codes_of(thin=True, taken={"unexplained": 3.0}) == [*thin, "unexplained"]
-    assert codes_of(strange=True, taken={"elsewhere": 9.0}) == ["elsewhere"]
-    assert codes_of(twin=True, taken={"unexplained": 3.0}) == ["twin", "unexplained"], "whatever the models make of it"
+    thin = ["insufficient_evidence", "single_wall"]
+    assert everything == ["prior_contradicted", "search_incomplete", "not_on_map", *thin, "similar_place"]
+    assert codes_of(thin=True, taken={"map_mismatch": 3.0}) == [*thin, "map_mismatch"]
+    assert codes_of(strange=True, taken={"not_on_map": 9.0}) == ["not_on_map"]
+    assert codes_of(twin=True, taken={"map_mismatch": 3.0}) == ["similar_place", "map_mismatch"], (
+        "whatever the models make of it"
+    )
 
 
 @pytest.mark.parametrize("status", [Status.OK, Status.NO_MATCH])
 def test_where_the_models_do_not_decide_they_are_not_asked(status: Status) -> None:
-    assert codes_of(status, taken={"twin": 9.0}) == []
-    assert codes_of(status, complete=False, taken={"twin": 9.0}) == ["search_incomplete"]
-    assert codes_of(status, contradicted=True, taken={"twin": 9.0}) == ["prior_contradicted"]
+    assert codes_of(status, taken={"similar_place": 9.0}) == []
+    assert codes_of(status, complete=False, taken={"similar_place": 9.0}) == ["search_incomplete"]
+    assert codes_of(status, contradicted=True, taken={"similar_place": 9.0}) == ["prior_contradicted"]
 
 
 def test_a_free_direction_is_told_instead_of_what_is_weighed() -> None:
-    assert codes_of(Status.DEGENERATE, taken={"one_wall_decides": 9.0}) == ["free_direction"]
-    assert codes_of(Status.DEGENERATE, strange=True) == ["elsewhere", "free_direction"]
+    assert codes_of(Status.DEGENERATE, taken={"single_wall": 9.0}) == ["unobservable_direction"]
+    assert codes_of(Status.DEGENERATE, strange=True) == ["not_on_map", "unobservable_direction"]
     for status in set(Status) - {Status.DEGENERATE}:
-        assert "free_direction" not in codes_of(status, taken={"one_wall_decides": 9.0})
+        assert "unobservable_direction" not in codes_of(status, taken={"single_wall": 9.0})
 
 
 def test_without_an_answer_there_is_nothing_to_weigh() -> None:
     told = reasons_of(Standing(Status.NO_MATCH, True, False, elsewhere=True, thin=False, twin=False), None, None)
-    assert [reason.code for reason in told] == ["elsewhere"]
+    assert [reason.code for reason in told] == ["not_on_map"]
 
 
 # In drawn worlds, by the fitted models.
@@ -150,22 +167,22 @@ def test_a_room_that_is_seen_whole_needs_no_reason() -> None:
 
 @pytest.mark.usefixtures("fitted")
 def test_equal_rooms_are_twins() -> None:
-    assert codes(answer_of(index_of(equal_rooms(2)), ROOM_SCAN)) == ["twin"]
+    assert codes(answer_of(index_of(equal_rooms(2)), ROOM_SCAN)) == ["similar_place"]
 
 
 @pytest.mark.usefixtures("fitted")
 def test_a_corridor_is_free_along_itself() -> None:
     told = codes(answer_of(index_of(CORRIDOR), scan_of(seen(CORRIDOR, pose(4.0, 0.8, 0.05))[0])))
-    assert "free_direction" in told
-    assert set(told) <= {"free_direction", "elsewhere"}
+    assert "unobservable_direction" in told
+    assert set(told) <= {"unobservable_direction", "not_on_map"}
 
 
 @pytest.mark.usefixtures("fitted")
 def test_a_corner_is_too_little() -> None:
     """Two walls of a room, of which either alone holds the pose along the other."""
     told = codes(answer_of(index_of(ROOM), scan_of([[-3, -1, 5.5, -1], [5.5, -1, 5.5, 2.5]])))
-    assert {"too_little", "one_wall_decides"} <= set(told)
-    assert "free_direction" not in told
+    assert {"insufficient_evidence", "single_wall"} <= set(told)
+    assert "unobservable_direction" not in told
 
 
 @pytest.mark.usefixtures("fitted")
@@ -177,8 +194,8 @@ def test_a_scan_of_another_building_is_elsewhere() -> None:
         result = answer_of(index_of(maze(1)), scan_of(ends))
         assert not result.usable
         if result.status is Status.AMBIGUOUS:
-            assert "unexplained" in codes(result)
-        told += result.status is Status.NO_MATCH or codes(result)[0] == "elsewhere"
+            assert "map_mismatch" in codes(result)
+        told += result.status is Status.NO_MATCH or codes(result)[0] == "not_on_map"
     assert told > 8
 
 

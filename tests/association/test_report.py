@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationResult, MapIndex, Reason, Status, View, assemble, sentence_of
+from association import AssociationResult, MapIndex, Reason, Status, View, assemble, message_of
 from association.acceptance import Accepted
 from association.explain import search_and_explain
 from association.explanations import Answer
@@ -44,7 +44,7 @@ from .scenes import (
 )
 
 SURE = Verdict(Status.OK, 0.97, True, pose(1.0, 2.0, 0.3), 20.0, 0.75, False, (), True)
-WHY = (Reason("twin", "Another pose explains the scan about as well."),)
+WHY = (Reason("similar_place", "Another pose explains the scan about as well."),)
 ROOMS = index_of(equal_rooms(4))
 
 
@@ -149,7 +149,7 @@ def test_what_is_not_usable_has_its_other_poses() -> None:
     result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())
     assert not result.usable
     assert len(result.alternatives) == 2
-    assert "2 other places" in sentence_of(result)
+    assert "2 other places" in message_of(result)
 
 
 @pytest.mark.parametrize("most", [0, 2, 50])
@@ -215,16 +215,16 @@ def test_a_free_alternative_has_no_covariance() -> None:
     assert other.covariance is None
 
 
-def test_nothing_hinges_on_one_wall_where_the_pose_stays_without_any() -> None:
+def test_no_wall_is_critical_where_the_pose_stays_without_any() -> None:
     for hinges in (hinges_of(), hinges_of((1, 0.09, 0.02), (2, 0.01, 0.099))):
         answer = replace(given_answer(), settled=settled_of(registered_room(), hinges))
         diagnostics = told(answer).diagnostics
         assert diagnostics is not None
-        assert diagnostics.hinges_on is None
+        assert diagnostics.critical_wall is None
 
 
 @pytest.mark.parametrize(("moves", "deviation", "least"), [(0.3, 0.05, 0.3), (0.05, 0.4, 0.4)])
-def test_what_the_pose_hinges_on_is_the_wall_without_which_it_moves_most_or_is_free(
+def test_the_critical_wall_is_that_without_which_the_pose_moves_most_or_is_free(
     moves: float, deviation: float, least: float
 ) -> None:
     """By the indices that were sent: scan segments of row 2 lie on wall 2, which is that piece of the map."""
@@ -232,26 +232,26 @@ def test_what_the_pose_hinges_on_is_the_wall_without_which_it_moves_most_or_is_f
     answer = replace(given_answer(), settled=settled_of(registered_room(), hinges))
     diagnostics = told(answer).diagnostics
     assert diagnostics is not None
-    hinge = diagnostics.hinges_on
-    assert hinge is not None
+    wall = diagnostics.critical_wall
+    assert wall is not None
     rows = context_of(ROOM_INDEX, SCAN).lines.row_of
     on_it = [(scan, piece % 8) for scan, piece in answer.accepted.pairs.tolist() if rows[scan] == 2]
-    assert (list(hinge.scan), list(hinge.map)) == ([s for s, _ in on_it], sorted({p for _, p in on_it}))
-    assert hinge.direction == (0.6, 0.8)
-    assert hinge.moves == pytest.approx(least)
+    assert (list(wall.scan), list(wall.map)) == ([s for s, _ in on_it], sorted({p for _, p in on_it}))
+    assert wall.direction == (0.6, 0.8)
+    assert wall.displacement == pytest.approx(least)
 
 
-def test_at_a_corridors_end_the_pose_hinges_on_it() -> None:
+def test_at_a_corridors_end_that_wall_is_critical() -> None:
     """It was seen in two pieces, and is drawn in two; without it the place along the corridor is free."""
     walls = np.vstack([CORRIDOR, [[30.0, 0.0, 30.0, 1.0], [30.0, 1.0, 30.0, 2.0]]])
     scan = [[-6.0, -0.8, 3.0, -0.8], [3.0, -0.8, 3.0, 0.1], [3.0, 1.2, -6.0, 1.2], [3.0, 0.3, 3.0, 1.2]]
     diagnostics = answer_of(index_of(walls), scan_of(scan)).diagnostics
     assert diagnostics is not None
-    hinge = diagnostics.hinges_on
-    assert hinge is not None
-    assert (hinge.scan, hinge.map) == ((1, 3), (2, 3))
-    assert np.abs(hinge.direction) == pytest.approx([1.0, 0.0], abs=1e-3)
-    assert hinge.moves > 1.0
+    wall = diagnostics.critical_wall
+    assert wall is not None
+    assert (wall.scan, wall.map) == ((1, 3), (2, 3))
+    assert np.abs(wall.direction) == pytest.approx([1.0, 0.0], abs=1e-3)
+    assert wall.displacement > 1.0
 
 
 def test_where_a_direction_is_free_it_is_named_instead_of_a_covariance() -> None:

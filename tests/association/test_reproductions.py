@@ -58,7 +58,7 @@ def test_a_rival_that_an_exhaustive_search_finds_is_found(
     assert runner_up(usual) > 0.7
     assert usual.probability == pytest.approx(whole.probability)
     assert (usual.status, usual.usable) == (whole.status, False)
-    assert usual.search.rivals_above <= 0.75
+    assert usual.search.complete_above <= 0.75
 
 
 @pytest.mark.parametrize("sigma", SIGMAS)

@@ -260,7 +260,7 @@ def test_what_a_search_claims_holds_only_where_it_is_complete(exhaustive: bool) 
         search = associate(index, scan, None, options, Deadline(time.monotonic() + 1e-4 * tenths)).search
         took.add(search.complete)
         assert search.complete or not search.exhaustive
-        assert search.complete is (search.rivals_above < 1.0)
+        assert search.complete is (search.complete_above < 1.0)
     whole = associate(index, scan, None, options).search
     assert (whole.complete, whole.exhaustive or not exhaustive) == (True, True)
     assert False in took

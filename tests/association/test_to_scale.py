@@ -68,7 +68,7 @@ def answer(walls: Floats, seed: int = 1, estimator: Estimator = "joint") -> Asso
 
 
 def told(result: AssociationResult) -> list[str]:
-    return [warning.message for warning in result.warnings if warning.code == "scale"]
+    return [warning.message for warning in result.warnings if warning.code == "map_scale"]
 
 
 def squared_error(result: AssociationResult, truth: RigidTransform) -> float:

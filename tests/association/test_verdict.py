@@ -84,7 +84,7 @@ def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.
             assert unusable.verdict.cautious == pytest.approx(1.0)
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
     assert got.probability == pytest.approx(0.5)
-    assert "twin" in [reason.code for reason in got.reasons]
+    assert "similar_place" in [reason.code for reason in got.reasons]
 
 
 def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
@@ -94,8 +94,8 @@ def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
         alone, beside = (judge(room(), explanations_of(answer_with(best), *others)) for others in ((), (other,)))
     assert alone.status is beside.status is Status.AMBIGUOUS
     assert (alone.margin, beside.margin) == (None, 1.0)
-    assert [reason.code for reason in alone.reasons] == ["too_little"]
-    assert [reason.code for reason in beside.reasons] == ["twin"]
+    assert [reason.code for reason in alone.reasons] == ["insufficient_evidence"]
+    assert [reason.code for reason in beside.reasons] == ["similar_place"]
 
 
 def test_the_probability_is_that_for_scans_of_the_map() -> None:
@@ -126,7 +126,7 @@ def test_what_explains_the_scan_no_better_than_other_buildings_is_no_match(expla
         for numbers in (LIKELY, LIKELY._replace(rival=LIKELY.score), LIKELY._replace(deviation=0.4)):
             got = Drawn(room(), numbers).verdict
             assert got.status is status
-            assert got.reasons[0].code == "elsewhere"
+            assert got.reasons[0].code == "not_on_map"
         free = Drawn(room(), LIKELY, degenerate=True).verdict
         assert free.status is (Status.DEGENERATE if status is Status.AMBIGUOUS else status)
 
@@ -149,7 +149,7 @@ def test_below_a_limit_the_scan_may_be_of_another_place(more: float) -> None:
     cautious = {"constant": [math.log(bar / (1.0 - bar))]}
     with judged_by({**SURE, "cautious": cautious}):
         for one in (leading(40.0), replace(leading(40.0), degenerate=True)):
-            assert ("elsewhere" in [reason.code for reason in one.verdict.reasons]) is (more < 0.0)
+            assert ("not_on_map" in [reason.code for reason in one.verdict.reasons]) is (more < 0.0)
     with judged_by({**SURE, "cautious": cautious}, USABLE_CAUTIOUS=0.05):
         assert leading(40.0).verdict.reasons == ()
 
@@ -224,7 +224,7 @@ def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> No
     assert strong.usable
     assert weak.status is Status.AMBIGUOUS
     assert weak.probability == pytest.approx(strong.probability)
-    assert weak.reasons[0].code == "elsewhere"
+    assert weak.reasons[0].code == "not_on_map"
 
 
 @pytest.mark.parametrize(("better", "usable"), [(0.019, True), (0.021, False)])
@@ -235,17 +235,17 @@ def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, mo
     with judged_by(SURE):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.OK if usable else Status.AMBIGUOUS, usable)
-    assert usable or got.reasons[0] == Reason("elsewhere", reasons.MIRRORED)
+    assert usable or got.reasons[0] == Reason("not_on_map", reasons.MIRRORED)
 
 
 def test_nothing_found() -> None:
     """Outside of the window there may be something."""
     nothing = judge(room(), explanations_of(None))
     assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, False, (), True)
-    assert [reason.code for reason in nothing.reasons] == ["elsewhere"]
+    assert [reason.code for reason in nothing.reasons] == ["not_on_map"]
     outside = judge(room(), explanations_of(None, ranked(inside=False)))
     assert replace(outside, reasons=()) == replace(nothing, reasons=(), contradicted=True)
-    assert [reason.code for reason in outside.reasons] == ["prior_contradicted", "elsewhere"]
+    assert [reason.code for reason in outside.reasons] == ["prior_contradicted", "not_on_map"]
 
 
 def test_an_incomplete_search_is_never_usable() -> None:
@@ -271,12 +271,12 @@ def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypa
     in_time = associate(index, sent, None, THROUGH, Deadline(time.monotonic() + 60.0))
     assert in_time.usable
     assert (in_time.search.complete, in_time.search.exhaustive) == (True, True)
-    assert in_time.search.rivals_above < 1.0
+    assert in_time.search.complete_above < 1.0
     monkeypatch.setattr(module, during, late)
     got = associate(index, sent, None, THROUGH, deadline)
     assert deadline.at == 0.0
     assert not got.usable
-    assert (got.search.complete, got.search.exhaustive, got.search.rivals_above) == (False, False, 1.0)
+    assert (got.search.complete, got.search.exhaustive, got.search.complete_above) == (False, False, 1.0)
     assert got.pose == in_time.pose
     assert got.reasons[0].code == "search_incomplete"
     assert "search_incomplete" in [warning.code for warning in got.warnings]
@@ -296,7 +296,7 @@ def test_few_walls_of_which_one_decides_are_not_enough() -> None:
     with judged_by(SURE):
         got = replace(leading(40.0), thin=True).verdict
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
-    assert got.reasons[0].code == "too_little"
+    assert got.reasons[0].code == "insufficient_evidence"
 
 
 @pytest.mark.parametrize(("more", "contradicted"), [(6.0, False), (6.01, True)])
@@ -350,7 +350,7 @@ def test_the_window_is_that_of_the_family_member_that_is_answered() -> None:
     assert got.pose is not None
     assert same_pose(got.pose, window.pose, 1e-6, 1e-9)
     assert not got.contradicted
-    assert [reason.code for reason in got.reasons] == ["free_direction"]
+    assert [reason.code for reason in got.reasons] == ["unobservable_direction"]
 
 
 def test_margin_and_runner_up() -> None:

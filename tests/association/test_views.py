@@ -316,7 +316,7 @@ def test_a_drive_whose_last_view_does_not_fit_is_not_gone_by() -> None:
     assert answer is not None
     slipped = replace(explained, answer=replace(answer, beams=replace(answer.beams, in_step=LEAST_IN_STEP - 0.01)))
     verdict = judge(context, slipped)
-    assert (verdict.status, [one.code for one in verdict.reasons][:1]) == (Status.AMBIGUOUS, ["unexplained"])
+    assert (verdict.status, [one.code for one in verdict.reasons][:1]) == (Status.AMBIGUOUS, ["map_mismatch"])
 
 
 @pytest.mark.parametrize(("covariance", "longest", "together"), [(STEP, 1.0, 1.0), (None, 1.5, 3.0)])

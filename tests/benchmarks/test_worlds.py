@@ -144,8 +144,8 @@ def test_wrong_answers_and_strangers_are_counted() -> None:
     assert judged(found, "ranges: clean") == f"{4000.0 / before:.1f} (40.0 of {before:.1f} % of the scans)"
     away = [AWAY] * 3 + [replace(AWAY, read=0.99)] + [replace(AWAY, usable=False, status="no_match", pose=None)] * 4
     assert judged(away, "ranges: sister") == "37.50"
-    away[-1] = replace(AWAY, usable=False, status="ambiguous", reasons=["twin", "elsewhere"])
-    away[-2] = replace(AWAY, usable=False, status="ambiguous", reasons=["twin"])
+    away[-1] = replace(AWAY, usable=False, status="ambiguous", reasons=["similar_place", "not_on_map"])
+    away[-2] = replace(AWAY, usable=False, status="ambiguous", reasons=["similar_place"])
     assert judged(away, "ranges: in another building: told to be elsewhere") == "37.5"
     assert judged(away, "ranges: mirrored") == "not measured"
     assert judged([replace(ANSWER, form="segments", condition="turning")] * 2, "segments: turning") == "100.0"

@@ -45,14 +45,14 @@ def test_short_segments_and_segments_of_few_points_are_left_out(cut):
     assert 0 < len(only_long.pairs) < len(everything.pairs)
     assert only_long.measured.segments.lengths[only_long.pairs[:, 0]].min() >= 80.0 * UNIT
     assert 0 < len(only_many.pairs) < len(everything.pairs)
-    assert only_many.measured.points[only_many.pairs[:, 0]].min() >= 20
+    assert only_many.measured.point_counts[only_many.pairs[:, 0]].min() >= 20
 
 
 def test_a_wall_behind_a_pillar_is_cut_where_it_is_hidden():
     _, scan_ = measured("Pillars", CUTS["walls"])
     walls = scan_.pairs[:, 1]
     assert len(walls) > len(np.unique(walls))
-    assert scan_.measured.points.sum() <= NOISE[0]
+    assert scan_.measured.point_counts.sum() <= NOISE[0]
 
 
 def test_a_segment_over_two_walls_is_left_out_unless_asked_for():
@@ -94,4 +94,4 @@ def test_nothing_smaller_than_asked_for_is_a_pair():
     rng = Condition("CutSquare", 1000, 3.0, 8, 1).rng(3)
     setup = Setup(min_length=0.0, purity=0.0)
     scans = [take(world("CutSquare"), poses("CutSquare")[3], (1000, 3.0), setup, rng) for _ in range(4)]
-    assert all((s.measured.points[s.pairs[:, 0]] >= setup.min_points).all() for s in scans)
+    assert all((s.measured.point_counts[s.pairs[:, 0]] >= setup.min_points).all() for s in scans)

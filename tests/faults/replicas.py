@@ -142,7 +142,7 @@ def replicas(folder: Path, count: int = 3, **settings: object) -> Iterator[Repli
         parts = urlsplit(LOCAL)
         line = Line(parts.hostname or "127.0.0.1", parts.port or 5432)
         stack.callback(line.close)
-        told = {"database_url": url.replace(f":{parts.port}/", f":{line.port}/"), "drain_seconds": 1, **settings}
+        told = {"database_url": url.replace(f":{parts.port}/", f":{line.port}/"), "drain_s": 1, **settings}
         places = [folder / f"replica-{number}" for number in range(count)]
         for place in places:
             place.mkdir()

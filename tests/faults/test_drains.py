@@ -61,7 +61,7 @@ def test_what_was_accepted_is_answered(start_service: Callable[..., Any], tmp_pa
     total: Counter[str] = Counter()
     slowest = 0.0
     for turn in range(drains):
-        running = start_service(tmp_path, drain_seconds=0.2)
+        running = start_service(tmp_path, drain_s=0.2)
         callers = [Caller(running.url, f"{turn}-{i}") for i in range(CALLERS)]
         for caller in callers:
             caller.start()

@@ -59,7 +59,7 @@ def test_one_pair_is_degenerate(estimator: Estimator) -> None:
     scan = MeasuredSegments.from_segments(seen_from(POSE, map_segments))
     result = register(map_segments, scan, [[0, 0]], 0.0, RegistrationOptions(estimator))
     assert result.degenerate
-    assert (result.diagnostics.n, result.diagnostics.dof) == (1, 0)
+    assert (result.diagnostics.pairs, result.diagnostics.dof) == (1, 0)
     np.testing.assert_allclose(result.offsets, 0.0, atol=1e-12)
 
 
@@ -118,7 +118,7 @@ def test_a_translation_less_certain_than_half_a_metre_is_degenerate() -> None:
 def test_half_a_metre_is_the_limit(deviation: float, degenerate: bool) -> None:
     """A cross of two walls, each of which alone says where it is across itself."""
     cross = Segments.from_array([[-50, 0, 50, 0], [0, -50, 0, 50]])
-    scan = MeasuredSegments.from_segments(seen_from(POSE, cross), 4.0 * deviation, points=[16.0, 16.0])
+    scan = MeasuredSegments.from_segments(seen_from(POSE, cross), 4.0 * deviation, point_counts=[16.0, 16.0])
     result = register(cross, scan, diagonal(2))
     assert (result.degenerate, result.diagnostics.dof) == (degenerate, 1)
 
@@ -160,9 +160,9 @@ def test_a_pair_of_weight_0_does_not_say_that_the_others_fix_the_pose() -> None:
     map_segments, _ = nearly_parallel(0.45)
     across = Segments.from_array(np.vstack([map_segments.endpoints, [1.0, 1.0, 1.0, 4.0]]))
     scan = MeasuredSegments.from_segments(seen_from(POSE, across), 0.02)
-    weights = np.append(scan.points[:2] / 0.02**2, 0.0)
+    weights = np.append(scan.point_counts[:2] / 0.02**2, 0.0)
     result = register(across, scan, diagonal(3), 0.0, RegistrationOptions(weights=weights))
-    assert (result.degenerate, result.diagnostics.n, result.diagnostics.dof) == (True, 2, 2)
+    assert (result.degenerate, result.diagnostics.pairs, result.diagnostics.dof) == (True, 2, 2)
 
 
 def test_one_step_gives_the_papers_answer_as_long_as_it_has_one() -> None:

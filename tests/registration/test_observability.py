@@ -19,7 +19,7 @@ def parallel(degrees: list[float], sigma: float, lengths: tuple[float, ...] = (4
     reach = np.array(lengths[: len(a)])[:, None]
     segments = Segments.from_array(np.hstack([begins, begins + reach * directions]))
     scan = MeasuredSegments.from_segments(segments, sigma)
-    return are_parallel(correspondences(segments, scan), scan.points / sigma**2)
+    return are_parallel(correspondences(segments, scan), scan.point_counts / sigma**2)
 
 
 @pytest.mark.parametrize(

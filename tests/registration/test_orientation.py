@@ -65,7 +65,7 @@ def test_without_directions_the_half_turn_has_to_be_worse_by_three_deviations(de
     """A cross, which the half turn takes to itself, and a wall that it takes so many standard deviations off."""
     ends = np.array([[-2, 0, 2, 0], [0, -2, 0, 2], [-1, 0.5 * deviations, 1, 0.5 * deviations]])
     map_segments = Segments.from_array(ends)
-    scan = MeasuredSegments.from_segments(map_segments, 1.0, points=[1e8, 1e8, 1.0])
+    scan = MeasuredSegments.from_segments(map_segments, 1.0, point_counts=[1e8, 1e8, 1.0])
     result = register(map_segments, scan, diagonal(3), 0.0, RegistrationOptions(oriented=False))
     assert result.degenerate is not unique
     # It is a question of noise, and not of how a caller weighs.

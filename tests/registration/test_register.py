@@ -59,7 +59,7 @@ def test_perfect_data_give_the_pose_and_no_ambiguity(
     d = result.diagnostics
     assert d.ambiguity.total == pytest.approx(0.0, abs=1e-15 * result.weights.sum())
     assert d.chi2 == pytest.approx(0.0, abs=1e-15)
-    assert (d.n, d.dof) == (6, 9)
+    assert (d.pairs, d.dof) == (6, 9)
     assert (result.covariance is None) == (estimator == "one_step")
     assert result.unobservable is None
 
@@ -242,7 +242,7 @@ def test_a_pair_of_weight_0_has_a_residual_and_no_say() -> None:
     result = register(map_segments, scan, pairs, 0.0, RegistrationOptions(weights=[1e4] * 6 + [0.0]))
     np.testing.assert_allclose(difference(pose_of(result), POSE), 0.0, atol=1e-12)
     assert abs(result.offsets[6]) == pytest.approx(6.0)
-    assert (result.diagnostics.n, result.diagnostics.dof) == (6, 9)
+    assert (result.diagnostics.pairs, result.diagnostics.dof) == (6, 9)
 
 
 def test_weights_replace_the_information() -> None:

@@ -50,8 +50,8 @@ def test_bad_pairs_are_refused(pairs: Any, index: int | None) -> None:
 def test_each_index_has_the_range_of_its_own_set() -> None:
     many = Segments.from_array(ROOM)
     few = many.take(np.arange(2))
-    assert register(many, MeasuredSegments.from_segments(few), [[0, 4], [1, 5]]).diagnostics.n == 2
-    assert register(few, MeasuredSegments.from_segments(many), [[4, 0], [5, 1]]).diagnostics.n == 2
+    assert register(many, MeasuredSegments.from_segments(few), [[0, 4], [1, 5]]).diagnostics.pairs == 2
+    assert register(few, MeasuredSegments.from_segments(many), [[4, 0], [5, 1]]).diagnostics.pairs == 2
     for map_segments, scan, pair in ((many, few, [2, 0]), (few, many, [0, 2])):
         with pytest.raises(InvalidArgumentError, match="from 0 to 1, got 2"):
             register(map_segments, MeasuredSegments.from_segments(scan), [pair])
@@ -91,7 +91,7 @@ def test_information_without_noise_is_refused() -> None:
         register(map_segments, scan, diagonal(6))
     assert caught.value.argument == "scan.sigma"
     with_little = MeasuredSegments.from_segments(scan.segments, 1e-200)
-    np.testing.assert_allclose(register(map_segments, with_little, diagonal(6)).weights, 1e24 * scan.points)
+    np.testing.assert_allclose(register(map_segments, with_little, diagonal(6)).weights, 1e24 * scan.point_counts)
     little = register(map_segments, scan, diagonal(6), 1e-200)
     np.testing.assert_allclose(little.weights, 1e24)
     assert register(map_segments, scan, diagonal(6), 0.01).usable

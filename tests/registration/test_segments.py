@@ -100,7 +100,7 @@ def test_what_is_no_array_of_segments_is_refused(array: Any) -> None:
 def test_what_a_caller_does_not_know_is_filled_in() -> None:
     measured = MeasuredSegments.from_segments(Segments.from_array(np.array([[0, 0, 6, 0], [0, 0, 0, 0.03]])))
     np.testing.assert_allclose(measured.sigma, [0.02, 0.02])
-    np.testing.assert_allclose(measured.points, [120, 0.6])
+    np.testing.assert_allclose(measured.point_counts, [120, 0.6])
     assert not measured.counted
     np.testing.assert_allclose(measured.spreads, [3.0, 0.03**2 / 12])
     np.testing.assert_allclose(measured.centroids, np.array([[3, 0], [0, 0.015]]))
@@ -114,12 +114,12 @@ def test_of_nothing_lists_of_any_form_are_taken() -> None:
 
 def test_points_that_were_counted_are_told_from_those_that_were_not() -> None:
     segments = Segments.from_array([[0, 0, 0, 0.03]])
-    counted = MeasuredSegments.from_segments(segments, points=[1.0])
+    counted = MeasuredSegments.from_segments(segments, point_counts=[1.0])
     assert counted.counted
-    assert counted.points.tolist() == [1.0]
+    assert counted.point_counts.tolist() == [1.0]
     with pytest.raises(InvalidArgumentError) as caught:
-        MeasuredSegments.from_segments(segments, points=[0.6])
-    assert (caught.value.argument, caught.value.index) == ("scan.points", 0)
+        MeasuredSegments.from_segments(segments, point_counts=[0.6])
+    assert (caught.value.argument, caught.value.index) == ("scan.point_counts", 0)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_points_that_were_counted_are_told_from_those_that_were_not() -> None:
         ({"sigma": -0.1}, "scan.sigma", 0),
         ({"sigma": [0.1, math.nan]}, "scan.sigma", 1),
         ({"sigma": [0.1]}, "scan.sigma", None),
-        ({"points": [5, 0]}, "scan.points", 1),
+        ({"point_counts": [5, 0]}, "scan.point_counts", 1),
         ({"moments": ([[0, 0], [0, math.inf]], [1, 1])}, "scan.centroids", 1),
         ({"moments": ([[0, 0], [0, 0]], [-1, 1])}, "scan.spreads", 0),
     ],

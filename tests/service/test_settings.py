@@ -82,7 +82,7 @@ def test_keys_that_are_set_to_nothing_are_none(monkeypatch: pytest.MonkeyPatch) 
     assert read_settings([]).keys == ()
 
 
-@pytest.mark.parametrize("name", ["max_deadline_ms", "request_timeout", "drain_seconds", "hang_seconds"])
+@pytest.mark.parametrize("name", ["max_deadline_ms", "request_timeout_s", "drain_s", "hang_s"])
 @pytest.mark.parametrize("value", ["inf", "nan", "-inf", "1e400"])
 def test_times_are_finite(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
     monkeypatch.setenv(f"LINEFIX_{name.upper()}", value)

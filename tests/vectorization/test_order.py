@@ -56,7 +56,7 @@ def test_points_that_come_again_count_once(name: str, viewpoint: Viewpoint) -> N
     repeats = counts(name, len(points))
     found = vectorize(np.repeat(points, repeats, axis=0), viewpoint=viewpoint)
     np.testing.assert_array_equal(found.measured.segments.endpoints, once.measured.segments.endpoints)
-    np.testing.assert_array_equal(found.measured.points, once.measured.points)
+    np.testing.assert_array_equal(found.measured.point_counts, once.measured.point_counts)
     assert found.sigma == once.sigma
     assert found.ordered
     # Spans are indices of the points as they were sent.
@@ -69,7 +69,9 @@ def test_points_that_come_again_count_once(name: str, viewpoint: Viewpoint) -> N
 def test_a_scan_that_is_sent_twice_counts_once(again: Callable[[Floats], Floats], viewpoint: Viewpoint) -> None:
     points, _ = seen()
     found = vectorize(np.vstack([points, again(points)]), viewpoint=viewpoint)
-    np.testing.assert_array_equal(found.measured.points, vectorize(points, viewpoint=viewpoint).measured.points)
+    np.testing.assert_array_equal(
+        found.measured.point_counts, vectorize(points, viewpoint=viewpoint).measured.point_counts
+    )
 
 
 def nearly(once: Floats, other: Floats) -> bool:
@@ -86,7 +88,7 @@ def test_points_that_come_nearly_again_count_once(name: str, scatter: float, vie
     repeated += np.random.default_rng(2).normal(0.0, scatter, repeated.shape)
     once, found = vectorize(points, viewpoint=viewpoint), vectorize(repeated, viewpoint=viewpoint)
     assert nearly(once.measured.segments.endpoints, found.measured.segments.endpoints)
-    assert found.measured.points.sum() < 1.25 * len(points)
+    assert found.measured.point_counts.sum() < 1.25 * len(points)
     assert found.ordered
 
 
@@ -97,7 +99,7 @@ def test_two_returns_of_each_beam_count_once(scatter: float) -> None:
     pairs = np.stack([points, points + along * rays], axis=1).reshape(-1, 2)
     once, found = vectorize(points), vectorize(pairs)
     assert nearly(once.measured.segments.endpoints, found.measured.segments.endpoints)
-    assert found.measured.points.sum() <= len(points)
+    assert found.measured.point_counts.sum() <= len(points)
 
 
 @pytest.mark.parametrize("fraction", [0.05, 0.1, 0.3, 0.6, 1.0])

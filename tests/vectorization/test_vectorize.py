@@ -62,7 +62,7 @@ def test_a_wall_alone_has_the_numbers_of_its_closed_form() -> None:
     np.testing.assert_allclose(measured.segments.endpoints, [[2, y[0], 2, y[-1]]], atol=1e-12)
     # Noise along the ray, and 3 mm of the wall's own, straight through the wall.
     weights = 1 / ((0.01 * np.cos(a)) ** 2 + 0.003**2)
-    assert measured.points.tolist() == [5]
+    assert measured.point_counts.tolist() == [5]
     assert measured.sigma[0] == pytest.approx(np.sqrt(5 / weights.sum()))
     np.testing.assert_allclose(measured.centroids, [[2, 0]], atol=1e-12)
     assert measured.spreads[0] == pytest.approx(np.sum(weights * y**2) / np.sum(weights))
@@ -97,7 +97,7 @@ def test_where_the_angles_start_turns_the_segments_and_nothing_else(start: float
     turn = RigidTransform(0, 0, start + step * steps + math.pi)
     turned = turn.apply(one.segments.endpoints.reshape(-1, 2)).reshape(-1, 4)
     assert_same_walls(other.segments.endpoints, turned, 1e-6)
-    assert np.sort(other.points).tolist() == np.sort(one.points).tolist()
+    assert np.sort(other.point_counts).tolist() == np.sort(one.point_counts).tolist()
 
 
 def test_a_door_parts_a_wall() -> None:
@@ -118,7 +118,7 @@ def test_a_thin_post_does_not_part_a_wall() -> None:
     found = vectorize(laser(seen))
     assert len(found.measured) == 1
     assert found.measured.segments.lengths[0] == pytest.approx(6 * math.tan(0.5), abs=0.05)
-    assert found.measured.points[0] == pytest.approx(401 - np.sum(seen.hits == 1), abs=1)
+    assert found.measured.point_counts[0] == pytest.approx(401 - np.sum(seen.hits == 1), abs=1)
 
 
 def test_a_slit_that_is_seen_through_parts_a_wall() -> None:
@@ -136,7 +136,7 @@ def test_a_point_beside_the_end_of_a_wall_is_not_its_own() -> None:
     ranges[-1] += 0.06
     found = vectorize(LaserScan(0.0, 0.01, ranges), VectorizationOptions(sigma=0.02))
     assert found.spans.tolist() == [[0, 29]]
-    assert found.measured.points.tolist() == [30]
+    assert found.measured.point_counts.tolist() == [30]
     np.testing.assert_allclose(found.measured.segments.endpoints[0], [2, 0, 2, 2 * math.tan(0.29)], atol=1e-7)
 
 
@@ -145,7 +145,7 @@ def test_a_lost_beam_does_not_part_a_wall_but_a_given_gap_does() -> None:
     ranges[[10, 40]] = np.nan, np.inf
     scan_ = LaserScan(-0.3, 0.01, ranges)
     assert len(vectorize(scan_).measured) == 1
-    assert vectorize(scan_).measured.points[0] == 59
+    assert vectorize(scan_).measured.point_counts[0] == 59
     parted = vectorize(scan_, VectorizationOptions(max_gap=0.03))
     assert parted.spans.tolist() == [[0, 9], [11, 39], [41, 60]]
 
@@ -205,7 +205,7 @@ def test_what_a_segment_claims_is_what_it_is_off_by() -> None:
         assert len(m) == 4
         d = RigidTransform(0, 0, pose.theta).apply(m.segments.directions)
         k = np.argmax(d @ SQUARE.directions.T, axis=1)
-        information = m.points / m.sigma**2
+        information = m.point_counts / m.sigma**2
         off = np.sum(SQUARE.normals[k] * pose.apply(m.centroids), axis=1) - SQUARE.offsets[k]
         turn = d[:, 0] * SQUARE.directions[k, 1] - d[:, 1] * SQUARE.directions[k, 0]
         offsets.append(off * np.sqrt(information))
@@ -289,7 +289,7 @@ def test_none_is_smaller_than_asked_for_after_its_corners_were_cut() -> None:
     for options in (VectorizationOptions(), VectorizationOptions(min_points=30, min_length=1.0)):
         for pose in world.poses:
             found = vectorize(laser(scan(world.segments, pose, Scanner(sigma=0.02), rng)), options)
-            least.append((found.measured.points.min() - options.min_points,
+            least.append((found.measured.point_counts.min() - options.min_points,
                           found.measured.segments.lengths.min() - options.min_length))  # fmt: skip
     assert np.min(least, axis=0).min() >= -1e-9
 

@@ -17,7 +17,7 @@ button.addEventListener("click", async () => {
     told.textContent = "There is no map yet.";
     return;
   }
-  const { own, added } = kept();
+  const { own, landmark } = kept();
   const laser = {
     fov: Math.min(2 * Math.PI, (Math.PI / 180) * Number(value("#fov"))),
     beams: Math.round(Number(value("#beams"))),
@@ -30,14 +30,14 @@ button.addEventListener("click", async () => {
   const stored = asStored() || (state.mapId !== null && own.length === state.own);
   const map = stored ? { map_id: state.mapId } : { ...state.map, segments: own };
   button.disabled = true;
-  told.textContent = drive || added.length ? "Looking about, which may take half a minute ..." : "Looking about ...";
+  told.textContent = drive || landmark.length ? "Looking about, which may take half a minute ..." : "Looking about ...";
   const of = state.walls;
   try {
-    const found = await analyze({ map, laser, spacing, drive, added, deadline_ms: drive ? LONG_TIME : TIME });
+    const found = await analyze({ map, laser, spacing, drive, landmark, deadline_ms: drive ? LONG_TIME : TIME });
     if (of !== state.walls) return; // another map is shown by now
     Object.assign(state, { analysis: found, pointed: null });
-    state.show = added.length ? "added" : drive ? "driven" : "now";
-    told.textContent = sentence(found, drive);
+    state.show = landmark.length ? "landmark" : drive ? "driven" : "now";
+    told.textContent = summaryOf(found, drive);
   } catch (error) {
     told.textContent = error instanceof Error ? error.message : String(error);
   } finally {
@@ -46,14 +46,14 @@ button.addEventListener("click", async () => {
   }
 });
 
-function sentence({ places: found, summary, complete }: Analysis, drive: number): string {
-  const { places, usable, look_alike, left_out, knows_within, usable_with_added } = summary;
+function summaryOf({ places: found, summary, complete }: Analysis, drive: number): string {
+  const { places, usable, similar_pose, left_out, resolved_within, usable_with_landmark } = summary;
   const rest = complete ? "" : ` There was no time for ${left_out} more.`;
   if (!places) return `There is no place where a robot could stand.${rest}`;
-  const driven = knows_within === null ? "" : ` After a drive of up to ${drive} m it would at ${knows_within}.`;
-  const added = usable_with_added === null ? "" : ` With the boxes that you put up it would at ${usable_with_added}.`;
+  const driven = resolved_within === null ? "" : ` After a drive of up to ${drive} m it would at ${resolved_within}.`;
+  const landmark = usable_with_landmark === null ? "" : ` With the boxes that you put up it would at ${usable_with_landmark}.`;
   const each = found.some((one) => one.pose.theta !== found[0].pose.theta) ? "places, four headings at each" : "places";
-  return `A robot would know where it is at ${usable} of ${places} ${each}; ${look_alike} look like another.${driven}${added}${rest}`;
+  return `A robot would know where it is at ${usable} of ${places} ${each}; ${similar_pose} look like another.${driven}${landmark}${rest}`;
 }
 
 show.addEventListener("change", () => {
@@ -69,10 +69,10 @@ clear.addEventListener("click", () => {
 onChange(() => {
   if (clear.disabled !== !state.analysis && !state.analysis && !button.disabled) told.textContent = "";
   clear.disabled = !state.analysis;
-  const { knows_within, usable_with_added } = state.analysis?.summary ?? { knows_within: null, usable_with_added: null };
-  const there: Record<Shown, boolean> = { now: true, driven: knows_within !== null, added: usable_with_added !== null };
+  const { resolved_within, usable_with_landmark } = state.analysis?.summary ?? { resolved_within: null, usable_with_landmark: null };
+  const there: Record<Shown, boolean> = { now: true, driven: resolved_within !== null, landmark: usable_with_landmark !== null };
   if (!there[state.show]) state.show = "now";
   for (const option of show.options) option.disabled = !there[option.value as Shown];
-  show.disabled = !there.driven && !there.added;
+  show.disabled = !there.driven && !there.landmark;
   show.value = state.show;
 });

@@ -8,7 +8,7 @@ import { drawWalls } from "./walls";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const context = canvas.getContext("2d")!;
-const NAMES = ["wall", "off", "before", "point", "unmatched", "missing", "ghost", "robot", "hinge", "ok", "ambiguous", "degenerate", "no_match"];
+const NAMES = ["wall", "off", "before", "point", "unmatched", "missing", "ghost", "robot", "critical", "ok", "ambiguous", "degenerate", "no_match"];
 let colours: Record<string, string> = {};
 let frame = 0;
 export const HANDLE = 46; // px from the robot to its handle
@@ -56,7 +56,7 @@ function draw(): void {
   if (state.analysis) drawAnalysis(state.analysis.places, state.analysis.spacing);
   drawWalls(context, colours.wall, redraw);
   drawPutUp();
-  if (state.analysis && state.pointed?.look_alike) drawLikeness(state.pointed.pose, state.pointed.look_alike);
+  if (state.analysis && state.pointed?.similar_pose) drawLikeness(state.pointed.pose, state.pointed.similar_pose);
   drawTakenOff();
   if (state.log.length) drawLog();
   const { answer, sent } = state;
@@ -111,7 +111,7 @@ function drawAnswer(answer: Answer, scan: Scan): void {
   }
   drawScan({ ...scan, segments: undefined }, pose, "point", 0.75);
   const segments = sentSegments();
-  for (const k of answer.diagnostics?.hinges_on?.map ?? []) line(state.walls[state.sentTo[k]], colours.hinge, 11);
+  for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[state.sentTo[k]], colours.critical, 11);
   answer.correspondences.forEach((pair, index) => {
     line(state.walls[state.sentTo[pair.map]], pairColour(index), 2.5);
     line(placed(pose, segments[pair.scan]), pairColour(index), 5);
@@ -220,8 +220,8 @@ function drawLikeness(from: Pose, to: Pose): void {
 
 /** What is shown of a place: at once, after a drive, or with what was put up; null where no robot can stand then. */
 export function shownOf(one: Place): { status: Answer["status"]; usable: boolean; probability: number | null } | null {
-  if (state.show === "added") return one.with_added;
-  if (state.show === "driven" && one.knows_after !== null) return { ...one, status: "ok", usable: true };
+  if (state.show === "landmark") return one.with_landmark;
+  if (state.show === "driven" && one.resolved_after !== null) return { ...one, status: "ok", usable: true };
   return one;
 }
 
@@ -280,10 +280,10 @@ function toldOf(one: Place): string {
   const at = ({ x, y }: Pose) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;
   const told = ({ status, usable, probability }: { status: string; usable: boolean; probability: number | null }) =>
     `${status.replace("_", " ")}, ${usable ? "" : "not "}usable${probability === null ? "" : `, ${(100 * probability).toFixed(1)} %`}`;
-  const like = one.look_alike ? `, looks like ${at(one.look_alike)}` : "";
-  const drive = one.knows_after ? `; knows after ${one.knows_after} m` : "";
-  const added = one.with_added ? `; with the boxes: ${told(one.with_added)}` : "";
-  return `${at(one.pose)}: ${told(one)}${like}${drive}${added}`;
+  const like = one.similar_pose ? `, looks like ${at(one.similar_pose)}` : "";
+  const drive = one.resolved_after ? `; knows after ${one.resolved_after} m` : "";
+  const landmark = one.with_landmark ? `; with the boxes: ${told(one.with_landmark)}` : "";
+  return `${at(one.pose)}: ${told(one)}${like}${drive}${landmark}`;
 }
 
 /** Which wall is within some metres of a place, -1 for none. */

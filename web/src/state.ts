@@ -25,7 +25,7 @@ export interface State {
   logAt: number;
 }
 
-export type Shown = "now" | "driven" | "added";
+export type Shown = "now" | "driven" | "landmark";
 
 export const state: State = {
   map: null,
@@ -71,11 +71,11 @@ export function setMap(map: MapDocument, mapId: string | null = null): void {
 }
 
 /** The walls that count, of the map's own and of those that were put up. */
-export function kept(): { own: Segment[]; added: Segment[] } {
+export function kept(): { own: Segment[]; landmark: Segment[] } {
   const on = (_: Segment, k: number) => !state.off.has(k);
   const left = state.walls.filter(on);
-  const added = state.walls.slice(state.own).filter((_, k) => !state.off.has(state.own + k));
-  return { own: left.slice(0, left.length - added.length), added };
+  const landmark = state.walls.slice(state.own).filter((_, k) => !state.off.has(state.own + k));
+  return { own: left.slice(0, left.length - landmark.length), landmark };
 }
 
 /** Whether the map is the stored one, as it is stored. */

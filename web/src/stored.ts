@@ -84,8 +84,8 @@ async function remove(id: string): Promise<void> {
 async function upload(): Promise<void> {
   if (!state.map) throw new Error("There is no map yet.");
   if (!name.value || !name.checkValidity()) throw new Error("A name has letters, digits, dots, dashes and underscores only.");
-  const { own, added } = kept();
-  const told = await putMap(name.value, { ...state.map, segments: [...own, ...added] });
+  const { own, landmark } = kept();
+  const told = await putMap(name.value, { ...state.map, segments: [...own, ...landmark] });
   await load("");
   tell(`${told.map_id} is stored, revision ${told.revision}.`);
 }

@@ -40,11 +40,11 @@ export interface Correspondence {
   angle: number;
 }
 
-export interface Hinge {
+export interface CriticalWall {
   scan: number[];
   map: number[];
   direction: [number, number];
-  moves: number;
+  displacement: number;
 }
 
 export interface Reason {
@@ -56,7 +56,7 @@ export interface Answer {
   status: "ok" | "ambiguous" | "degenerate" | "no_match";
   usable: boolean;
   probability: number | null; // null: degenerate
-  sentence: string;
+  message: string;
   pose: Pose | null;
   covariance: number[][] | null;
   unobservable: [number, number] | null;
@@ -64,7 +64,7 @@ export interface Answer {
   unmatched_scan: number[];
   missing_map: number[];
   segments: Segment[] | null;
-  diagnostics: { hinges_on: Hinge | null; score: number } | null;
+  diagnostics: { critical_wall: CriticalWall | null; score: number } | null;
   reasons: Reason[];
   warnings: Reason[];
   alternatives: { pose: Pose; score: number; inlier_fraction: number }[];
@@ -76,15 +76,15 @@ export interface Place {
   status: Answer["status"];
   usable: boolean;
   probability: number | null; // null: degenerate
-  look_alike: Pose | null;
+  similar_pose: Pose | null;
   reasons: string[];
-  knows_after: number | null;
-  with_added: { status: Answer["status"]; usable: boolean; probability: number | null } | null;
+  resolved_after: number | null;
+  with_landmark: { status: Answer["status"]; usable: boolean; probability: number | null } | null;
 }
 
 export interface Analysis {
   places: Place[];
-  summary: Record<string, number> & { knows_within: number | null; usable_with_added: number | null };
+  summary: Record<string, number> & { resolved_within: number | null; usable_with_landmark: number | null };
   spacing: number;
   complete: boolean;
 }
@@ -132,5 +132,5 @@ export interface Imported {
 export interface StoredMap {
   map_id: string;
   revision: number;
-  segments: number;
+  segment_count: number;
 }

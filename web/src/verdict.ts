@@ -17,8 +17,8 @@ function show(): void {
   const { answer } = state;
   card.dataset.state = problem ? "problem" : answer ? (answer.usable ? "usable" : answer.status) : "none";
   element("#verdict-title").textContent = problem ? "That did not work" : answer ? title() : "Verdict";
-  if (problem || answer) element("#sentence").textContent = problem || answer!.sentence;
-  else if (state.map) element("#sentence").textContent = "Not asked yet.";
+  if (problem || answer) element("#message").textContent = problem || answer!.message;
+  else if (state.map) element("#message").textContent = "Not asked yet.";
   list(element("#reasons"), answer && !problem ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
   numbers();
   others();
@@ -54,10 +54,10 @@ function numbers(): void {
       const [x, y, theta] = [0, 1, 2].map((k) => Math.sqrt(Math.max(0, c[k][k])));
       rows.push(["deviation", `${(1000 * x).toFixed(1)} mm, ${(1000 * y).toFixed(1)} mm, ${degrees(theta).toFixed(3)}°`]);
     }
-    const hinge = answer.diagnostics?.hinges_on;
-    if (hinge) {
-      const walls = hinge.map.map((k) => state.sentTo[k]).join(", ");
-      rows.push(["hinges on", `wall ${walls}: without it the pose could move ${hinge.moves.toFixed(2)} m`]);
+    const critical = answer.diagnostics?.critical_wall;
+    if (critical) {
+      const walls = critical.map.map((k) => state.sentTo[k]).join(", ");
+      rows.push(["critical wall", `${walls}: without it the pose could move ${critical.displacement.toFixed(2)} m`]);
     }
     const seen = answer.correspondences.length + answer.unmatched_scan.length;
     rows.push(["matched", `${answer.correspondences.length} of ${seen} segments, ${answer.missing_map.length} walls missing`]);
@@ -104,7 +104,7 @@ export function legend(): void {
     parts.push(["pair", "seen on a wall"]);
     if (state.answer.unmatched_scan.length) parts.push(["unmatched", "on no wall"]);
     if (state.answer.missing_map.length) parts.push(["missing", "not seen, though it should"]);
-    if (state.answer.diagnostics?.hinges_on) parts.push(["hinge", "what the pose hinges on"]);
+    if (state.answer.diagnostics?.critical_wall) parts.push(["critical", "critical wall: without it the pose could move"]);
     parts.push([state.answer.usable ? "ok" : state.answer.status, "where it was found"]);
     parts.push(state.virtual ? ["robot", "where it stands"] : ["before", "where you put the scan"]);
     if (state.answer.unobservable) parts.push(["degenerate", "free along this"]);

@@ -31,6 +31,7 @@ class ProblemError(LinefixError):
     code : str
         Stable, such as ``invalid_request``; ``unknown`` where something between said no.
     detail : str
+        What is wrong; of an ``invalid_request`` the first of `errors`.
     errors : list of dict
         ``pointer`` and ``message`` of each place that is wrong.
     request_id : str
@@ -46,8 +47,7 @@ class ProblemError(LinefixError):
             [one for one in errors if isinstance(one, dict)] if isinstance(errors, list) else []
         )
         self.request_id = str(problem.get("request_id", ""))
-        places = "".join(f"; {item.get('pointer')}: {item.get('message')}" for item in self.errors)
-        super().__init__(f"{status} {self.code}: {self.detail}{places}")
+        super().__init__(f"{status} {self.code}: {self.detail}")
 
 
 class BusyError(ProblemError):

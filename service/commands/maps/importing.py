@@ -138,7 +138,7 @@ def beside_log(answer: Json, file: Path, fields: Fields, log: Path) -> Json:
     """
     scans = samples_of(log, None)
     checked = _checked(answer["map"], scans)
-    thicker, line_map = checked["samples"]["thicker"], answer["map"]
+    thicker, line_map = checked["samples"]["wall_thickness"], answer["map"]
     drawn = float(line_map["meta"].get("thickness", 0.0)) if line_map["oriented"] else 0.0
     made_of_centres = "thickness" in line_map["meta"] or not line_map["oriented"]
     said = "thickness" in fields or fields.get("drawn") == ["faces"]

@@ -43,7 +43,8 @@ def list_maps(server: Server = None, as_json: AsJson = False) -> None:
         return
     columns = ("id", "revision", "segments", "from x", "y", "to x", "y", "sigma", "oriented")
     rows = [
-        (m["map_id"], m["revision"], m["segments"], *map(float, m["bounds"]), m["sigma"], m["oriented"]) for m in found
+        (m["map_id"], m["revision"], m["segment_count"], *map(float, m["bounds"]), m["sigma"], m["oriented"])
+        for m in found
     ]
     print_table(columns, rows)
 

@@ -65,6 +65,6 @@ def _example(kind: Kind) -> dict[str, Any]:
         "request_id": "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
     }
     if kind.code == "invalid_request":
-        example["detail"] = "one place is wrong; see errors"
-        example["errors"] = [{"pointer": "/scan/segments/3", "message": "expected 4 numbers, got 3"}]
+        example["detail"] = "/scan/segments/3: expected 4 numbers, found 3"
+        example["errors"] = [{"pointer": "/scan/segments/3", "message": "expected 4 numbers, found 3"}]
     return example

@@ -50,7 +50,7 @@ async def limits(request: Request) -> Response:
         "max_bodies_bytes",
         "max_answers_bytes",
         "max_connections",
-        "request_timeout",
+        "request_timeout_s",
         "max_map_segments",
         "max_scan_segments",
         "max_beams",

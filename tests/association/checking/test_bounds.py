@@ -129,6 +129,6 @@ def test_without_time_for_an_index_of_both_directions_the_check_says_that_it_is_
     with pytest.raises(IndexingEndedError):
         index.undirected_by(Deadline(time.monotonic()))
     late = check_map(index, Deadline(time.monotonic()), oriented=False)
-    assert (late.complete, late.looked_from) == (False, 0)
+    assert (late.complete, late.viewpoints) == (False, 0)
     kept = index.undirected_by(Deadline())
     assert kept is index.undirected

@@ -41,10 +41,10 @@ def test_a_map_that_is_right() -> None:
     result = checked(ROOM)
     assert result.findings == ()
     assert (result.advice.sigma, result.advice.oriented) == (None, True)
-    assert (result.size.segments, result.size.walls) == (10, 10)
+    assert (result.size.segment_count, result.size.walls) == (10, 10)
     assert (result.size.length, result.size.diagonal) == pytest.approx((28.0 + 4.4, 10.0))
     assert (result.complete, result.places) == (True, ())
-    assert result.looked_from >= 4
+    assert result.viewpoints >= 4
 
 
 def test_every_finding_is_a_sentence() -> None:
@@ -162,10 +162,10 @@ def test_what_looks_alike() -> None:
     assert set(finding.segments) <= set(range(18))
     assert len(finding.segments) > 9
     for place in result.places:
-        away = place.look_alike.x - place.pose.x
+        away = place.similar_pose.x - place.pose.x
         assert abs(round(away / 5.0)) in (1, 2)
         assert away == pytest.approx(5.0 * round(away / 5.0), abs=0.05)
-        assert place.look_alike.y == pytest.approx(place.pose.y, abs=0.05)
+        assert place.similar_pose.y == pytest.approx(place.pose.y, abs=0.05)
 
 
 def test_a_view_is_what_stands_there() -> None:

@@ -52,7 +52,7 @@ def given_to(measured: MeasuredSegments) -> Measured:
     segments = measured.segments
     return Measured(
         as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,
-        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.points,
+        as_records(POINT, measured.centroids), measured.spreads, measured.sigma, measured.point_counts,
     )  # fmt: skip
 
 

@@ -81,14 +81,14 @@ def join_segments(measured: MeasuredSegments, labels: list[int]) -> Records:
 
 
 def _of(measured: MeasuredSegments, members: list[int]) -> MeasuredSegments:
-    arrays = {name: getattr(measured, name)[members] for name in ("sigma", "points", "centroids", "spreads")}
+    arrays = {name: getattr(measured, name)[members] for name in ("sigma", "point_counts", "centroids", "spreads")}
     return replace(measured, segments=measured.segments.take(members), **arrays)
 
 
 def _join(measured: MeasuredSegments, line: Record) -> None:
     segments = measured.segments
     new = new_lengths(_spans(segments, segments.directions[0], segments.midpoints[0]))
-    points = measured.points * new / segments.lengths  # behind what overlaps those that were seen longest count
+    points = measured.point_counts * new / segments.lengths  # behind what overlaps those that were seen longest count
     mean, moment = _moments(measured, points)
     if len(segments) == 1:  # of which the points may lie beside it
         d = segments.directions[0]

@@ -37,29 +37,29 @@ def test_the_same_on_all_cores_and_from_a_server(folder: Path, service: RunningS
         "180",
         "--drive",
         "1",
-        "--added",
+        "--landmark",
         "box.json",
         "--json",
     )
     here = linefix(*asked, LINEFIX_SEARCHES="2")
     assert (here.code, here.err) == (0, "")
     answer = json.loads(here.out)
-    assert len(answer["places"]) == answer["summary"]["look_alike"] > 30
+    assert len(answer["places"]) == answer["summary"]["similar_pose"] > 30
     there = json.loads(linefix(*asked, "--server", service.url).out)
     for name in ("places", "summary", "complete", "spacing", "map"):
         assert answer[name] == there[name]
-    assert answer["summary"]["knows_within"] == 0
-    assert answer["summary"]["usable_with_added"] > answer["summary"]["usable"] == 0
+    assert answer["summary"]["resolved_within"] == 0
+    assert answer["summary"]["usable_with_landmark"] > answer["summary"]["usable"] == 0
 
 
 def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     asked = ("analyze", "room.json", "--spacing", "1", "--out", "a.geojson", "--picture", "a.png")
-    ended = linefix(*asked, "--drive", "2", "--added", "box.json")
+    ended = linefix(*asked, "--drive", "2", "--landmark", "box.json")
     assert ended.code == 0, ended.err
     assert "usable" in ended.out
     assert re.search(r"^usable +2[0-4] \((8[3-9]|9\d|100) %\)$", ended.out, re.MULTILINE)
     assert "at once or on the way" in ended.out
-    assert "with what is added" in ended.out
+    assert "with the landmark" in ended.out
     features = json.loads((folder / "a.geojson").read_text())["features"]
     assert len(features) > 15
     assert features[0]["geometry"]["type"] == "Point"
@@ -81,7 +81,7 @@ def test_little_time(folder: Path, linefix: Linefix) -> None:
         (("--fov", "360"), 3, "/laser/fov"),
         (("--point", "100", "0"), 3, "/point"),
         (("--drive", "31"), 3, "/drive"),
-        (("--added", "none.json"), 2, "none.json"),
+        (("--landmark", "none.json"), 2, "none.json"),
         (("--out", "a.txt"), 2, "--out"),
     ],
     ids=["degrees", "nowhere", "far", "nothing", "no format"],

@@ -63,13 +63,13 @@ def test_a_verdict_that_is_no_answer_is_done_all_the_same(linefix: Linefix, fold
 def test_register_takes_pairs(linefix: Linefix, folder: Path) -> None:
     ended = linefix("register", "room.json", "scan.json", "--pairs", "pairs.json", "--json")
     answer = json.loads(ended.out)
-    assert (answer["status"], answer["diagnostics"]["n"]) == ("ok", 4)
+    assert (answer["status"], answer["diagnostics"]["pairs"]) == ("ok", 4)
 
 
 def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None:
     assert linefix("vectorize", "points.json", "--out", "found.json").code == 0
     found = json.loads((folder / "found.json").read_text())
-    assert (len(found["segments"]), found["points"], found["frame_id"]) == (1, [60], "front")
+    assert (len(found["segments"]), found["point_counts"], found["frame_id"]) == (1, [60], "front")
     assert linefix("locate", "room.json", "found.json").code == 0
 
 

@@ -64,12 +64,12 @@ def test_a_drive_and_something_added(client: httpx.Client) -> None:
     box = [[1, 1, 1, 2], [1, 2, 3, 2], [3, 2, 3, 1], [3, 1, 1, 1]]
     put(client, rectangle)
     plain = analyzed(client, {"laser": LASER, "spacing": 2.0})
-    assert {(one["knows_after"], one["with_added"]) for one in plain["places"]} == {(None, None)}
-    assert (plain["summary"]["knows_within"], plain["summary"]["usable_with_added"]) == (None, None)
-    more = analyzed(client, {"laser": LASER, "spacing": 2.0, "drive": 2.0, "added": box})
-    assert (more["summary"]["usable"], more["summary"]["knows_within"]) == (0, 0)
-    told = [one["with_added"] for one in more["places"] if one["with_added"]]
-    assert sum(one["usable"] for one in told) == more["summary"]["usable_with_added"] > 0.5 * len(told)
+    assert {(one["resolved_after"], one["with_landmark"]) for one in plain["places"]} == {(None, None)}
+    assert (plain["summary"]["resolved_within"], plain["summary"]["usable_with_landmark"]) == (None, None)
+    more = analyzed(client, {"laser": LASER, "spacing": 2.0, "drive": 2.0, "landmark": box})
+    assert (more["summary"]["usable"], more["summary"]["resolved_within"]) == (0, 0)
+    told = [one["with_landmark"] for one in more["places"] if one["with_landmark"]]
+    assert sum(one["usable"] for one in told) == more["summary"]["usable_with_landmark"] > 0.5 * len(told)
     assert {"status", "usable", "probability"} == set(told[0])
     put(client, [*rectangle, *box])
     there = {
@@ -78,18 +78,18 @@ def test_a_drive_and_something_added(client: httpx.Client) -> None:
     }
     for one in more["places"]:
         told_there = there.get((one["pose"]["x"], one["pose"]["y"]))
-        assert (one["with_added"] is None) == (told_there is None)
+        assert (one["with_landmark"] is None) == (told_there is None)
         if told_there:
-            assert one["with_added"] == {name: told_there[name] for name in one["with_added"]}
+            assert one["with_landmark"] == {name: told_there[name] for name in one["with_landmark"]}
 
 
 def test_two_equal_rooms_and_a_point_in_one_of_them(client: httpx.Client) -> None:
     put(client, [*examples.WALLS, *[[a + 20, b, c + 20, d] for a, b, c, d in examples.WALLS]])
     answer = analyzed(client, {"laser": LASER, "spacing": 1.0, "point": [0, 0]})
     for place in answer["places"]:
-        assert (place["status"], place["usable"], place["reasons"][0]) == ("ambiguous", False, "twin")
-        assert place["look_alike"]["x"] == pytest.approx(place["pose"]["x"] + 20.0, abs=0.2)
-    assert answer["summary"]["look_alike"] == len(answer["places"]) > 20
+        assert (place["status"], place["usable"], place["reasons"][0]) == ("ambiguous", False, "similar_place")
+        assert place["similar_pose"]["x"] == pytest.approx(place["pose"]["x"] + 20.0, abs=0.2)
+    assert answer["summary"]["similar_pose"] == len(answer["places"]) > 20
 
 
 def test_directions_that_mean_nothing(client: httpx.Client) -> None:
@@ -121,9 +121,9 @@ def test_what_there_is_no_time_for_is_left_out(client: httpx.Client) -> None:
         ({"point": [1]}, "/point"),
         ({"places": 3}, "/places"),
         ({"drive": 31}, "/drive"),
-        ({"added": [[0, 0, 1]]}, "/added/0"),
-        ({"added": [[0, 0, 1, 0], [1, 1, 1, 1]]}, "/added/1"),
-        ({"added": [[0, 0, 1, 0]] * 101}, "/added"),
+        ({"landmark": [[0, 0, 1]]}, "/landmark/0"),
+        ({"landmark": [[0, 0, 1, 0], [1, 1, 1, 1]]}, "/landmark/1"),
+        ({"landmark": [[0, 0, 1, 0]] * 101}, "/landmark"),
     ],
 )
 def test_what_cannot_be_analyzed(client: httpx.Client, body: dict[str, Any], pointer: str) -> None:

@@ -94,21 +94,21 @@ def test_reasons_are_given_where_an_answer_is_not_usable(client: httpx.Client) -
     assert answer["reasons"]
     assert all(reason.keys() == {"code", "message"} for reason in answer["reasons"])
     answer = associated(client, scan={"segments": []})
-    assert [reason["code"] for reason in answer["reasons"]] == ["elsewhere"]
+    assert [reason["code"] for reason in answer["reasons"]] == ["not_on_map"]
 
 
 def test_numbers_beside_a_pose(client: httpx.Client) -> None:
-    """What it hinges on, down to where rivals were looked for, and the paper's measures of each alternative."""
+    """Its critical wall, down to where rivals were looked for, and the paper's measures of each alternative."""
     rectangle = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]]}
     corner = {"segments": [[-3.5, 1.0, -3.5, -3.0], [-3.5, -3.0, 2.5, -3.0]]}
     answer = associated(client, map=rectangle, scan=corner, options={"sampling": "random", "seed": 4})
     search = answer["search"]
     assert (search["sampling"], search["seed"]) == ("random", 4)
-    assert 0.5 < search["rivals_above"] < 1.0
-    hinge = answer["diagnostics"]["hinges_on"]
-    assert hinge["moves"] > 1.0
-    assert len(hinge["scan"]) == len(hinge["map"]) == 1
-    assert math.hypot(*hinge["direction"]) == pytest.approx(1.0)
+    assert 0.5 < search["complete_above"] < 1.0
+    wall = answer["diagnostics"]["critical_wall"]
+    assert wall["displacement"] > 1.0
+    assert len(wall["scan"]) == len(wall["map"]) == 1
+    assert math.hypot(*wall["direction"]) == pytest.approx(1.0)
     assert answer["alternatives"]
     for other in answer["alternatives"]:
         assert other["ambiguity"]["total"] >= 0.0
@@ -188,7 +188,7 @@ def test_a_batch_of_a_map_that_is_none_fails_whole(client: httpx.Client) -> None
 def test_vectorize_finds_the_corner(client: httpx.Client) -> None:
     answer = client.post("/v1/vectorize", json=examples.VECTORIZE).json()
     assert len(answer["segments"]) == 2
-    for name in ("points", "centroids", "spreads", "sigmas", "rms"):
+    for name in ("point_counts", "centroids", "spreads", "sigmas", "rms"):
         assert len(answer[name]) == 2
     # Counter-clockwise, free space on the left: up the wall at x = 2, then back along y = 2.
     assert answer["segments"][0] == pytest.approx([2.0, 0.0, 2.0, 2.0], abs=0.05)
@@ -197,7 +197,7 @@ def test_vectorize_finds_the_corner(client: httpx.Client) -> None:
 
 def test_what_vectorize_gives_can_be_sent_back(client: httpx.Client) -> None:
     found = client.post("/v1/vectorize", json={"laser": laser(range_max=30.0)}).json()
-    scan = {name: found[name] for name in ("segments", "points", "centroids", "spreads")}
+    scan = {name: found[name] for name in ("segments", "point_counts", "centroids", "spreads")}
     answer = associated(client, scan={**scan, "sigma": found["sigmas"]})
     assert answer["status"] == "ok"
     assert answer["pose"]["x"] == pytest.approx(0.0, abs=0.02)

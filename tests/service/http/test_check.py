@@ -58,9 +58,9 @@ def test_a_map_that_is_right(client: httpx.Client) -> None:
     answer = checked(client)
     assert (answer["findings"], answer["complete"], answer["samples"]) == ([], True, None)
     assert answer["map"] == {"map_id": "checked", "revision": revision}
-    assert answer["size"] == {"segments": 6, "walls": 6, "length": 28.0, "diagonal": 10.0}
+    assert answer["size"] == {"segment_count": 6, "walls": 6, "length": 28.0, "diagonal": 10.0}
     assert answer["advice"] == {"sigma": None, "oriented": True}
-    assert answer["looked_from"] > 0
+    assert answer["viewpoints"] > 0
     assert answer["timing_ms"].keys() == {"decode", "search", "total"}
     assert client.head(URL).status_code == 200
 
@@ -85,7 +85,7 @@ def test_lines_along_the_middle_of_walls_and_what_to_do_about_them(client: httpx
     assert by_itself["advice"] == {"sigma": None, "oriented": False}
     seen = checked(client, {"scans": scans(6), "client_ref": 7})
     assert codes(seen) == ["centre_lines", "undirected", "mixed_directions"]
-    assert seen["samples"]["thicker"] == pytest.approx(THICK, abs=0.02)
+    assert seen["samples"]["wall_thickness"] == pytest.approx(THICK, abs=0.02)
     assert seen["client_ref"] == 7
     samples, advice = seen["samples"], seen["advice"]
     assert samples["usable_as_advised"] > samples["usable"] + 1

@@ -71,7 +71,7 @@ def test_a_grid_becomes_a_map_that_can_be_put(client: httpx.Client, tmp_path: Pa
     assert (found["map"]["oriented"], found["map"]["frame_id"]) == (True, "map")
     assert (found["report"]["format"], found["report"]["files"]) == ("map_server", ["room.yaml", "room.pgm"])
     assert [note["code"] for note in found["report"]["read"]] == [note.code for note in expected.report.read]
-    assert found["check"]["size"]["segments"] == len(expected.map.segments)
+    assert found["check"]["size"]["segment_count"] == len(expected.map.segments)
     assert client.get("/v1/maps").json() == before
     assert client.put("/v1/maps/imported", json=found["map"]).status_code == 201
     client.delete("/v1/maps/imported")

@@ -28,7 +28,7 @@ def test_the_example_has_the_pose_it_was_made_from(client: httpx.Client) -> None
     # 8 m and 4 m of wall at 5 cm a point, 2 cm of noise each.
     assert [row["weight"] for row in answer["residuals"]] == pytest.approx([160 / 4e-4, 80 / 4e-4])
     diagnostics = answer["diagnostics"]
-    assert (diagnostics["n"], diagnostics["dof"]) == (2, 1)
+    assert (diagnostics["pairs"], diagnostics["dof"]) == (2, 1)
     assert diagnostics["reliability"] == pytest.approx(2 * math.sqrt(160 * 80) / 240)
     assert diagnostics["ambiguity_at"] is None
     assert answer["timing_ms"].keys() == {"decode", "search", "total"}

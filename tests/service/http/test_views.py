@@ -145,7 +145,7 @@ LASER = {"angle_min": 0.0, "angle_increment": 0.1, "ranges": [1.0, 1.0]}
         ([VIEW, {"segments": examples.SEEN}], "/scan/views/1/pose"),
         ([VIEW, {**VIEW, "segments": [[0.0, 0.0, 0.0, 0.0]]}], "/scan/views/1/segments/0"),
         ([VIEW, {**VIEW, "segments": [[0.0, 0.0, 0.0]]}], "/scan/views/1/segments/0"),
-        ([VIEW, {**VIEW, "points": [3.0], "sigma": -1.0}], "/scan/views/1/sigma"),
+        ([VIEW, {**VIEW, "point_counts": [3.0], "sigma": -1.0}], "/scan/views/1/sigma"),
         ([VIEW, {**VIEW, "covariance": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]]}], "/scan/views/1/covariance"),
         ([VIEW, {**VIEW, "covariance": [[200.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]}], "/scan/views/1/covariance"),
         ([VIEW, {**VIEW, "relative_to": 2}], "/scan/views/1/relative_to"),

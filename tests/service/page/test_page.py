@@ -48,7 +48,7 @@ def test_every_example(page: Page, title: str, state: str, said: str) -> None:
     page.goto("/")
     page.get_by_label("Example").select_option(label=title)
     verdict(page, state)
-    expect(page.locator("#sentence")).to_contain_text(said)
+    expect(page.locator("#message")).to_contain_text(said)
     expect(page.locator("#numbers")).to_contain_text("matched")
 
 
@@ -125,10 +125,10 @@ def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
     expect(page.locator("#numbers")).to_contain_text("1.000 m, 0.500 m")
     (bad,) = files(tmp_path, bad={"rooms": 3})
     page.set_input_files("#files", [bad])
-    expect(page.locator("#sentence")).to_contain_text("neither a map nor a scan")
+    expect(page.locator("#message")).to_contain_text("neither a map nor a scan")
     (short,) = files(tmp_path, short={"laser": {"angle_min": 0, "angle_increment": 9, "ranges": [1, 2]}})
     page.set_input_files("#files", [short])
-    expect(page.locator("#sentence")).to_contain_text("/scan/laser/angle_increment")
+    expect(page.locator("#message")).to_contain_text("/scan/laser/angle_increment")
 
 
 def test_a_service_without_the_formats(page: Page, tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_service_without_the_formats(page: Page, tmp_path: Path) -> None:
     page.goto("/")
     (tmp_path / "plan.dxf").write_text("0")
     page.set_input_files("#files", [tmp_path / "plan.dxf"])
-    expect(page.locator("#sentence")).to_contain_text("JSON only")
+    expect(page.locator("#message")).to_contain_text("JSON only")
 
 
 def test_a_refusal_and_a_lost_connection(page: Page) -> None:
@@ -144,11 +144,11 @@ def test_a_refusal_and_a_lost_connection(page: Page) -> None:
     page.route("**/v1/associate", lambda route: route.fulfill(status=503, json=PROBLEM))
     page.get_by_role("button", name="Ask").click()
     verdict(page, "problem")
-    expect(page.locator("#sentence")).to_have_text("All places are taken")
+    expect(page.locator("#message")).to_have_text("All places are taken")
     page.unroute("**/v1/associate")
     page.route("**/v1/associate", lambda route: route.abort())
     page.get_by_role("button", name="Ask").click()
-    expect(page.locator("#sentence")).to_contain_text("does not answer")
+    expect(page.locator("#message")).to_contain_text("does not answer")
     page.unroute("**/v1/associate")
     page.get_by_role("button", name="Ask").click()
     verdict(page, "usable")
@@ -157,7 +157,7 @@ def test_a_refusal_and_a_lost_connection(page: Page) -> None:
 def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
     page.goto(f"{guarded.url}/?example=flat")
     verdict(page, "problem")
-    expect(page.locator("#sentence")).to_contain_text("Key")
+    expect(page.locator("#message")).to_contain_text("Key")
     page.locator("#access summary").click()
     page.locator("#key").fill("sesame")
     page.get_by_role("button", name="Ask").click()
@@ -217,7 +217,7 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     assert "it would at 0." in told.inner_text()
     assert not told.inner_text().endswith("it would at 0.")
     show = page.get_by_label("Show")
-    expect(show).to_have_value("added")
+    expect(show).to_have_value("landmark")
     show.select_option("driven")
     page.get_by_role("button", name="The map as it came").click()
     verdict(page, "ambiguous")
@@ -260,7 +260,7 @@ def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
     shown(page, "flat", "usable")
     about = page.locator("#about").inner_text()
     page.set_input_files("#files", [tmp_path / "plan.svg"])
-    expect(page.locator("#sentence")).to_contain_text("plan.svg: does not say its unit", timeout=60_000)
+    expect(page.locator("#message")).to_contain_text("plan.svg: does not say its unit", timeout=60_000)
     expect(page.locator("#numbers")).to_be_empty()  # of an answer to something else
     expect(page.locator("#about")).to_have_text(about)
     page.get_by_label("Unit of a drawing").select_option("metres")

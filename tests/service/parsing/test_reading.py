@@ -85,7 +85,7 @@ def test_every_count_has_its_limit(name: str, model: type, body: object) -> None
     assert caught.value.limit == 11
 
 
-@pytest.mark.parametrize("name", ["points", "sigma", "spreads"])
+@pytest.mark.parametrize("name", ["point_counts", "sigma", "spreads"])
 def test_what_comes_with_each_segment_has_the_limit_of_the_segments(name: str) -> None:
     scan = {"segments": [ROW], "centroids": [[0.0, 0.0]], "spreads": [1.0], name: [1.0] * 12}
     data = orjson.dumps({**examples.ASSOCIATE, "scan": scan})

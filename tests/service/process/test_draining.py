@@ -21,7 +21,7 @@ SHARED = re.compile(r"\S*/linefix-workers-[^/\s]+")  # where workers that share 
 
 
 def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(drain_seconds=1.0)
+    running = start_service(drain_s=1.0)
     answers: list[int] = []
     store_hard_map(running)
     body = searched_for()
@@ -47,7 +47,7 @@ def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -
 
 
 def test_a_second_ctrl_c_cuts_the_draining_short(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(drain_seconds=5.0)
+    running = start_service(drain_s=5.0)
     begun = time.monotonic()
     running.process.send_signal(signal.SIGINT)
     until(lambda: running.client.get("/readyz").status_code == 503)
@@ -61,7 +61,7 @@ def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., Runnin
     """It ended at once, without its last answers, and left its counts in shared memory."""
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may have been told to outlive it
     try:
-        running = start_service(drain_seconds=1.0, workers=workers, searches=2)
+        running = start_service(drain_s=1.0, workers=workers, searches=2)
     finally:
         signal.signal(signal.SIGHUP, before)
     begun = time.monotonic()

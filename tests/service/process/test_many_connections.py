@@ -35,7 +35,7 @@ def few_descriptors(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runnin
     with ExitStack() as stack:
         resource.setrlimit(resource.RLIMIT_NOFILE, (256, before[1]))
         try:
-            started = stack.enter_context(start_running(tmp_path_factory.mktemp("few"), request_timeout=3.0))
+            started = stack.enter_context(start_running(tmp_path_factory.mktemp("few"), request_timeout_s=3.0))
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, before)
         yield started
@@ -64,7 +64,7 @@ def test_connections_that_are_held_end_in_time(few_descriptors: RunningService, 
 
 
 def test_beyond_all_that_may_be_open_a_connection_waits(start_service: Callable[..., RunningService]) -> None:
-    running = start_service(max_connections=8, request_timeout=60.0)
+    running = start_service(max_connections=8, request_timeout_s=60.0)
     running.client.get("/livez")  # keeps a connection
     held = [connect(running) for _ in range(7)]
     try:

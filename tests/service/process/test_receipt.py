@@ -20,7 +20,7 @@ from tests.running import RunningService, running
 @pytest.fixture(scope="module")
 def impatient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     folder = tmp_path_factory.mktemp("impatient")
-    with running(folder, request_timeout=2.0, max_body_bytes=20_000_000) as service:
+    with running(folder, request_timeout_s=2.0, max_body_bytes=20_000_000) as service:
         yield service
 
 

@@ -47,7 +47,7 @@ def ready(service: RunningService) -> int:
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     """Two workers; tests may kill them, since they are replaced."""
     folder = tmp_path_factory.mktemp("pair")
-    with running(folder, workers=2, searches=2, queue=4, hang_seconds=8) as service:
+    with running(folder, workers=2, searches=2, queue=4, hang_s=8) as service:
         until(lambda: ready(service) == 2)
         yield service
         assert "a defect" not in service.log()

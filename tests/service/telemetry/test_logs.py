@@ -87,7 +87,7 @@ def test_the_service_does_not_wait_for_who_reads_its_log(tmp_path: Path) -> None
         str(port),
         "--data-dir",
         str(tmp_path),
-        "--drain-seconds",
+        "--drain-s",
         "0",
     ]
     process = subprocess.Popen(command, stderr=writing)

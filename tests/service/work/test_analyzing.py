@@ -35,7 +35,7 @@ def test_others_have_their_turn_within_a_drive(tally: Tally, monkeypatch: pytest
     assert len(free) > 2
     assert turns > 4 * len(free)
     assert tally.found == {number: tally.analysis.look(number) for number in tally.found}
-    assert any(one.with_added is not None and one.with_added.usable for one in free)
+    assert any(one.with_landmark is not None and one.with_landmark.usable for one in free)
 
 
 def test_who_hangs_up_within_a_drive_ends_it(tally: Tally, monkeypatch: pytest.MonkeyPatch) -> None:

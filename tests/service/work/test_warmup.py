@@ -41,7 +41,7 @@ def associations() -> list[dict[str, Any]]:
     moments = {
         "centroids": [[0.5 * (a + c), 0.5 * (b + d)] for a, b, c, d in SEGMENTS],
         "spreads": [1] * len(SEGMENTS),
-        "points": [20] * len(SEGMENTS),
+        "point_counts": [20] * len(SEGMENTS),
     }
     scans: list[dict[str, Any]] = [
         {"segments": SEGMENTS, "sigma": 0.02, **moments, "viewpoint": [0, 0]},
