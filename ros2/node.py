@@ -69,7 +69,7 @@ class Node:
     ) -> None:
         self._options, self._index, self._frame, self._generation = options, index, frame, 0
         self._frames, self._odometry = Frames(), OdometryHistory()
-        self._gathering = Gathering(len(options.scans), options.together)
+        self._gathering = Gathering(len(options.scans), options.together_s)
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
         self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
         self._watch, self._correction = Watch(), MapToOdom()
@@ -182,7 +182,7 @@ class Node:
         for topic, scans in enumerate(self._topics.scans):
             for scan in scans.take()[-1:]:
                 self._silence.scan()
-                if self._options.together > 0.0:
+                if self._options.together_s > 0.0:
                     self._gathering.take(topic, scan)
                 else:
                     self._next[topic] = [scan]

@@ -29,7 +29,7 @@ class NodeOptions:
     ----------
     scans : tuple of str
         Topics of scans.
-    together : float
+    together_s : float
         Seconds; scans of several topics that are taken no farther apart are searched as one. 0: each by itself.
     odometry : str
         Topic of odometry: the motion of the robot between scans, and during each.
@@ -61,7 +61,7 @@ class NodeOptions:
     """
 
     scans: tuple[str, ...] = ("scan",)
-    together: float = 0.1
+    together_s: float = 0.1
     odometry: str = "odom"
     motion: bool = True
     map_topic: str | None = None

@@ -27,7 +27,7 @@ OPTIONS = {
     "odom_frame": ("", "odometry frame"),
     "namespace": ("", "namespace of the robot"),
     "frame_prefix": ("", "prefix of all frames of the robot"),
-    "together": ("", "seconds within which scans of several topics are one"),
+    "together_s": ("", "seconds within which scans of several topics are one"),
     "agree": ("", "scans that have to agree"),
     "when": ("", "start, lost or always"),
     "min_sigma": ("", "least standard deviation of initialpose, metres"),

@@ -50,7 +50,7 @@ def ros2(
     scan: Annotated[
         list[str] | None, typer.Option(metavar="TOPIC", help="Topic of scans; repeat for more scanners. Default: scan.")
     ] = None,
-    together: Annotated[
+    together_s: Annotated[
         float,
         typer.Option(
             metavar="SECONDS", min=0.0, max=5.0, help="Scans of several topics so near in time are one; 0: none are."
@@ -116,7 +116,7 @@ def ros2(
     try:
         where, remappings = _names(scans, namespace, remap or [])
         options = NodeOptions(
-            scans=scans, together=together, odometry=odom, motion=motion, map_topic=None if on else map_topic,
+            scans=scans, together_s=together_s, odometry=odom, motion=motion, map_topic=None if on else map_topic,
             base_frame=base, odom_frame=odom_frame, namespace=where, remappings=remappings, frame_prefix=frame_prefix,
             agree=agree, when=when, min_sigma=min_sigma, min_sigma_theta=min_sigma_theta, publish_tf=publish_tf,
             domain=domain_of(os.environ), hardware_id=hardware_id,

@@ -68,7 +68,7 @@ class AnalyzeRequest(Strict):
 class MapAnalyzeRequest(AnalyzeRequest):
     """The same on a map of the request's own."""
 
-    map: AnyMap
+    map: AnyMap = Field(description="the map to analyze, or the id of a stored one")
 
 
 class WithLandmarkAnswer(Answer):

@@ -24,7 +24,7 @@ class FindingAnswer(Answer):
 class SizeAnswer(Answer):
     """How much of a map there is."""
 
-    segment_count: Index
+    segment_count: Index = Field(description="how many segments it has, as sent")
     walls: Index = Field(description="what they come to where collinear ones are one")
     length: float = Field(description="of the walls together, metres")
     diagonal: float = Field(description="of the box around them, metres")

@@ -45,7 +45,7 @@ class MapDocument(Strict):
         None,
         description="false: directions of its segments mean nothing; null: they do; a request's option goes first",
     )
-    frame_id: FrameId = "map"
+    frame_id: FrameId = Field("map", description="frame of the map, as `frame_id` of the answer")
     meta: FreeJson = Field(None, description="given back as it was sent")
 
 
@@ -58,7 +58,7 @@ class InlineMap(MapDocument):
 class StoredMap(Strict):
     """A map that was stored with PUT before."""
 
-    map_id: MapId
+    map_id: MapId = Field(description="id under which the map was stored")
 
 
 def _map_kind(value: Any) -> str | None:
@@ -79,7 +79,7 @@ AnyMap = Annotated[
 
 
 class _Scan(Strict):
-    frame_id: FrameId = "laser"
+    frame_id: FrameId = Field("laser", description="frame of the scan, as `child_frame_id` of the answer")
     stamp: FreeJson = Field(None, description="given back as it was sent")
     viewpoint: Point | None = Field(
         default_factory=lambda: [0.0, 0.0],
@@ -131,8 +131,8 @@ class Header(Strict):
     """The header of a LaserScan message: `stamp` and `frame_id` of the scan, where it says nothing of them itself."""
 
     stamp: FreeJson = Field(None, description="given back as it was sent")
-    frame_id: FrameId = ""
-    seq: Any = None
+    frame_id: FrameId = Field("", description="frame of the scan where it names none itself")
+    seq: Any = Field(None, description="of ROS 1; not used")
 
 
 Increment = Annotated[
@@ -163,8 +163,8 @@ class Laser(Strict):
     angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
         None, description="radians, of the last beam; has to agree with the other angles within 1.5 beams"
     )
-    scan_time: Any = Field(None, description="of a LaserScan message; taken and not used, as the next one")
-    intensities: Any = None
+    scan_time: Any = Field(None, description="of a LaserScan message; not used")
+    intensities: Any = Field(None, description="of a LaserScan message; not used")
 
 
 Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
@@ -273,9 +273,13 @@ AnyPrior = Annotated[
 class SearchOptions(Strict):
     """How to search, and what to put into the answer."""
 
-    max_alternatives: Annotated[int, Field(ge=0, le=50)] = 5
-    confidence: Annotated[float, Field(ge=0.5, le=1.0)] = 0.9999
-    exhaustive: bool = False
+    max_alternatives: Annotated[int, Field(ge=0, le=50)] = Field(
+        5, description="how many other poses to report at most"
+    )
+    confidence: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
+        0.9999, description="probability of not missing a better pose at which the search ends"
+    )
+    exhaustive: bool = Field(False, description="try every base, whatever the confidence")
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of random sampling")
     sampling: Literal["ordered", "random"] = Field(
         "ordered", description="how bases are drawn: the telling and cheap ones first, or by `seed`"
@@ -287,11 +291,19 @@ class SearchOptions(Strict):
         None,
         description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
     )
-    offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(None, description="metres")
-    angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = Field(None, description="radians")
-    min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
-    estimator: Literal["joint", "one_step"] = "joint"
-    rotation: Literal["wahba", "mitsuta"] = "wahba"
+    offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(
+        None, description="gate for offsets between scan lines and walls, metres; null: from the sigmas"
+    )
+    angle_tolerance: Annotated[float, Field(ge=1e-3, le=0.35)] | None = Field(
+        None, description="gate for angles between scan lines and walls, radians; null: from the sigmas"
+    )
+    min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.5, description="fraction of a scan segment's length that has to lie on the map"
+    )
+    estimator: Literal["joint", "one_step"] = Field(
+        "joint", description="estimator of the final pose; `one_step` is the published closed form"
+    )
+    rotation: Literal["wahba", "mitsuta"] = Field("wahba", description="estimate of the rotation for `one_step`")
     include: list[IncludeName] = Field(
         default_factory=lambda: list(EVERYTHING),
         max_length=16,

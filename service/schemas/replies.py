@@ -62,9 +62,9 @@ class PoseAnswer(Answer):
 class AmbiguityAnswer(Answer):
     """The paper's ambiguity, with the weights used."""
 
-    translation: float
-    rotation: float
-    total: float
+    translation: float = Field(description="of the translation")
+    rotation: float = Field(description="of the rotation")
+    total: float = Field(description="sum of both")
 
 
 class RegistrationDiagnosticsAnswer(Answer):
@@ -75,9 +75,9 @@ class RegistrationDiagnosticsAnswer(Answer):
     ambiguity_at: AmbiguityAnswer | None = Field(description="at `evaluate_at`")
     similarity: float | None = Field(description="1 / total ambiguity; null where that is 0")
     reliability: float = Field(description="0 to 1: how well the directions fix the translation; scale-free")
-    determinant: float
+    determinant: float = Field(description="D of equation 8 of the paper")
     chi2: float = Field(description="joint cost at the answered pose")
-    dof: int
+    dof: int = Field(description="degrees of freedom of `chi2`")
     rms_offset: float = Field(description="metres")
     rms_angle: float = Field(description="radians")
     pairs: Index = Field(description="number of pairs")
@@ -126,18 +126,18 @@ class AlternativeAnswer(Answer):
     """Another pose that explains part of the scan."""
 
     pose: PoseAnswer
-    covariance: Matrix | None
-    score: float
+    covariance: Matrix | None = Field(description="as of the pose of the answer; null where it is degenerate")
+    score: float = Field(description="as of the diagnostics, nats")
     ambiguity: AmbiguityAnswer
-    reliability: float
-    inlier_fraction: float
+    reliability: float = Field(description="as of the diagnostics")
+    inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
 
 
 class CriticalWallAnswer(Answer):
     """The wall whose removal would move the pose most, or leave it unobservable."""
 
-    scan: list[Index] | list[SegmentOfView]
-    map: list[Index]
+    scan: list[Index] | list[SegmentOfView] = Field(description="scan segments on the wall")
+    map: list[Index] = Field(description="map segments of the wall")
     direction: Row2 = Field(description="unit vector in the map frame")
     displacement: float = Field(
         description="metres by which the pose would move, or the standard deviation where that is more"
@@ -167,12 +167,12 @@ class SearchAnswer(Answer):
 
     complete: bool = Field(description="false when deadline or budget ended it early")
     exhaustive: bool = Field(description="whether every pair of segments was tried; only of a complete search")
-    confidence: float
-    bases: Index
-    hypotheses: Index
-    verified: Index
-    seed: int
-    sampling: Literal["ordered", "random"]
+    confidence: float = Field(description="reached probability of not having missed a better pose")
+    bases: Index = Field(description="bases that were tried")
+    hypotheses: Index = Field(description="poses that the bases proposed")
+    verified: Index = Field(description="poses that were scored to the end")
+    seed: int = Field(description="as of the options")
+    sampling: Literal["ordered", "random"] = Field(description="as of the options")
     complete_above: float = Field(
         description="share of the best score above which no pose was missed whose matches agree within their "
         "tolerances; 1 where the search is not complete"
@@ -298,7 +298,7 @@ class MapSummaryAnswer(Answer):
 
     map_id: str
     revision: Annotated[int, Field(ge=1)]
-    segment_count: Index
+    segment_count: Index = Field(description="how many segments it has")
     bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
     sigma: float | None = Field(description="of its lines, metres; null where the map says nothing")
     oriented: bool | None = Field(description="whether directions mean anything; null where the map says nothing")
@@ -335,13 +335,13 @@ class Limits(Answer):
     max_answers_bytes: int = Field(description="of large answers that wait to be read, in one of several workers")
     max_connections: int = Field(description="open at once")
     request_timeout_s: float = Field(description="seconds that a request may take to arrive, head and body")
-    max_map_segments: int
-    max_scan_segments: int
+    max_map_segments: int = Field(description="segments of one map")
+    max_scan_segments: int = Field(description="segments of one scan")
     max_beams: int = Field(description="ranges or points of one scan, or view")
     max_views: int = Field(description="of one scan")
     max_beams_together: int = Field(description="ranges or points of all views of one scan")
     max_segments_together: int = Field(description="segments of all views of one scan")
-    max_correspondences: int
+    max_correspondences: int = Field(description="of one registration")
     max_batch: int = Field(description="scans of one batch")
     max_deadline_ms: float = Field(description="and the deadline where none is asked for")
     searches: int = Field(description="that run at once")

@@ -37,10 +37,16 @@ class KnownMap(InlineMap):
 class EstimatorOptions(Strict):
     """How to register."""
 
-    estimator: Literal["joint", "one_step"] = "joint"
-    rotation: Literal["wahba", "mitsuta"] = "wahba"
-    k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
-    k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = 1.0
+    estimator: Literal["joint", "one_step"] = Field(
+        "joint", description="`joint` minimizes over rotation and translation; `one_step` is the published closed form"
+    )
+    rotation: Literal["wahba", "mitsuta"] = Field("wahba", description="estimate of the rotation for `one_step`")
+    k_translation: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
+        1.0, description="coefficient of the translation in the ambiguity"
+    )
+    k_rotation: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
+        1.0, description="coefficient of the rotation in the ambiguity"
+    )
     evaluate_at: Pose | None = Field(None, description="also give the ambiguity at this pose")
     oriented: bool | None = Field(
         None,
@@ -55,16 +61,18 @@ class RegisterRequest(Strict):
     scan: MeasuredFields
     correspondences: PairRows | None = Field(None, description="`[scan, map]` indices; default i with i")
     weights: Weights | None = Field(None, description="one per correspondence; replaces `weighting`")
-    weighting: Literal["uniform", "shorter_length", "information"] = "information"
+    weighting: Literal["uniform", "shorter_length", "information"] = Field(
+        "information", description="weights of the correspondences: all equal, the shorter length, or the information"
+    )
     options: EstimatorOptions = EstimatorOptions()
 
 
 class AssociateRequest(Strict):
     """Unknown correspondences."""
 
-    map: AnyMap
-    scan: AnyScan
-    prior: AnyPrior | None = None
+    map: AnyMap = Field(description="the map to search, or the id of a stored one")
+    scan: AnyScan = Field(description="as segments, ranges, points or views")
+    prior: AnyPrior | None = Field(None, description="what is known of the pose; null: nothing")
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="given back as it was sent")
 
@@ -72,7 +80,8 @@ class AssociateRequest(Strict):
 class BatchRequest(Strict):
     """Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else."""
 
-    map: AnyMap
+    map: AnyMap = Field(description="the map to search, or the id of a stored one")
+    # Each is validated by itself, as `BatchItem`.
     scans: list[Annotated[AnyScan, SkipValidation]] = Field(min_length=1, description="as `scan` of /v1/associate")
     priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = Field(
         None, description="as `prior` of /v1/associate or null, one per scan"
@@ -103,7 +112,9 @@ MOST_SAMPLES = 64
 class CheckRequest(Strict):
     """Sample scans to check a map by, and where they were taken, as far as that is known."""
 
-    scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)]
+    scans: Annotated[list[AnyScan], Field(min_length=1, max_length=MOST_SAMPLES)] = Field(
+        description="each as `scan` of /v1/associate"
+    )
     poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = Field(
         None, description="one per scan, or null; of the scan's frame in the map's, as their sender has it"
     )
@@ -133,7 +144,7 @@ class VectorizeOptions(Strict):
 class VectorizeRequest(Strict):
     """Ranges or points; exactly one of the two."""
 
-    laser: Laser | None = None
+    laser: Laser | None = Field(None, description="ranges, as in a LaserScan message")
     points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
     twist: Twist | None = Field(
         None, description="how the sensor moved meanwhile, in its own frame; segments are in that of the first beam"

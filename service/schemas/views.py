@@ -96,7 +96,7 @@ class ViewsScan(Strict):
     """A scan of several views: of the sensors of a robot, or from places along its way."""
 
     views: list[AnyView] = Field(min_length=1, description="at most `max_views`")
-    frame_id: FrameId = "base_link"
+    frame_id: FrameId = Field("base_link", description="frame that the views share; `child_frame_id` of the answer")
     stamp: FreeJson = Field(None, description="given back as it was sent")
 
     @model_validator(mode="before")

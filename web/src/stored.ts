@@ -31,7 +31,7 @@ async function trying(action: () => Promise<void>): Promise<void> {
 async function load(from: string): Promise<void> {
   const page = await listMaps(from);
   if (!from) maps.replaceChildren();
-  for (const one of page.maps) maps.append(row(one.map_id, one.segments));
+  for (const one of page.maps) maps.append(row(one.map_id, one.segment_count));
   if (!maps.children.length) {
     const none = document.createElement("li");
     none.textContent = "None is stored yet.";

@@ -37,9 +37,9 @@ class AnalysisSummaryAnswer(TypedDict):
     ambiguous: int
     degenerate: int
     no_match: int
-    look_alike: int
-    knows_within: int | None
-    usable_with_added: int | None
+    similar_pose: int
+    resolved_within: int | None
+    usable_with_landmark: int | None
     not_free: int
     left_out: int
 
@@ -64,10 +64,36 @@ class FindingAnswer(TypedDict):
     Something doubtful.
     """
 
-    code: str
+    code: Literal[
+        "unlikely_size",
+        "reversed",
+        "mixed_directions",
+        "short_pieces",
+        "doubled_faces",
+        "both_ways",
+        "overlaps",
+        "gaps",
+        "looks_alike",
+        "centre_lines",
+        "thickness",
+        "undirected",
+        "mirrored",
+        "scale",
+        "moved",
+    ]
     message: str
     segments: list[int]
     count: int
+
+
+class ImportTimingAnswer(TypedDict):
+    """
+    Duration of an import, milliseconds.
+    """
+
+    read: float
+    check: float
+    total: float
 
 
 class ImportedMapAnswer(TypedDict):
@@ -92,7 +118,7 @@ class Limits(TypedDict):
     max_bodies_bytes: int
     max_answers_bytes: int
     max_connections: int
-    request_timeout: float
+    request_timeout_s: float
     max_map_segments: int
     max_scan_segments: int
     max_beams: int
@@ -146,7 +172,7 @@ class MapSummaryAnswer(TypedDict):
 
     map_id: str
     revision: int
-    segments: int
+    segment_count: int
     bounds: list[float]
     sigma: float | None
     oriented: bool | None
@@ -190,7 +216,28 @@ class Problem(TypedDict):
     title: str
     status: int
     detail: str
-    code: str
+    code: Literal[
+        "invalid_json",
+        "invalid_http",
+        "unauthorized",
+        "forbidden",
+        "not_found",
+        "unknown_map",
+        "method_not_allowed",
+        "request_timeout",
+        "map_corrupt",
+        "revision_conflict",
+        "too_large",
+        "unsupported_media_type",
+        "invalid_request",
+        "rate_limited",
+        "internal",
+        "not_ready",
+        "overloaded",
+        "read_only",
+        "deadline_exceeded",
+        "storage_full",
+    ]
     request_id: str
     errors: NotRequired[list[Place]]
 
@@ -200,7 +247,16 @@ class ReasonAnswer(TypedDict):
     Why an answer is not usable.
     """
 
-    code: str
+    code: Literal[
+        "prior_contradicted",
+        "search_incomplete",
+        "not_on_map",
+        "unobservable_direction",
+        "similar_place",
+        "single_wall",
+        "map_mismatch",
+        "insufficient_evidence",
+    ]
     message: str
 
 
@@ -219,7 +275,7 @@ class RegistrationDiagnosticsAnswer(TypedDict):
     dof: int
     rms_offset: float
     rms_angle: float
-    n: int
+    pairs: int
 
 
 class ReportAnswer(TypedDict):
@@ -265,7 +321,7 @@ class SamplesAnswer(TypedDict):
 
     usable: int
     usable_as_advised: int
-    thicker: float | None
+    wall_thickness: float | None
     scans: list[SampleAnswer]
 
 
@@ -282,7 +338,7 @@ class SearchAnswer(TypedDict):
     verified: int
     seed: int
     sampling: Literal["ordered", "random"]
-    rivals_above: float
+    complete_above: float
 
 
 class SegmentOfView(TypedDict):
@@ -299,10 +355,20 @@ class SizeAnswer(TypedDict):
     How much of a map there is.
     """
 
-    segments: int
+    segment_count: int
     walls: int
     length: float
     diagonal: float
+
+
+class TimingAnswer(TypedDict):
+    """
+    Duration of the request, milliseconds.
+    """
+
+    decode: float
+    search: float
+    total: float
 
 
 class Version(TypedDict):
@@ -317,16 +383,29 @@ class Version(TypedDict):
 
 class WarningAnswer(TypedDict):
     """
-    Something to know.
+    Something to know about the scan, the map or the search.
     """
 
-    code: str
+    code: Literal[
+        "no_segments",
+        "points_not_in_order",
+        "stuck_ranges",
+        "scan_exceeds_map",
+        "faces_away",
+        "prior_contradicted",
+        "search_incomplete",
+        "map_scale",
+        "last_view_only",
+        "mirrored",
+        "reversed",
+        "unit_scale",
+    ]
     message: str
 
 
-class WithAddedAnswer(TypedDict):
+class WithLandmarkAnswer(TypedDict):
     """
-    What a robot would know with what was added.
+    What a robot would know with the landmark.
     """
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
@@ -404,7 +483,7 @@ class MeasuredFields(TypedDict):
 
     segments: list[list[float]]
     sigma: NotRequired[float | list[float]]
-    points: NotRequired[list[float] | None]
+    point_counts: NotRequired[list[float] | None]
     centroids: NotRequired[list[list[float]] | None]
     spreads: NotRequired[list[float] | None]
 
@@ -469,7 +548,7 @@ class SegmentScan(TypedDict):
 
     segments: list[list[float]]
     sigma: NotRequired[float | list[float]]
-    points: NotRequired[list[float] | None]
+    point_counts: NotRequired[list[float] | None]
     centroids: NotRequired[list[list[float]] | None]
     spreads: NotRequired[list[float] | None]
     frame_id: NotRequired[str]
@@ -561,22 +640,33 @@ class AnalyzedPlaceAnswer(TypedDict):
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
     probability: float | None
-    look_alike: PoseAnswer | None
+    similar_pose: PoseAnswer | None
     unobservable: list[float] | None
-    reasons: list[str]
-    knows_after: float | None
-    with_added: WithAddedAnswer | None
+    reasons: list[
+        Literal[
+            "prior_contradicted",
+            "search_incomplete",
+            "not_on_map",
+            "unobservable_direction",
+            "similar_place",
+            "single_wall",
+            "map_mismatch",
+            "insufficient_evidence",
+        ]
+    ]
+    resolved_after: float | None
+    with_landmark: WithLandmarkAnswer | None
 
 
-class HingeAnswer(TypedDict):
+class CriticalWallAnswer(TypedDict):
     """
-    The wall that a pose hinges on.
+    The wall whose removal would move the pose most, or leave it unobservable.
     """
 
     scan: list[int] | list[SegmentOfView]
     map: list[int]
     direction: list[float]
-    moves: float
+    displacement: float
 
 
 class MapList(TypedDict):
@@ -595,7 +685,7 @@ class PlaceAnswer(TypedDict):
     """
 
     pose: PoseAnswer
-    look_alike: PoseAnswer
+    similar_pose: PoseAnswer
 
 
 class RegisterAnswer(TypedDict):
@@ -611,7 +701,7 @@ class RegisterAnswer(TypedDict):
     residuals: list[Residual]
     diagnostics: RegistrationDiagnosticsAnswer
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: TimingAnswer
 
 
 class VectorizeAnswer(TypedDict):
@@ -620,7 +710,7 @@ class VectorizeAnswer(TypedDict):
     """
 
     segments: list[list[float]]
-    points: list[int]
+    point_counts: list[int]
     centroids: list[list[float]]
     spreads: list[float]
     sigma: float
@@ -628,7 +718,7 @@ class VectorizeAnswer(TypedDict):
     rms: list[float]
     warnings: list[WarningAnswer]
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: TimingAnswer
 
 
 class AnalyzeRequest(TypedDict):
@@ -640,21 +730,9 @@ class AnalyzeRequest(TypedDict):
     spacing: NotRequired[float | None]
     point: NotRequired[list[float] | None]
     drive: NotRequired[float]
-    added: NotRequired[list[list[float]]]
+    landmark: NotRequired[list[list[float]]]
     seed: NotRequired[int]
     deadline_ms: NotRequired[float | None]
-    client_ref: NotRequired[Any]
-
-
-class BatchRequest(TypedDict):
-    """
-    Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else.
-    """
-
-    map: InlineMap | StoredMap
-    scans: list[Any]
-    priors: NotRequired[list[Any] | None]
-    options: NotRequired[SearchOptions]
     client_ref: NotRequired[Any]
 
 
@@ -708,7 +786,7 @@ class MapAnalyzeRequest(TypedDict):
     spacing: NotRequired[float | None]
     point: NotRequired[list[float] | None]
     drive: NotRequired[float]
-    added: NotRequired[list[list[float]]]
+    landmark: NotRequired[list[list[float]]]
     seed: NotRequired[int]
     deadline_ms: NotRequired[float | None]
     client_ref: NotRequired[Any]
@@ -749,7 +827,7 @@ class SegmentView(TypedDict):
 
     segments: list[list[float]]
     sigma: NotRequired[float | list[float]]
-    points: NotRequired[list[float] | None]
+    point_counts: NotRequired[list[float] | None]
     centroids: NotRequired[list[list[float]] | None]
     spreads: NotRequired[list[float] | None]
     pose: SensorPose
@@ -781,7 +859,7 @@ class AnalyzeAnswer(TypedDict):
     map: MapReference | None
     client_ref: Any
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: TimingAnswer
 
 
 class AssociationDiagnosticsAnswer(TypedDict):
@@ -799,13 +877,13 @@ class AssociationDiagnosticsAnswer(TypedDict):
     dof: int
     rms_offset: float
     rms_angle: float
-    n: int
+    pairs: int
     inlier_fraction: float
     score: float
     runner_up: float | None
     margin: float | None
     significance: float
-    hinges_on: HingeAnswer | None
+    critical_wall: CriticalWallAnswer | None
 
 
 class CheckAnswer(TypedDict):
@@ -817,13 +895,13 @@ class CheckAnswer(TypedDict):
     size: SizeAnswer
     advice: AdviceAnswer
     places: list[PlaceAnswer]
-    looked_from: int
+    viewpoints: int
     complete: bool
     samples: SamplesAnswer | None
     map: MapReference
     client_ref: Any
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: TimingAnswer
 
 
 class FoundAnswer(TypedDict):
@@ -834,7 +912,7 @@ class FoundAnswer(TypedDict):
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
     probability: float | None
-    sentence: str
+    message: str
     pose: PoseAnswer | None
     covariance: list[list[float]] | None
     unobservable: list[float] | None
@@ -861,7 +939,7 @@ class MapCheckAnswer(TypedDict):
     size: SizeAnswer
     advice: AdviceAnswer
     places: list[PlaceAnswer]
-    looked_from: int
+    viewpoints: int
     complete: bool
 
 
@@ -873,6 +951,18 @@ class AssociateRequest(TypedDict):
     map: InlineMap | StoredMap
     scan: SegmentScan | LaserScan | PointScan | ViewsScan
     prior: NotRequired[SoftPriorFields | HardPriorFields | None]
+    options: NotRequired[SearchOptions]
+    client_ref: NotRequired[Any]
+
+
+class BatchRequest(TypedDict):
+    """
+    Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else.
+    """
+
+    map: InlineMap | StoredMap
+    scans: list[SegmentScan | LaserScan | PointScan | ViewsScan]
+    priors: NotRequired[list[SoftPriorFields | HardPriorFields | None] | None]
     options: NotRequired[SearchOptions]
     client_ref: NotRequired[Any]
 
@@ -896,7 +986,7 @@ class AssociateAnswer(TypedDict):
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
     probability: float | None
-    sentence: str
+    message: str
     pose: PoseAnswer | None
     covariance: list[list[float]] | None
     unobservable: list[float] | None
@@ -915,7 +1005,7 @@ class AssociateAnswer(TypedDict):
     map: MapReference | None
     client_ref: Any
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: TimingAnswer
 
 
 class BatchResult(TypedDict):
@@ -938,7 +1028,7 @@ class ImportAnswer(TypedDict):
     report: ReportAnswer
     check: MapCheckAnswer
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: ImportTimingAnswer
 
 
 class BatchAnswer(TypedDict):
@@ -950,4 +1040,4 @@ class BatchAnswer(TypedDict):
     map: MapReference | None
     client_ref: Any
     request_id: str
-    timing_ms: dict[str, float]
+    timing_ms: TimingAnswer

@@ -6,11 +6,14 @@ import asyncio
 import re
 import threading
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 import httpx
 import pytest
 
+from association import Status, WarningCode
+from association.checking import FindingCode
+from association.reasons import SENTENCES
 from service.http.openapi import Contract
 from service.http.problems import KINDS
 from service.schemas import examples
@@ -203,3 +206,51 @@ def test_quantities_have_units(document: dict[str, Any]) -> None:
     assert "radians" in schemas["Laser"]["properties"]["angle_min"]["description"]
     assert "m^2" in schemas["AssociateAnswer"]["properties"]["covariance"]["description"]
     assert "metres" in schemas["InlineMap"]["properties"]["segments"]["description"]
+
+
+def reached(document: dict[str, Any], schema: dict[str, Any]) -> set[str]:
+    """Return the names of the schemas that a schema refers to, directly or not."""
+    found: set[str] = set()
+    todo: list[Any] = [schema]
+    while todo:
+        one = todo.pop()
+        todo += one.values() if isinstance(one, dict) else one if isinstance(one, list) else []
+        name = str(one.get("$ref", "")).rpartition("/")[2] if isinstance(one, dict) else ""
+        if name and name not in found:
+            found.add(name)
+            todo.append(document["components"]["schemas"][name])
+    return found
+
+
+def test_every_option_has_a_description(document: dict[str, Any]) -> None:
+    asked: set[str] = set()
+    for _, _, operation in operations(document):
+        asked |= reached(document, operation.get("requestBody", {}))
+    schemas = document["components"]["schemas"]
+    assert {"SearchOptions", "EstimatorOptions", "VectorizeOptions", "AnalyzeRequest", "CheckRequest"} <= asked
+    fields = [(name, field, of) for name in asked for field, of in schemas[name].get("properties", {}).items()]
+    bare = [(name, field) for name, field, of in fields if not of.get("description") and "$ref" not in of]
+    assert bare == []
+
+
+def test_codes_and_statuses_are_enumerations(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    known = {"ReasonAnswer": SENTENCES, "Problem": KINDS, "WarningAnswer": get_args(WarningCode)}
+    known |= {"FindingAnswer": get_args(FindingCode)}
+    for name, codes in known.items():
+        assert set(schemas[name]["properties"]["code"]["enum"]) == set(codes), name
+    assert set(schemas["AnalyzedPlaceAnswer"]["properties"]["reasons"]["items"]["enum"]) == set(SENTENCES)
+    for name in ("FoundAnswer", "AssociateAnswer", "AnalyzedPlaceAnswer", "WithLandmarkAnswer"):
+        assert set(schemas[name]["properties"]["status"]["enum"]) == set(Status), name
+
+
+def test_times_and_the_scans_of_a_batch_are_typed(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    for name, schema in schemas.items():
+        if timing := schema.get("properties", {}).get("timing_ms"):
+            (times,) = reached(document, timing)
+            assert {"total"} < set(schemas[times]["properties"]), name
+    assert schemas["BatchRequest"]["properties"]["scans"]["items"] == {
+        "oneOf": schemas["AssociateRequest"]["properties"]["scan"]["oneOf"]
+    }
+    assert reached(document, schemas["BatchRequest"]["properties"]["priors"]) >= {"SoftPriorFields", "HardPriorFields"}

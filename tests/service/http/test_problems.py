@@ -71,12 +71,13 @@ def test_what_comes_with_a_problem(error: Exception, expected: dict[str, str]) -
     assert headers == {"content-type": "application/problem+json", **expected}
     document = orjson.loads(bytes(answer.body))
     kind = RAISED[type(error)]
-    assert document.pop("errors", None) in (None, [{"pointer": "/scans", "message": "at most 2 scans are taken"}])
+    errors = document.pop("errors", None)
+    assert errors in (None, [{"pointer": "/scans", "message": "at most 2 scans are taken"}])
     assert document == {
         "type": f"urn:linefix:problem:{kind.code}",
         "title": kind.title,
         "status": kind.status,
-        "detail": str(error),
+        "detail": f"/scans: {error}" if errors else str(error),
         "code": kind.code,
         "request_id": "id",
     }
@@ -88,7 +89,7 @@ def test_places_are_named_and_bounded() -> None:
     problem = problem_of(InvalidRequestError(faults))
     assert problem is not None
     document = orjson.loads(bytes(problem.response("id").body))
-    assert document["detail"] == "30 places are wrong; see errors"
+    assert document["detail"] == f"/{'p' * 119}: {'m' * 200} (and 19 more)"
     assert document["errors"] == [{"pointer": "/" + "p" * 119, "message": "m" * 200}] * 20
     problem = problem_of(TooManyError("", 5, "values"))
     assert problem is not None
@@ -101,9 +102,9 @@ def test_places_are_named_and_bounded() -> None:
 def test_a_place_can_be_moved() -> None:
     problem = problem_of(InvalidRequestError([Fault("/scan/sigma", "wrong")]))
     assert problem is not None
-    assert problem.as_json("id", lambda pointer: "/scans/3" + pointer.removeprefix("/scan"))["errors"] == [
-        {"pointer": "/scans/3/sigma", "message": "wrong"}
-    ]
+    moved = problem.as_json("id", lambda pointer: "/scans/3" + pointer.removeprefix("/scan"))
+    assert moved["errors"] == [{"pointer": "/scans/3/sigma", "message": "wrong"}]
+    assert moved["detail"] == "/scans/3/sigma: wrong"
 
 
 @pytest.mark.parametrize(
@@ -113,7 +114,19 @@ def test_what_the_libraries_refuse_has_its_place(index: int | None, pointer: str
     problem = problem_of(InvalidArgumentError("too short", argument="scan.segments", index=index))
     assert problem is not None
     assert (problem.kind.code, problem.faults) == ("invalid_request", (Fault(pointer, "too short"),))
-    assert problem.detail == "one place is wrong; see errors"
+    assert problem.as_json("id")["detail"] == f"{pointer}: too short"
+
+
+def test_the_first_place_stands_in_the_detail() -> None:
+    one, other = Fault("/scan/segments/3", "expected 4 numbers, found 3"), Fault("", "expected an object")
+    for faults, detail in (
+        ([one], "/scan/segments/3: expected 4 numbers, found 3"),
+        ([one, other], "/scan/segments/3: expected 4 numbers, found 3 (and 1 more)"),
+        ([other], "expected an object"),
+    ):
+        problem = problem_of(InvalidRequestError(faults))
+        assert problem is not None
+        assert problem.as_json("id")["detail"] == detail
 
 
 def test_who_is_cancelled_is_told_why() -> None:

@@ -68,7 +68,7 @@ def _raise(error: Exception) -> None:
 def test_what_is_wrong_crosses_whole(parser: ParserProcess) -> None:
     with pytest.raises(InvalidRequestError) as invalid:
         parser.call(read_model, MapDocument, b'{"segments": [[0, 0, 1]]}', LIMITS)
-    assert invalid.value.faults == (Fault("/segments/0", "expected 4 numbers, got 3"),)
+    assert invalid.value.faults == (Fault("/segments/0", "expected 4 numbers, found 3"),)
     for error in (TooManyError("/scans", 2, "scans"), BodyTooLargeError(7), NotJsonError("not"), ParserEndedError()):
         with pytest.raises(type(error)) as caught:
             parser.call(_raise, error)
