@@ -66,7 +66,7 @@ overload: $(VENV)/.ready  ## print what ten times too much load does, and what l
 endings: $(VENV)/.ready  ## print how soon hang-ups, slow clients, killed workers and drains end (5 min)
 	$(BIN)/python -m benchmarks.endings
 
-mutants: $(VENV)/.ready  ## put 600 mistakes into the code, one at a time, and see which the tests notice (hours; takes up where it was stopped)
+mutants: $(VENV)/.ready  ## change the code in 600 places, one at a time, and report which changes the tests notice (hours; continues a stopped run)
 	nice -n 19 $(BIN)/python -m benchmarks.mutants $(ARGS)
 
 docs: $(VENV)/.ready requirements/docs.txt  ## build the documents as pages, into out/docs

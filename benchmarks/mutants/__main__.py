@@ -1,134 +1,166 @@
-"""``python -m benchmarks.mutants [--count 100] [--seed 1] [--again] [package or module ...]``."""
+"""``python -m benchmarks.mutants [--count 100] [--seed 1] [--report] [package or module ...]``.
+
+Draws mutants of each package, runs the tests of the mutated module for each of them, and prints how many were noticed.
+A run that was stopped continues where it stopped: Cosmic Ray keeps a session for each suite in ``out/mutants``.
+"""
 
 from __future__ import annotations
 
 import argparse
-import hashlib
-import json
+import contextlib
+import os
+import random
+import re
+import shlex
+import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from . import drawing
-from .drawing import Mutant, draw, modules_of
-from .rules import key_of, known_equivalents, suite_of
-from .running import RESULTS, Outcome, Runner
+from cosmic_ray.commands import execute, init
+from cosmic_ray.config import ConfigDict
+from cosmic_ray.work_db import WorkDB, use_db
+from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkItem, WorkResult
+
+from .suites import SUITES, Suite, changed_lines, known_equivalents, suite_of
 
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "out" / "mutants"
 PACKAGES = ("registration", "vectorization", "service", "simulation", "analysis", "association")
-ALL_KILLED = (
-    "association/verdict.py",
-    "service/admission/",
-    "service/maps/store.py",
-    "service/schemas/limits.py",
-    "service/parsing/unpacking.py",
-)
-"""Where no mistake may go unnoticed."""
+LEFT_OUT = ("tuning.py", "layout.py", "migrations", "examples.py")
+"""Modules and folders of measured numbers or of names."""
+WITHOUT_EFFECT = re.compile(r"core/(RemoveDecorator|ReplaceBinaryOperator_BitOr_\w+|ExceptionReplacer)")
+"""Operators whose mutants seldom differ at run time: `int | None` in annotations, decorators of kernels and caches."""
+TIMEOUT = 900.0  # s for the tests of one mutant; a mutated kernel is compiled first, 90 s of processor time
+PYTEST = "-x -q -p no:cacheprovider --tb=line -m"
+SKIPPED = WorkResult(worker_outcome=WorkerOutcome.SKIPPED)
 
 
-class Results:
-    """What is known of mutants from earlier runs; kept line by line, so that a run can be broken off and taken up."""
-
-    def __init__(self, path: Path, root: Path) -> None:
-        self._path = path
-        self._root = root
-        self._known: dict[str, Outcome] = {}
-        if path.exists():
-            for line in path.read_text().splitlines():
-                entry = json.loads(line)
-                self._known[entry["key"]] = Outcome(**entry["outcome"])
-
-    def of(self, mutant: Mutant) -> Outcome | None:
-        """Return what became of a mutant of the module as it is now."""
-        return self._known.get(self._key(mutant))
-
-    def add(self, mutant: Mutant, outcome: Outcome) -> None:
-        """Keep what became of it."""
-        self._known[self._key(mutant)] = outcome
-        with self._path.open("a") as file:
-            file.write(json.dumps({"key": self._key(mutant), "outcome": asdict(outcome)}) + "\n")
-
-    def _key(self, mutant: Mutant) -> str:
-        text = (self._root / mutant.path).read_bytes()
-        return f"{mutant.path} {hashlib.sha1(text).hexdigest()[:12]} {mutant.operator} {mutant.occurrence}"
+def modules_of(root: Path, package: str) -> list[Path]:
+    """Return the modules of a package that are mutated, or the module itself, relative to the root."""
+    place = root / package
+    paths = sorted(place.rglob("*.py")) if place.is_dir() else [place]
+    return [
+        path for path in (each.relative_to(root) for each in paths) if not any(part in LEFT_OUT for part in path.parts)
+    ]
 
 
-def drawn_from(root: Path, package: str, count: int, seed: int) -> list[Mutant]:
-    """Return mutants of a package as `draw` does, which takes a minute, or as it did of the same modules before."""
-    texts = [(root / path).read_bytes() for path in modules_of(root, package)]
-    asked = f"{package} {count} {seed}".encode()
-    digest = hashlib.sha1(b"\0".join([asked, Path(drawing.__file__).read_bytes(), *texts])).hexdigest()[:12]
-    kept = PLACE / f"drawn-{digest}.json"
-    if not kept.exists():
-        kept.write_text(json.dumps([asdict(mutant) for mutant in draw(root, package, count, seed)]))
-    return [Mutant(**each) for each in json.loads(kept.read_text())]
+def draw(items: Sequence[WorkItem], count: int, seed: int) -> set[str]:
+    """Return the identifiers of the mutants that are run.
+
+    Parameters
+    ----------
+    items : sequence of WorkItem
+        All mutants of a package.
+    count : int
+        How many are drawn; 0 for all.
+    seed : int
+    """
+    able = [item for item in items if not WITHOUT_EFFECT.fullmatch(item.mutations[0].operator_name)]
+    able.sort(key=_place_of)
+    drawn = random.Random(seed).sample(able, min(count, len(able))) if count else able
+    return {item.job_id for item in drawn}
 
 
-def table(drawn: dict[str, list[Mutant]], results: Results) -> Iterator[str]:
-    """Return the lines of the report: a row for each package, then who survived."""
+def _place_of(item: WorkItem) -> tuple[str, tuple[int, int], str, int]:
+    mutation = item.mutations[0]
+    return str(mutation.module_path), mutation.start_pos, mutation.operator_name, mutation.occurrence
+
+
+def prepare(session: Path, modules: Sequence[Path], count: int, seed: int) -> None:
+    """Write a session with the drawn mutants of some modules; the others count as skipped."""
+    with use_db(str(session)) as database:
+        init(modules, database, {})
+        items = list(database.work_items)
+        drawn = draw(items, count, seed)
+        database.set_multiple_results([item.job_id for item in items if item.job_id not in drawn], SKIPPED)
+
+
+def run(session: Path, suite: Suite) -> None:
+    """Run the tests of a suite for each mutant of a session that has no result; call it in the copy of the code."""
+    compiled = "" if suite.compiled else "env NUMBA_DISABLE_JIT=1 "
+    command = f"{compiled}{shlex.quote(sys.executable)} -m pytest {PYTEST} 'not long' {shlex.join(suite.tests)}"
+    if subprocess.run(shlex.split(command), stdout=subprocess.DEVNULL, check=False).returncode:
+        raise SystemExit(f"these tests fail without any mutant; run them in {Path.cwd()}: {command}")
+    config = ConfigDict({"test-command": command, "timeout": TIMEOUT, "distributor": {"name": "local"}})
+    with use_db(str(session), WorkDB.Mode.open) as database:
+        execute(database, config)
+
+
+def report(sessions: dict[str, list[Path]]) -> Iterator[str]:
+    """Return the lines of the report: a row for each package, then the mutants that no test noticed."""
     equivalents = known_equivalents()
-    yield f"{'':32}{'drawn':>7}{'run':>7}{'killed':>8}{'by time':>9}{'equal':>7}{'share':>8}"
-    survivors: list[Mutant] = []
-    totals = [0] * 5
-    rows = list(drawn.items())
-    every = [mutant for mutants in drawn.values() for mutant in mutants]
-    rows += [(f"  {place}", [m for m in every if m.path.startswith(place)]) for place in ALL_KILLED]
-    for name, mutants in rows:
-        run = [(mutant, outcome) for mutant in mutants if (outcome := results.of(mutant)) is not None]
-        equal = [mutant for mutant, outcome in run if not outcome.killed and key_of(mutant) in equivalents]
-        killed = [outcome for _, outcome in run if outcome.killed]
-        counts = [len(mutants), len(run), len(killed), sum(outcome.by == "time" for outcome in killed), len(equal)]
-        if name in drawn:
-            totals = [a + b for a, b in zip(totals, counts, strict=True)]
-            survivors += [m for m, outcome in run if not outcome.killed and key_of(m) not in equivalents]
-        if counts[0]:
-            yield _row(name, counts)
-    yield _row("together", totals)
-    for mutant in survivors:
-        yield f"{mutant.path}:{mutant.line}  {mutant.before}  ->  {mutant.after}"
+    survivors: list[str] = []
+    yield f"{'':20}{'drawn':>7}{'run':>7}{'killed':>8}{'equal':>7}{'noticed':>9}"
+    for package, paths in sessions.items():
+        drawn = ran = killed = equal = 0
+        for item, result in (each for path in paths for each in _results(path)):
+            drawn += 1
+            if result is None or result.worker_outcome is not WorkerOutcome.NORMAL:
+                continue
+            ran += 1
+            before, after = changed_lines(result.diff or "")
+            mutation = item.mutations[0]
+            if result.test_outcome is not TestOutcome.SURVIVED:
+                killed += 1
+            elif (str(mutation.module_path), before, after) in equivalents:
+                equal += 1
+            else:
+                survivors.append(f"{mutation.module_path}:{mutation.start_pos[0]}  {before}  ->  {after}")
+        noticed = f"{killed / (ran - equal):9.1%}" if ran > equal else f"{'':9}"
+        yield f"{package:20}{drawn:7}{ran:7}{killed:8}{equal:7}{noticed}"
+    yield from survivors
 
 
-def _row(name: str, counts: list[int]) -> str:
-    drawn, run, killed, late, equal = counts
-    share = f"{killed / (run - equal):8.1%}" if run > equal else f"{'':8}"
-    return f"{name:32}{drawn:7}{run:7}{killed:8}{late:9}{equal:7}{share}"
+def _results(session: Path) -> Iterator[tuple[WorkItem, WorkResult | None]]:
+    """Return each drawn mutant with its result, None where it has not run yet."""
+    with use_db(str(session), WorkDB.Mode.open) as database:
+        results = dict(database.results)
+        for item in database.work_items:
+            result = results.get(item.job_id)
+            if result is None or result.worker_outcome is not WorkerOutcome.SKIPPED:
+                yield item, result
 
 
-def _told(outcome: Outcome | None) -> str:
-    if outcome is None:
-        return "not known: the machine was too busy"
-    return f"killed by {outcome.by}" if outcome.killed else "SURVIVED"
+def copy_of(root: Path, place: Path) -> Path:
+    """Copy the files of the project that Git knows, and return the folder of the copy."""
+    tree = place / "tree"
+    shutil.rmtree(tree, ignore_errors=True)
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, check=True).stdout
+    for name in filter(None, listed.decode().split("\0")):
+        if (root / name).exists():
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(root / name, tree / name)
+    return tree
 
 
 def main() -> None:
-    """Draw, run what is not known yet, report."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Draw mutants, run the tests for those that have no result yet, and print the report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("places", nargs="*", default=PACKAGES, help="packages, folders or modules")
-    parser.add_argument("--count", type=int, default=100, help="of each; 0: one at every place")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--again", action="store_true", help="run those again that survived")
-    parser.add_argument("--table", action="store_true", help="print what is known and run nothing")
-    asked = parser.parse_args()
+    parser.add_argument("--count", type=int, default=100, help="mutants of each place; 0 for all")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the sample")
+    parser.add_argument("--report", action="store_true", help="print the results of earlier runs, and run nothing")
+    arguments = parser.parse_args()
     PLACE.mkdir(parents=True, exist_ok=True)
-    drawn = {place: drawn_from(ROOT, place, asked.count, asked.seed) for place in asked.places}
-    results = Results(ROOT / RESULTS, ROOT)
-    runner = None if asked.table else Runner(ROOT, PLACE)
-    for mutant in (mutant for mutants in drawn.values() for mutant in mutants if runner is not None):
-        known = results.of(mutant)
-        if known is not None and (known.killed or not asked.again):
-            continue
-        assert runner is not None
-        outcome = runner.outcome(mutant, suite_of(mutant.path))
-        if outcome is not None:
-            results.add(mutant, outcome)
-        what = _told(outcome)
-        print(f"{mutant.path}:{mutant.line}  {mutant.before[:50]} -> {mutant.after[:50]}  {what}", file=sys.stderr)
-    commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True)
-    print(f"commit {commit.stdout.strip()}, seed {asked.seed}")
-    print("\n".join(table(drawn, results)))
+    tree = copy_of(ROOT, PLACE)
+    os.environ.setdefault("LINEFIX_KERNELS", str(PLACE / "kernels"))
+    sessions: dict[str, list[Path]] = defaultdict(list)
+    with contextlib.chdir(tree):
+        for place in arguments.places:
+            modules = modules_of(tree, place)
+            for begin in sorted({suite_of(str(module)) for module in modules}):
+                mine = [module for module in modules if suite_of(str(module)) == begin]
+                count = arguments.count and max(1, round(arguments.count * len(mine) / len(modules)))
+                session = PLACE / f"{place}-{begin}-{count}-{arguments.seed}.sqlite".replace("/", "_")
+                if not session.exists():
+                    prepare(session, mine, count, arguments.seed)
+                if not arguments.report:
+                    run(session, SUITES[begin])
+                sessions[place].append(session)
+    print("\n".join(report(sessions)))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Which tests are those of a module, and which of its mutants are no mistakes."""
+"""The tests of each module, and the mutants that make no difference."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from .drawing import Mutant
-
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """Tests that are run together.
+    """Tests that run together.
 
     Attributes
     ----------
     tests : tuple of str
         Folders and files.
     compiled : bool
-        Whether kernels are compiled; where few tests call them it is quicker without.
+        True where kernels are compiled; where few tests call them, plain Python is faster.
     """
 
     tests: tuple[str, ...]
@@ -85,20 +83,31 @@ SUITES = {
         )
     ),
 }
-"""By the beginning of a module's path; the first that applies."""
+"""By the beginning of a module's path; the first entry that fits is used."""
 
 
-def suite_of(path: str) -> Suite:
-    """Return the tests that have to notice a mistake in a module."""
-    return next(suite for begin, suite in SUITES.items() if path.startswith(begin))
+def suite_of(path: str) -> str:
+    """Return the key in `SUITES` of the tests that must notice a mutant of a module."""
+    return next(begin for begin in SUITES if path.startswith(begin))
 
 
 def known_equivalents() -> dict[tuple[str, str, str], str]:
-    """Return why mutants make no difference, by path and changed lines; written by hand, one by one."""
+    """Return why mutants make no difference, by path, line before and line after; each was examined by hand."""
     entries = tomllib.loads(EQUIVALENT.read_text()).get("equivalent", [])
-    return {(entry["path"], entry["before"], after): entry["why"] for entry in entries for after in entry["after"]}
+    return {
+        (entry["path"], _plain(entry["before"]), _plain(after)): entry["why"]
+        for entry in entries
+        for after in entry["after"]
+    }
 
 
-def key_of(mutant: Mutant) -> tuple[str, str, str]:
-    """Return what a mutant is looked up by."""
-    return mutant.path, mutant.before, mutant.after
+def changed_lines(diff: str) -> tuple[str, str]:
+    """Return the removed and the added lines of a unified diff, each joined into one line."""
+    lines = diff.splitlines()
+    removed = [line[1:] for line in lines if line.startswith("-") and not line.startswith("---")]
+    added = [line[1:] for line in lines if line.startswith("+") and not line.startswith("+++")]
+    return _plain(" ".join(removed)), _plain(" ".join(added))
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.split())
