@@ -38,7 +38,7 @@ class AdviceAnswer(Answer):
 
 
 class PlaceAnswer(Answer):
-    """A place from which the map shows what it shows elsewhere, too."""
+    """A pose from which the map shows what it shows from another, too."""
 
     pose: PoseAnswer
     similar_pose: PoseAnswer = Field(description="from where it shows about the same")
@@ -70,8 +70,8 @@ class MapCheckAnswer(Answer):
     findings: list[FindingAnswer] = Field(description="the weightiest first")
     size: SizeAnswer
     advice: AdviceAnswer
-    places: list[PlaceAnswer] = Field(description="from which it looks like elsewhere")
-    viewpoints: Index = Field(description="places, to see whether the map looks alike elsewhere")
+    places: list[PlaceAnswer] = Field(description="poses from which the map shows about the same as from another")
+    viewpoints: Index = Field(description="number of poses that were compared")
     complete: bool = Field(description="false where the deadline left something out")
 
 

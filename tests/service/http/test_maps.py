@@ -21,7 +21,7 @@ def test_a_map_comes_back_to_the_bit(client: httpx.Client) -> None:
     }
     put = client.put("/v1/maps/bits", json=document)
     assert put.status_code == 201
-    told = {"map_id": "bits", "revision": 1, "segments": 2, "bounds": [0.0, 2.0**-40, 1e3 + 1 / 3, 4.4]}
+    told = {"map_id": "bits", "revision": 1, "segment_count": 2, "bounds": [0.0, 2.0**-40, 1e3 + 1 / 3, 4.4]}
     assert put.json() == {**told, "sigma": 0.1, "oriented": None}
     got = client.get("/v1/maps/bits")
     assert got.json() == document
