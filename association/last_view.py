@@ -114,7 +114,7 @@ def last_view(scan: Scan) -> tuple[Scan, Indices]:
         spread=np.eye(0),
     )
     alone = _of_one_place(_measured(scan.measured, own), _beams(scan.beams, beams), some)
-    return replace(alone, ordered=scan.ordered), own
+    return replace(alone, ordered=scan.ordered, warnings=scan.warnings), own
 
 
 def _of_one_place(measured: MeasuredSegments, beams: Beams | None, views: Views) -> Scan:

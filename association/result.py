@@ -26,6 +26,7 @@ ReasonCode = Literal[
 WarningCode = Literal[
     "no_segments",
     "points_not_in_order",
+    "motion_unknown",
     "stuck_ranges",
     "scan_exceeds_map",
     "faces_away",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from registration import Beams, MeasuredSegments, RigidTransform, Segments
 
+from .result import AssociationWarning
 from .tuning import VIEWS_APART
 
 Floats = NDArray[np.float64]
@@ -106,6 +107,8 @@ class Scan:
         Where it was put together of several.
     ordered : bool
         True unless the scan was made of points that are not in scanning order.
+    warnings : tuple of AssociationWarning
+        What is wrong with how it was taken; each answer has them.
     """
 
     measured: MeasuredSegments
@@ -113,6 +116,7 @@ class Scan:
     beams: Beams | None = None
     views: Views | None = None
     ordered: bool = True
+    warnings: tuple[AssociationWarning, ...] = ()
 
 
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
@@ -123,7 +127,7 @@ def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     at, views = scan.viewpoint, scan.views
     beams = None if scan.beams is None else scan.beams.mirrored()
     measured = _mirrored(scan.measured) if segments else NOTHING_MEASURED
-    return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered)
+    return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings)
 
 
 def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
@@ -138,7 +142,7 @@ def turned_round(scan: Scan) -> Scan:
     """
     ends = scan.measured.segments.endpoints[:, [2, 3, 0, 1]]
     measured = replace(scan.measured, segments=Segments.derived(ends))
-    return Scan(measured, None, None, scan.views and scan.views.blind())
+    return Scan(measured, None, None, scan.views and scan.views.blind(), warnings=scan.warnings)
 
 
 def scaled(scan: Scan, factor: float) -> Scan:
@@ -152,4 +156,5 @@ def scaled(scan: Scan, factor: float) -> Scan:
         spreads=seen.spreads * factor**2,
     )
     place = at and (at[0] * factor, at[1] * factor)
-    return Scan(measured, place, beams and beams.scaled(factor), views and views.scaled(factor), scan.ordered)
+    views = views and views.scaled(factor)
+    return Scan(measured, place, beams and beams.scaled(factor), views, scan.ordered, scan.warnings)

@@ -86,6 +86,7 @@ def assemble(views: Sequence[View]) -> Scan:
             spread=np.eye(root.shape[1]),
         ),
         ordered=all(view.scan.ordered for view in views),
+        warnings=tuple({one.code: one for view in reversed(views) for one in view.scan.warnings}.values()),
     )
 
 
@@ -108,7 +109,7 @@ def corrected(scan: Scan, found: Floats, spread: Floats) -> Scan:
     sighted = places[~np.isnan(places[:, 0])]
     viewpoint = (float(sighted[0, 0]), float(sighted[0, 1])) if len(sighted) else None
     views = replace(views, poses=poses, viewpoints=places, found=found, spread=spread)
-    return Scan(measured, viewpoint, beams, views, scan.ordered)
+    return Scan(measured, viewpoint, beams, views, scan.ordered, scan.warnings)
 
 
 def moved(measured: MeasuredSegments, by: RigidTransform) -> MeasuredSegments:

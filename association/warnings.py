@@ -68,6 +68,7 @@ def _of_scan(context: SearchContext) -> dict[WarningCode, str | None]:
     return {
         "no_segments": _no_segments(context),
         "points_not_in_order": None if context.scan.ordered else NOT_IN_ORDER,
+        **{warning.code: warning.message for warning in context.scan.warnings},
         "stuck_ranges": _stuck_ranges(context.scan.beams),
         "scan_exceeds_map": _exceeding(context),
         "faces_away": _facing_away(context),

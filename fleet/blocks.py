@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 
 import linefix
 from association import Scan
-from registration import MeasuredSegments, RigidTransform, Segments
+from linefix.mounted import RangeScan
+from registration import MeasuredSegments, Segments
 from vectorization import LaserScan, Motion
 
 from .errors import UnreadableScansError
@@ -51,16 +52,6 @@ class Block:
         middle = (self.start + self.stop) // 2
         first = Block(self.number, self.log, self.path, self.start, middle)
         return first, Block(self.number, self.log, self.path, middle, self.stop)
-
-
-@dataclass(frozen=True, slots=True)
-class RangeScan:
-    """Ranges of a row, as `linefix.view_of` takes them."""
-
-    laser: LaserScan
-    time_increment: float
-    flipped: bool
-    mount: RigidTransform | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +104,7 @@ class Row:
             math.inf if farthest is None else farthest,
             self._motion(),
         )
-        seen = RangeScan(laser, self._number("time_increment") or 0.0, bool(self.values.get("flipped")))
+        seen = RangeScan(laser, self._number("time_increment") or 0.0, flipped=bool(self.values.get("flipped")))
         return linefix.assemble([linefix.view_of(seen, sigma=self._number("sigma"))])
 
     def _motion(self) -> Motion | None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from association import Scan, View, mirrored
+from association import AssociationWarning, Scan, View, mirrored
 from registration import RigidTransform
 from vectorization import LaserScan, VectorizationOptions, vectorize
+from vectorization.laser import LONGEST_SCAN, USUAL_SCAN
 
 # Standard deviations of the speed of a robot whose motion is not known, m/s and rad/s: default limits of Nav2's
 # controllers.
@@ -26,7 +28,8 @@ class MountedScan(Protocol):
     laser : LaserScan
         In the sensor's frame; with its `motion` where that is known.
     time_increment : float
-        From beam to beam, seconds; 0: not known, the scan is taken for one of a moment.
+        From beam to beam, seconds; 0: not known, the scan is taken for one of a moment. One by which the scan takes
+        more than 1 s is in another unit: 0.2 s are assumed.
     mount : RigidTransform or None
         base_from_sensor; None: not known, poses are those of the sensor.
     flipped : bool
@@ -54,6 +57,16 @@ class MountedScan(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RangeScan:
+    """The plainest `MountedScan`; its attributes are those."""
+
+    laser: LaserScan
+    time_increment: float = 0.0
+    mount: RigidTransform | None = None
+    flipped: bool = False
+
+
 def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: float | None = None) -> View:
     """Return what a mounted scanner saw, in the frame of the robot; of the sensor where its mount is not known.
 
@@ -68,7 +81,8 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     Returns
     -------
     View
-        Several of them, put together by `assemble`, are one scan.
+        Several of them, put together by `assemble`, are one scan. Where the scanner's motion during the scan is not
+        known, it has the covariance and the warning for that.
 
     Raises
     ------
@@ -90,12 +104,13 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     [0.3, -0.25]
     >>> scan = linefix.assemble(views)
     """
-    scan = ranges_scan(seen.laser, sigma)
+    scan, warning = ranges_scan(seen.laser, sigma), motion_warning(seen)
+    scan = scan if warning is None else replace(scan, warnings=(warning,))
     place = base_from_then.compose(seen.mount or HERE)
-    return View(mirrored(scan) if seen.flipped else scan, place, motion_covariance(seen, base_from_then))
+    return View(mirrored(scan) if seen.flipped else scan, place, _motion_covariance(seen, base_from_then))
 
 
-def motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
+def _motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
     """Return what is not known of where a scanner was because it moved during the scan; None where its motion is known.
 
     On average the beams are taken half the duration after the first one. A robot moves by ``v`` and ``omega``
@@ -112,14 +127,39 @@ def motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) 
     (3, 3) or None
         Of additive (x, y, theta) of the view's pose: m^2, m rad, rad^2.
     """
-    if not seen.time_increment > 0.0 or seen.laser.motion is not None:
+    seconds = _seconds_moving(seen)
+    if not seconds:
         return None
     place = base_from_then.compose(seen.mount or HERE)
     x, y = place.x - base_from_then.x, place.y - base_from_then.y
-    half = 0.5 * seen.time_increment * len(seen.laser.ranges)
-    moved = half * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+    moved = 0.5 * seconds * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
     covariance: NDArray[np.float64] = moved @ np.diag([SPEED**2, SPEED**2, TURN**2]) @ moved.T
     return covariance
+
+
+def motion_warning(seen: MountedScan) -> AssociationWarning | None:
+    """Return the warning about a scanner that may have moved during the scan; None where its motion is known."""
+    seconds = _seconds_moving(seen)
+    if not seconds:
+        return None
+    beams, increment = len(seen.laser.ranges), seen.time_increment
+    told = f"By its time_increment of {increment:.3g} s a scan of {beams} beams takes {increment * beams:.3g} s"
+    if seconds < increment * beams:
+        told += f", expected at most {LONGEST_SCAN:g} s, so {seconds:g} s is assumed; give time_increment in seconds"
+    return AssociationWarning(
+        "motion_unknown",
+        f"{told}. The motion of its sensor meanwhile is not known, so the scan may be distorted; the covariance of a "
+        f"pose allows for {SPEED:g} m/s and {TURN:g} rad/s. Give the motion: over HTTP as twist, 0 where the sensor "
+        "stands still; in a log and in ROS 2 by odometry.",
+    )
+
+
+def _seconds_moving(seen: MountedScan) -> float:
+    """Return the duration of a scan during which the motion of its sensor is not known; 0 where it is known."""
+    if not seen.time_increment > 0.0 or seen.laser.motion is not None:
+        return 0.0
+    seconds = seen.time_increment * len(seen.laser.ranges)
+    return seconds if seconds <= LONGEST_SCAN else USUAL_SCAN
 
 
 def ranges_scan(scan: LaserScan | ArrayLike, sigma: float | None = None) -> Scan:

@@ -17,6 +17,9 @@ from .kernels.rays import clean
 MIN_INCREMENT = 1e-6  # rad; neighbouring beams closer than that are one
 
 
+LONGEST_SCAN = 1.0  # s; slow scanners turn at 5 Hz, and a `time_increment` that makes more is in another unit
+USUAL_SCAN = 0.2  # s; of a slow scanner, assumed in its place
+
 MOST_TURN = 0.5  # of the step from beam to beam, that the sensor itself may turn meanwhile
 
 # Beams that angle_max may differ from angle_min + (n - 1) * angle_increment. Drivers set angle_max to n increments

@@ -10,6 +10,7 @@ import numpy as np
 
 from registration import RigidTransform
 from vectorization import Motion
+from vectorization.laser import LONGEST_SCAN, USUAL_SCAN
 
 from ..errors import UprightFrameError
 from ..report import Notes, shown
@@ -17,7 +18,7 @@ from .odometry import BASES, Odometry, base_of, moves, outer_frames
 from .scan import LogOptions
 from .transforms import NS, Floats, Transforms, planar
 from .trees import BagFrames
-from .tuning import FASTEST, LONGEST_SCAN, MOST_TILT, SAID_TILT, USUAL_SCAN
+from .tuning import FASTEST, MOST_TILT, SAID_TILT
 
 
 def tilt_of(matrix: Floats) -> float:

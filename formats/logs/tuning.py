@@ -5,8 +5,6 @@ import math
 MOVED = 0.05  # m and rad; a frame that stays within it does not move: half of what tracking allows at rest
 STALE_NS = 500_000_000  # a moving transform holds no longer than this before its first and after its last value
 WINDOW_NS = 500_000_000  # between the values that a speed is taken from, the duration of the scan aside
-LONGEST_SCAN = 1.0  # s; slow scanners turn at 5 Hz, and a `time_increment` that makes more is in another unit
-USUAL_SCAN = 0.2  # s; of a slow scanner, where a message says nothing that can be
 FASTEST = 10.0  # m/s and rad/s; a robot indoors that seems to be faster has odometry that jumps
 MOST_TILT = math.radians(20.0)  # of a scan plane; beyond, ranges say little of walls: cos(20 degrees) is 6 %
 SAID_TILT = math.radians(2.0)  # of a scan plane, from which on it is reported: mounts are not more exact

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO, TypeVar
 
 import typer
 
-from linefix.mounted import HERE, motion_covariance
+from linefix.mounted import HERE
 
 from .errors import WrongUseError
 from .inputs import needing_formats
@@ -87,8 +87,8 @@ def print_notes(log: Log, where: TextIO) -> None:
 
 
 def sent(one: LoggedScan) -> Json:
-    """Return a scan of a log as a request has it: one view, with the mount, the motion and what is not known of it."""
-    laser, mount, covariance = one.laser, one.mount or HERE, motion_covariance(one)
+    """Return a scan of a log as a request has it: one view, with the mount, and the motion where it is known."""
+    laser, mount = one.laser, one.mount or HERE
     most = laser.range_max if math.isfinite(laser.range_max) else FARTHEST
     view: Json = {
         "laser": {
@@ -96,14 +96,12 @@ def sent(one: LoggedScan) -> Json:
             "angle_increment": laser.angle_increment,
             "ranges": _ranges(laser, most),
             "range_max": most,
+            "time_increment": one.time_increment,
         },
         "pose": {"x": mount.x, "y": mount.y, "theta": mount.theta},
         "flipped": one.flipped,
     }
-    if covariance is not None:
-        view["covariance"] = covariance.tolist()
     if laser.motion is not None:
-        view["laser"]["time_increment"] = laser.motion.time_increment
         view["twist"] = {"vx": laser.motion.vx, "vy": laser.motion.vy, "omega": laser.motion.omega}
     return {"views": [view], "stamp": one.stamp}
 

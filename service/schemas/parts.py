@@ -158,7 +158,9 @@ class Laser(Strict):
     )
     header: Header | None = Field(None, description="of a LaserScan message")
     time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
-        None, description="seconds from beam to beam; with a `twist` every beam is taken to where the sensor was"
+        None,
+        description="seconds from beam to beam; with a `twist` every beam is taken to where the sensor was; without "
+        "it the covariance is wider, and the answer has the warning `motion_unknown`",
     )
     angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
         None, description="radians, of the last beam; has to agree with the other angles within 1.5 beams"
@@ -190,7 +192,9 @@ class LaserScan(_Scan):
     laser: Laser
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
     twist: Twist | None = Field(
-        None, description="how the sensor moved meanwhile, in its own frame; the pose is that at the first beam"
+        None,
+        description="how the sensor moved meanwhile, in its own frame, 0 where it stood still; the pose is that at the "
+        "first beam",
     )
 
     @property

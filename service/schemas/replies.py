@@ -288,7 +288,7 @@ class VectorizeAnswer(Answer):
     sigma: float = Field(description="of single ranges or points, metres; given or estimated")
     sigmas: list[float] = Field(description="of each segment's points normal to the wall, metres; a scan's `sigma`")
     rms: list[float] = Field(description="of the points' distances from their segment, metres")
-    warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, as of a scan of /v1/associate")
+    warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, `motion_unknown`, as of /v1/associate")
     request_id: str
     timing_ms: TimingAnswer
 

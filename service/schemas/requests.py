@@ -147,7 +147,9 @@ class VectorizeRequest(Strict):
     laser: Laser | None = Field(None, description="ranges, as in a LaserScan message")
     points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
     twist: Twist | None = Field(
-        None, description="how the sensor moved meanwhile, in its own frame; segments are in that of the first beam"
+        None,
+        description="how the sensor moved meanwhile, in its own frame, 0 where it stood still; segments are in that of "
+        "the first beam",
     )
     viewpoint: Point | None = Field(
         default_factory=lambda: [0.0, 0.0],

@@ -60,7 +60,7 @@ class LaserView(_View):
 
     laser: Laser
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
-    twist: Twist | None = Field(None, description="how the sensor moved meanwhile, in its own frame")
+    twist: Twist | None = Field(None, description="how the sensor moved meanwhile, in its own frame; 0: it stood still")
 
     @model_validator(mode="after")
     def _from_the_sensor(self) -> LaserView:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Alternative, AssociationResult, Correspondence, CriticalWall, message_of
+from association import (
+    Alternative,
+    AssociationResult,
+    AssociationWarning,
+    Correspondence,
+    CriticalWall,
+    message_of,
+)
 from association.warnings import NOT_IN_ORDER
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
@@ -178,7 +185,7 @@ def association_json(result: AssociationResult, include: frozenset[str], starts:
             "sampling": search.sampling,
             "complete_above": search.complete_above,
         },
-        "warnings": [{"code": warning.code, "message": warning.message} for warning in result.warnings],
+        "warnings": warnings_json(result.warnings),
     }
     if "correspondences" in include:
         answer["correspondences"] = [correspondence_json(pair, named) for pair in result.correspondences]
@@ -189,9 +196,15 @@ def association_json(result: AssociationResult, include: frozenset[str], starts:
     return answer
 
 
-def vectorization_json(found: Vectorization) -> Json:
-    """Return the answer of a vectorization."""
+def warnings_json(warnings: Iterable[AssociationWarning]) -> list[Json]:
+    """Return what a caller should know."""
+    return [{"code": warning.code, "message": warning.message} for warning in warnings]
+
+
+def vectorization_json(found: Vectorization, moving: AssociationWarning | None = None) -> Json:
+    """Return the answer of a vectorization; `moving` is the warning about a sensor whose motion is not known."""
     measured = found.measured
+    unordered = None if found.ordered else AssociationWarning("points_not_in_order", NOT_IN_ORDER)
     return {
         "segments": measured.segments.endpoints.tolist(),
         "point_counts": measured.point_counts.astype(int).tolist(),
@@ -200,7 +213,7 @@ def vectorization_json(found: Vectorization) -> Json:
         "sigma": found.sigma,
         "sigmas": measured.sigma.tolist(),
         "rms": found.rms.tolist(),
-        "warnings": [] if found.ordered else [{"code": "points_not_in_order", "message": NOT_IN_ORDER}],
+        "warnings": warnings_json(one for one in (unordered, moving) if one is not None),
     }
 
 

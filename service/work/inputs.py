@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +24,10 @@ from ..schemas.parts import (
 from ..schemas.requests import RegisterRequest
 from ..schemas.strict import Pose
 from ..schemas.views import LaserView, PointView, SegmentView, ViewsScan
-from .scanning import Scanned, scan_laser, scan_points, viewpoint_of
+from .scanning import Scanned, range_scan, scan_points, view_laser, viewpoint_of
+
+HERE = RigidTransform(0.0, 0.0, 0.0)
+LONGEST_LEVER = 5.0  # m; a view farther from the scan's frame is one of a drive, not of a scanner on the robot
 
 
 def transform_of(pose: Pose) -> RigidTransform:
@@ -38,13 +44,17 @@ def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegment
     return MeasuredSegments.from_segments(segments, scan.sigma, scan.point_counts, moments, argument=argument)
 
 
-def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan) -> Scanned:
-    """Return what the robot saw, whatever form it came in."""
+def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan, *, timed: bool = True) -> Scanned:
+    """Return what the robot saw, whatever form it came in.
+
+    Where not `timed`, a motion that is not known during a scan is taken for none.
+    """
     if isinstance(scan, ViewsScan):
-        return _of_views(scan)
+        return _of_views(scan, timed=timed)
     viewpoint = viewpoint_of(scan.viewpoint)
     if isinstance(scan, LaserScan):
-        return _vectorized(scan_laser(scan.laser, scan.sigma, viewpoint, scan.twist))
+        seen = range_scan(scan.laser, scan.twist, "/scan", timed=timed)
+        return _vectorized(assemble([view_laser(seen, HERE, scan.sigma, viewpoint)]))
     if isinstance(scan, PointScan):
         return _vectorized(scan_points(scan.points, scan.sigma, viewpoint))
     return Scanned(Scan(measured_of(scan), viewpoint), None)
@@ -54,8 +64,8 @@ def _vectorized(scan: Scan) -> Scanned:
     return Scanned(scan, scan.measured.segments.endpoints)
 
 
-def _of_views(scan: ViewsScan) -> Scanned:
-    views = [_view_of(view, k) for k, view in enumerate(scan.views)]
+def _of_views(scan: ViewsScan, *, timed: bool) -> Scanned:
+    views = [_view_of(view, k, timed=timed) for k, view in enumerate(scan.views)]
     together = assemble(views)
     counts = np.array([len(view.scan.measured) for view in views])
     starts = np.cumsum(counts) - counts
@@ -65,17 +75,29 @@ def _of_views(scan: ViewsScan) -> Scanned:
     return Scanned(together, None, parts, starts)
 
 
-def _view_of(view: SegmentView | LaserView | PointView, number: int) -> View:
+def _view_of(view: SegmentView | LaserView | PointView, number: int, *, timed: bool) -> View:
     """Return what one sensor saw, from where it stood."""
     viewpoint, place = viewpoint_of(view.viewpoint), f"/scan/views/{number}"
     if isinstance(view, LaserView):
-        seen = scan_laser(view.laser, view.sigma, viewpoint, view.twist, place)
-    elif isinstance(view, PointView):
+        return _laser_view(view, place, timed=timed)
+    if isinstance(view, PointView):
         seen = scan_points(view.points, view.sigma, viewpoint, place)
     else:
         seen = Scan(measured_of(view, f"scan.views.{number}"), viewpoint)
     seen = mirrored(seen) if view.flipped else seen
     return View(seen, transform_of(view.pose), view.covariance, view.relative_to)
+
+
+def _laser_view(view: LaserView, place: str, *, timed: bool) -> View:
+    """Return what a scanner saw; of one whose motion is not known, the covariance has that of the step and of it."""
+    pose = transform_of(view.pose)
+    seen = replace(range_scan(view.laser, view.twist, place, timed=timed), flipped=view.flipped)
+    at = pose
+    if view.relative_to is None and view.covariance is None and math.hypot(pose.x, pose.y) <= LONGEST_LEVER:
+        seen, at = replace(seen, mount=pose), HERE  # turns with the robot, whose frame is that of the scan
+    found = view_laser(seen, at, view.sigma, viewpoint_of(view.viewpoint), place)
+    parts = [one for one in (view.covariance, found.covariance) if one is not None]
+    return replace(found, covariance=sum(parts[1:], parts[0]) if parts else None, relative_to=view.relative_to)
 
 
 def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:

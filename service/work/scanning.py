@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Scan
+from association import Scan, View
+from linefix import view_of
+from linefix.mounted import RangeScan
+from registration import RigidTransform
 from vectorization import (
     LaserScan,
     Motion,
@@ -55,10 +58,11 @@ class Scanned:
     starts: NDArray[np.intp] | None = None
 
 
-def vectorize_laser(
-    laser: Laser, options: VectorizationOptions, places: tuple[str, str], twist: Twist | None = None
-) -> Vectorization:
-    """Return the segments in a turn of a scanner; `places` are the pointers of scan and options."""
+def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = True) -> RangeScan:
+    """Return the ranges of a scanner; `place` is the pointer of its scan.
+
+    Where not `timed`, a motion that is not known is taken for none.
+    """
     bounds = {
         name: value
         for name, value in (("range_min", laser.range_min), ("range_max", laser.range_max))
@@ -67,11 +71,17 @@ def vectorize_laser(
     motion = None
     if twist is not None and laser.time_increment:
         motion = Motion(laser.time_increment, twist.vx, twist.vy, twist.omega)
-    with _placed(f"{places[0]}/laser", places):
+    with _placed(f"{place}/laser", (place, place)):
         if laser.angle_max is not None and len(laser.ranges):
             require_angle_max(laser.angle_min, laser.angle_max, laser.angle_increment, len(laser.ranges))
         scan = LaserScan(laser.angle_min, laser.angle_increment, laser.ranges, motion=motion, **bounds)
-        return vectorize(scan, options)
+    return RangeScan(scan, (timed and laser.time_increment) or 0.0)
+
+
+def vectorize_laser(seen: RangeScan, options: VectorizationOptions, places: tuple[str, str]) -> Vectorization:
+    """Return the segments in the ranges of a scanner; `places` are the pointers of scan and options."""
+    with _placed(f"{places[0]}/laser", places):
+        return vectorize(seen.laser, options)
 
 
 def vectorize_points(
@@ -82,14 +92,13 @@ def vectorize_points(
         return vectorize(points, options, viewpoint)
 
 
-def scan_laser(
-    laser: Laser, sigma: float | None, viewpoint: Viewpoint, twist: Twist | None = None, place: str = "/scan"
-) -> Scan:
-    """Return ranges as a scan; the single beams stay evidence."""
-    found = vectorize_laser(laser, VectorizationOptions(sigma=sigma), (place, place), twist)
-    if viewpoint is None:
-        return Scan(found.measured, None)
-    return Scan(found.measured, found.viewpoint, found.beams)
+def view_laser(
+    seen: RangeScan, at: RigidTransform, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan"
+) -> View:
+    """Return what a scanner saw; the single beams stay evidence. `at` is the pose of what it is mounted on."""
+    with _placed(f"{place}/laser", (place, place)):
+        view = view_of(seen, at, sigma)
+    return view if viewpoint is not None else replace(view, scan=replace(view.scan, viewpoint=None, beams=None))
 
 
 def scan_points(points: Floats, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan") -> Scan:

@@ -52,8 +52,7 @@ def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) ->
     source = opened(log, options_of(topic, tf_namespace))
     taken = spread(list(scans_of(source)), SAMPLES)
     print_notes(source, sys.stderr)
-    # The mount does not matter to the map; an unknown motion would only loosen the fit.
-    return [sent(replace(one, mount=None, time_increment=0.0)) for one in taken]
+    return [sent(replace(one, mount=None)) for one in taken]  # the mount does not matter to the map
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:

@@ -1,0 +1,144 @@
+"""Scans that take time: the motion of their sensor is sent, or the answer allows for it and says so."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from registration import RigidTransform
+from service.schemas import examples
+
+from .test_views import EXACT, HERE, pose_json, read_from
+
+ANGLES = np.linspace(-math.pi, math.pi, 720, endpoint=False)
+STEP = 0.1 / len(ANGLES)  # s from beam to beam
+STILL = {"vx": 0.0, "vy": 0.0, "omega": 0.0}
+MAP = {"segments": examples.WALLS, "sigma": 0.002}
+CODE = "motion_unknown"
+
+
+def laser(at: RigidTransform = HERE, **more: Any) -> dict[str, Any]:
+    """Return what a scanner reads all around, all beams at one time."""
+    noise = np.random.default_rng(5).normal(0.0, 0.01, len(ANGLES))
+    ranges = (np.array(read_from(at, ANGLES)) + noise).tolist()
+    return {"angle_min": ANGLES[0], "angle_increment": ANGLES[1] - ANGLES[0], "ranges": ranges, **more}
+
+
+def found(client: httpx.Client, scan: dict[str, Any]) -> dict[str, Any]:
+    response = client.post("/v1/associate", json={"map": MAP, "scan": scan})
+    assert response.status_code == 200, response.text
+    answer: dict[str, Any] = response.json()
+    return answer
+
+
+def warned(answer: dict[str, Any]) -> list[str]:
+    return [one["message"] for one in answer["warnings"] if one["code"] == CODE]
+
+
+def deviations(answer: dict[str, Any]) -> list[float]:
+    deviations: list[float] = np.sqrt(np.diag(answer["covariance"])).tolist()
+    return deviations
+
+
+UNKNOWN = [{"laser": laser(time_increment=STEP)}, {"views": [{"laser": laser(time_increment=STEP), "pose": EXACT}]}]
+KNOWN = [
+    {"laser": laser()},
+    {"laser": laser(time_increment=0.0)},
+    {"laser": laser(time_increment=None)},
+    {"laser": laser(time_increment=STEP), "twist": STILL},
+    {"laser": laser(time_increment=0.0), "twist": STILL},
+    {"views": [{"laser": laser(time_increment=STEP), "pose": EXACT, "twist": STILL}]},
+]
+
+
+@pytest.mark.parametrize("scan", UNKNOWN, ids=["one sensor", "views"])
+def test_a_motion_that_is_not_known_is_warned_of_and_allowed_for(client: httpx.Client, scan: dict[str, Any]) -> None:
+    answer = found(client, scan)
+    assert answer["usable"]
+    (message,) = warned(answer)
+    assert "time_increment of 0.000139 s a scan of 720 beams takes 0.1 s" in message
+    assert "twist" in message
+    # Half of 0.1 s at 0.5 m/s and 1 rad/s.
+    assert deviations(answer) == pytest.approx([0.025, 0.025, 0.05], rel=0.1)
+
+
+@pytest.mark.parametrize("scan", KNOWN, ids=range(6))
+def test_a_sensor_that_stood_still_is_not_warned_of(client: httpx.Client, scan: dict[str, Any]) -> None:
+    answer = found(client, scan)
+    assert answer["usable"]
+    assert warned(answer) == []
+    assert max(deviations(answer)) < 0.005
+
+
+def test_the_covariance_holds_where_the_robot_turned(client: httpx.Client) -> None:
+    ranges = []
+    for k, angle in enumerate(ANGLES.tolist()):
+        ranges += read_from(HERE.compose(RigidTransform(0.0, 0.0, 1.0 * k * STEP)), np.array([angle]))
+    answer = found(client, {"laser": laser(time_increment=STEP) | {"ranges": ranges}})
+    wrong = abs(math.remainder(answer["pose"]["theta"] - HERE.theta, math.tau))
+    assert 0.03 < wrong < 2.0 * deviations(answer)[2]
+
+
+def test_indices_are_those_of_one_scan(client: httpx.Client) -> None:
+    answer = found(client, UNKNOWN[0])
+    assert all("view" not in pair for pair in answer["correspondences"])
+    assert all(isinstance(index, int) for index in answer["unmatched_scan"])
+    assert len(answer["segments"][0]) == 4
+
+
+def test_a_sensor_moves_with_the_robot_it_is_mounted_on(client: httpx.Client) -> None:
+    """Ahead of the axis the sensor moves more than the robot, whose pose is answered."""
+    mount = RigidTransform(1.5, 0.0, 0.0)
+    seen = laser(HERE.compose(mount), time_increment=STEP)
+    ahead = found(client, {"views": [{"laser": seen, "pose": pose_json(mount)}]})
+    assert ahead["usable"]
+    assert deviations(ahead) == pytest.approx([0.025, 0.025, 0.05], rel=0.1)
+
+
+def test_a_step_of_a_drive_keeps_its_own_covariance(client: httpx.Client) -> None:
+    step = RigidTransform(-40.0, 0.0, 0.0)  # too far for a lever
+    views = [
+        {"laser": laser(time_increment=STEP), "pose": EXACT},
+        {"laser": laser(time_increment=STEP), "pose": EXACT, "covariance": np.diag([0.04] * 3).tolist()},
+        {"laser": laser(time_increment=STEP), "pose": pose_json(step)},
+    ]
+    first, second = (found(client, {"views": [view]}) for view in views[:2])
+    assert deviations(second)[0] == pytest.approx(math.hypot(0.2, deviations(first)[0]), rel=0.1)
+    assert len(warned(found(client, {"views": views[:2]}))) == 1
+    assert warned(found(client, {"views": views[2:]}))
+
+
+def test_another_unit_is_named(client: httpx.Client) -> None:
+    """Milliseconds, where seconds are wanted: as in logs the scan is taken for one of 0.2 s."""
+    answer = found(client, {"laser": laser(time_increment=1e3 * STEP)})
+    (message,) = warned(answer)
+    assert "takes 100 s, expected at most 1 s, so 0.2 s is assumed" in message
+    assert deviations(answer)[2] == pytest.approx(0.1, rel=0.1)
+
+
+def test_in_a_batch_each_scan_has_its_own_warnings(client: httpx.Client) -> None:
+    scans = [*UNKNOWN, *KNOWN]
+    results = client.post("/v1/associate:batch", json={"map": MAP, "scans": scans}).json()["results"]
+    assert [len(warned(one["result"])) for one in results] == [1] * len(UNKNOWN) + [0] * len(KNOWN)
+    assert results[0]["result"]["covariance"] == found(client, scans[0])["covariance"]
+
+
+def test_segments_of_a_scan_that_took_time_are_warned_of(client: httpx.Client) -> None:
+    moved = client.post("/v1/vectorize", json=UNKNOWN[0]).json()
+    assert len(warned(moved)) == 1
+    for known in KNOWN[:5]:
+        assert client.post("/v1/vectorize", json=known).json()["warnings"] == []
+    assert moved["segments"] == client.post("/v1/vectorize", json=KNOWN[0]).json()["segments"]
+
+
+def test_a_map_is_checked_by_samples_as_they_are(client: httpx.Client) -> None:
+    client.put("/v1/maps/moving", json={"segments": examples.WALLS}).raise_for_status()
+    timed, still = (
+        client.post("/v1/maps/moving:check", json={"scans": [scan]}).json() for scan in (UNKNOWN[0], KNOWN[0])
+    )
+    client.delete("/v1/maps/moving")
+    assert {**timed, "timing_ms": None, "request_id": None} == {**still, "timing_ms": None, "request_id": None}
