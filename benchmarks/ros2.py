@@ -21,9 +21,10 @@ from cyclonedds.domain import DomainParticipant
 
 import linefix
 from association import MapIndex, associate
+from formats.logs.lasers import laser_of
+from formats.report import Notes
 from ros2 import messages
 from ros2.frames import NS
-from ros2.locating import laser_of
 from ros2.odometry import nanoseconds
 from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription, Waiting
 
@@ -183,7 +184,7 @@ def odometry_of(pose: linefix.RigidTransform, at: int) -> list[messages.Odometry
 
 def search(index: MapIndex, message: messages.LaserScan) -> tuple[bool, float, float]:
     """Answer a scan in this process; return whether that is usable, and the milliseconds of both steps."""
-    laser = laser_of(messages.LaserScan.deserialize(message.serialize()), flipped=False)
+    laser = laser_of(messages.LaserScan.deserialize(message.serialize()), Notes())
     begun = time.perf_counter()
     scan = linefix.scan_of(laser)
     between = time.perf_counter()

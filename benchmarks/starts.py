@@ -90,8 +90,7 @@ def observe(index: linefix.MapIndex, laser: linefix.LaserScan, stamp: int) -> Ob
         answer = linefix.locate(index, laser, options=OPTIONS)
     except InputError:
         return Observation(stamp, None, None, False)
-    others = tuple(one.pose for one in answer.alternatives)
-    return Located(Time(), answer, answer.pose, answer.covariance, others).observation(None, stamp)
+    return Located(Time(), answer).observation(None, stamp)
 
 
 def with_odometry(

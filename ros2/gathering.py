@@ -6,8 +6,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from registration import InputError
+
 from .frames import FrameError, Frames, Mount
-from .locating import Look, seconds_of
+from .looking import Look, look_of
 from .messages import LaserScan
 from .odometry import OdometryHistory, nanoseconds
 from .options import NodeOptions
@@ -63,7 +65,7 @@ def looks_of(
         The newest first.
     frames : Frames
     options : NodeOptions
-        The base frame, and whether the speed of the robot goes with the scans, as far as odometry has it.
+        The base frame, and whether scans are corrected for motion.
     odometry : OdometryHistory
 
     Returns
@@ -75,19 +77,17 @@ def looks_of(
     looks: list[Look] = []
     missing: list[str] = []
     for scan in scans:
-        now, stamp = (looks[0].message if looks else scan).header.stamp, scan.header.stamp
+        stamp, frame = scan.header.stamp, quoted(scan.header.frame_id)
+        step = odometry.step(looks[0].stamp if looks else stamp, stamp)
         try:
             mount = _mount_of(scan, frames, options)
+            if step is None:
+                raise FrameError(f"no odometry between the newest scan and that of {frame}, which is left out")
+            looks.append(look_of(scan, mount, odometry, step, motion=options.motion))
         except FrameError as error:
             missing.append(str(error))
-            continue
-        step = odometry.step(now, stamp)
-        if step is None:
-            frame = quoted(scan.header.frame_id)
-            missing.append(f"no odometry between the newest scan and that of {frame}, which is left out")
-            continue
-        middle = nanoseconds(stamp) + round(0.5e9 * seconds_of(scan))
-        looks.append(Look(scan, mount, step, odometry.speed(middle) if options.motion else None))
+        except InputError as error:
+            missing.append(f"the scan of {frame} cannot be used: {error}")
     return looks, missing
 
 
@@ -99,11 +99,6 @@ def _mount_of(scan: LaserScan, frames: Frames, options: NodeOptions) -> Mount:
         )
     if len(name) > MAX_NAME:
         raise FrameError(f"the frame_id of the scan has {len(name)} characters, expected at most {MAX_NAME}")
-    if not has_returns(scan):
-        raise FrameError(
-            f"no valid range in the scan of {quoted(name)}: {len(scan.ranges)} ranges, none of them a number; "
-            "is the laser on?"
-        )
     frame = options.frame(name)
     base = options.base_of(frame)
     mount = frames.mount(base, frame, nanoseconds(scan.header.stamp))
@@ -113,8 +108,3 @@ def _mount_of(scan: LaserScan, frames: Frames, options: NodeOptions) -> Mount:
             f"{options.topic('/tf')}; publish it, or name the base frame with --base"
         )
     return mount
-
-
-def has_returns(scan: LaserScan) -> bool:
-    """Return whether a range of a scan says anything: a return, or that nothing came back."""
-    return any(one == one and one >= scan.range_min for one in scan.ranges)

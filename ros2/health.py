@@ -66,15 +66,15 @@ class Health:
             self.publish("scan", stamp or Time(), (ERROR, problem))
         self.note(problem)
 
-    def warn(self, warning: str, stamp: Time) -> None:
-        """Publish a warning, and log it, as often as a problem."""
-        if _is_new(self._published, warning, time.monotonic(), REPEAT_SECONDS):
+    def warn(self, warning: str, stamp: Time, about: str) -> None:
+        """Publish a warning, and log it, as often as a problem; warnings `about` one thing may differ in numbers."""
+        if _is_new(self._published, about, time.monotonic(), REPEAT_SECONDS):
             self.publish("scan", stamp, (WARN, warning))
-        self.note(warning)
+        self.note(warning, about)
 
-    def note(self, line: str) -> None:
-        """Log a line; the same one at most once in `LOG_SECONDS`."""
-        if _is_new(self._logged, line, time.monotonic(), LOG_SECONDS):
+    def note(self, line: str, about: str | None = None) -> None:
+        """Log a line; the same one, or one `about` the same, at most once in `LOG_SECONDS`."""
+        if _is_new(self._logged, about or line, time.monotonic(), LOG_SECONDS):
             self.log(line)
 
     def publish(

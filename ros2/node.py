@@ -16,7 +16,8 @@ from .deciding import InitialPose
 from .frames import NS, FrameError, Frames, planar
 from .gathering import Gathering, looks_of
 from .health import Health, State
-from .locating import HERE, Located
+from .locating import Located
+from .looking import HERE
 from .map_conversion import MapConverter
 from .messages import LaserScan, Odometry, Time
 from .odometry import OdometryHistory, nanoseconds
@@ -226,11 +227,8 @@ class Node:
         for problem in missing:
             self._health.problem(problem, stamp)
         for look in looks:
-            if not look.mount.level:
-                frame, degrees = quoted(look.message.header.frame_id), math.degrees(look.mount.tilt)
-                self._health.warn(
-                    f"the scan plane of {frame} is tilted by {degrees:.0f} degrees; ranges are taken as they are", stamp
-                )
+            for code, note in look.notes.items():
+                self._health.warn(f"{quoted(look.frame)}: {note}", stamp, f"{code} {look.frame}")
         self._searched = bool(looks)
         if looks:
             self._silence.searched()

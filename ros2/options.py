@@ -34,7 +34,8 @@ class NodeOptions:
     odometry : str
         Topic of odometry: the motion of the robot between scans, and during each.
     motion : bool
-        Take every beam to where the scanner was, where a scan has a `time_increment` and odometry a twist.
+        Take every beam to where the scanner was, where a scan has a `time_increment` and odometry a twist; without the
+        twist the covariance is wider. False: scans are taken as they are.
     map_topic : str or None
         Of an OccupancyGrid, for a node that was given no map.
     base_frame, odom_frame : str

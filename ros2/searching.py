@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import linefix
 from registration import InputError
 
-from .locating import Located, Look, locate
+from .locating import Located, locate
+from .looking import Look
 from .messages import Time
 from .tuning import SEARCH_SECONDS
 
@@ -93,7 +94,7 @@ class Searcher:
             self._found()
 
     def _search(self, task: _Task) -> Found:
-        stamp, begun = task.looks[0].message.header.stamp, time.monotonic()
+        stamp, begun = task.looks[0].stamp, time.monotonic()
         located, problem = None, ""
         try:
             located = locate(task.index, task.looks, self._deadline.within(begun + SEARCH_SECONDS))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 # What is read of messages from outside. More is refused, never cut.
-MAX_BEAMS = 100_000  # of a scan; geometry: a beam each 0.0036 degrees
 MAX_TRANSFORMS = 2_000  # of one message; a humanoid robot has some 200
 MAX_FRAMES = 5_000  # that are stored, some 2 KB each
 TRANSFORMS_KEPT = 200  # of a moving frame: 2 s at 100 Hz

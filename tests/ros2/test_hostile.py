@@ -206,6 +206,17 @@ UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, 
         scan(1),
         '"laser" is tilted by 90 degrees',
     ),
+    "angles that contradict each other": (
+        mount,
+        replace(scan(1), angle_max=-scan(1).angle_min / 2),
+        'the scan of "laser" cannot be used: angle_max: angle_min -3.14159 rad, angle_max',
+    ),
+    "degrees": (
+        mount,
+        replace(scan(1), angle_min=-180.0, angle_max=179.5, angle_increment=0.5),
+        "expected radians, not degrees",
+    ),
+    "nothing but unknown ranges": (mount, replace(scan(1), ranges=[math.nan] * 720), "none of 720 ranges is a number"),
     "steep": (
         lambda: transform("base_link", "laser", rotation=tilted(23.0)),
         scan(1),

@@ -11,29 +11,40 @@ from linefix_client import Pose, base_from_laser
 import linefix
 from ros2 import messages
 from ros2.frames import Frames, Mount
-from ros2.locating import Look, locate
+from ros2.locating import Located, locate
+from ros2.looking import HERE, look_of
+from ros2.odometry import OdometryHistory
 from ros2.reporting import values_of
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
+WALLS = linefix.Segments.from_array(ROOM)
 SCANNER = linefix.simulation.Scanner(beams=720, sigma=0.01)
 TRUTH = linefix.RigidTransform(1.0, 1.5, 0.4)  # of the laser
 MOUNT = linefix.RigidTransform(0.3, -0.1, 2.0)
 
 
 def seen(*, flipped: bool = False) -> messages.LaserScan:
-    walls = linefix.Segments.from_array(ROOM)
-    ranges = linefix.simulation.scan(walls, TRUTH, SCANNER, np.random.default_rng(3)).ranges
+    ranges = linefix.simulation.scan(WALLS, TRUTH, SCANNER, np.random.default_rng(3)).ranges
     first, step = SCANNER.angle_min, SCANNER.angle_increment
     if flipped:  # its own counter-clockwise is clockwise for whoever looks from above
         first, ranges = -(first + 719 * step), ranges[::-1]
+    return message(ranges.tolist(), first, step, range_max=30.0)
+
+
+def message(ranges: list[float], first: float, step: float, *, range_max: float) -> messages.LaserScan:
+    last = first + (len(ranges) - 1) * step
     return messages.LaserScan(
-        angle_min=first, angle_increment=step, range_min=0.05, range_max=30.0, ranges=ranges.tolist()
+        angle_min=first, angle_max=last, angle_increment=step, range_min=0.05, range_max=range_max, ranges=ranges
     )
+
+
+def located_in(walls: linefix.Segments, scan: messages.LaserScan, mount: Mount) -> Located:
+    return locate(linefix.index_map(walls), [look_of(scan, mount, OdometryHistory(), HERE, motion=True)])
 
 
 @pytest.mark.parametrize("flipped", [False, True])
 def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
-    located = locate(linefix.index_map(ROOM), [Look(seen(flipped=flipped), Mount(MOUNT, flipped))])
+    located = located_in(WALLS, seen(flipped=flipped), Mount(MOUNT, flipped))
     expected = TRUTH.compose(MOUNT.inverse())
     assert located.answer.usable
     assert located.pose is not None
@@ -41,8 +52,9 @@ def test_the_robot_is_where_its_laser_is_not(flipped: bool) -> None:
 
 
 def test_its_covariance_is_that_of_the_client() -> None:
-    located = locate(linefix.index_map(ROOM), [Look(seen(), Mount(MOUNT))])
-    pose, covariance = located.answer.pose, located.answer.covariance
+    located = located_in(WALLS, seen(), Mount(MOUNT))
+    alone = located_in(WALLS, seen(), Mount(HERE))  # of the laser
+    pose, covariance = alone.pose, alone.covariance
     assert pose is not None
     assert covariance is not None
     _, expected = base_from_laser(
@@ -69,13 +81,8 @@ def test_a_position_that_is_open_is_published_without_a_probability() -> None:
     corridor = linefix.Segments.from_array(np.array([[-40, 0, 40, 0], [40, 2, -40, 2]], dtype=float))
     at = linefix.RigidTransform(0.0, 0.8, 0.3)
     ranges = linefix.simulation.scan(corridor, at, SCANNER, np.random.default_rng(3)).ranges
-    scan = messages.LaserScan(
-        angle_min=SCANNER.angle_min,
-        angle_increment=SCANNER.angle_increment,
-        range_min=0.05,
-        range_max=10.0,
-        ranges=np.where(ranges < 10.0, ranges, np.inf).tolist(),
-    )
-    located = locate(linefix.index_map(corridor), [Look(scan, Mount(MOUNT, flipped=False))])
+    near = np.where(ranges < 10.0, ranges, np.inf).tolist()
+    scan = message(near, SCANNER.angle_min, SCANNER.angle_increment, range_max=10.0)
+    located = located_in(corridor, scan, Mount(MOUNT))
     values = values_of(located, 1.0)
     assert (values["status"], values["usable"], values["probability"]) == ("degenerate", "false", "")

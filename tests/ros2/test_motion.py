@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,12 +13,13 @@ import linefix
 from ros2 import messages
 from ros2.frames import Frames, Mount
 from ros2.gathering import looks_of
-from ros2.locating import Look, locate, motion_of, seconds_of
+from ros2.locating import locate
+from ros2.looking import HERE, Look, look_of, motion_of
 from ros2.odometry import OdometryHistory, Speed
 from ros2.options import NodeOptions
 from ros2.wire import SENSOR, Publisher
 
-from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, mount
+from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, mount, running
 
 SCANNER = linefix.simulation.Scanner.over(1.5 * math.pi, 720, sigma=0.01)
 SPEED = Speed(0.8, -0.1, 2.0)
@@ -34,11 +36,11 @@ def robot_at(seconds: float) -> linefix.RigidTransform:
     return at
 
 
-def moving_scan(second: int, *, flipped: bool = False) -> messages.LaserScan:
+def moving_scan(second: int, *, flipped: bool = False, speed: Speed = SPEED) -> messages.LaserScan:
     """Return what the scanner reads, each beam from where it is at that time; `flipped`: it hangs upside down."""
     sign = -1.0 if flipped else 1.0
     walls, rng, ranges = linefix.Segments.from_array(ROOM), np.random.default_rng(second), []
-    little = linefix.RigidTransform(SPEED.vx * BEAT, SPEED.vy * BEAT, SPEED.omega * BEAT)
+    little = linefix.RigidTransform(speed.vx * BEAT, speed.vy * BEAT, speed.omega * BEAT)
     at = MAP_FROM_BASE
     for angle in SCANNER.angles.tolist():
         beam = linefix.simulation.Scanner(1, sign * angle, SCANNER.angle_increment, sigma=SCANNER.sigma)
@@ -85,26 +87,39 @@ def test_a_turning_robot_is_where_it_was_at_the_first_beam(
     assert all(is_at_truth(pose) for pose in found)
 
 
-def looked(scan: messages.LaserScan, *told: messages.Odometry) -> Speed | None:
-    """Return how fast the robot is taken to have moved during a scan."""
+def looked(scan: messages.LaserScan, *told: messages.Odometry, motion: bool = True) -> Look:
+    """Return what is searched for a scan, given odometry."""
     where, driven = Frames(), OdometryHistory()
-    where.take(mount(), static=True)
+    where.take(
+        messages.TFMessage([messages.TransformStamped(messages.Header(frame_id="base_link"), "laser")]), static=True
+    )
     for one in told:
         driven.take(one)
-    looks, missing = looks_of([scan], where, NodeOptions(), driven)
+    (look,), missing = looks_of([scan], where, NodeOptions(motion=motion), driven)
     assert missing == []
-    return looks[0].speed
+    return look
+
+
+def timed(beams: int, time_increment: float, scan_time: float = 0.0) -> messages.LaserScan:
+    header, last = messages.Header(messages.Time(10, 0), "laser"), (beams - 1) * 0.01
+    return messages.LaserScan(header, 0.0, last, 0.01, time_increment, scan_time, 0.05, 30.0, [1.0] * beams)
+
+
+def speed_during(scan: messages.LaserScan, *told: messages.Odometry) -> Speed | None:
+    """Return how fast the laser, which is where the base is, is taken to have moved during a scan."""
+    motion = looked(scan, *told).laser.motion
+    return None if motion is None else Speed(motion.vx, motion.vy, motion.omega)
 
 
 def test_the_twist_nearest_to_the_middle_of_the_scan_counts() -> None:
-    scan = messages.LaserScan(messages.Header(messages.Time(10, 0), "laser"), time_increment=0.001, ranges=[1.0] * 100)
+    scan = timed(100, 0.001)
     slow, fast = Speed(0.1, 0.0, 0.0), Speed(0.5, 0.0, 0.0)
-    assert looked(scan) is None
-    assert looked(scan, odometry(10, 0, slow), odometry(10, 90_000_000, fast)) == fast
-    assert looked(scan, odometry(10, 20_000_000, slow), odometry(10, 90_000_000, fast)) == slow
-    assert looked(scan, odometry(9, 860_000_000, slow)) == slow
-    assert looked(scan, odometry(9, 840_000_000, slow)) is None  # said too long before
-    assert looked(scan, odometry(10, 260_000_000, slow)) is None
+    assert speed_during(scan) is None
+    assert speed_during(scan, odometry(10, 0, slow), odometry(10, 90_000_000, fast)) == fast
+    assert speed_during(scan, odometry(10, 20_000_000, slow), odometry(10, 90_000_000, fast)) == slow
+    assert speed_during(scan, odometry(9, 860_000_000, slow)) == slow
+    assert speed_during(scan, odometry(9, 840_000_000, slow)) is None  # said too long before
+    assert speed_during(scan, odometry(10, 260_000_000, slow)) is None
 
 
 def test_the_clock_that_goes_back_takes_twists_along() -> None:
@@ -117,37 +132,84 @@ def test_the_clock_that_goes_back_takes_twists_along() -> None:
 
 @pytest.mark.parametrize("time_increment", [0.0, -0.001, math.nan, math.inf])
 def test_a_scan_that_says_no_time_is_taken_at_once(time_increment: float) -> None:
-    scan = messages.LaserScan(time_increment=time_increment, ranges=[1.0, 1.0])
-    assert seconds_of(scan) == 0.0
-    assert motion_of(scan, Mount(BASE_FROM_LASER), SPEED) is None
+    look = looked(timed(2, time_increment), odometry(10, 0))
+    assert (look.time_increment, look.laser.motion, look.notes) == (0.0, None, {})
+    assert look.view.covariance is None
+
+
+STILL = Speed(0.0, 0.0, 0.0)
+
+
+def test_without_odometry_the_covariance_allows_for_a_motion_and_that_is_noted() -> None:
+    look = looked(timed(100, 0.001))
+    (code, note), *others = look.notes.items()
+    assert others == []
+    assert code == "motion_unknown"
+    assert "time_increment of 0.001 s a scan of 100 beams takes 0.1 s" in note
+    assert "odometry" in note
+    assert look.view.covariance is not None
+    assert np.sqrt(np.diag(look.view.covariance)) == pytest.approx([0.025, 0.025, 0.05])
+
+
+def test_a_robot_that_stands_still_or_is_not_to_be_corrected_has_no_note() -> None:
+    for look in (looked(timed(100, 0.001), odometry(10, HALF, STILL)), looked(timed(100, 0.001), motion=False)):
+        assert look.notes == {}
+        assert look.view.covariance is None
+
+
+def test_a_time_increment_in_another_unit_is_replaced_as_in_logs() -> None:
+    look = looked(timed(100, 1.0, scan_time=0.1), odometry(10, HALF, SPEED))
+    assert look.time_increment == pytest.approx(0.001)
+    assert look.laser.motion is not None
+    assert look.laser.motion.time_increment == pytest.approx(0.001)
+    assert "100 s, expected at most 1.0 s; 0.1 s" in look.notes["time_increment"]
 
 
 def test_a_scanner_on_a_turning_robot_moves_with_it() -> None:
     """Two metres to the left of the robot's middle, and looking back: there a turn to the left goes forward."""
-    scan = messages.LaserScan(time_increment=0.25, ranges=[1.0, 1.0])
-    aside = Mount(linefix.RigidTransform(0.0, 2.0, math.pi))
-    motion = motion_of(scan, aside, Speed(1.0, 0.5, 0.25))
-    assert motion is not None
+    aside = linefix.RigidTransform(0.0, 2.0, math.pi)
+    motion = motion_of(0.25, Mount(aside), Speed(1.0, 0.5, 0.25))
     assert (motion.time_increment, motion.omega) == (0.25, 0.25)
     assert (motion.vx, motion.vy) == pytest.approx((-0.5, -0.5))
+    below = motion_of(0.25, Mount(aside, flipped=True), Speed(1.0, 0.5, 0.25))
+    assert (below.vx, below.vy, below.omega) == pytest.approx((-0.5, 0.5, -0.25))
 
 
 def test_a_scanner_s_way_is_that_of_the_robot_and_the_mount() -> None:
-    beams = 5
-    scan = messages.LaserScan(time_increment=0.02, ranges=[1.0] * beams)
-    motion = motion_of(scan, Mount(BASE_FROM_LASER), SPEED)
-    assert motion is not None
+    motion = motion_of(0.02, Mount(BASE_FROM_LASER), SPEED)
     first = robot_at(0.0).compose(BASE_FROM_LASER)
-    for k, place in enumerate(motion.places(beams).tolist()):
+    for k, place in enumerate(motion.places(5).tolist()):
         seen = first.inverse().compose(robot_at(0.02 * k).compose(BASE_FROM_LASER))
         assert place == pytest.approx([seen.x, seen.y, seen.theta], abs=1e-4)
 
 
 def test_a_scanner_upside_down_moves_the_right_way_round() -> None:
-    scan = moving_scan(10, flipped=True)
-    located = locate(linefix.index_map(ROOM), [Look(scan, Mount(BASE_FROM_LASER, flipped=True), speed=SPEED)])
+    driven = OdometryHistory()
+    driven.take(odometry(10))
+    look = look_of(moving_scan(10, flipped=True), Mount(BASE_FROM_LASER, flipped=True), driven, HERE, motion=True)
+    located = locate(linefix.index_map(ROOM), [look])
     assert located.answer.usable
     pose = located.pose
     assert pose is not None
     assert math.hypot(pose.x - MAP_FROM_BASE.x, pose.y - MAP_FROM_BASE.y) < 0.03
     assert abs(pose.theta - MAP_FROM_BASE.theta) < 0.02
+
+
+def test_a_motion_that_is_not_known_is_published(domain: int, room: linefix.MapIndex) -> None:
+    """The pose, too, with a covariance in which the error of the turning robot has its place."""
+    with running(NodeOptions(agree=1, domain=domain), room):
+        robot = Robot(domain)
+        robot.mounts.publish(mount())
+        scan = replace(moving_scan(10, speed=Speed(0.2, 0.0, 0.8)), header=messages.Header(messages.Time(10), "laser"))
+        told = robot.until(
+            robot.diagnostics,
+            lambda: robot.scans.publish(scan),
+            lambda one: "motion of its sensor" in one.status[0].message,
+        )
+        assert told.status[0].level == 1
+        assert '"laser": By its time_increment of' in told.status[0].message
+        found = robot.until(robot.poses, lambda: robot.scans.publish(scan))
+    angle, turn = found.pose.pose.orientation, math.sqrt(found.pose.covariance[35])
+    wrong = abs(2.0 * math.atan2(angle.z, angle.w) - MAP_FROM_BASE.theta)
+    assert turn == pytest.approx(0.05, rel=0.1)
+    assert 0.02 < wrong < 2.0 * turn
