@@ -58,14 +58,10 @@ def ros2(
     ] = 0.1,
     odom: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of odometry.")] = "odom",
     motion: Annotated[
-<<<<<<< ours
         bool,
         typer.Option(
             help="Correct scans for motion, by time_increment and the twist of odometry; no: take them as they are."
         ),
-=======
-        bool, typer.Option(help="Correct scans for motion, by time_increment and the twist of odometry.")
->>>>>>> theirs
     ] = True,
     base: Annotated[str, typer.Option(metavar="FRAME", help="The base frame of the robot.")] = "base_link",
     odom_frame: Annotated[
