@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..work.warmup import warm_up
+from service.work.warmup import warm_up
+
 from .errors import RefusedError, WrongUseError
 from .inputs import document_at, needing_formats
 
