@@ -34,6 +34,7 @@ COPY fleet fleet
 COPY linefix linefix
 COPY ros2 ros2
 COPY service service
+COPY cli cli
 # Given the time of a commit, the wheel is that of `make wheel`, to the byte.
 ARG SOURCE_DATE_EPOCH
 RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . \
@@ -46,7 +47,7 @@ ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE compiled registration vectorization association simulation analysis formats fleet linefix ros2 service \
+    && $COMPILE compiled registration vectorization association simulation analysis formats fleet linefix ros2 service cli \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}

@@ -136,7 +136,7 @@ class Player:
 @contextmanager
 def running_bridge(map_file: Path, domain: int) -> Iterator[None]:
     """Run ``linefix ros2`` as long as needed."""
-    program = "import sys; from service.commands.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
+    program = "import sys; from cli.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
     command = [sys.executable, "-c", program, "--map", str(map_file), "--agree", "1"]
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "CYCLONEDDS_URI": LOOPBACK}
     process = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)

@@ -4,8 +4,7 @@ Each room imports only from those below it; import-linter holds them to that (`p
 
 ::
 
-    commands/              the command line
-    cli                    starts the service
+    serving                starts the service
     process/               the process that serves: server, workers, protocol at the socket, how it ends
     app                    puts the parts of one application together
     http/                  routes, problems, bodies, the log of requests

@@ -2,6 +2,6 @@
 
 import sys
 
-from .cli import serve
+from .serving import serve
 
 sys.exit(serve(sys.argv[1:]))

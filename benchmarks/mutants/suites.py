@@ -69,7 +69,7 @@ SUITES = {
     "service/process/": Suite(("tests/service/process", "tests/service/http/test_refusals.py")),
     "service/telemetry/": Suite(("tests/service/telemetry",)),
     "service/importing/": Suite(("tests/service/importing", "tests/service/http/test_importing.py")),
-    "service/commands/": Suite(("tests/service/commands",)),
+    "cli/": Suite(("tests/cli",)),
     "service/http/": Suite(("tests/service/http",)),
     "service/schemas/": Suite(("tests/service/schemas", "tests/service/http")),
     "service/work/": Suite(("tests/service/work", "tests/service/http")),

@@ -115,7 +115,7 @@ def test_the_version_is_said_once_and_has_its_changes() -> None:
     client = tomllib.loads((ROOT / "clients" / "python" / "pyproject.toml").read_text())["project"]["version"]
     assert client == version
     # The service reads it from what is installed: another number in a source would be a second place.
-    sources = [path for folder in ("service", "linefix", "ros2") for path in (ROOT / folder).rglob("*.py")]
+    sources = [path for folder in ("service", "cli", "linefix", "ros2") for path in (ROOT / folder).rglob("*.py")]
     assert [path for path in sources if f'"{version}"' in path.read_text()] == []
 
 
@@ -126,6 +126,6 @@ import sys
 for name in ("fcntl", "grp", "pwd", "resource", "termios", "uvloop"):
     sys.modules[name] = None
 import registration, vectorization, association, simulation, analysis, formats, fleet, linefix, ros2
-import service.commands.program
+import cli.program
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)

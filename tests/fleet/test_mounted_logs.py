@@ -12,9 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fleet import associate_many
-from tests.formats.test_log_frames import Robots
-from tests.formats.test_logs import SECOND
-from tests.service.commands.test_replay_bags import (
+from tests.cli.test_replay_bags import (
     BEAMS,
     MOUNT,
     ROOM,
@@ -26,6 +24,8 @@ from tests.service.commands.test_replay_bags import (
     swept,
     write_drive,
 )
+from tests.formats.test_log_frames import Robots
+from tests.formats.test_logs import SECOND
 
 from .logs import rows
 from .test_running import SMALL, Here

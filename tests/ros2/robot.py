@@ -90,7 +90,7 @@ def running(options: NodeOptions, index: linefix.MapIndex | None) -> Iterator[No
 @contextmanager
 def bridge(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     """Run ``linefix ros2`` in a process of its own."""
-    program = "import sys; from service.commands.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
+    program = "import sys; from cli.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(
             [sys.executable, "-c", program, *arguments], cwd=ROOT, env=dict(os.environ), stderr=log

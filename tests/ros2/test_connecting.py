@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from cli.entry import run
 from ros2 import ConnectionRefusedError, domain_of
 from ros2.connecting import configuration_of, connect
-from service.commands.entry import run
 
 
 def test_the_range_of_discovery() -> None:

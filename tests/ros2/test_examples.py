@@ -11,8 +11,8 @@ import pytest
 import typer.main
 from ruamel.yaml import YAML
 
-from service.commands.program import app
-from service.commands.ros2 import NOT_IN_FILES, parameters_of
+from cli.program import app
+from cli.ros2 import NOT_IN_FILES, parameters_of
 
 ROOT = Path(__file__).parents[2]
 NAV2 = ROOT / "examples" / "nav2"

@@ -11,8 +11,8 @@ import pytest
 from rosbags.rosbag2 import Reader, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from cli.entry import run
 from ros2 import messages
-from service.commands.entry import run
 
 from .robot import BASE_FROM_LASER, MAP_FROM_BASE, Robot, bridge, grid_of_room, is_at_truth, mount, scan
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from cli.entry import run
+from cli.errors import WrongUseError
+from cli.ros2 import parameters_of
 from ros2 import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
 from ros2.options import absolute_name
-from service.commands.entry import run
-from service.commands.errors import WrongUseError
-from service.commands.ros2 import parameters_of
 
 
 @pytest.mark.parametrize(

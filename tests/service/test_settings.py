@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from service.cli import unknown_settings
+from service.serving import unknown_settings
 from service.settings import SettingsError, read_settings
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from cli.entry import run
 from service.admission.errors import UnknownKeyError
 from service.admission.grants import EVERY_ROLE, Role
 from service.admission.key_file import KeyFile, KeyFileError, read_keys
 from service.admission.keys import Keyring
-from service.commands.entry import run
 from tests.service.issuing import key_lines
 
 DIGEST = hashlib.sha256(b"sesame").hexdigest()

@@ -6,13 +6,16 @@ import math
 import os
 import signal
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..work.warmup import warm_up
+from service.work.warmup import warm_up
+
 from .errors import RefusedError, WrongUseError
+from .grouping import grouped
 from .inputs import document_at, needing_formats
 
 if TYPE_CHECKING:
@@ -41,71 +44,101 @@ def _read_params(context: typer.Context, file: Path | None) -> Path | None:
     return file
 
 
-def ros2(
+@dataclass(frozen=True, slots=True)
+class MapSource:
+    """Where the map comes from, as options."""
+
     on: Annotated[
         str | None,
         typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map. Default: a topic."),
-    ] = None,
-    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of an OccupancyGrid, without --map.")] = "map",
+    ] = None
+    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of an OccupancyGrid, without --map.")] = "map"
+
+
+@dataclass(frozen=True, slots=True)
+class ScanSources:
+    """Where scans and odometry come from, as options."""
+
     scan: Annotated[
         list[str] | None, typer.Option(metavar="TOPIC", help="Topic of scans; repeat for more scanners. Default: scan.")
-    ] = None,
+    ] = None
     together_s: Annotated[
         float,
         typer.Option(
             metavar="SECONDS", min=0.0, max=5.0, help="Scans of several topics so near in time are one; 0: none are."
         ),
-    ] = 0.1,
-    odom: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of odometry.")] = "odom",
+    ] = 0.1
+    odom: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of odometry.")] = "odom"
     motion: Annotated[
         bool,
         typer.Option(
             help="Correct scans for motion, by time_increment and the twist of odometry; no: take them as they are."
         ),
-    ] = True,
-    base: Annotated[str, typer.Option(metavar="FRAME", help="The base frame of the robot.")] = "base_link",
+    ] = True
+
+
+@dataclass(frozen=True, slots=True)
+class RobotNames:
+    """How topics and frames of the robot are named, as options."""
+
+    base: Annotated[str, typer.Option(metavar="FRAME", help="The base frame of the robot.")] = "base_link"
     odom_frame: Annotated[
         str, typer.Option(metavar="FRAME", help="The odometry frame, where no odometry message names it.")
-    ] = "odom",
+    ] = "odom"
     namespace: Annotated[
         str | None,
         typer.Option(metavar="NAMESPACE", help="Namespace of all relative topics. Default: that of the first --scan."),
-    ] = None,
+    ] = None
     frame_prefix: Annotated[
         str, typer.Option(metavar="PREFIX", help="Prefix of all frames of the robot, such as robot1/.")
-    ] = "",
+    ] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Publishing:
+    """What is published and when, as options."""
+
     agree: Annotated[
         int,
         typer.Option(min=1, max=100, help="Scans that have to agree before a pose is published; 1: each by itself."),
-    ] = 3,
+    ] = 3
     when: Annotated[
         Literal["start", "lost", "always"],
         typer.Option(
             help="When to publish initialpose: at the start, on request and for new subscribers; also when the "
             "localizer disagrees; or for each scan that confirms the pose."
         ),
-    ] = "start",
+    ] = "start"
     min_sigma: Annotated[
         float, typer.Option(metavar="METRES", min=0.0, max=10.0, help="Least standard deviation of initialpose.")
-    ] = 0.05,
+    ] = 0.05
     min_sigma_theta: Annotated[
         float, typer.Option(metavar="RADIANS", min=0.0, max=3.0, help="Least standard deviation of its heading.")
-    ] = round(math.radians(2.0), 4),
+    ] = round(math.radians(2.0), 4)
     publish_tf: Annotated[
         bool, typer.Option(help="Publish the transform from the map to the odometry frame; without AMCL.")
-    ] = False,
-    hardware_id: Annotated[str, typer.Option(metavar="NAME", help="Of the diagnostics. Default: the namespace.")] = "",
+    ] = False
+    hardware_id: Annotated[str, typer.Option(metavar="NAME", help="Of the diagnostics. Default: the namespace.")] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RosArguments:
+    """Parameters and remappings in the way of ROS 2, as options."""
+
     params_file: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE", is_eager=True, callback=_read_params, help="A YAML file of parameters, as ROS 2 has it."
         ),
-    ] = None,
-    ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored: what follows is taken as it is.")] = False,
+    ] = None
+    ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored: what follows is taken as it is.")] = False
     remap: Annotated[
         list[str] | None, typer.Option("--remap", "-r", metavar="FROM:=TO", help="Remap the name of a topic.")
-    ] = None,
-) -> None:
+    ] = None
+
+
+@grouped
+def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing: Publishing, ros: RosArguments) -> None:
     """Subscribe to scans of ROS 2, publish initialpose when they agree; ends with an interrupt.
 
     The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI are honoured.
@@ -115,15 +148,29 @@ def ros2(
     except ModuleNotFoundError:
         raise RefusedError('linefix ros2 needs more packages: pip install "linefix[formats,ros2]"') from None
 
-    scans = tuple(scan or ("scan",))
+    on = source.on
+    scans = tuple(sources.scan or ("scan",))
     try:
-        where, remappings = _names(scans, namespace, remap or [])
+        where, remappings = _names(scans, names.namespace, ros.remap or [])
         options = NodeOptions(
-            scans=scans, together_s=together_s, odometry=odom, motion=motion, map_topic=None if on else map_topic,
-            base_frame=base, odom_frame=odom_frame, namespace=where, remappings=remappings, frame_prefix=frame_prefix,
-            agree=agree, when=when, min_sigma=min_sigma, min_sigma_theta=min_sigma_theta, publish_tf=publish_tf,
-            domain=domain_of(os.environ), hardware_id=hardware_id,
-        )  # fmt: skip
+            scans=scans,
+            together_s=sources.together_s,
+            odometry=sources.odom,
+            motion=sources.motion,
+            map_topic=None if on else source.map_topic,
+            base_frame=names.base,
+            odom_frame=names.odom_frame,
+            namespace=where,
+            remappings=remappings,
+            frame_prefix=names.frame_prefix,
+            agree=publishing.agree,
+            when=publishing.when,
+            min_sigma=publishing.min_sigma,
+            min_sigma_theta=publishing.min_sigma_theta,
+            publish_tf=publishing.publish_tf,
+            domain=domain_of(os.environ),
+            hardware_id=publishing.hardware_id,
+        )
         index, frame = (None, "map") if on is None else _map_at(on)
         node = Node(options, index, frame)
     except (OptionError, ConnectionRefusedError) as error:

@@ -15,7 +15,7 @@ from simulation import OfficePlan, offices
 
 from .running import Linefix
 
-CHECKOUT = Path(__file__).parents[3]
+CHECKOUT = Path(__file__).parents[2]
 
 
 def test_the_drive_is_found_in_its_map(linefix: Linefix, folder: Path) -> None:

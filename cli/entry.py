@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sys
 
-from ..cli import ONE_THREAD, serve
+from service.serving import ONE_THREAD, serve
+
 from .errors import CommandError
 
 INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number what a signal ended

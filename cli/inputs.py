@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from registration import InputError, Segments
+from service.parsing.errors import NotJsonError
+from service.parsing.reading import parse
+from service.schemas.errors import TooManyError
+from service.schemas.limits import Limits
 
-from ..parsing.errors import NotJsonError
-from ..parsing.reading import parse
-from ..schemas.errors import TooManyError
-from ..schemas.limits import Limits
 from .errors import NOTHING, Asked, RefusedError, WrongUseError
 from .printing import noted, plain
 from .service import Json, answering

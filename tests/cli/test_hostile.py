@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from linefix_client import Client, ProblemError, UnreachableError, asking
 
-from service.commands import remote
+from cli import remote
 from tests.formats.recorded import BEGUN, Recording
 
 from .running import Linefix, refused

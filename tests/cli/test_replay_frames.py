@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
+from cli.errors import RefusedError
+from cli.frames import Frames, odometry_of
+from cli.replay import HOPELESS
 from formats import LoggedScan
 from registration import RigidTransform
-from service.commands.errors import RefusedError
-from service.commands.frames import Frames, odometry_of
-from service.commands.replay import HOPELESS
 from tests.association.checking.drawn import faces
 from tests.running import RunningService
 from vectorization import LaserScan

@@ -35,8 +35,8 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> No
     write_log(tmp_path / "a.parquet", 400)
     write_room(tmp_path)
     asked = ("batch", "a.parquet", "--maps", "room.json", "--out", "poses.parquet", "--block", "5", "--workers", "1")
-    command = [sys.executable, "-c", "from service.commands.entry import main; main()", *asked]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    command = [sys.executable, "-c", "from cli.entry import main; main()", *asked]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(command, cwd=tmp_path, env=environment)
     parts = tmp_path / "poses.parquet.parts" / "poses"
     while process.poll() is None and len(list(parts.glob("*.parquet"))) < 1:

@@ -9,8 +9,9 @@ from typing import Annotated
 import orjson
 import typer
 
-from ..admission.grants import Role
-from ..admission.key_file import parse_keys
+from service.admission.grants import Role
+from service.admission.key_file import parse_keys
+
 from .errors import WrongUseError
 
 

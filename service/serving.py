@@ -20,7 +20,7 @@ logger = logging.getLogger("linefix")
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # What a disk may be mended of while the service runs, and says that it is not ready.
 AILING_DISK = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
-# Read by compiled.cache and by service.commands, which are not loaded here for these names.
+# Read by compiled.cache and by `cli`, which are not loaded here for these names.
 NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
 
 

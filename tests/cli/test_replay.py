@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from cli.locators import Found
+from cli.tracking import LOST, Tracker
 from registration import RigidTransform
-from service.commands.locators import Found
-from service.commands.tracking import LOST, Tracker
 from tests.association.checking.drawn import faces
 from tests.running import RunningService
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from ..importing.fields import Fields
+from service.importing.fields import Fields
 
 Json = dict[str, Any]
 Question = Literal["associate", "register", "vectorize"]

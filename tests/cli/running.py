@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.commands.entry import run
+from cli.entry import run
 
 
 @dataclass(frozen=True)

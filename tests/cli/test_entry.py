@@ -7,12 +7,12 @@ import sys
 
 import pytest
 
-from service.commands.logs import spread
-from service.commands.printing import console
+from cli.logs import spread
+from cli.printing import console
 
 
 def test_it_starts_and_ends_as_a_program() -> None:
-    command = [sys.executable, "-c", "from service.commands.entry import main; main()"]
+    command = [sys.executable, "-c", "from cli.entry import main; main()"]
     told = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=300, check=False)
     assert (told.returncode, told.stdout.split()[0], told.stderr) == (0, "linefix", "")
     wrong = subprocess.run([*command, "lokate"], capture_output=True, text=True, timeout=300, check=False)

@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from ...importing.fields import Fields
+from service.importing.fields import Fields
+
 from ..errors import WrongUseError
 from ..grouping import grouped
 from ..inputs import line_map_of, needing_formats

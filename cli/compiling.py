@@ -10,10 +10,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from compiled import compiled_fraction
-
-from ..parsing.errors import ParserEndedError
-from ..parsing.parser_process import ParserProcess
-from ..work.compiling import compile_kernels
+from service.parsing.errors import ParserEndedError
+from service.parsing.parser_process import ParserProcess
+from service.work.compiling import compile_kernels
 
 LOOK_SECONDS = 0.3
 

@@ -21,11 +21,12 @@ from typing import IO
 import orjson
 from pydantic import BaseModel, ValidationError
 
-from ..importing.fields import Fields
-from ..schemas.analysis import AnalyzeAnswer
-from ..schemas.checks import CheckAnswer
-from ..schemas.imports import ImportAnswer
-from ..schemas.replies import AssociateAnswer, MapList, MapSummaryAnswer, RegisterAnswer, Row4, VectorizeAnswer
+from service.importing.fields import Fields
+from service.schemas.analysis import AnalyzeAnswer
+from service.schemas.checks import CheckAnswer
+from service.schemas.imports import ImportAnswer
+from service.schemas.replies import AssociateAnswer, MapList, MapSummaryAnswer, RegisterAnswer, Row4, VectorizeAnswer
+
 from .errors import NOTHING, Asked, NoServerError, WrongUseError, error_of
 from .service import KEY, Json, Progress, Question, id_of
 

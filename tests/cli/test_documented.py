@@ -11,11 +11,11 @@ import pytest
 import typer
 from typer.main import get_command
 
-from service.commands.errors import WrongUseError
-from service.commands.program import app, call
+from cli.errors import WrongUseError
+from cli.program import app, call
 from service.settings import read_settings
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md"), *ROOT.glob("clients/*/README.md")]
 PLACES = {"X": "1", "Y": "2", "THETA": "0.5", "N": "3", "...": ""}
 SHOWN = re.compile(r"`(linefix [^`]+)`|^(?:\s*\$ )?(linefix (?!is |tells |answers |says ).*)$", re.MULTILINE)

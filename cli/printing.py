@@ -12,7 +12,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..printable import escaped
+from service.printable import escaped
+
 from .service import Json
 
 

@@ -8,8 +8,9 @@ import typer
 from typer.exceptions import TyperException
 from typer.main import get_command
 
-from ..cli import serve
-from ..version import VERSION
+from service.serving import serve
+from service.version import VERSION
+
 from . import maps
 from .analyze import analyze
 from .batch import batch

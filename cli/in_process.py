@@ -14,28 +14,28 @@ from pydantic import ValidationError
 
 from association import Deadline, MapIndex
 from compiled import is_complete
+from service.http.problems import problem_of
+from service.importing.bounded import ReadMap
+from service.importing.fields import Fields, options_of
+from service.maps import IndexCache, MapStore, Preconditions
+from service.maps.lookup import FoundMap, MapLookup, outline_of
+from service.parsing.parser_process import ParserProcess
+from service.parsing.reading import read_map as read_document
+from service.parsing.reading import read_model
+from service.schemas.analysis import MapAnalyzeRequest
+from service.schemas.parts import InlineMap, StoredMap
+from service.schemas.requests import AssociateRequest, CheckRequest, RegisterRequest, VectorizeRequest
+from service.settings import Settings
+from service.telemetry.metrics import Metrics
+from service.work.analyzing import analysis_json, analysis_of, reference_to
+from service.work.answers import outline_json
+from service.work.association import Associator
+from service.work.checking import check, check_done, conclude, sample
+from service.work.importing import answer_import, index_import
+from service.work.job import Done, Job, Stopwatch
+from service.work.registration import answer_registration
+from service.work.vectorization import answer_vectorization
 
-from ..http.problems import problem_of
-from ..importing.bounded import ReadMap
-from ..importing.fields import Fields, options_of
-from ..maps import IndexCache, MapStore, Preconditions
-from ..maps.lookup import FoundMap, MapLookup, outline_of
-from ..parsing.parser_process import ParserProcess
-from ..parsing.reading import read_map as read_document
-from ..parsing.reading import read_model
-from ..schemas.analysis import MapAnalyzeRequest
-from ..schemas.parts import InlineMap, StoredMap
-from ..schemas.requests import AssociateRequest, CheckRequest, RegisterRequest, VectorizeRequest
-from ..settings import Settings
-from ..telemetry.metrics import Metrics
-from ..work.analyzing import analysis_json, analysis_of, reference_to
-from ..work.answers import outline_json
-from ..work.association import Associator
-from ..work.checking import check, check_done, conclude, sample
-from ..work.importing import answer_import, index_import
-from ..work.job import Done, Job, Stopwatch
-from ..work.registration import answer_registration
-from ..work.vectorization import answer_vectorization
 from .all_cores import look_on_all_cores
 from .compiling import compile_in
 from .errors import NOTHING, Asked, CommandError, WrongUseError, error_of
