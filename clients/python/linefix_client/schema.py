@@ -681,7 +681,7 @@ class MapList(TypedDict):
 
 class PlaceAnswer(TypedDict):
     """
-    A place from which the map shows what it shows elsewhere, too.
+    A pose from which the map shows what it shows from another, too.
     """
 
     pose: PoseAnswer
