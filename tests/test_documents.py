@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")])
+DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")])
 MADE = "out/"  # what a command writes is there only afterwards
 LINK = re.compile(r"\]\((?!https?:|#)([^)\s#]+)")
 FILE = re.compile(r"(?<![\w./-])(?:[\w.*-]+/)+[\w*-]+\.(?:py|json|md|png|csv|cpp|toml)\b")

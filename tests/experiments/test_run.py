@@ -48,9 +48,9 @@ def test_the_quick_mode_writes_tables_without_gaps_and_figures(name, tmp_path):
 
 
 def test_every_published_figure_and_table_comes_from_an_experiment():
-    published = {p.name for p in (ROOT / "docs" / "experiments").iterdir()}
+    published = {p.name for p in (ROOT / "docs" / "dev" / "experiments").iterdir()}
     assert published <= {name for names in FILES.values() for name in names}
-    text = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "dev" / "experiments.md").read_text(encoding="utf-8")
     assert all(f"experiments/{name}" in text for name in published if name.endswith(".png"))
 
 
