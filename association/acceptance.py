@@ -127,7 +127,7 @@ def _weights(context: SearchContext, best: Ranked, accepted: Accepted, wall_sigm
 
 
 def _known_together(alone: Floats, walls: NDArray[np.int32], ties: Floats) -> Floats:
-    """Return what all pairs know of each pair's wall, (n,) 1/m^2: those on others as far as their walls are one with it.
+    """Return what all pairs know of each pair's wall, (n,) 1/m^2; those on other walls as far as these are one with it.
 
     Some pairs at a time are compared with all, so that the memory grows with their number, not with its square.
     """
