@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
@@ -21,7 +22,7 @@ from .ranking import Ranked
 from .result import Correspondence
 from .settling import Settled
 from .tables import Lines
-from .tuning import LEAST_KNOWN_VARIANCE
+from .tuning import LEAST_KNOWN_VARIANCE, PAIRS_COMPARED
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -121,11 +122,23 @@ def _weights(context: SearchContext, best: Ranked, accepted: Accepted, wall_sigm
         return None
     given = Correspondences.of(context.index.segments, context.scan.measured, accepted.pairs)
     alone = _not_shown_before(given, rows) / np.maximum(given.variances, LEAST_KNOWN_VARIANCE**2)
-    apart = np.abs(ties[:, None] - ties)
-    tied = (ties[:, None] >= 0.0) & (ties >= 0.0)
-    one = np.where(walls[:, None] == walls, 1.0, np.where(tied, np.exp(-apart), 0.0))
-    weights: Floats = alone / (1.0 + wall_sigma**2 * (one @ alone))
+    weights: Floats = alone / (1.0 + wall_sigma**2 * _known_together(alone, walls, ties))
     return np.where(weights >= MIN_WEIGHT, weights, 0.0)
+
+
+def _known_together(alone: Floats, walls: NDArray[np.int32], ties: Floats) -> Floats:
+    """Return what all pairs know of each pair's wall, (n,) 1/m^2; those on other walls as far as these are one with it.
+
+    Some pairs at a time are compared with all, so that the memory grows with their number, not with its square.
+    """
+    together = np.empty(len(alone))
+    step = max(1, PAIRS_COMPARED // max(1, len(alone)))
+    for begin in range(0, len(alone), step):
+        some = slice(begin, begin + step)
+        here, there = ties[some, None], walls[some, None]
+        tied = (here >= 0.0) & (ties >= 0.0)
+        together[some] = np.where(there == walls, 1.0, np.where(tied, np.exp(-np.abs(here - ties)), 0.0)) @ alone
+    return together
 
 
 def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
@@ -137,20 +150,32 @@ def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
         along = given.directions[members[0]]
         middles = given.midpoints[members] @ along
         reach = 0.5 * given.lengths[members]
-        covered: list[tuple[float, float]] = []
-        for k, member in enumerate(members.tolist()):
-            low, high = float(middles[k] - reach[k]), float(middles[k] + reach[k])
-            own = sum(max(0.0, min(high, b) - max(low, a)) for a, b in covered)
-            shares[member] = max(0.0, 1.0 - own / (high - low))
-            covered = _united(covered, low, high)
+        covered = _Intervals()
+        for member, low, high in zip(members.tolist(), middles - reach, middles + reach, strict=True):
+            shares[member] = max(0.0, 1.0 - covered.add(float(low), float(high)) / float(high - low))
     return shares
 
 
-def _united(covered: list[tuple[float, float]], low: float, high: float) -> list[tuple[float, float]]:
-    """Return disjoint intervals with one more."""
-    apart = [(a, b) for a, b in covered if b < low or a > high]
-    over = [(a, b) for a, b in covered if not (b < low or a > high)]
-    return [*apart, (min([low, *(a for a, _ in over)]), max([high, *(b for _, b in over)]))]
+class _Intervals:
+    """Disjoint closed intervals, by where they begin, and when each was added."""
+
+    def __init__(self) -> None:
+        self._lows: list[float] = []
+        self._highs: list[float] = []
+        self._added: list[int] = []
+        self._count = 0
+
+    def add(self, low: float, high: float) -> float:
+        """Unite an interval with those that it meets; return how much of it they covered before."""
+        met = slice(bisect_left(self._highs, low), bisect_right(self._lows, high))
+        lows, highs = self._lows[met], self._highs[met]
+        # In the order in which they were added, on which the last bit of the sum depends.
+        by_age = sorted(zip(self._added[met], lows, highs, strict=True))
+        covered = sum(max(0.0, min(high, b) - max(low, a)) for _, a, b in by_age)
+        self._lows[met], self._highs[met] = [min([low, *lows])], [max([high, *highs])]
+        self._added[met] = [self._count]
+        self._count += 1
+        return covered
 
 
 def correspondences(

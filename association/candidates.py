@@ -15,11 +15,10 @@ from .kernels.advancing import BUDGET, EXHAUSTED, PROVEN
 from .kernels.planning import begin
 from .kernels.searching import go_on, put_in_order, search
 from .kernels.stopping import missed_share, restrict
-from .layout import FOUND, HOW, PROGRESS, RULES, TRIED, Integers, record
+from .layout import FOUND, HOW, PROGRESS, RULES, Integers, record
 from .options import AssociationOptions, CancelledError
 from .planning_tables import Plan, Planning
 from .result import SearchReport
-from .sharing import Sharing
 from .tables import Question
 from .tuning import (
     BASE_SEGMENTS,
@@ -44,7 +43,6 @@ from .tuning import (
 )
 
 NO_NOISE = np.zeros(0)
-NONE_TRIED = np.zeros(0, TRIED)
 COUNT, BASES, HYPOTHESES, VERIFIED, MISSED = map(
     (PROGRESS.names or ()).index, ("count", "bases", "hypotheses", "verified", "missed")
 )
@@ -195,9 +193,7 @@ class Begun:
             if not progress["left"][0]:
                 stopped = _leave_bases(context, self.question, plan, found, progress, how)
             while not (progress["done"][0] or deadline.passed):
-                go_on(
-                    self.question, context.index.tables, plan, found, NONE_TRIED, progress, context.workspace, how
-                )  # fmt: skip
+                go_on(self.question, context.index.tables, plan, found, progress, context.workspace, how)
         if deadline.cancelled:
             raise CancelledError
         slid = plan is None or bool(progress["done"][0])
@@ -241,12 +237,8 @@ def _leave_bases(
         progress["missed"], progress["left"] = 0.0, 1
         return EXHAUSTED
     stopped = BUDGET
-    while stopped == BUDGET:
-        if deadline.helped:
-            stopped = Sharing(context, question, plan, found, progress, how).go_on()
-        if stopped != BUDGET or deadline.passed:
-            break
-        stopped = go_on(question, tables, plan, found, NONE_TRIED, progress, work, how)
+    while stopped == BUDGET and not deadline.passed:
+        stopped = go_on(question, tables, plan, found, progress, work, how)
     if stopped in (BUDGET, EXHAUSTED) and not plan.random:
         progress["missed"] = missed_share(question, plan, progress)
     progress["left"] = 1

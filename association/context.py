@@ -185,10 +185,6 @@ class SearchContext:
     @cached_property
     def workspace(self) -> Workspace:
         """What the kernels write to while they look at poses."""
-        return self.another_workspace()
-
-    def another_workspace(self) -> Workspace:
-        """Return one for another thread."""
         return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
 
     @cached_property

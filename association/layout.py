@@ -84,10 +84,6 @@ WALL_SHARE = _fields((_F, "c s x y one weight count other_weight other_sum"), (_
 # A pose among the best: score and prior together; the score alone.
 FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
 
-# A pose that was tried ahead of its turn: what the prior says of it; what the scan lines come to at most before it is
-# refined; the score; the refined pose.
-TRIED = np.dtype([*_fields((_F, "bonus possible score")).descr, *POSE.descr])
-
 # Geometry of a grid: its corner; the size of a cell; how many there are.
 GRID_SHAPE = _fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 
@@ -169,13 +165,13 @@ POSED = np.dtype(
 
 # How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
 # through, poses proposed, poses scored to the end; where to go on: at which base or -1, the anchor, the step along it,
-# and the entry of the list there; how many poses were tried ahead of their turn; bound on the gain of a pose that
-# contains no base so far; chance of having missed a better consensus set; the freedom that any set takes at least whose
-# score would be kept. Once bases have been left: how many poses are of these; how many segments have been laid along
-# walls, -1 before, and what they have to come to together; whether bases have been left, and nothing is left to do.
+# and the entry of the list there; bound on the gain of a pose that contains no base so far; chance of having missed a
+# better consensus set; the freedom that any set takes at least whose score would be kept. Once bases have been left:
+# how many poses are of these; how many segments have been laid along walls, -1 before, and what they have to come to
+# together; whether bases have been left, and nothing is left to do.
 PROGRESS = _fields(
     (_F, "best_value least_kept"),
-    (_I, "count bases hypotheses verified current anchor step entry tried"),
+    (_I, "count bases hypotheses verified current anchor step entry"),
     (_F, "bound missed least_freedom"),
     (_I, "of_bases sliding"),
     (_F, "floor"),

@@ -242,5 +242,5 @@ class MapIndex:
 
 
 def _require_time(deadline: Deadline | None) -> None:
-    if deadline is not None and deadline.over:
+    if deadline is not None and deadline.passed:
         raise IndexingEndedError

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,21 +152,6 @@ class CancelledError(Exception):
     """The search was told to stop by `Deadline.cancel`; there is no answer."""
 
 
-class Helpers(Protocol):
-    """Threads that may go through parts of a long search, where processors are free."""
-
-    @property
-    def free(self) -> bool:
-        """Whether one would begin at once."""
-
-    @property
-    def welcome(self) -> bool:
-        """Whether those that have begun may go on."""
-
-    def run(self, function: Callable[[], None]) -> Future[None]:
-        """Run a function in one of them."""
-
-
 @dataclass(slots=True)
 class Deadline:
     """A cooperative end of the search: a time, a flag that another thread sets, or both.
@@ -177,23 +160,16 @@ class Deadline:
     ----------
     at : float or None
         `time.monotonic()` seconds.
-    rest : callable or None
-        Called in the search's own thread whenever that looks whether it has to end, every few milliseconds; it may
-        wait, so that a processor can be lent to somebody else.
-    helpers : Helpers or None
-        Who may take part; the answer is the same.
     """
 
     at: float | None = None
-    rest: Callable[[], None] | None = field(default=None, init=False)
-    helpers: Helpers | None = field(default=None, init=False)
     _cancelled: bool = field(default=False, init=False)
     _outer: Deadline | None = field(default=None, init=False)
 
     def within(self, at: float) -> Deadline:
         """Return an end that comes no later than a time, and is cancelled with this one."""
         inner = Deadline(at if self.at is None else min(at, self.at))
-        inner._outer, inner.helpers = self, self.helpers
+        inner._outer = self
         return inner
 
     def cancel(self) -> None:
@@ -207,22 +183,5 @@ class Deadline:
 
     @property
     def passed(self) -> bool:
-        """True when the search has to end; reading it may let the search pause."""
-        self._may_rest()
-        return self.over
-
-    @property
-    def over(self) -> bool:
-        """The same without a pause: a stage that holds much memory continues, so that only a few hold it at once."""
+        """Whether the search has to end: it was cancelled, or its time is over."""
         return self.cancelled or (self.at is not None and time.monotonic() >= self.at)
-
-    @property
-    def helped(self) -> bool:
-        """Whether somebody would take part now."""
-        return self.helpers is not None and self.helpers.free
-
-    def _may_rest(self) -> None:
-        if self._outer is not None:
-            self._outer._may_rest()
-        if self.rest is not None:
-            self.rest()

@@ -202,7 +202,7 @@ def with_lines_of_sight(
     """Yield some of the explanations with what lines of sight speak against them, within the window first, by value.
 
     The models of the verdict were fitted to scores without it for poses that are far behind. Scores that are returned
-    include it; explanations whose score falls to zero are left out.
+    include it, but for those that come after the deadline; explanations whose score falls to zero are left out.
 
     Raises
     ------
@@ -217,8 +217,8 @@ def with_lines_of_sight(
         # No later value exceeds the one that it has without lines of sight.
         while waiting and _place(waiting[0]) <= _place(one):
             yield waiting.pop(0)
-        spared = one.blocked == 0.0 and one.score <= least
-        seen = _charged(context, one) if spared else one
+        unseen = one.blocked == 0.0 and one.score <= least
+        seen = _charged(context, one) if unseen and not context.deadline.passed else one
         if seen.score > 0.0:
             waiting.append(seen)
             waiting.sort(key=_place)

@@ -26,7 +26,7 @@ from .result import (
     CriticalWall,
     Status,
 )
-from .settling import Settled, settle
+from .settling import Settled, settle, slices_between_looks
 from .sight import missing_segments
 from .to_scale import Factor
 from .tuning import HINGES
@@ -136,10 +136,20 @@ def _alternatives(
     if not shown:
         return ()
     settled = settle(context, shown)
-    shown = shown[: len(settled)]
+    found: list[Alternative] = []
+    for some in slices_between_looks(context, len(settled)):
+        measures = _measures(context, shown[some], settled[some])
+        found += map(partial(_alternative, context), shown[some], settled[some], measures)
+    return tuple(found)
+
+
+def _measures(context: SearchContext, shown: Sequence[Ranked], settled: Sequence[Settled]) -> list[list[float]]:
+    """Return the paper's measures of explanations at their settled poses, of which there may be fewer."""
     poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)
-    measures = paper_measures(context.lines.rows, matches_of(shown), context.known_walls, poses)
-    return tuple(map(partial(_alternative, context), shown, settled, measures.tolist()))
+    measures: list[list[float]] = paper_measures(
+        context.lines.rows, matches_of(shown[: len(settled)]), context.known_walls, poses
+    ).tolist()
+    return measures
 
 
 def _alternative(context: SearchContext, other: Ranked, settled: Settled, measures: list[float]) -> Alternative:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, repeat
 from typing import Any
@@ -20,7 +20,7 @@ from .kernels import settling as kernels
 from .layout import HINGE, SETTLED
 from .ranking import Ranked, matches_of, poses_of
 from .scan import Views
-from .tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY
+from .tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY, SETTLED_AT_ONCE
 from .view_settling import SeenOnWalls, ViewsSettled
 
 NO_HINGES = np.zeros(0, HINGE)
@@ -90,24 +90,57 @@ class Settled:
 def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bool = False) -> list[Settled]:
     """Work out the poses of consensus sets, of one at least; with `hinges` of the first, where the others have none.
 
-    Those of uncertain views are solved one by one: after the deadline no more than the first one is, and returned.
+    After the deadline no more than some are, the first one at least, and returned; and the hinges are those of some of
+    the walls.
     """
-    found = np.zeros(len(explanations), SETTLED)
-    without = np.zeros(len(explanations[0].matches) if hinges else 0, HINGE)
-    count = _settle(
-        context.question_of_a_pose, context.known_walls, matches_of(explanations), poses_of(explanations), found,
-        without, context.workspace,
-    )  # fmt: skip
-    settled = list(map(Settled.of, found.tolist(), chain([without[:count]], repeat(NO_HINGES))))
+    every = slices_between_looks(context, len(explanations))
+    found, without = _settled(context, explanations[next(every)], hinges=hinges)
+    settled = list(map(Settled.of, found.tolist(), chain([without], repeat(NO_HINGES))))
+    for some in every:
+        settled += [Settled.of(one, NO_HINGES) for one in _settled(context, explanations[some])[0].tolist()]
     views = context.scan.views
     if views is None or not views.uncertain:
         return settled
     solved: list[Settled] = []
-    for one, alone in zip(explanations, settled, strict=True):
+    for one, alone in zip(explanations, settled, strict=False):
         if solved and context.deadline.passed:
             break
         solved.append(_with_views(context, one, views, alone))
     return solved
+
+
+def slices_between_looks(context: SearchContext, count: int) -> Iterator[slice]:
+    """Yield the slices of some poses that are settled between two looks at the deadline, until it passes."""
+    step = _at_once(context)
+    for begin in range(0, max(1, count), step):
+        if begin > 0 and context.deadline.passed:
+            break
+        yield slice(begin, begin + step)
+
+
+def _at_once(context: SearchContext) -> int:
+    """Return how many poses are settled, or walls left out of one, between two looks at the deadline."""
+    return max(1, SETTLED_AT_ONCE // max(1, len(context.lines.rows)) ** 2)
+
+
+def _settled(
+    context: SearchContext, explanations: Sequence[Ranked], *, hinges: bool = False
+) -> tuple[Records, Records]:
+    """Return the poses of some consensus sets, (k,) of `SETTLED`, and the hinges of the first as far as wanted."""
+    found = np.zeros(len(explanations), SETTLED)
+    lines = len(context.lines.rows)
+    # Each wall that is left out takes as long as the lines are many.
+    room = min(lines, max(1, SETTLED_AT_ONCE // max(1, lines))) if hinges else 0
+    without = np.zeros(lines if hinges else 0, HINGE)
+    question, walls, work = context.question_of_a_pose, context.known_walls, context.workspace
+    matches, starts = matches_of(explanations), poses_of(explanations)
+    count = _settle(question, walls, matches, starts, found, 0, without[:room], work)
+    done = min(room, count)
+    while hinges and done < count and not context.deadline.passed:
+        some = without[done : done + room]
+        _settle(question, walls, matches[:1], starts[:1], found[:1], done, some, work)
+        done = min(done + room, count)
+    return found, without[:done]
 
 
 def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settled) -> Settled:

@@ -198,6 +198,11 @@ AT_ONCE = 256  # runs, cells and poses that go through a stage together; measure
 # Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
 # of a place. More than all poses of a usual search, and some seconds where thousands of walls lie in one place.
 RANKED_AT_ONCE = 200_000
+# Work between two looks at the clock while poses are settled: pairs of scan lines. Some 20 ms; of fewer than 140 lines
+# all poses that are returned.
+SETTLED_AT_ONCE = 1_000_000
+SORTED_BY_INSERTION = 64  # walls; of more an order by insertion takes longer than by merging
+PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at a time; 2 MB for each table
 
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 

@@ -91,7 +91,7 @@ def collinear_groups(
     heads, following = list_begins(ends, cell)
     gates = (cell, float(max_gap), float(max_lateral), float(min_cos))
     for first in range(0, len(ends), PIECES_A_LOOK):
-        if deadline is not None and deadline.over:
+        if deadline is not None and deadline.passed:
             raise IndexingEndedError
         last = min(first + PIECES_A_LOOK, len(ends))
         join_collinear(ends, directions, heads, following, gates, labels, first, last)

@@ -1,4 +1,4 @@
-"""Compiled main loop of the search: base after base, or some of them ahead of their turn."""
+"""Compiled main loop of the search: propose and score the poses of a base, then ask the stopping rule."""
 
 import math
 
@@ -19,7 +19,6 @@ from .stopping import (
     needed_of,
     strike,
 )
-from .trying import keep_tried
 
 # Why `advance` came back.
 BUDGET, EXHAUSTED, PROVEN, CONFIDENT = range(4)
@@ -31,7 +30,6 @@ def advance(
     tables: MapTables,
     plan: Plan,
     found: Records,
-    tried: Records,
     progress: Records,
     work: Workspace,
     how: Records,
@@ -40,10 +38,6 @@ def advance(
 
     `how` (1,) of `HOW`; `progress` (1,) keeps the chance of having missed something up to date, or says that it is
     greater than is allowed: see `missed_share`. Returns one of `BUDGET`, `EXHAUSTED`, `PROVEN`, `CONFIDENT`.
-
-    Where there is room in `tried` (k,) of `TRIED` only the current base is gone through, before its turn: what others
-    find meanwhile is not known, so that what may have to be kept is only noted there, for `merge`. It is `BUDGET` until
-    that base is done, or the room used up.
     """
     state = progress[0]
     allowed = how[0].allowed
@@ -55,11 +49,9 @@ def advance(
             if state.current < 0:
                 return EXHAUSTED
         base = plan.bases[state.current]
-        spent += search_base(question, tables, base, found, tried, state, work, budget - spent)
+        spent += search_base(question, tables, base, found, state, work, budget - spent)
         if state.anchor > 0 or state.step > 0 or state.entry > 0:
             return BUDGET
-        if len(tried) > 0:
-            return EXHAUSTED
         why = after_base(question, plan, state, allowed)
         if why != BUDGET:
             return why
@@ -98,29 +90,3 @@ def after_base(question: Question, plan: Plan, state: Record, allowed: float) ->
         if state.missed <= allowed:
             return CONFIDENT
     return BUDGET
-
-
-@kernel
-def merge(
-    question: Question,
-    plan: Plan,
-    tried: Records,
-    ahead: Records,
-    found: Records,
-    progress: Records,
-    work: Workspace,
-    allowed: float,
-) -> int:
-    """Take over what was found in a base ahead of its turn, which has come; return as `after_base` does.
-
-    `found` and `progress` are then what they would be if the base had been gone through now.
-    """
-    state = progress[0]
-    state.hypotheses += ahead[0].hypotheses
-    state.bases += 1
-    state.current = ahead[0].current
-    state.anchor = 0
-    state.step = 0
-    state.entry = 0
-    keep_tried(question, tried, found, state, work)
-    return after_base(question, plan, state, allowed)

@@ -9,13 +9,17 @@ of a copy of the sums before it is solved.
 
 import math
 
+import numpy as np
+
 from compiled import kernel
 from registration.kernels import invert3, joint_add, joint_cost, joint_information, joint_solve
 from registration.layout import Floats, Record, Records
 
+from ..layout import Integers
 from ..tables import Place, Workspace
-from ..tuning import MAX_STEP, MAX_TURN, ROUNDS, SAME_SHIFT, SPRING
+from ..tuning import MAX_STEP, MAX_TURN, ROUNDS, SAME_SHIFT, SORTED_BY_INSERTION, SPRING
 from .matching import allow_all, match_scan, wrap
+from .ordering import ascending
 
 
 @kernel
@@ -155,13 +159,9 @@ def list_walls(work: Workspace, ties: Floats) -> tuple[int, int]:
             listed[alone] = w
             alone += 1
         else:
-            # From the back on, in order.
             tied -= 1
-            k = tied
-            while k + 1 < len(held) and ties[listed[k + 1]] < ties[w]:
-                listed[k] = listed[k + 1]
-                k += 1
-            listed[k] = w
+            listed[tied] = w
+    sort_by_ties(listed[tied : len(held)], ties)
     count = alone
     for k in range(tied, len(held)):
         listed[count] = listed[k]
@@ -169,6 +169,28 @@ def list_walls(work: Workspace, ties: Floats) -> tuple[int, int]:
     for k in range(count):
         shares[listed[k]].listed = 0
     return alone, count
+
+
+@kernel
+def sort_by_ties(walls: Integers, ties: Floats) -> None:
+    """Put walls (k,) in the order in which they lie along their chains; equal ones stay as they are."""
+    n = len(walls)
+    if n > SORTED_BY_INSERTION:
+        keys = np.empty(n, np.float64)
+        for k in range(n):
+            keys[k] = ties[walls[k]]
+        order = ascending(keys)
+        before = walls.copy()
+        for k in range(n):
+            walls[k] = before[order[k]]
+        return
+    for k in range(1, n):
+        w = walls[k]
+        j = k
+        while j > 0 and ties[walls[j - 1]] > ties[w]:
+            walls[j] = walls[j - 1]
+            j -= 1
+        walls[j] = w
 
 
 @kernel

@@ -142,7 +142,6 @@ def sweep_base(
     tables: MapTables,
     base: Record,
     found: Records,
-    tried: Records,
     progress: Record,
     work: Workspace,
     budget: int,
@@ -151,8 +150,8 @@ def sweep_base(
 
     A run under a fixes the rotation and leaves one slide; the grid is walked along what the midpoint of b then sweeps.
     Goes on from the anchor where `progress` stands, in the cell of its step, at the entry of its list, and stops when
-    `budget` tests are used up, within a cell, too, or the room in `tried`. Returns the tests that it took; `progress`
-    is back at the first anchor when the base is done.
+    `budget` tests are used up, within a cell, too. Returns the tests that it took; `progress` is back at the first
+    anchor when the base is done.
     """
     runs = tables.sweep.runs
     sectors = tables.sweep.sectors
@@ -187,7 +186,7 @@ def sweep_base(
                 cell, entry, crossings = meet(laid, swept, cell, entry, cells, sectors, met)
                 poses = pose_crossings(a, b, laid, swept, met, crossings, runs, work)
                 left = budget - spent - crossings
-                cost, stopped = try_poses(question, tables, poses, found, tried, progress, work, left)
+                cost, stopped = try_poses(question, tables, poses, found, progress, work, left)
                 spent += crossings + cost
                 if stopped:
                     progress.anchor += begin
@@ -211,7 +210,6 @@ def search_listed(
     tables: MapTables,
     base: Record,
     found: Records,
-    tried: Records,
     progress: Record,
     work: Workspace,
     budget: int,
@@ -241,7 +239,7 @@ def search_listed(
             if not gated:
                 gated = True
                 gates_about(question.scan, figure, gates, work.spreads, work.shifts, work.later)
-            cost, stopped = try_poses(question, tables, poses, found, tried, progress, work, budget - spent)
+            cost, stopped = try_poses(question, tables, poses, found, progress, work, budget - spent)
             spent += cost
             if stopped:
                 return spent
@@ -259,12 +257,11 @@ def search_base(
     tables: MapTables,
     base: Record,
     found: Records,
-    tried: Records,
     progress: Record,
     work: Workspace,
     budget: int,
 ) -> int:
     """Go through all pairs of runs that fit a base, by the lists of crossings or else by sweeping; see `sweep_base`."""
     if base.listed >= 0:
-        return search_listed(question, tables, base, found, tried, progress, work, budget)
-    return sweep_base(question, tables, base, found, tried, progress, work, budget)
+        return search_listed(question, tables, base, found, progress, work, budget)
+    return sweep_base(question, tables, base, found, progress, work, budget)

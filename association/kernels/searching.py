@@ -6,7 +6,7 @@ from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import Records
 
-from ..layout import FOUND, TRIED
+from ..layout import FOUND
 from ..planning_tables import Plan, Planning
 from ..tables import MapTables, Question, Workspace
 from ..tuning import BASE_SEGMENTS, SLIDE_SEGMENTS
@@ -39,7 +39,7 @@ def search(
         progress[0].missed = 0.0  # walls of which no two cross are slid
     else:
         of_bases = found[: how[0].kept]
-        why = advance(question, tables, plan, of_bases, np.empty(0, TRIED), progress, work, how)
+        why = advance(question, tables, plan, of_bases, progress, work, how)
         if why == BUDGET:
             return why, plan
         if why == EXHAUSTED and not plan.random:
@@ -57,7 +57,6 @@ def go_on(
     tables: MapTables,
     plan: Plan,
     found: Records,
-    tried: Records,
     progress: Records,
     work: Workspace,
     how: Records,
@@ -67,7 +66,7 @@ def go_on(
     Returns as `advance` does. Both in one kernel, for each that goes through bases takes seconds to compile.
     """
     if progress[0].left == 0:
-        return advance(question, tables, plan, found[: how[0].kept], tried, progress, work, how)
+        return advance(question, tables, plan, found[: how[0].kept], progress, work, how)
     finish(question, tables, found, progress, work, how)
     return BUDGET if progress[0].done == 0 else EXHAUSTED
 

@@ -162,28 +162,31 @@ def walls_of(scan: Records, matches: Records, ties: Floats) -> tuple[Integers, F
     for i in range(len(scan)):
         w = matches[i].wall
         if w >= 0:
-            left = 1.0
-            for k in range(count):
-                left = min(left, 1.0 - sameness(ties, of_wall[k], w))
+            nearest = math.inf  # along their chain
             known = False
             for k in range(count):
-                known = known or of_wall[k] == w
+                v = of_wall[k]
+                if v == w:
+                    known = True
+                    break
+                if ties[v] >= 0.0 and ties[w] >= 0.0:
+                    nearest = min(nearest, abs(ties[v] - ties[w]))
             if not known:
                 of_wall[count] = w
-                own[count] = left
+                own[count] = 1.0 - math.exp(-2.0 * nearest)
                 count += 1
     return of_wall[:count], own[:count]
 
 
 @kernel
 def settle(
-    question: Question, known_walls: KnownWalls, matches: Records, starts: Records, settled: Records, hinges: Records,
-    work: Workspace,
+    question: Question, known_walls: KnownWalls, matches: Records, starts: Records, settled: Records, begin: int,
+    hinges: Records, work: Workspace,
 ) -> int:  # fmt: skip
     """Work out the poses of consensus sets from `starts` (k,), with the error of the walls as their residuals show it.
 
-    `matches` (k, n). Writes `settled` (k,) and, for each wall that holds a match of the first set, `hinges`, unless
-    that has no room for any; returns how many walls that are.
+    `matches` (k, n). Writes `settled` (k,) and, for the walls from number `begin` on that hold a match of the first
+    set, as many `hinges` as there is room for; returns how many walls hold one.
     """
     count = 0
     for k in range(len(starts)):
@@ -191,7 +194,7 @@ def settle(
         if k == 0:
             count = len(of_wall)
             if len(hinges) > 0:
-                leave_each_out(question, known_walls, matches[0], of_wall, settled, hinges, work)
+                leave_each_out(question, known_walls, matches[0], begin, settled, hinges, work)
         register_settled(question.scan, known_walls, matches[k], settled[k], work)
     return count
 
@@ -290,10 +293,13 @@ def register_settled(scan: Records, known_walls: KnownWalls, matches: Records, o
 
 @kernel
 def leave_each_out(
-    question: Question, known_walls: KnownWalls, matches: Records, of_wall: Integers, settled: Records,
-    hinges: Records, work: Workspace,
+    question: Question, known_walls: KnownWalls, matches: Records, begin: int, settled: Records, hinges: Records,
+    work: Workspace,
 ) -> None:  # fmt: skip
-    """Write what the settled pose would be without each wall; the sums hold all, and do so again."""
+    """Write what the settled pose would be without each of the walls from number `begin` on that `hinges` has room for.
+
+    The sums hold all matches, and do so again.
+    """
     scan = question.scan
     information = work.scratch[0].information
     value = work.scratch[0].value
@@ -302,13 +308,14 @@ def leave_each_out(
     wall_variance = settled[0].wall_variance
     one = np.zeros(1, ESTIMATE)
     without = one[0]
-    _, own = walls_of(scan, matches, known_walls.ties)
-    for k in range(len(of_wall)):
-        add_without(scan, matches, known_walls, wall_variance, of_wall[k], work)
+    of_wall, own = walls_of(scan, matches, known_walls.ties)
+    for k in range(min(len(hinges), len(of_wall) - begin)):
+        wall = of_wall[begin + k]
+        add_without(scan, matches, known_walls, wall_variance, wall, work)
         copy_estimate(pose, without)
         hinge = hinges[k]
-        hinge.wall = of_wall[k]
-        hinge.own = own[k]
+        hinge.wall = wall
+        hinge.own = own[begin + k]
         moved = solve(sums, without, information, value)
         x = without.x - pose.x
         y = without.y - pose.y

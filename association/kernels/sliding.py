@@ -7,7 +7,7 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Floats, Records
 
-from ..layout import HARD_PRIOR, TRIED, Integers
+from ..layout import HARD_PRIOR, Integers
 from ..tables import MapTables, Question, Workspace
 from ..tuning import BASE_SEGMENTS, MIN_CROSSING_BASE, PARALLEL_SINE, WINDOW_TURN
 from .matching import gates_about, wrap
@@ -83,7 +83,6 @@ def search_slides(
     posed = work.posed
     a = question.scan[sliding]
     variance = a.angle_variance
-    nothing = np.empty(0, TRIED)
     figure = work.scratch[0].figure
     figure.angle_variance = variance
     figure.pin_x = a.x
@@ -131,9 +130,9 @@ def search_slides(
             one.entry = 0
             n += 1
             if n == len(posed):
-                cost, stopped = try_poses(question, tables, n, found, nothing, state, work, left)
+                cost, stopped = try_poses(question, tables, n, found, state, work, left)
                 if stopped:
                     return False
                 left -= cost
                 n = 0
-    return not try_poses(question, tables, n, found, nothing, state, work, left)[1]
+    return not try_poses(question, tables, n, found, state, work, left)[1]

@@ -19,15 +19,14 @@ def try_poses(
     tables: MapTables,
     count: int,
     found: Records,
-    tried: Records,
     progress: Record,
     work: Workspace,
     budget: int,
 ) -> tuple[int, bool]:
     """Score the first `count` poses of the workspace, in order; keep them if they are among the best.
 
-    Where there is room in `tried` (k,) they are noted there instead, for `keep_tried`. Returns what it cost, in tests
-    of a wall, and whether `budget`, or that room, was used up: then `progress` stands behind the last one tried.
+    Returns what it cost, in tests of a wall, and whether `budget` was used up: then `progress` stands behind the last
+    one tried.
     """
     scan = question.scan
     posed = work.posed
@@ -56,10 +55,10 @@ def try_poses(
             pose.x = one.x
             pose.y = one.y
             turning(one.angle_variance, one.lever_x, one.lever_y, pose)
-            spent += _match_and_refine(question, tables.place, k, found, tried, progress, work)
+            spent += _match_and_refine(question, tables.place, k, found, progress, work)
         else:
             spent += TESTS_REJECTED
-        if spent > budget or (progress.tried == len(tried) and progress.tried > 0):
+        if spent > budget:
             progress.anchor = one.anchor
             progress.step = one.step
             progress.entry = one.entry
@@ -76,7 +75,7 @@ def is_about(prior: Record, pose: Record) -> bool:
 
 @kernel
 def _match_and_refine(
-    question: Question, place: Place, k: int, found: Records, tried: Records, progress: Record, work: Workspace
+    question: Question, place: Place, k: int, found: Records, progress: Record, work: Workspace
 ) -> int:
     """Match the pose of the workspace, which is the k-th of its poses to be tried, as far as it may still be kept."""
     scan = question.scan
@@ -102,36 +101,5 @@ def _match_and_refine(
     # No prior makes up for what the set lacks.
     least = floor_of(rules, progress, 0.0) + progress.least_freedom
     score = refine(scan, pose, place, terms, work.matches, work, least)
-    if len(tried) == 0:
-        offer(found, progress, rules, terms.prior, pose, score)
-        return TESTS_REFINED
-    note = tried[progress.tried]
-    progress.tried += 1
-    note.bonus = one.bonus
-    note.possible = min(most, matched)
-    note.score = score
-    note.theta = pose.theta
-    note.x = pose.x
-    note.y = pose.y
+    offer(found, progress, rules, terms.prior, pose, score)
     return TESTS_REFINED
-
-
-@kernel
-def keep_tried(question: Question, tried: Records, found: Records, progress: Record, work: Workspace) -> None:
-    """Keep of the poses that were tried ahead of their turn what `try_poses` would have kept in their turn, in order.
-
-    It would have known of better ones by then, and left off sooner, where `tried` (k,) shows how much was possible. A
-    score that is kept comes of gains that it would not have left off at.
-    """
-    rules = question.rules[0]
-    prior = question.terms[0].prior
-    pose = work.scratch[0].estimate
-    for k in range(len(tried)):
-        one = tried[k]
-        if one.possible < floor_of(rules, progress, one.bonus) + progress.least_freedom:
-            continue
-        progress.verified += 1
-        pose.theta = one.theta
-        pose.x = one.x
-        pose.y = one.y
-        offer(found, progress, rules, prior, pose, one.score)

@@ -128,7 +128,7 @@ def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadl
                     return process.wait(LOOK_SECONDS)
                 if deadline.cancelled:
                     raise CancelledError
-                if deadline.over:
+                if deadline.passed:
                     raise TooLateError
         finally:
             process.kill()

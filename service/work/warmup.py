@@ -78,7 +78,6 @@ def warm_up() -> None:
     warm_up_vectorizing()
     warm_up_searching()
     warm_up_searching_long()
-    warm_up_searching_late()
     warm_up_analyzing()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
@@ -98,7 +97,6 @@ def warm_up_second_half() -> None:
     warm_up_indexing()
     warm_up_vectorizing()
     warm_up_explaining()
-    warm_up_searching_late()
     warm_up_searching_long()
     warm_up_simulating()
 
@@ -179,19 +177,9 @@ def warm_up_searching() -> None:
 
 
 def warm_up_searching_long() -> None:
-    """Search as where it takes long: in steps."""
-    _search_in_steps(Deadline())
-
-
-def warm_up_searching_late() -> None:
-    """Search as beyond the deadline."""
-    _search_in_steps(Deadline(0.0))
-
-
-def _search_in_steps(deadline: Deadline) -> None:
     """Go on with a search that has just begun: what a whole one takes is compiled by who is searching meanwhile."""
     index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
-    context = SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), deadline)
+    context = SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), Deadline())
     begun = Begun.of(context, Effort.of(context), chunk=1)
     begun.go_on(context, *begun.plan(context))
 

@@ -63,6 +63,34 @@ def far_apart(rng: np.random.Generator) -> Pair:
     return np.stack([x, zero(x), x + 0.05, zero(x)], axis=1), scan
 
 
+def dashes(rng: np.random.Generator) -> Pair:
+    """Return a line of dashes that wanders, and so consists of as many walls tied to one another; a scan of all."""
+    x, y, lengths = np.arange(SEEN - 2.0), np.cumsum(rng.normal(0.0, 0.1, SEEN - 2)), rng.uniform(0.5, 0.95, SEEN - 2)
+    across = np.array([[0.0, -3.0, 9.0, -3.0], [9.0, -3.0, 9.0, -6.0]])
+    walls = np.vstack([np.stack([x, y - y.mean(), x + lengths, y - y.mean()], axis=1), across])
+    return walls, walls + rng.normal(0.0, 0.003, walls.shape)
+
+
+def steps(rng: np.random.Generator) -> Pair:
+    """Return a line of dashes that goes to and fro by centimetres, and a scan of all, which are one line of it."""
+    x, y = 0.5 * np.arange(SEEN - 2.0), 0.03 * (np.arange(SEEN - 2) % 2)
+    across = np.array([[0.0, -3.0, 9.0, -3.0], [9.0, -3.0, 9.0, -6.0]])
+    walls = np.vstack([np.stack([x, y, x + 0.45, y], axis=1), across])
+    return walls, walls + rng.normal(0.0, 0.003, walls.shape)
+
+
+@pytest.mark.parametrize("drawn", [dashes, steps])
+def test_it_holds_where_all_that_is_seen_lies_on_walls_that_are_nearly_one(
+    drawn: Callable[[np.random.Generator], Pair],
+) -> None:
+    """Whatever compares each pair, or each wall, with each other one took 2 to 3 s of processor time."""
+    walls, seen = drawn(np.random.default_rng(0))
+    index, scan = index_of(walls, sigma=0.02), scan_of(seen, viewpoint=(5.0, -1.0))
+    found, took = within(index, scan, replace(OPTIONS, max_alternatives=50))
+    assert len(found.correspondences) > SEEN // 2
+    assert took < ALLOWED + 0.5 * MORE
+
+
 @pytest.mark.parametrize("drawn", [repeated, cut_up, along_lines_of_sight, heap, far_apart])
 @pytest.mark.parametrize("viewpoint", [(0.0, 0.0), None])
 def test_the_deadline_holds_for_every_stage(

@@ -69,17 +69,17 @@ class Looks(Deadline):
         self.count, self.longest, self._most, self._last = 0, 0.0, most, time.thread_time()
 
     @property
-    def over(self) -> bool:
+    def passed(self) -> bool:
         now = time.thread_time()
         self.longest, self._last = max(self.longest, now - self._last), now
         self.count += 1
         if self.count == self._most:
             self.cancel()
-        return Deadline.over.fget(self)  # type: ignore[attr-defined, no-any-return]
+        return Deadline.passed.fget(self)  # type: ignore[attr-defined, no-any-return]
 
     def ended(self) -> float:
         """Return the longest time, up to now."""
-        _ = self.over
+        _ = self.passed
         return self.longest
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
-from association.layout import TRIED, Indices
+from association.layout import Indices
 from association.scan_lines import gates
 from association.tables import Workspace
 from registration import RigidTransform
@@ -26,7 +26,6 @@ PLACE = TABLES.place
 GATES = gates(AssociationOptions())
 ASKED = context_of(INDEX, scan_of([[0.0, 0.0, 1.0, 0.0]])).question_of_a_pose  # under the usual options
 MODEL = ASKED.terms["model"]
-NOTHING = np.zeros(0, TRIED)
 SMALL = np.diag([1e-4, 1e-4, 1e-6])  # a pose's covariance
 
 

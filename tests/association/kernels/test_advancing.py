@@ -18,7 +18,7 @@ from registration.layout import Records
 
 from ..reference import planning as twin
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, NOTHING, SEEDS, TABLES, Drawn, drawn, workspace_of
+from .drawn import INDEX, SEEDS, TABLES, Drawn, drawn, workspace_of
 from .plans import RULE, bases_of, plan_of
 
 BASES = 8  # segments that bases are made of
@@ -69,7 +69,7 @@ def expected_end(d: Drawn, effort: Effort) -> End:
     order = twin.order_of(weighed[["sliding", "crossing", "merit"]].tolist(), plan.fade, at_most)
     for count, k in enumerate(order, 1):
         base = weighed[k]
-        search_base(question, TABLES, base, found, NOTHING, state[0], work, 10**9)
+        search_base(question, TABLES, base, found, state[0], work, 10**9)
         best = float(state["best_value"][0])
         state["least_freedom"] = twin.least_freedom_sorted(d.scan, 0.65 * best)
         needed = 0.95 * best + twin.least_freedom_sorted(d.scan, 0.95 * best)
@@ -104,7 +104,7 @@ def end_of(d: Drawn, effort: Effort, budget: int) -> tuple[End, Records, int]:
     )
     why, calls = advancing.BUDGET, 0
     while why == advancing.BUDGET:
-        why = advancing.advance(question, TABLES, plan, found, NOTHING, progress, work, how)
+        why = advancing.advance(question, TABLES, plan, found, progress, work, how)
         calls += 1
     state = progress[0]
     missed = float(state["missed"]) if effort.by_chance else stopping.missed_share(question, plan, progress)

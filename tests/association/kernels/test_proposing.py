@@ -25,7 +25,7 @@ from ..reference.consensus import refine
 from ..reference.geometry import moved
 from ..reference.matching import gates_about, match_scan, reachable
 from ..scenes import context_of, index_of, same_pose, scan_of
-from .drawn import GATES, INDEX, MODEL, NOTHING, PLACE, SEEDS, SMALL, TABLES, Drawn, drawn, oblique, workspace_of
+from .drawn import GATES, INDEX, MODEL, PLACE, SEEDS, SMALL, TABLES, Drawn, drawn, oblique, workspace_of
 from .plans import entries_of
 
 ALL = record(RULES, kept_share=0.0, distinct_distance=0.0, distinct_angle=0.0, rival_share=0.95)  # keep every pose
@@ -117,7 +117,7 @@ def swept(question: Question, base: tuple[int, int], budget: int = 10**9, listed
     chosen, work, calls = record(BASE, sliding=base[0], crossing=base[1], listed=listed), workspace_of(question.scan), 0
     while progress["bases"][0] == 0:
         calls += 1
-        assert proposing.search_base(question, TABLES, chosen[0], found, NOTHING, progress[0], work, budget) > 0
+        assert proposing.search_base(question, TABLES, chosen[0], found, progress[0], work, budget) > 0
     assert (progress["anchor"][0], progress["step"][0], progress["entry"][0]) == (0, 0, 0)
     return Found(found[: int(progress["count"][0])], progress, calls)
 
@@ -182,7 +182,7 @@ def test_what_is_met_at_once_is_gone_through_in_pieces(count: int, apart: float,
         found, progress, proposed = np.zeros(20_000, FOUND), record(PROGRESS), [0]
         work = workspace_of(question.scan, index)
         while progress["bases"][0] == 0:
-            proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, budget)
+            proposing.search_base(question, index.tables, chosen[0], found, progress[0], work, budget)
             proposed.append(int(progress["hypotheses"][0]))
         return np.diff(proposed).tolist(), found
 
@@ -206,7 +206,7 @@ def test_what_is_met_and_does_not_fit_is_not_met_again() -> None:
     question, chosen = context_of(index, scan).question(ALL), record(BASE, sliding=0, crossing=1, listed=-1)
     found, progress, work, stood = np.zeros(20_000, FOUND), record(PROGRESS), workspace_of(question.scan, index), set()
     while progress["bases"][0] == 0:
-        proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 1)
+        proposing.search_base(question, index.tables, chosen[0], found, progress[0], work, 1)
         stood.add(progress[["anchor", "step", "entry"]][0].item())
     assert progress["hypotheses"][0] == 5 + 1  # on the runs that fit, and on the one that they make up
     assert len(stood) > 5 + 1
@@ -248,7 +248,7 @@ def test_wherever_a_base_lies_its_crossings_are_looked_up(length: float, apart: 
         assert question.scan["length"][0] == 3.0
         found, progress, work = np.zeros(20, FOUND), record(PROGRESS), workspace_of(question.scan, index)
         chosen = record(BASE, sliding=first, crossing=1 - first, listed=1)
-        proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 10**9)
+        proposing.search_base(question, index.tables, chosen[0], found, progress[0], work, 10**9)
         proposed.append(int(progress["hypotheses"][0]))
         assert proposed[-1] == len(twin.placements(question.scan, first, 1 - first, index.runs.rows, GATES))
     assert set(proposed) == {0, 1}
@@ -269,7 +269,7 @@ def test_only_what_crosses_at_about_the_angle_of_a_base_is_proposed_within_the_w
     for prior, expected in ((None, ways), (moved_window, inside)):
         question, found, progress = context_of(index, scan, prior).question(ALL), np.zeros(99, FOUND), record(PROGRESS)
         chosen, work = record(BASE, sliding=0, crossing=1, listed=1), workspace_of(question.scan, index)
-        proposing.search_base(question, index.tables, chosen[0], found, NOTHING, progress[0], work, 10**9)
+        proposing.search_base(question, index.tables, chosen[0], found, progress[0], work, 10**9)
         assert progress["hypotheses"][0] == len(expected)
 
 
@@ -359,12 +359,12 @@ def test_try_poses(seed: int) -> None:
             kept_scores += [refined.score] if kept else []
             best_value = max(best_value, *kept_scores)
     # All of them; and one at a time, each from where the one before it left off.
-    spent, stopped = trying.try_poses(question, TABLES, len(places), found, NOTHING, progress[0], work, 10**9)
+    spent, stopped = trying.try_poses(question, TABLES, len(places), found, progress[0], work, 10**9)
     assert not stopped
     assert (progress["hypotheses"][0], progress["verified"][0]) == (len(places), sum(one[0] for one in expected))
     assert spent == sum(one[1] for one in expected)
     assert found["value"].max() == pytest.approx(max(kept_scores))
     progress["hypotheses"] = 0
-    spent, stopped = trying.try_poses(question, TABLES, len(places), found, NOTHING, progress[0], work, 0)
+    spent, stopped = trying.try_poses(question, TABLES, len(places), found, progress[0], work, 0)
     assert stopped
     assert progress[0][["hypotheses", "anchor", "step", "entry"]].item() == (1, 100, 10, 0)

@@ -18,7 +18,7 @@ from association.tuning import BASE_SEGMENTS, REUSE, SLIDE_SEGMENTS
 from registration.layout import Records
 
 from ..scenes import context_of, scan_of
-from .drawn import INDEX, NOTHING, SEEDS, TABLES, Drawn, drawn, workspace_of
+from .drawn import INDEX, SEEDS, TABLES, Drawn, drawn, workspace_of
 from .plans import NOT_LISTED, RULE, sampled
 
 BASES, KEPT, SLIDES = 8, 20, 16  # segments that bases are made of; poses of bases and of slides that are kept
@@ -40,7 +40,7 @@ def apart(
     plan, why = begin(question, tables, by, progress), advancing.EXHAUSTED
     if len(plan.bases):
         how = record(HOW, allowed=allowed, budget=10**9)
-        why = advancing.advance(question, tables, plan, found, NOTHING, progress, work, how)
+        why = advancing.advance(question, tables, plan, found, progress, work, how)
     if not len(plan.bases):
         progress["missed"] = 0.0
     elif why == advancing.EXHAUSTED and not plan.random:
@@ -77,13 +77,13 @@ def test_a_search_in_one_call(seed: int) -> None:
             if left is not None:
                 steps = 0
                 while not progress["left"][0]:
-                    why = go_on(question, tables, left, found, NOTHING, progress, work, how)
+                    why = go_on(question, tables, left, found, progress, work, how)
                     progress["left"] = why != advancing.BUDGET
                     steps += 1
                 if steps and why == advancing.EXHAUSTED and not by_chance:
                     progress["missed"] = stopping.missed_share(question, left, progress)
                 while not progress["done"][0]:
-                    go_on(question, tables, left, found, NOTHING, progress, work, how)
+                    go_on(question, tables, left, found, progress, work, how)
             assert why == ended
             np.testing.assert_array_equal(found[: int(progress["count"][0])], expected)
             same = ["best_value", "least_kept", "bases", "hypotheses", "verified", "bound", "missed", "least_freedom"]

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from association.kernels.consensus import sort_by_ties
 from association.kernels.settling import settle, unlike, weakest
 from association.layout import HINGE, SETTLED, WALL, Integers
 from association.tables import KnownWalls, Workspace
-from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, UNSEEN_ERROR
+from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, SORTED_BY_INSERTION, UNSEEN_ERROR
 from registration import RigidTransform
 from registration.layout import Record, Records
 from registration.observability import most_parallel, most_parallel_up_to
@@ -39,7 +40,7 @@ class Set:
         out, hinges = np.zeros(1, SETTLED), np.zeros(len(self.scan), HINGE)
         question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
         start, matches = estimate_of(self.start), matches_on(self.held)[None]
-        count = settle(question, known_walls(self, map_variance), matches, start, out, hinges, work)
+        count = settle(question, known_walls(self, map_variance), matches, start, out, 0, hinges, work)
         assert start == estimate_of(self.start)
         return out[0], hinges[:count]
 
@@ -121,6 +122,26 @@ def test_what_the_pose_would_be_without_a_wall(seed: int) -> None:
             assert [got["dx"], got["dy"]] == pytest.approx(hinge.direction.tolist(), abs=1e-4)
 
 
+def test_hinges_begin_at_any_wall() -> None:
+    one = some(7)
+    everything, every = one.settled(0.02**2)
+    out, hinges = np.zeros(1, SETTLED), np.zeros(2, HINGE)
+    question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
+    matches, start = matches_on(one.held)[None], estimate_of(one.start)
+    assert settle(question, known_walls(one, 0.02**2), matches, start, out, 1, hinges, work) == len(every) > 3
+    assert out == everything
+    np.testing.assert_array_equal(hinges, every[1:3])
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, SORTED_BY_INSERTION, SORTED_BY_INSERTION + 1, 300])
+def test_walls_are_put_in_order_along_their_chains(count: int) -> None:
+    rng = np.random.default_rng(count)
+    ties, walls = rng.integers(0, 40, 400) / 7.0, rng.permutation(400)[:count]
+    expected = walls[np.argsort(ties[walls], kind="stable")]
+    sort_by_ties(walls, ties)
+    np.testing.assert_array_equal(walls, expected)
+
+
 def test_several_sets_are_each_settled_as_if_alone() -> None:
     """Hinges are those of the first."""
     one = some(7)
@@ -129,7 +150,7 @@ def test_several_sets_are_each_settled_as_if_alone() -> None:
     starts = np.concatenate([estimate_of(one.start)] * 2)
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = np.stack([matches_on(held) for held in helds])
-    count = settle(question, known_walls(one), matches, starts, out, hinges, work)
+    count = settle(question, known_walls(one), matches, starts, out, 0, hinges, work)
     for k, held in enumerate(helds):
         alone, without = Set(one.scan, one.walls, held, one.start).settled()
         assert out[k] == alone
