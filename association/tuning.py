@@ -1,8 +1,8 @@
 """Every threshold of the search and the verdict, by stage, with its unit and where it comes from.
 
-Origins: *geometry* follows from what the number means; *tables* was chosen by the tables of `docs/dev/search.md` on floor
-plans and logs, and little changes near it; *measured* is a fit or a timing of what it stands for; *rounding* keeps
-arithmetic sound. Coefficients of the verdict are not here: a command fits them, see `verdict.py`.
+Origins: *geometry* follows from what the number means; *tables* was chosen by the tables of `docs/dev/search.md` on
+floor plans and logs, and little changes near it; *measured* is a fit or a timing of what it stands for; *rounding*
+keeps arithmetic sound. Coefficients of the verdict are not here: a command fits them, see `verdict.py`.
 """
 
 import math

@@ -16,7 +16,12 @@ from cli.program import app, call
 from service.settings import read_settings
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("clients/*/README.md")]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *ROOT.glob("docs/**/*.md"),
+    *ROOT.glob("clients/*/README.md"),
+]
 PLACES = {"X": "1", "Y": "2", "THETA": "0.5", "N": "3", "...": ""}
 SHOWN = re.compile(r"`(linefix [^`]+)`|^(?:\s*\$ )?(linefix (?!is |tells |answers |says ).*)$", re.MULTILINE)
 WITHOUT_ARGUMENTS = re.compile(r"linefix(?: map)? [a-z0-9]+")  # a command that is named in a sentence
