@@ -82,7 +82,7 @@ def test_maps_are_stored_listed_and_forgotten(
     server = [] if where == "here" else ["--server", service.url]
     assert "revision 1" in linefix("map", "put", f"hall.{len(server)}", "floor.json", *server).out
     (listed,) = [json.loads(row) for row in linefix("map", "list", "--json", *server).out.splitlines()]
-    assert (listed["map_id"], listed["segments"]) == (f"hall.{len(server)}", len(faces()))
+    assert (listed["map_id"], listed["segment_count"]) == (f"hall.{len(server)}", len(faces()))
     assert "hall" in linefix("map", "list", *server).out
     found = json.loads(linefix("map", "get", listed["map_id"], *server).out)
     assert found["segments"] == faces().tolist()
