@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -23,9 +23,11 @@ from simulation import scan
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 from .drive import STEP, seen_on_the_way, ways_from
+from .errors import AnalysisError
 from .robot import Robot
-from .standing import Standing, is_free
+from .standing import Standing, is_free, standing_places
 
+MOST_DRIVE = 30.0  # m
 SAME_PLACE, SAME_HEADING = 0.5, 0.5  # m, rad; nearer than that a pose is the one where the robot stood
 
 
@@ -100,6 +102,46 @@ class Analysis:
     seed: int = 0
     drive: float = 0.0
     landmark: Analysis | None = None
+
+    @classmethod
+    def over(
+        cls,
+        index: MapIndex,
+        robot: Robot,
+        spacing: float | None = None,
+        point: Sequence[float] | None = None,
+        *,
+        seed: int = 0,
+        drive: float = 0.0,
+        landmark: Segments | None = None,
+    ) -> Analysis:
+        """Lay a grid of poses over a map.
+
+        Parameters
+        ----------
+        index : MapIndex
+            Directions count as they do in the index.
+        robot : Robot
+        spacing, point
+            As of `standing_places`.
+        seed, drive
+            As of `Analysis`; metres to drive from 0 to 30.
+        landmark : Segments, optional
+            As of `with_segments`.
+
+        Raises
+        ------
+        AnalysisError
+            When the places cannot be had, or the drive is out of range.
+        """
+        if not 0.0 <= drive <= MOST_DRIVE:
+            raise AnalysisError(f"expected from 0 to {MOST_DRIVE:g} m, got {drive:g}", argument="drive")
+        # Of a map without directions the index holds each segment twice.
+        segments = Segments.derived(index.segments.endpoints[: index.directed])
+        standing = standing_places(segments, robot, spacing, point)
+        oriented = len(index.segments) == index.directed
+        analysis = cls(index, segments, robot, standing, oriented, seed, drive)
+        return analysis if landmark is None or not len(landmark) else analysis.with_segments(landmark)
 
     def with_segments(self, landmark: Segments) -> Analysis:
         """Return the same, which also says what would be known with more segments, on the map and in the building.

@@ -15,7 +15,7 @@ from analysis import Analysis, PlaceVerdict, Robot, Standing
 from association import Deadline, MapIndex
 from registration import Segments
 
-from .service import Progress
+from .contract import Progress
 
 PORTION = 16  # places that a process is given at a time
 ALONE = 64  # places up to which starting others takes longer than it saves

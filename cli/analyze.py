@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
 import orjson
 import typer
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
-from registration import Segments
+from registration import InputError, Segments
 
-from .errors import WrongUseError
+from .compiling import compile_first
+from .contract import Json, Progress
+from .errors import RefusedError, WrongUseError
 from .grouping import grouped
 from .inputs import needing_formats, read_map_file, read_map_or_id
+from .keeping import server_at
 from .options import AsJson, MapArgument, Server
 from .printing import print_json, print_rows
-from .service import Json, Progress, answering
 
 COLOURS = {"ok": (46, 125, 70), "ambiguous": (214, 130, 20), "degenerate": (150, 60, 160), "no_match": (190, 40, 40)}
 SUFFIXES = (".json", ".geojson")
+# Arguments of the library by the options that they come from.
+OPTIONS = {f"laser.{name.replace('-', '_')}": f"--{name}" for name in ("fov", "beams", "range-max", "sigma")}
+OPTIONS |= {name: f"--{name}" for name in ("spacing", "point", "drive", "landmark")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +81,16 @@ def analyze(
     target = read_map_or_id(on)
     if picture is not None and "map_id" in target:
         raise WrongUseError("--picture: it is drawn over the map of a file; name one instead of an id")
-    body: Json = {"map": target, "laser": asdict(scanner), "spacing": spacing, "deadline_ms": deadline_ms}
-    body["drive"] = further.drive
-    if further.landmark is not None:
-        body["landmark"] = read_map_file(further.landmark)["segments"]
-    if point is not None:
-        body["point"] = list(point)
-    with answering(server) as service, _progress() as progress:
-        answer = service.analyze(body, progress)
+    landmark = [] if further.landmark is None else read_map_file(further.landmark).get("segments", [])
+    if server is None:
+        answer = _analyzed(target, Asked(scanner, further.drive, landmark, spacing, point, deadline_ms))
+    else:
+        body: Json = {"map": target, "laser": asdict(scanner), "spacing": spacing, "deadline_ms": deadline_ms}
+        body |= {"drive": further.drive, "landmark": landmark}
+        if point is not None:
+            body["point"] = list(point)
+        with closing(server_at(server)) as service:
+            answer = service.analyze(body)
     if out is not None:
         out.write_bytes(orjson.dumps(answer if out.suffix.lower() == ".json" else features(answer)) + b"\n")
     if picture is not None:
@@ -90,6 +99,48 @@ def analyze(
         print_json(answer)
     else:
         print_rows(list(_rows(answer)))
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which analysis is asked for, as the options of the command say."""
+
+    scanner: ScannerOptions
+    drive: float
+    landmark: ArrayLike
+    spacing: float | None
+    point: tuple[float, float] | None
+    deadline_ms: float | None
+
+
+def _analyzed(target: Json, asked: Asked) -> Json:
+    """Return the answer of ``POST /v1/analyze``, worked out here on all cores, however long it takes."""
+    import linefix
+    from analysis import Analysis, Robot
+    from service.work.analyzing import analysis_json
+
+    from .all_cores import look_on_all_cores
+    from .stored import map_here, settings_here
+
+    if asked.deadline_ms is not None and not asked.deadline_ms >= 0.0:
+        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {asked.deadline_ms:g}")
+    found, cores = map_here(target), settings_here().searches
+    compile_first()
+    begun = time.monotonic()
+    try:
+        laser = asked.scanner
+        robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
+        landmark = Segments.from_array(asked.landmark, argument="landmark")
+        index = linefix.index_map(found.document)
+        analysis = Analysis.over(index, robot, asked.spacing, asked.point, drive=asked.drive, landmark=landmark)
+    except InputError as error:
+        raise RefusedError(OPTIONS.get(error.argument, error.argument) + f": {error.message}") from None
+    deadline = linefix.Deadline(None if asked.deadline_ms is None else begun + 1e-3 * asked.deadline_ms)
+    with _progress() as progress:
+        looks = look_on_all_cores(analysis, cores, deadline, progress)
+    spent = round(1e3 * (time.monotonic() - begun), 3)
+    sealed = {"map": found.reference, "client_ref": None, "timing_ms": {"search": spent, "total": spent}}
+    return {**analysis_json(analysis, looks), **sealed}
 
 
 @contextmanager

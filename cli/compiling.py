@@ -9,7 +9,7 @@ from contextlib import suppress
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from compiled import compiled_fraction
+from compiled import compiled_fraction, is_complete
 from service.parsing.errors import ParserEndedError
 from service.parsing.parser_process import ParserProcess
 from service.work.compiling import compile_kernels
@@ -17,11 +17,14 @@ from service.work.compiling import compile_kernels
 LOOK_SECONDS = 0.3
 
 
-def compile_in(parser: ParserProcess) -> None:
-    """Compile what is not kept from before in a process that ends with it: the compiler keeps 330 MB.
+def compile_first() -> None:
+    """Compile the kernels that are not cached, in a process that ends with it: the compiler takes 330 MB.
 
-    A person who looks on sees how far it is.
+    A terminal shows how far it is.
     """
+    if is_complete():
+        return
+    parser = ParserProcess()
     print("linefix: compiling the kernels for about a minute; later runs load them from the cache", file=sys.stderr)
     columns = TextColumn("kernels"), BarColumn(), TaskProgressColumn()
     bar = Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True)

@@ -16,9 +16,10 @@ from service.parsing.reading import parse
 from service.schemas.errors import TooManyError
 from service.schemas.limits import Limits
 
+from .contract import Json
 from .errors import NOTHING, Asked, RefusedError, WrongUseError
+from .keeping import keeping
 from .printing import noted, plain
-from .service import Json, answering
 
 if TYPE_CHECKING:
     from formats import ImportReport, LineMap
@@ -103,8 +104,8 @@ def whole_map(on: Json, server: str | None) -> Json:
     """Return the map of a request itself, also where the request has its id; raises `RefusedError` where it is gone."""
     if "map_id" not in on:
         return on
-    with answering(server) as service:
-        return service.get(on["map_id"])
+    with keeping(server) as maps:
+        return maps.get(on["map_id"])
 
 
 def read_map_file(name: str) -> Json:

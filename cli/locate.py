@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
+from .answering import answering
+from .contract import Json
 from .inputs import read_map_or_id, read_scan
 from .options import AsJson, MapArgument, ScanArgument, Server
 from .printing import print_json, print_rows, verdict_rows
-from .service import Json, answering
 
 
 def locate(

@@ -14,9 +14,12 @@ import orjson
 import linefix
 from registration import InputError, RigidTransform
 
+from .answering import answering
+from .compiling import compile_first
+from .contract import Json, Service
 from .errors import RefusedError
+from .inputs import whole_map
 from .logs import sent
-from .service import Json, Service, answering
 
 if TYPE_CHECKING:
     from formats import LoggedScan
@@ -73,13 +76,16 @@ def locating(on: Json, server: str | None) -> Iterator[Locator]:
         with answering(server) as service:
             yield Remote(service, on)
         return
-    from .in_process import InProcess
+    from .stored import settings_here
 
-    here = InProcess()
+    seconds = 1e-3 * settings_here().max_deadline_ms
+    document = whole_map(on, None)
+    compile_first()
     try:
-        yield Local(here.indexed(on), here.longest_search)
-    finally:
-        here.close()
+        index = linefix.index_map(document)
+    except InputError as error:
+        raise RefusedError(str(error)) from None
+    yield Local(index, seconds)
 
 
 @dataclass(frozen=True, slots=True)

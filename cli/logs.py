@@ -12,10 +12,10 @@ import typer
 
 from linefix.mounted import HERE
 
+from .contract import Json
 from .errors import WrongUseError
 from .inputs import needing_formats
 from .printing import noted, plain
-from .service import Json
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, LogOptions

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from service.printable import escaped
 
-from .service import Json
+from .contract import Json
 
 
 def print_json(answer: Any) -> None:

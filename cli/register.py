@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
+from .answering import answering
+from .contract import Json
 from .inputs import read_json, read_map_file, read_scan
 from .options import AsJson, ScanArgument, Server
 from .printing import print_json, print_rows, verdict_rows
-from .service import Json, answering
 
 
 def register(

@@ -20,6 +20,7 @@ from rich.progress import track
 from linefix.mounted import SPEED, TURN
 from registration import RigidTransform
 
+from .contract import Json
 from .errors import CommandError, NoSuchMapError, RefusedError
 from .frames import Frames, odometry_of
 from .inputs import line_map_of, needing_formats, read_map_or_id, whole_map
@@ -27,7 +28,6 @@ from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
 from .options import AsJson, Server
 from .printing import plain, print_json, print_rows, print_table
-from .service import Json
 from .tracking import Tracker
 
 if TYPE_CHECKING:

@@ -215,9 +215,7 @@ def _map_at(name: str) -> tuple[linefix.MapIndex, str]:
 
     document = document_at(name, None)
     with needing_formats(name):
-        segments = linefix.Segments.from_array(document.get("segments", []), argument="map.segments")
-        oriented = document.get("oriented", True)
-        index = linefix.MapIndex.build(segments, document.get("sigma"), oriented=oriented)
+        index = linefix.index_map(document)
     frame = document.get("frame_id") or "map"
     if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):
         raise RefusedError(f"{name}: found a frame_id that is no name, expected one of at most {MAX_FRAME} characters")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from .mounted import MountedScan, ranges_scan, view_of
 
 if TYPE_CHECKING:
     from formats import ImportedMap, LineMap
+
+MAP_FIELDS = frozenset(("segments", "sigma", "oriented", "frame_id", "meta"))  # of a map document
 
 
 def locate(
@@ -81,13 +84,14 @@ def locate(
     return associate(index if how.oriented else index.undirected, scan_of(scan, angles), prior, how, deadline)
 
 
-def index_map(map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike) -> MapIndex:
+def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, Any] | ArrayLike) -> MapIndex:
     """Prepare a map for many scans.
 
     Parameters
     ----------
-    map : MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
-        An index is returned as it is. Nothing is known of the error of bare segments: each answer estimates it.
+    map : MapIndex, LineMap, ImportedMap, Segments, mapping, or array-like of shape (n, 4)
+        An index is returned as it is. Nothing is known of the error of bare segments: each answer estimates it. A
+        mapping is a map document as in a map file: ``segments``, and optionally ``sigma`` and ``oriented``.
 
     Raises
     ------
@@ -103,11 +107,29 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike) -> M
     """
     if isinstance(map, MapIndex):
         return map
+    if isinstance(map, Mapping):
+        return _index_document(map)
     inner: Any = getattr(map, "map", map)  # what was imported comes with a report
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):
         return MapIndex.build(segments, inner.sigma, oriented=inner.oriented)
     return MapIndex.build(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument="map"))
+
+
+def _index_document(document: Mapping[str, Any]) -> MapIndex:
+    """Index a map document; raises `InputError` where a field is unknown, or not what it should be."""
+    unknown = sorted(set(map(str, document)) - MAP_FIELDS)
+    if unknown:
+        raise InvalidArgumentError(
+            f"found the field {unknown[0]}, expected {', '.join(sorted(MAP_FIELDS))}", argument="map"
+        )
+    oriented, sigma = document.get("oriented"), document.get("sigma")
+    if not (oriented is None or isinstance(oriented, bool)):
+        raise InvalidArgumentError(f"expected true, false or null, found {oriented!r}", argument="map.oriented")
+    if sigma is not None and (isinstance(sigma, bool) or not isinstance(sigma, int | float)):
+        raise InvalidArgumentError(f"expected metres or null, found {sigma!r}", argument="map.sigma")
+    segments = Segments.from_array(document.get("segments", []), argument="map.segments")
+    return MapIndex.build(segments, sigma, oriented=oriented is not False)
 
 
 def scan_of(

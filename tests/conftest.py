@@ -52,6 +52,13 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService
 
 
 @pytest.fixture(scope="session")
+def patient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    """A service that goes on for as long as a slow machine needs to start a process and read a file in it."""
+    with running(tmp_path_factory.mktemp("patient"), max_deadline_ms=600_000) as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     """One that asks for a key, `sesame` or `open`."""
     with running(tmp_path_factory.mktemp("guarded"), keys="sesame,open") as started:

@@ -9,11 +9,12 @@ from typing import Annotated
 
 import typer
 
+from ..answering import answering
+from ..contract import Json
 from ..inputs import read_map_or_id, read_scan
 from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Server
 from ..printing import print_json, print_rows
-from ..service import Json, answering
 
 SAMPLES = 10  # of a log: ten from all over the building tell more than a hundred from one room
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import orjson
 
+from ..contract import Json
 from ..inputs import line_map_of, needing_formats
-from ..service import Json
 
 
 def write_document(document: Json, out: Path) -> None:

@@ -11,12 +11,13 @@ import typer
 
 from service.importing.fields import Fields
 
+from ..answering import answering
+from ..contract import Json
 from ..errors import WrongUseError
 from ..grouping import grouped
 from ..inputs import line_map_of, needing_formats
 from ..options import AsJson, Picture, Server
 from ..printing import noted, print_json, print_rows
-from ..service import Json, answering
 from .checking import check_rows, samples_of
 from .files import write_document
 

@@ -9,9 +9,9 @@ import typer
 
 from ..errors import WrongUseError
 from ..inputs import MAP_ID, read_map_file
+from ..keeping import keeping
 from ..options import AsJson, Server
 from ..printing import print_json, print_rows, print_table
-from ..service import answering
 from .files import write_document
 
 MapId = Annotated[str, typer.Argument(metavar="ID", help="1 to 128 of A-Z a-z 0-9 . _ -")]
@@ -25,8 +25,8 @@ def put(
 ) -> None:
     """Store a map under an id."""
     document = read_map_file(file)
-    with answering(server) as service:
-        told = service.put(_checked(map_id), document)
+    with keeping(server) as maps:
+        told = maps.put(_checked(map_id), document)
     if as_json:
         print_json(told)
     else:
@@ -35,8 +35,8 @@ def put(
 
 def list_maps(server: Server = None, as_json: AsJson = False) -> None:
     """List the stored maps, by id; with --json one a line."""
-    with answering(server) as service:
-        found = list(service.maps())
+    with keeping(server) as maps:
+        found = list(maps.maps())
     if as_json:
         for one in found:
             print_json(one)
@@ -55,8 +55,8 @@ def get(
     server: Server = None,
 ) -> None:
     """Print a stored map as JSON, or write it to a file."""
-    with answering(server) as service:
-        document = service.get(_checked(map_id))
+    with keeping(server) as maps:
+        document = maps.get(_checked(map_id))
     if out is None:
         print_json(document)
     else:
@@ -65,8 +65,8 @@ def get(
 
 def remove(map_id: MapId, server: Server = None) -> None:
     """Forget a stored map."""
-    with answering(server) as service:
-        service.remove(_checked(map_id))
+    with keeping(server) as maps:
+        maps.remove(_checked(map_id))
 
 
 def _checked(map_id: str) -> str:

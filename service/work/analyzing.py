@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from analysis import Analysis, PlaceVerdict, Robot, standing_places
+from analysis import Analysis, PlaceVerdict, Robot
 from association import CancelledError, Deadline, Status
 from registration import Segments
 
@@ -66,16 +66,12 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     InputError
         When a segment of the landmark is too short or too long.
     """
-    # Of a map without directions the index holds each segment twice.
-    index = cached.index
-    segments = Segments.derived(index.segments.endpoints[: index.directed])
     laser = asked.laser
     robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
-    standing = standing_places(segments, robot, asked.spacing, asked.point)
-    analysis = Analysis(index, segments, robot, standing, cached.oriented, asked.seed, asked.drive)
-    if not asked.landmark:
-        return analysis
-    return analysis.with_segments(Segments.from_array(asked.landmark, argument="landmark"))
+    landmark = Segments.from_array(asked.landmark, argument="landmark")
+    return Analysis.over(
+        cached.index, robot, asked.spacing, asked.point, seed=asked.seed, drive=asked.drive, landmark=landmark
+    )
 
 
 def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRequest, job: Job) -> Tally:

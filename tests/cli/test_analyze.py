@@ -78,13 +78,14 @@ def test_little_time(folder: Path, linefix: Linefix) -> None:
 @pytest.mark.parametrize(
     ("more", "code", "said"),
     [
-        (("--fov", "360"), 3, "/laser/fov"),
-        (("--point", "100", "0"), 3, "/point"),
-        (("--drive", "31"), 3, "/drive"),
+        (("--fov", "360"), 3, "--fov: expected radians"),
+        (("--point", "100", "0"), 3, "--point: expected a place"),
+        (("--drive", "31"), 3, "--drive: expected from 0 to 30 m"),
+        (("--deadline-ms", "nan"), 2, "--deadline-ms: expected"),
         (("--landmark", "none.json"), 2, "none.json"),
         (("--out", "a.txt"), 2, "--out"),
     ],
-    ids=["degrees", "nowhere", "far", "nothing", "no format"],
+    ids=["degrees", "nowhere", "far", "no time", "nothing", "no format"],
 )
 def test_what_is_not_done(folder: Path, more: tuple[str, ...], code: int, said: str, linefix: Linefix) -> None:
     assert said in refused(linefix("analyze", "room.json", *more), code)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from linefix_client import Client, ProblemError, UnreachableError, asking
 
-from cli import remote
+from cli import server
 from tests.formats.recorded import BEGUN, Recording
 
 from .running import Linefix, refused
@@ -74,19 +74,19 @@ PIECE = b" " * 4096
 def test_an_answer_without_end_is_refused(
     linefix: Linefix, monkeypatch: pytest.MonkeyPatch, head: bytes, piece: bytes
 ) -> None:
-    monkeypatch.setattr(remote, "MAX_ANSWER_BYTES", 2**20)
     monkeypatch.setattr(asking, "MAX_ANSWER_BYTES", 2**20)
     with sending(head, piece) as url:
         line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
-        assert "answers with more than 1 MB" in line
+        assert "the answer is longer than 1 MB; check the URL" in line
         with Client(url, retries=0) as client, pytest.raises(UnreachableError, match="longer than 1 MB"):
             client.version()
 
 
 def test_an_answer_that_takes_for_ever_is_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(remote, "SECONDS", 0.2)
+    monkeypatch.setattr(server, "SECONDS", 0.2)
     with sending(ENDLESS, b" ") as url:
-        assert "not ended its answer" in refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
+        line = refused(linefix("locate", "hall", "scan.json", "--server", url), 4)
+        assert "the answer has not ended after 0.2 s; check the URL" in line
         with Client(url, timeout=0.2) as client, pytest.raises(UnreachableError, match=r"not ended after 0.2 s"):
             client.version()
 
@@ -142,7 +142,7 @@ def test_a_refusal_of_any_shape_is_a_problem(body: bytes) -> None:
 
 
 def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(remote, "MAX_PAGES", 5)
+    monkeypatch.setattr(server, "MAX_PAGES", 5)
     body = b'{"maps": [], "corrupt": [], "next": "a b\\r\\n"}'
     with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
         assert "lists more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)

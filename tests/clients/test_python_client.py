@@ -55,6 +55,32 @@ def test_a_map_is_stored_and_a_scan_found_in_it(service: RunningService) -> None
             client.get_map("of-a-client")
 
 
+def test_a_map_of_another_tool_is_imported_checked_by_scans_and_analyzed(patient: RunningService) -> None:
+    rows = "".join(",".join(map(str, row)) + "\n" for row in ROOM["segments"])
+    with Client(patient.url, timeout=300.0) as client:
+        imported = client.import_map([("room.csv", f"x1,y1,x2,y2\n{rows}".encode())], {"units": "m"})
+        assert len(imported["map"]["segments"]) == len(ROOM["segments"])
+        with pytest.raises(ProblemError) as refused:
+            client.import_map([("room.csv", b"x1,y1,x2,y2\n")], {"units": ["m", "mm"]})
+        assert refused.value.errors[0]["pointer"] == "/units"
+        client.put_map("imported", {"segments": imported["map"]["segments"]})
+        checked = client.check_map("imported", {"scans": [QUESTION["scan"]]})
+        assert checked["samples"] is not None
+        assert [one["usable"] for one in checked["samples"]["scans"]] == [True]
+        analyzed = client.analyze({"map": {"map_id": "imported"}, "spacing": 2.0})
+        assert analyzed["map"] == {"map_id": "imported", "revision": 1}
+        assert analyzed["complete"]
+        client.delete_map("imported")
+
+
+def test_the_event_loop_imports_as_well(patient: RunningService) -> None:
+    async def ask() -> Any:
+        async with AsyncClient(patient.url, timeout=300.0) as client:
+            return await client.import_map([("room.csv", b"x1,y1,x2,y2\n0,0,6,0\n6,0,6,4\n")], {"units": "m"})
+
+    assert len(asyncio.run(ask())["map"]["segments"]) == 2
+
+
 def test_a_refusal_says_where(service: RunningService) -> None:
     with Client(service.url) as client, pytest.raises(ProblemError) as refused:
         client.vectorize({"laser": {"angle_min": 0.0, "angle_increment": 0.0, "ranges": [1.0]}})

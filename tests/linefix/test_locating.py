@@ -111,3 +111,28 @@ def test_a_map_keeps_what_is_known_of_its_error(tmp_path: Path) -> None:
 def test_what_is_no_map_or_scan_is_refused_by_name(map: Any, scan: Any, named: str) -> None:
     with pytest.raises(linefix.InputError, match=named):
         linefix.locate(map, scan)
+
+
+def test_a_map_document_is_indexed_as_its_file_says() -> None:
+    index = linefix.index_map({"segments": ROOM, "sigma": 0.03, "oriented": None, "frame_id": "map", "meta": {}})
+    assert (index.sigma, len(index.segments), index.directed) == (0.03, len(ROOM), len(ROOM))
+    undirected = linefix.index_map({"segments": ROOM, "oriented": False})
+    assert (undirected.sigma, len(undirected.segments), undirected.directed) == (None, 2 * len(ROOM), len(ROOM))
+
+
+@pytest.mark.parametrize(
+    ("document", "argument"),
+    [
+        ({"segments": ROOM, "sgma": 1}, "map"),
+        ({"segments": ROOM, "sigma": "1"}, "map.sigma"),
+        ({"segments": ROOM, "sigma": -1}, "map.sigma"),
+        ({"segments": ROOM, "oriented": "no"}, "map.oriented"),
+        ({"segments": ROOM, "oriented": 1}, "map.oriented"),
+        ({"segments": [[1, 2, 3]]}, "map.segments"),
+        ({}, "map.segments"),
+    ],
+)
+def test_a_document_that_is_no_map_is_refused(document: dict[str, object], argument: str) -> None:
+    with pytest.raises(linefix.InputError) as refused:
+        linefix.index_map(document)
+    assert refused.value.argument == argument

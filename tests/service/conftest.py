@@ -13,7 +13,6 @@ import pytest
 
 from service.database_url import database_url
 from service.maps import MapStore
-from tests.running import RunningService, running
 
 SERVER = "LINEFIX_TEST_POSTGRESQL"
 LOCAL = "postgresql://postgres@127.0.0.1:5432/test"
@@ -46,13 +45,6 @@ def empty_database(kind: str, folder: Path) -> Iterator[str]:
         finally:
             connection.execute(f"DROP SCHEMA {schema} CASCADE")  # type: ignore[call-overload]
     connection.close()
-
-
-@pytest.fixture(scope="session")
-def patient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """A service that goes on for as long as a slow machine needs to start a process and read a file in it."""
-    with running(tmp_path_factory.mktemp("patient"), max_deadline_ms=600_000) as started:
-        yield started
 
 
 @pytest.fixture(params=KINDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
@@ -19,6 +20,14 @@ FIRST_WAIT = 0.5  # s, doubled with each try, where the service does not say
 
 
 @dataclass(frozen=True)
+class Form:
+    """A body of files, each with its name, and fields beside them."""
+
+    files: Sequence[tuple[str, bytes]]
+    fields: Mapping[str, str | Sequence[str]]
+
+
+@dataclass(frozen=True)
 class Question:
     """One request, and what of its answer is wanted."""
 
@@ -27,6 +36,7 @@ class Question:
     body: Any = None
     headers: dict[str, str] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)
+    form: Form | None = None
 
     def on(self, client: httpx.Client | httpx.AsyncClient) -> httpx.Request:
         """Return the request as a client sends it."""
@@ -34,6 +44,8 @@ class Question:
             self.method,
             self.path,
             json=self.body,
+            data=None if self.form is None else self.form.fields,
+            files=None if self.form is None else [("file", file) for file in self.form.files],
             headers=self.headers,
             params={name: value for name, value in self.params.items() if value is not None},
         )
@@ -160,6 +172,16 @@ def _json_of(answer: Answer) -> Any:
 def map_path(map_id: str) -> str:
     """Return the path of a stored map."""
     return f"/v1/maps/{quote(map_id, safe='')}"
+
+
+def check_of(map_id: str, body: Any) -> Question:
+    """Return the request for a check of a stored map; with a body also by scans taken there."""
+    return Question("GET" if body is None else "POST", map_path(map_id) + ":check", body)
+
+
+def import_of(files: Sequence[tuple[str, bytes]], fields: Mapping[str, str | Sequence[str]] | None) -> Question:
+    """Return the request for an import."""
+    return Question("POST", "/v1/maps:import", form=Form(files, fields or {}))
 
 
 def if_match(revision: int | None) -> dict[str, str]:

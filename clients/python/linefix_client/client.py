@@ -8,13 +8,25 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import aclosing, closing
 from typing import Any, cast
 
 import httpx
 
 from . import schema
-from .asking import Answer, Question, Reading, Settings, answer_of, if_match, map_path, wait_before_next
+from .asking import (
+    Answer,
+    Question,
+    Reading,
+    Settings,
+    answer_of,
+    check_of,
+    if_match,
+    import_of,
+    map_path,
+    wait_before_next,
+)
 from .problems import UnreachableError
 
 
@@ -111,9 +123,22 @@ class Client:
         """Return maps by id, and where to go on in `next`."""
         return cast(schema.MapList, self._ask(Question("GET", "/v1/maps", params={"limit": limit, "cursor": cursor})))
 
-    def check_map(self, map_id: str) -> schema.CheckAnswer:
-        """Tell what is doubtful in a stored map."""
-        return cast(schema.CheckAnswer, self._ask(Question("GET", map_path(map_id) + ":check")))
+    def check_map(self, map_id: str, body: schema.CheckRequest | None = None) -> schema.CheckAnswer:
+        """Report what is doubtful in a stored map; with a body also compare it to scans taken there."""
+        return cast(schema.CheckAnswer, self._ask(check_of(map_id, body)))
+
+    def import_map(
+        self, files: Sequence[tuple[str, bytes]], fields: Mapping[str, str | Sequence[str]] | None = None
+    ) -> schema.ImportAnswer:
+        """Read the map of another tool, which is not stored; the first file is the map, the others are those it names.
+
+        Each file is its name and content; `fields` are those of the form, such as ``{"units": "mm"}``.
+        """
+        return cast(schema.ImportAnswer, self._ask(import_of(files, fields)))
+
+    def analyze(self, body: schema.MapAnalyzeRequest) -> schema.AnalyzeAnswer:
+        """Simulate scans all over a map and report where localization succeeds; takes long on a large map."""
+        return cast(schema.AnalyzeAnswer, self._ask(Question("POST", "/v1/analyze", body)))
 
     def limits(self) -> schema.Limits:
         """Tell what is too much for the service."""
@@ -221,9 +246,22 @@ class AsyncClient:
             schema.MapList, await self._ask(Question("GET", "/v1/maps", params={"limit": limit, "cursor": cursor}))
         )
 
-    async def check_map(self, map_id: str) -> schema.CheckAnswer:
-        """Tell what is doubtful in a stored map."""
-        return cast(schema.CheckAnswer, await self._ask(Question("GET", map_path(map_id) + ":check")))
+    async def check_map(self, map_id: str, body: schema.CheckRequest | None = None) -> schema.CheckAnswer:
+        """Report what is doubtful in a stored map; with a body also compare it to scans taken there."""
+        return cast(schema.CheckAnswer, await self._ask(check_of(map_id, body)))
+
+    async def import_map(
+        self, files: Sequence[tuple[str, bytes]], fields: Mapping[str, str | Sequence[str]] | None = None
+    ) -> schema.ImportAnswer:
+        """Read the map of another tool, which is not stored; the first file is the map, the others are those it names.
+
+        Each file is its name and content; `fields` are those of the form, such as ``{"units": "mm"}``.
+        """
+        return cast(schema.ImportAnswer, await self._ask(import_of(files, fields)))
+
+    async def analyze(self, body: schema.MapAnalyzeRequest) -> schema.AnalyzeAnswer:
+        """Simulate scans all over a map and report where localization succeeds; takes long on a large map."""
+        return cast(schema.AnalyzeAnswer, await self._ask(Question("POST", "/v1/analyze", body)))
 
     async def limits(self) -> schema.Limits:
         """Tell what is too much for the service."""
