@@ -389,6 +389,7 @@ class WarningAnswer(TypedDict):
     code: Literal[
         "no_segments",
         "points_not_in_order",
+        "motion_unknown",
         "stuck_ranges",
         "scan_exceeds_map",
         "faces_away",
