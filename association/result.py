@@ -27,6 +27,7 @@ WarningCode = Literal[
     "no_segments",
     "points_not_in_order",
     "motion_unknown",
+    "nulls_for_no_return",
     "stuck_ranges",
     "scan_exceeds_map",
     "faces_away",

@@ -16,6 +16,7 @@ import os
 import platform
 import shutil
 import tempfile
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import suppress
@@ -35,6 +36,7 @@ PACKAGES = ("registration", "vectorization", "association", "simulation")  # tho
 SOURCES = ("**/kernels/**/*.py", "**/layout.py", "**/*tables.py", "**/tuning.py")  # files that a kernel can reach
 DIRECTORY = "LINEFIX_KERNELS"  # the environment variable that names the cache directory
 COMPLETE = "complete"  # a file that is written when every kernel that a request needs is cached
+UNUSED_SECONDS = 86_400.0  # so long ago a directory was last used that may be removed
 STORED_DIGESTS = 8  # directories of other versions that stay, for checkouts and processors in use
 
 
@@ -196,8 +198,14 @@ def _temporary() -> Path | None:
 
 
 def _remove_oldest(directory: Path) -> None:
-    """Remove the directories of other versions beyond the newest few."""
+    """Remove the directories of other versions beyond the newest few, but for those that were used within a day.
+
+    A process that compiles into its directory, or loads from it, must not lose it to a process of another checkout.
+    """
+    with suppress(OSError):
+        os.utime(directory)
     names = directory.parent.glob("[0-9a-f]" * len(directory.name))
     others = sorted((path for path in names if path != directory), key=lambda path: path.stat().st_mtime)
     for path in others[: -STORED_DIGESTS + 1]:
-        shutil.rmtree(path, ignore_errors=True)
+        if time.time() - path.stat().st_mtime > UNUSED_SECONDS:
+            shutil.rmtree(path, ignore_errors=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from association import Scan, View
+from association import AssociationWarning, Scan, View
 from linefix import view_of
 from linefix.mounted import RangeScan
 from registration import RigidTransform
@@ -29,6 +29,7 @@ from ..schemas.parts import Laser, Twist
 Floats = NDArray[np.float64]
 Viewpoint = tuple[float, float] | None
 
+MOST_NULLS = 1.0 / 3.0  # fraction of a scan's ranges
 _OPTIONS = frozenset(("sigma", "min_points", "min_length", "max_gap"))
 
 
@@ -98,6 +99,9 @@ def view_laser(
     """Return what a scanner saw; the single beams stay evidence. `at` is the pose of what it is mounted on."""
     with _placed(f"{place}/laser", (place, place)):
         view = view_of(seen, at, sigma)
+    nulls = _nulls_warning(seen.laser)
+    if nulls is not None:
+        view = replace(view, scan=replace(view.scan, warnings=(*view.scan.warnings, nulls)))
     return view if viewpoint is not None else replace(view, scan=replace(view.scan, viewpoint=None, beams=None))
 
 
@@ -105,6 +109,19 @@ def scan_points(points: Floats, sigma: float | None, viewpoint: Viewpoint, place
     """Return points in scanning order as a scan."""
     found = vectorize_points(points, VectorizationOptions(sigma=sigma), viewpoint, (place, place))
     return Scan(found.measured, viewpoint, ordered=found.ordered)
+
+
+def _nulls_warning(laser: LaserScan) -> AssociationWarning | None:
+    """Return the warning about nulls that may stand for beams without a return; None where that is unlikely."""
+    nulls = int(np.isnan(laser.ranges).sum())  # strict JSON has no other NaN
+    if nulls <= MOST_NULLS * len(laser.ranges) or (laser.ranges > laser.range_max).any():
+        return None
+    return AssociationWarning(
+        "nulls_for_no_return",
+        f"{nulls} of {len(laser.ranges)} ranges are null, and none exceeds range_max. A null beam is unknown and gives "
+        "no evidence. If these beams had no return, send a number above range_max: some JSON bridges write infinity as "
+        "null.",
+    )
 
 
 @contextmanager

@@ -200,6 +200,15 @@ def test_directories_of_other_versions_are_removed_in_the_end(small: SmallPackag
     assert set(cached.iterdir()) == {newest, *others, *stamps[: cache.STORED_DIGESTS - 1]}
 
 
+def test_directories_that_other_checkouts_use_stay(small: SmallPackage, cached: Path) -> None:
+    """With nine checkouts at work, each removed the kernels that another one was compiling."""
+    theirs = [cached / f"{k:020x}" for k in range(cache.STORED_DIGESTS + 3)]
+    for path in theirs:
+        path.mkdir(parents=True)
+    newest = small.run(LINEFIX_KERNELS=cached).directory
+    assert set(cached.iterdir()) == {newest, *theirs}
+
+
 def test_other_functions_keep_the_directory_of_their_own_settings(
     small: SmallPackage, cached: Path, tmp_path: Path
 ) -> None:

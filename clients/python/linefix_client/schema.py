@@ -390,6 +390,7 @@ class WarningAnswer(TypedDict):
         "no_segments",
         "points_not_in_order",
         "motion_unknown",
+        "nulls_for_no_return",
         "stuck_ranges",
         "scan_exceeds_map",
         "faces_away",
