@@ -37,11 +37,11 @@ def press(page: Page, key: str, times: int) -> None:
 @pytest.mark.parametrize(
     ("title", "state", "said"),
     [
-        ("A flat", "usable", "The robot is here"),
-        ("An office", "usable", "The robot is here"),
-        ("Look-alike rooms", "ambiguous", "2 other places explain the scan about as well"),
-        ("A corridor", "degenerate", "cannot be told where along"),
-        ("A warehouse", "usable", "The robot is here"),
+        ("A flat", "usable", "The robot is at this pose"),
+        ("An office", "usable", "The robot is at this pose"),
+        ("Look-alike rooms", "ambiguous", "2 other poses fit the scan about as well"),
+        ("A corridor", "degenerate", "is unknown"),
+        ("A warehouse", "usable", "The robot is at this pose"),
     ],
 )
 def test_every_example(page: Page, title: str, state: str, said: str) -> None:
