@@ -55,7 +55,7 @@ class AnalyzeRequest(Strict):
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
         None, description="milliseconds; what it leaves no time for is left out"
     )
-    client_ref: FreeJson = Field(None, description="given back as it was sent")
+    client_ref: FreeJson = Field(None, description="returned as it was sent")
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> AnalyzeRequest:

@@ -1,4 +1,4 @@
-"""What pydantic complains of, in words of the contract: places of the request, and no echo of what was sent."""
+"""Faults that pydantic finds, in words of the contract, without an echo of the request."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .parts import TAGS
 _PLAIN = re.compile(r"^[A-Za-z0-9_.-]{1,40}$")
 # pydantic's own messages for these types repeat what was sent, or speak of Python.
 _MESSAGES: dict[str, str] = {
-    "extra_forbidden": "unknown field",
-    "missing": "missing",
+    "extra_forbidden": "unknown field; correct its name or remove it",
+    "missing": "expected this field, found none",
     "model_type": "expected an object",
     "model_attributes_type": "expected an object",
     "union_tag_invalid": "expected an object",
@@ -25,7 +25,8 @@ _MESSAGES: dict[str, str] = {
     "int_from_float": "expected an integer",
     "bool_type": "expected true or false",
     "string_type": "expected a string",
-    "string_pattern_mismatch": "does not match the pattern",
+    # All patterns of the contract are those of ids.
+    "string_pattern_mismatch": "expected only letters (A to Z, a to z), digits and the characters . _ -",
 }
 
 

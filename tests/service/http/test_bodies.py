@@ -185,7 +185,7 @@ def test_the_limit_is_exact_whichever_way_a_body_comes(narrow: RunningService, w
         answer = narrow.client.post("/v1/register", **WAYS[way](padded(size)))
         assert answer.status_code == status, (size, answer.text)
         if status == 413:
-            assert answer.json()["detail"] == "a body has at most 20000 bytes, unpacked"
+            assert answer.json()["detail"] == "expected a body of at most 20000 bytes, unpacked; found more"
 
 
 def test_a_length_over_the_limit_is_refused_before_the_body_comes(service: RunningService) -> None:
