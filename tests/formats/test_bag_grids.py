@@ -113,8 +113,8 @@ def test_a_turned_grid_is_turned(tmp_path: Path) -> None:
         ((0.0, 0.0, 0.0), (0.0, 0.0, math.nan, 1.0), "info.origin is not finite: .* orientation .*nan"),
         ((math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "info.origin is not finite: position .*nan"),
         ((0.0, math.inf, 0.0), (0.0, 0.0, 0.0, 0.0), "info.origin is not finite"),
-        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "does not lie flat"),
-        ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0, 0.9), "does not lie flat"),
+        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "is not horizontal"),
+        ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0, 0.9), "is not horizontal"),
     ],
 )
 def test_an_origin_that_is_none_is_refused(
