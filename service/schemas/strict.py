@@ -49,7 +49,7 @@ def _free_json(value: Any) -> Any:
         depth += 1
         count += len(layer)
         if count > MAX_FREE_BYTES:  # each takes one at least
-            raise PydanticCustomError("too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
+            raise PydanticCustomError("json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
         if depth > MAX_FREE_DEPTH:
             raise PydanticCustomError("too_deep", f"expected at most {MAX_FREE_DEPTH} levels of nesting, found more")
         inner: list[Any] = []
@@ -60,7 +60,7 @@ def _free_json(value: Any) -> Any:
                 inner.extend(item)
         layer = inner
     if len(orjson.dumps(value)) > MAX_FREE_BYTES:
-        raise PydanticCustomError("too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
+        raise PydanticCustomError("json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
     return value
 
 

@@ -62,7 +62,7 @@ def test_a_topic_called_map_goes_before_others(tmp_path: Path) -> None:
 )
 def test_where_it_is_not_clear_the_topics_are_listed(tmp_path: Path, grids: dict[str, Any]) -> None:
     first, second = grids
-    with pytest.raises(IncompleteFileError, match=rf"{first} \(60 x 50 .*\), {second} \(60 x 50 .*\); .* --topic"):
+    with pytest.raises(IncompleteFileError, match=rf"{first} \(60 x 50 .*\), {second} \(60 x 50 .*\); .*--topic"):
         read(tmp_path, grids)
     if "costmap" not in first:
         assert len(read(tmp_path, grids, second.lstrip("/")).map.segments) == 4
