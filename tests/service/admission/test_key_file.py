@@ -48,7 +48,7 @@ def test_a_key_for_nothing_is_not_made(capsys: pytest.CaptureFixture[str], argum
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("key", "no TOML"),
+        ("key", "is not TOML"),
         ('[[key]]\nname = "a"\nsha256 = "sesame"', "sha256"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = ["all"]', "roles"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = []', "roles"),
