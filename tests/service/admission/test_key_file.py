@@ -35,7 +35,7 @@ def test_a_byte_order_mark_is_no_part_of_a_key(tmp_path: Path) -> None:
     path.write_text(key_lines("sesame", ["read"]), encoding="utf-8-sig")
     assert [grant.roles for grant in read_keys(path).values()] == [{Role.READ}]
     path.write_text(key_lines("sesame", ["read"]), encoding="utf-16")
-    with pytest.raises(KeyFileError, match="not UTF-8"):
+    with pytest.raises(KeyFileError, match="is not TOML in UTF-8"):
         read_keys(path)
 
 
