@@ -56,7 +56,7 @@ def test_begins_and_ends_exchanged() -> None:
 def test_other_units(factor: float) -> None:
     """What was multiplied is to be divided again."""
     assert list(told(scaled(SCAN, factor))) == ["unit_scale"]
-    assert f"times {1.0 / factor:.4g}: the scan" in told(scaled(SCAN, factor))["unit_scale"]
+    assert f"with all lengths times {1.0 / factor:.4g}: the" in told(scaled(SCAN, factor))["unit_scale"]
 
 
 def test_feet_are_named() -> None:
