@@ -112,13 +112,15 @@ class MapIndex:
             When the deadline passes, or is cancelled, first.
         """
         if len(segments) == 0:
-            raise InvalidMapError("a map has at least one segment", argument="map.segments")
+            raise InvalidMapError("expected at least one segment, found none", argument="map.segments")
         if sigma is not None and not 0.0 <= sigma <= MAX_MAP_SIGMA:
             raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument="map.sigma")
         corners = segments.endpoints.reshape(-1, 2)
         low, high = corners.min(axis=0), corners.max(axis=0)
         if (high - low).max() > MAX_EXTENT:
-            raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="map.segments")
+            raise InvalidMapError(
+                f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit", argument="map.segments"
+            )
         origin = np.round(0.5 * (low + high))
         either = segments if oriented else both_ways(segments)
         return cls._of(either, sigma, origin, len(segments), deadline)

@@ -67,7 +67,7 @@ class HardPrior:
     def __post_init__(self) -> None:
         for name, value, high in (("radius", self.radius, 1e6), ("angle", self.angle, 4.0)):
             if not 0.0 < value <= high:
-                raise InvalidSearchError(f"expected a number above 0 and up to {high:g}", argument=f"prior.{name}")
+                raise InvalidSearchError(f"expected a number above 0 and at most {high:g}", argument=f"prior.{name}")
 
     def contains(self, pose: RigidTransform) -> bool:
         """Tell whether a pose lies within the window."""
@@ -142,7 +142,7 @@ class AssociationOptions:
             ("min_overlap", self.min_overlap, 0.0, 1.0),
         ]
         if unknown := set(self.parts).difference(PARTS):
-            raise InvalidSearchError(f"no parts of an answer: {sorted(unknown)}", argument="options.parts")
+            raise InvalidSearchError(f"unknown parts {sorted(unknown)}", argument="options.parts")
         for name, value, low, high in ranges:
             if value is not None and not low <= value <= high:
                 raise InvalidSearchError(f"expected a number from {low:g} to {high:g}", argument=f"options.{name}")

@@ -1,4 +1,4 @@
-"""Why an answer is not usable: codes for programs and a sentence for people."""
+"""Reasons why an answer is not usable: a code for programs and a message for people."""
 
 from __future__ import annotations
 
@@ -52,21 +52,29 @@ class Standing:
 
 INCOMPLETE: Literal["search_incomplete"] = "search_incomplete"
 SENTENCES: Mapping[ReasonCode, str] = {
-    "prior_contradicted": "The prior and the scan do not agree on where the robot is.",
-    INCOMPLETE: "The deadline, or too many walls in one place of the map, ended the search; a better pose may "
-    "have been missed.",
-    "unobservable_direction": "The walls that were seen leave the position free along one direction.",
-    "not_on_map": "The scan fits this map no better than chance would: is the robot somewhere that is not mapped?",
-    "similar_place": "Another pose explains the scan about as well.",
-    "single_wall": "Without one of the walls the pose would be another, or free.",
-    "map_mismatch": "Much is seen that the map does not show, or the map shows much that is not seen.",
-    "insufficient_evidence": "Too little of what was seen tells this place from others.",
+    "prior_contradicted": "The pose that the scan supports contradicts the prior. Check the prior, or search without "
+    "it.",
+    INCOMPLETE: "The search is incomplete: the deadline passed, or too many walls of the map lie in one place. A "
+    "better pose may have been missed. Extend the deadline, or see `warnings`.",
+    "unobservable_direction": "The observed walls do not fix the position along one direction (`unobservable`). Move "
+    "until other walls are in view, and scan again.",
+    "not_on_map": "The scan fits this map no better than an unrelated scan would. The robot may be in a place that "
+    "the map does not contain.",
+    "similar_place": "Another pose fits the scan about as well: see `alternatives`. Send a prior, or move and scan "
+    "again.",
+    "single_wall": "The pose depends on a single wall (`critical_wall`). Move and scan again.",
+    "map_mismatch": "The scan and the map differ: much of the scan is not on the map, or mapped walls are not in the "
+    "scan. Check that the map is up to date.",
+    "insufficient_evidence": "The scan has too few walls to distinguish this place from others. Move and scan again.",
 }
 
-MIRRORED = "The scan fits this map better with left and right exchanged: is the laser upside down, or this another map?"
+MIRRORED = (
+    "The scan fits this map better with left and right exchanged. Check whether the laser is mounted upside down, and "
+    "whether this is the right map."
+)
 OFF_SCALE = (
-    "The scan would fit this map better if it were larger or smaller by more than 4 %: are both in metres, and is this "
-    "the map of the place?"
+    "The scan fits this map better with its lengths changed by more than 4 %. Check that scan and map are in metres, "
+    "and that this is the right map."
 )
 
 # What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.

@@ -178,7 +178,7 @@ def _outward(views: Sequence[View]) -> list[int]:
         ready = [v for v in left if views[v].relative_to in placed]
         if not ready:
             raise InvalidSearchError(
-                "expected the index of a view that is not itself relative to this one",
+                "expected the index of a view that does not depend on this one; remove the cycle",
                 argument=f"scan.views.{left[0]}.relative_to",
             )
         order += ready

@@ -1,4 +1,4 @@
-"""What a caller should know beside the verdict: what is wrong, or strange, about the scan that was sent."""
+"""Warnings next to the verdict: mistakes and oddities of the scan that was sent."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
 from .verdict import Verdict
 
-# By what a scan is multiplied that was sent in them.
+# The factor from each unit to metres.
 UNITS = {
     0.001: "millimetres",
     0.01: "centimetres",
@@ -28,15 +28,16 @@ UNITS = {
     0.0254: "inches",
 }
 SENTENCES: Mapping[Mistake, str] = {
-    Mistake.MIRRORED: "With left and right exchanged the scan fits much better: is the laser mounted upside down, or "
-    "are its angles counted clockwise? Send its ranges in reverse order, or negate every y and exchange begin and end.",
-    Mistake.REVERSED: "With begin and end of every segment exchanged the scan fits much better: free space has to lie "
-    "on the left of the segments of scan and map alike. Exchange the ends of those that have it on the right, or say "
+    Mistake.MIRRORED: "The scan fits much better with left and right exchanged. The laser may be mounted upside down, "
+    "or its angles may increase clockwise. Reverse the order of its ranges, or negate every y and exchange begin and "
+    "end.",
+    Mistake.REVERSED: "The scan fits much better with begin and end of every segment exchanged. Free space must lie on "
+    "the left of the segments of scan and map. Exchange the ends of segments that have it on the right, or set "
     '"oriented": false.',
 }
 NOT_IN_ORDER = (
-    "The points are not in scanning order: once around the viewpoint in one direction, or, without a viewpoint, one "
-    "next to the other. Segments are found in points that follow one another, so walls are missed. "
+    "The points are not in scanning order, so walls are missed: segments are extracted from consecutive points. "
+    "Expected is one turn around the viewpoint in one direction or, without a viewpoint, neighbour after neighbour. "
     "Send the points of one scan in the order in which they were measured."
 )
 
@@ -48,9 +49,10 @@ def warnings_of(
     causes: Sequence[Cause] = (),
     factor: Factor | None = None,
 ) -> tuple[AssociationWarning, ...]:
-    """List what is strange about the scan, about the search, and about the map; then what mistakes would explain."""
+    """List the warnings about scan, search and map, then those about a sender's mistakes."""
     found = _of_scan(context) | {
-        "prior_contradicted": "A clearly better pose lies where the prior says it should not."
+        "prior_contradicted": "A clearly better pose lies where the prior excludes it. Check the prior, or search "
+        "without it."
         if verdict.contradicted
         else None,
         "search_incomplete": None if search.complete else _incomplete(context),
@@ -60,7 +62,7 @@ def warnings_of(
 
 
 def warnings_of_scan(context: SearchContext) -> tuple[AssociationWarning, ...]:
-    """List what is strange about the scan alone, whatever was found."""
+    """List the warnings about the scan alone, independent of the search."""
     return _listed(_of_scan(context))
 
 
@@ -89,35 +91,37 @@ def _mistaken(cause: Cause) -> str:
     elif taken is not None:
         what = f"the map seems to be in {taken}"
     return (
-        f"With all lengths times {cause.factor:.4g} the scan fits much better: {what}. Send both in metres: multiply "
-        "the scan by this, or divide the map."
+        f"The scan fits much better with all lengths times {cause.factor:.4g}: {what}. Send both in metres: multiply "
+        "the scan by this factor, or divide the map by it."
     )
 
 
 def _incomplete(context: SearchContext) -> str:
     if context.can_look:
-        return "The deadline ended the search; a better pose may have been missed."
+        return (
+            "The deadline ended the search; a better pose may have been missed. Extend the deadline, or send a prior."
+        )
     return (
-        f"Up to {context.index.most_near} walls lie in one place of the map, too many to follow lines of sight: a "
-        "wrong pose may score too high. Remove segments that repeat or overlap one another from the map."
+        f"Up to {context.index.most_near} walls lie in one place of the map, too many to trace lines of sight: a "
+        "wrong pose may score too high. Remove repeated and overlapping segments from the map."
     )
 
 
 def _off_scale(factor: Factor) -> str:
     return (
-        f"With its lengths times {factor.value:.4f} (+-{factor.deviation:.4f}) the scan fits much better, and so it "
-        "was searched: the map, or the laser's ranges, are not to scale. The pose is in the map as it is."
+        f"The scan fits much better with its lengths times {factor.value:.4f} (+-{factor.deviation:.4f}), and was "
+        "searched with this factor. The pose is in the unscaled map. Check the scale of the map and of the ranges."
     )
 
 
 def _no_segments(context: SearchContext) -> str | None:
     if len(context.scan.measured):
         return None
-    return "The scan has no segments, so that nothing could be searched."
+    return "The scan has no segments, so nothing was searched. Check the ranges, and the least length of segments."
 
 
 def _stuck_ranges(beams: Beams | None) -> str | None:
-    """Tell where most of the ranges have one value: walls are never so."""
+    """Describe ranges most of which have one value; ranges to walls never do."""
     if beams is None:
         return None
     returns = beams.ranges[np.isfinite(beams.ranges)]
@@ -127,14 +131,14 @@ def _stuck_ranges(beams: Beams | None) -> str | None:
         return None
     value = float(values[counts.argmax()])
     return (
-        f"{most} of {len(returns)} ranges are {value:g} m to the digit: does the laser hang, is it covered, or does it "
-        "report this value where nothing came back? Send such beams as null, or, where nothing came back, as more than "
-        "range_max."
+        f"{most} of {len(returns)} ranges are exactly {value:g} m. The laser may be stuck or covered, or it may report "
+        "this value where it has no return. Send beams without a return as more than `range_max`, and faulty ones as "
+        "null."
     )
 
 
 def _exceeding(context: SearchContext) -> str | None:
-    """Tell where the scan, but for its outermost pieces, would not fit into the box around the map."""
+    """Describe a scan that, without its outermost pieces, is larger than the box around the map."""
     segments, room = context.scan.measured.segments, context.index.diagonal
     # With its outermost pieces it is no less wide, which is sooner told.
     if extent(context.ends) <= EXCEEDING * room:
@@ -143,13 +147,13 @@ def _exceeding(context: SearchContext) -> str | None:
     if reach <= EXCEEDING * room:
         return None
     return (
-        f"The scan is {reach:.3g} m wide, the map {room:.3g} m from corner to corner: is one of them not in metres, or "
-        "is most of what is seen not on the map?"
+        f"The scan is {reach:.3g} m wide, but the map's diagonal is only {room:.3g} m. Check that both are in metres, "
+        "and that the map contains this place."
     )
 
 
 def _facing_away(context: SearchContext) -> str | None:
-    """Tell where segments have another left, where free space is, than where the sensor stood."""
+    """Describe segments whose free side, the left, is not the side of the sensor."""
     if context.scan.viewpoint is None or not context.options.oriented:
         return None
     views = context.scan.views
@@ -159,6 +163,6 @@ def _facing_away(context: SearchContext) -> str | None:
     if not away:
         return None
     return (
-        f"{away} of {len(context.ends)} segments show their back to the viewpoint, from where nobody can see them: are "
-        "begin and end exchanged, or is this not the sensor's frame?"
+        f"{away} of {len(context.ends)} segments have the viewpoint on their right, but a sensor sees only their left "
+        "side. Exchange their begin and end, or check that they are in the sensor's frame."
     )

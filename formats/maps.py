@@ -125,5 +125,5 @@ def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
     segments = find_faces(grid, notes, name)
     notes.add_read("segments", "faces of walls", len(segments))
     # Measured with the logs of two grids: no number that was tried makes more scans usable.
-    notes.add_assumed("sigma", "how well walls are known is left to be estimated for each answer")
+    notes.add_assumed("sigma", "sigma of the walls is unknown; each search estimates it")
     return LineMap(segments, None, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})

@@ -36,7 +36,7 @@ def yaml_of(text: str, name: str) -> object:
     except (YAMLError, RecursionError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         if isinstance(error, TooLargeError):
             raise
-        raise MalformedFileError("is no YAML", argument=name) from error
+        raise MalformedFileError("is not YAML", argument=name) from error
 
 
 def _values(node: Node, known: dict[int, int]) -> int:

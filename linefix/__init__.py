@@ -98,7 +98,11 @@ def __getattr__(name: str) -> Any:
     try:
         return getattr(importlib.import_module("formats"), name)
     except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f'linefix.{name} needs more packages: pip install "linefix[formats]"') from error
+        raise ModuleNotFoundError(
+            f"linefix.{name} requires the extra `formats`. Install it, for example with "
+            '`pip install ".[formats]"` in a '
+            "checkout"
+        ) from error
 
 
 def __dir__() -> list[str]:

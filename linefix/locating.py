@@ -168,7 +168,9 @@ def scan_of(
     shape = np.shape(scan)
     if len(shape) == 1:
         if angles is None:
-            raise InvalidArgumentError("an array of ranges needs (angle_min, angle_increment)", argument="angles")
+            raise InvalidArgumentError(
+                "an array of ranges requires angles; expected (angle_min, angle_increment), radians", argument="angles"
+            )
         return ranges_scan(LaserScan(*angles, scan))
     if len(shape) == 2 and shape[1] == 2:
         return ranges_scan(scan)

@@ -148,9 +148,9 @@ def motion_warning(seen: MountedScan) -> AssociationWarning | None:
         told += f", expected at most {LONGEST_SCAN:g} s, so {seconds:g} s is assumed; give time_increment in seconds"
     return AssociationWarning(
         "motion_unknown",
-        f"{told}. The motion of its sensor meanwhile is not known, so the scan may be distorted; the covariance of a "
-        f"pose allows for {SPEED:g} m/s and {TURN:g} rad/s. Give the motion: over HTTP as twist, 0 where the sensor "
-        "stands still; in a log and in ROS 2 by odometry.",
+        f"{told}. The motion of the sensor during this time is unknown, so the scan may be distorted. The covariance "
+        f"allows for {SPEED:g} m/s and {TURN:g} rad/s. Send the motion: over HTTP as `twist`, 0 for a sensor at rest; "
+        "in a log and in ROS 2 as odometry.",
     )
 
 

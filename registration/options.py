@@ -69,7 +69,9 @@ class RegistrationOptions:
                 )
         at = self.evaluate_at
         if at is not None and max(abs(at.x), abs(at.y)) > MAX_TRANSLATION:
-            raise InvalidArgumentError(f"expected within {MAX_TRANSLATION:g} m", argument="options.evaluate_at")
+            raise InvalidArgumentError(
+                f"expected x and y within {MAX_TRANSLATION:g} m of 0", argument="options.evaluate_at"
+            )
 
 
 def _require_choice(name: str, value: object, choices: tuple[str, ...]) -> None:

@@ -58,7 +58,7 @@ def weigh(pairs: Correspondences, map_sigma: float, options: RegistrationOptions
     if options.weighting == "information":
         if noise is None:
             raise InvalidArgumentError(
-                "sigma of scan and map are both 0: no information weight",
+                "sigma of scan and map are both 0, expected one above 0; set sigma, or other weights",
                 argument="scan.sigma",
             )
         return PairWeights(noise, noise, noise)
@@ -87,5 +87,5 @@ def _checked_weights(weights: ArrayLike, count: int) -> Floats:
             index=int(np.argmax(bad)),
         )
     if count and not array.any():
-        raise InvalidArgumentError("all weights are 0", argument="weights")
+        raise InvalidArgumentError("all weights are 0, expected at least one above 0", argument="weights")
     return array

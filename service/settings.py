@@ -157,16 +157,18 @@ class Settings(BaseSettings):
         stripped = (part.strip() if isinstance(part, str) else part for part in parts)
         found = tuple(part for part in stripped if part != "")
         if parts and not found:
-            raise ValueError("nothing but blanks; leave it empty for none")
+            raise ValueError("found only blanks; leave it empty for none")
         if any(isinstance(part, str) and not _PRINTABLE.fullmatch(part) for part in found):
-            raise ValueError("one of them holds a space, or a letter that no header can")
+            raise ValueError(
+                "found a space, or a character that HTTP headers cannot contain; expected keys of printable ASCII"
+            )
         return found
 
     @field_validator("cors_origins")
     @classmethod
     def _named(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
         if not all(_ORIGIN.fullmatch(origin) for origin in origins):
-            raise ValueError("name each as a browser does: https://site.example, or with a port")
+            raise ValueError("expected origins as browsers send them: https://site.example, optionally with a port")
         return origins
 
     @field_validator("database_url")
@@ -248,7 +250,9 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     _require_usable_keys(settings)
     _require_usable_certificate(settings)
     if settings.workers > settings.searches:
-        raise SettingsError(f"workers: at most as many as searches, of which there are {settings.searches}")
+        raise SettingsError(
+            f"workers: expected at most {settings.searches}, the number of searches, found {settings.workers}"
+        )
     return settings
 
 
@@ -261,19 +265,19 @@ def _require_usable_keys(settings: Settings) -> None:
             raise SettingsError(f"keys_file: {error}") from None
     said = [value is not None for value in (settings.jwt_issuer, settings.jwt_audience, settings.jwt_keys)]
     if any(said) and not all(said):
-        raise SettingsError("jwt_issuer, jwt_audience, jwt_keys: all three or none")
+        raise SettingsError("jwt_issuer, jwt_audience, jwt_keys: expected all three or none; set the missing ones")
     unknown = set(settings.jwt_algorithms) - set(ALGORITHMS)
     if unknown or not settings.jwt_algorithms:
-        raise SettingsError(f"jwt_algorithms: some of {', '.join(ALGORITHMS)}")
+        raise SettingsError(f"jwt_algorithms: expected some of {', '.join(ALGORITHMS)}")
     where = urlsplit(settings.jwt_keys or "")
     if where.scheme and where.scheme != "https" and not (where.scheme == "http" and is_loopback(where.hostname or "")):
-        raise SettingsError("jwt_keys: a path, or a URL that begins with https")
+        raise SettingsError("jwt_keys: expected a path, or a URL that begins with https")
 
 
 def _require_usable_certificate(settings: Settings) -> None:
     """Refuse a certificate that nobody could be shown."""
     if (settings.tls_cert is None) != (settings.tls_key is None):
-        raise SettingsError("tls_cert, tls_key: both or none")
+        raise SettingsError("tls_cert, tls_key: expected both or neither")
     if settings.tls_cert is not None:
         try:
             # Without an answer to that the start would wait for somebody to type one.
@@ -301,4 +305,4 @@ def _require_text(arguments: Sequence[str]) -> None:
     named = [(name, name + value) for name, value in os.environ.items() if name.upper().startswith("LINEFIX_")]
     for name, text in [*named, *((f"argument {index + 1}", text) for index, text in enumerate(arguments))]:
         if any("\ud800" <= letter <= "\udfff" for letter in text):
-            raise SettingsError(f"{ascii(name)[1:-1]}: not UTF-8")
+            raise SettingsError(f"{ascii(name)[1:-1]}: expected UTF-8")

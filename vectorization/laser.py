@@ -99,7 +99,9 @@ class LaserScan:
         values = _numbers(ranges)
         m = len(values)
         if not abs(angle_min) <= MAX_ANGLE:
-            raise InvalidScanError(f"expected at most {MAX_ANGLE:g} rad, got {angle_min!r}", argument="angle_min")
+            raise InvalidScanError(
+                f"expected -{MAX_ANGLE:g} to {MAX_ANGLE:g} rad, got {angle_min!r}", argument="angle_min"
+            )
         turn = abs(angle_increment) * max(1, m - 1)
         if not (abs(angle_increment) >= MIN_INCREMENT and turn <= math.tau * (1.0 + 1e-3)):
             raise InvalidScanError(
@@ -108,11 +110,14 @@ class LaserScan:
                 argument="angle_increment",
             )
         if not 0.0 <= range_min < math.inf:
-            raise InvalidScanError(f"expected from 0 up, got {range_min!r}", argument="range_min")
+            raise InvalidScanError(f"expected at least 0 m, got {range_min!r}", argument="range_min")
         if not range_max > range_min:
-            raise InvalidScanError(f"expected above range_min, got {range_max!r}", argument="range_max")
+            raise InvalidScanError(f"expected more than range_min, got {range_max!r}", argument="range_max")
         if motion is not None and abs(motion.omega * motion.time_increment) > MOST_TURN * abs(angle_increment):
-            raise InvalidScanError("the sensor turns nearly as fast as it scans", argument="twist")
+            raise InvalidScanError(
+                "expected a sensor that rotates much slower than its beams; check omega (rad/s) and time_increment (s)",
+                argument="twist",
+            )
         object.__setattr__(self, "motion", motion)
         object.__setattr__(self, "angle_min", float(angle_min))
         object.__setattr__(self, "angle_increment", float(angle_increment))
@@ -169,7 +174,7 @@ def require_angle_max(angle_min: float, angle_max: float, angle_increment: float
     told = f"angle_min {angle_min:g} rad, angle_max {angle_max:g} rad and angle_increment {angle_increment:g} rad"
     if agree:
         raise InvalidScanError(
-            f"{told} over {beams} ranges are more than a turn: expected radians, not degrees; correct the driver",
+            f"{told} over {beams} ranges exceed one turn; expected radians. Check for degrees in the driver",
             argument="angle_increment",
         )
     raise InvalidScanError(

@@ -226,7 +226,7 @@ def _checked_points(points: ArrayLike) -> Floats:
     try:
         raw = np.asarray(points)
     except ValueError as error:
-        raise InvalidScanError("expected an array of [x, y]", argument="points") from error
+        raise InvalidScanError("expected an array of [x, y] rows of numbers", argument="points") from error
     if raw.size == 0:
         raw = np.zeros((0, 2))
     if raw.dtype.kind not in "fiu" or raw.ndim != 2 or raw.shape[1] != 2:
@@ -253,7 +253,9 @@ def _checked_viewpoint(viewpoint: tuple[float, float], points: Floats) -> Floats
     if place.shape != (2,) or not np.isfinite(place).all():
         raise InvalidScanError(f"expected two finite numbers, got {viewpoint!r}", argument="viewpoint")
     if (np.abs(points - place) > MAX_LENGTH).any():
-        raise InvalidScanError(f"expected within {MAX_LENGTH:g} m of all points", argument="viewpoint")
+        raise InvalidScanError(
+            f"expected a viewpoint within {MAX_LENGTH:g} m of all points, got {viewpoint!r}", argument="viewpoint"
+        )
     return place
 
 

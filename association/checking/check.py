@@ -65,5 +65,6 @@ def _size_findings(size: Size) -> Iterator[Finding]:
     if not SMALLEST <= size.diagonal <= LARGEST:
         yield Finding(
             "unlikely_size",
-            f"The map is {size.diagonal:.3g} m from corner to corner: is it in metres?",
+            f"The map's diagonal is {size.diagonal:.3g} m, expected {SMALLEST:g} to {LARGEST:g} m. Check that it is "
+            "in metres.",
         )

@@ -60,8 +60,8 @@ def judge_samples(samples: Sequence[Sample], *, sigma: float | None, oriented: b
 def _undirected(count: int, usable: int, would_be: int) -> Finding:
     return Finding(
         "undirected",
-        f"The scans fit better where directions mean nothing: {would_be} of {count} are usable instead of {usable}. "
-        'Say "oriented": false.',
+        f"The scans fit better if directions are ignored: {would_be} of {count} are usable instead of {usable}. "
+        'Set "oriented": false.',
     )
 
 
@@ -100,8 +100,8 @@ def _mirrored(samples: Sequence[Sample], present: Way) -> Finding | None:
     count = sum(b.score > a.score for a, b in both)
     return Finding(
         "mirrored",
-        f"With left and right exchanged {count} of {len(samples)} scans fit better: is the map drawn with y pointing "
-        "down, or the laser mounted upside down? Negate every y of one of them, and exchange begin and end.",
+        f"{count} of {len(samples)} scans fit better with left and right exchanged. The y axis of the map may point "
+        "down, or the laser may be mounted upside down. Negate every y of map or scans, and exchange begin and end.",
     )
 
 
@@ -112,8 +112,8 @@ def _reversed(samples: Sequence[Sample]) -> Finding | None:
         return None
     return Finding(
         "reversed",
-        f"With begin and end of every segment exchanged {count} of {len(samples)} scans fit much better: free space "
-        "has to lie on the left of the segments of scan and map alike.",
+        f"{count} of {len(samples)} scans fit much better with begin and end of every segment exchanged. Free space "
+        "must lie on the left of the segments of scan and map. Exchange begin and end in one of them.",
     )
 
 
@@ -132,7 +132,7 @@ def _scaled(samples: Sequence[Sample], least: float) -> Finding | None:
     return Finding(
         "scale",
         f"{agreeing} of {len(samples)} scans fit better at another scale: divide the map by {middle:.4g}, or multiply "
-        f"the scans by it.{said}",
+        f"the scans by this factor.{said}",
     )
 
 
@@ -152,8 +152,9 @@ def _moved(samples: Sequence[Sample]) -> Finding | None:
         return None
     return Finding(
         "moved",
-        f"{same} of {len(moves)} scans are found elsewhere than where they are said to be taken, all by the same: the "
-        f"map's frame is theirs turned by {math.degrees(turn):.3g} degrees and moved by ({x:.3g}, {y:.3g}) m.",
+        f"{same} of {len(moves)} scans have poses that differ from the given ones by the same transform: the map's "
+        f"frame is theirs rotated by {math.degrees(turn):.3g} degrees and moved by ({x:.3g}, {y:.3g}) m. Correct the "
+        "map's origin, or the poses.",
     )
 
 

@@ -72,12 +72,13 @@ def find_look_alikes(index: MapIndex, deadline: Deadline, *, oriented: bool) -> 
 
 
 def likeness_findings(index: MapIndex, likeness: Likeness) -> Iterator[Finding]:
-    """Tell how much of the map looks alike."""
+    """Describe how much of the map is similar to another part of it."""
     if likeness.places:
         yield Finding(
             "looks_alike",
-            f"From {len(likeness.places)} of {likeness.viewpoints} places a laser that sees {REACH:g} m far sees the "
-            "same as elsewhere on the map: such scans cannot be told apart without a prior, or metres of driving.",
+            f"At {len(likeness.places)} of {likeness.viewpoints} poses a laser with a range of {REACH:g} m sees the "
+            "same as at another pose of the map. There a scan alone is ambiguous: send a prior, or the scans of a "
+            "drive.",
             segments_of(index, np.array(likeness.walls, dtype=np.intp)),
         )
 

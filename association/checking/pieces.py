@@ -126,8 +126,8 @@ def _short(index: MapIndex) -> Iterator[Finding]:
         found = segments_of(index, short)
         yield Finding(
             "short_pieces",
-            f"{len(found)} segments, {100.0 * share:.2g} % of the length, are shorter than {100.0 * SHORT:g} cm even "
-            "where they continue one another: they tell a search nothing. Leave them out, or join them.",
+            f"{len(found)} segments, {100.0 * share:.2g} % of the length, are shorter than {100.0 * SHORT:g} cm, also "
+            "together with the segments that they continue. A search does not profit from them. Omit or join them.",
             found,
         )
 
@@ -137,17 +137,17 @@ def _doubled(index: MapIndex, near: NearWalls) -> Iterator[Finding]:
         found = segments_of(index, near.doubled)
         yield Finding(
             "doubled_faces",
-            f"{len(found)} segments run beside another that looks the same way, or at it, less than {100.0 * DOUBLE:g} "
-            "cm apart: a wall of which one face is drawn twice, or whose free space is drawn inside of it. What a scan "
-            "sees of it may be laid on either.",
+            f"{len(found)} segments run less than {100.0 * DOUBLE:g} cm next to another that faces the same way, or "
+            "faces them. Either one face of a wall is drawn twice, or free space is drawn inside of it. A scan of the "
+            "wall fits both. Keep one of them.",
             found,
         )
     if near.opposite.any():
         found = segments_of(index, near.opposite)
         yield Finding(
             "both_ways",
-            f"{len(found)} segments lie on another that runs the other way: walls without thickness. Two faces drawn "
-            "apart, by as much as the wall is thick, fit what is seen from either side.",
+            f"{len(found)} segments lie on another that runs the opposite way: walls without thickness. Scans from "
+            "both sides fit better if the two faces are drawn apart by the thickness of the wall.",
             found,
         )
 
@@ -157,7 +157,7 @@ def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterat
     if found:
         yield Finding(
             "overlaps",
-            f"{len(found)} segments lie on others that run the same way: drawn twice.",
+            f"{len(found)} segments lie on others that run the same way: they are drawn twice. Remove one of them.",
             tuple(sorted(found)),
         )
 
@@ -179,8 +179,8 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     if found:
         yield Finding(
             "gaps",
-            f"{len(found)} segments end {100.0 * LEAST_GAP:g} to {100.0 * GREATEST_GAP:g} cm before another begins or "
-            "passes: walls that do not meet. Rays go between them.",
+            f"{len(found)} segments end {100.0 * LEAST_GAP:g} to {100.0 * GREATEST_GAP:g} cm before another segment: "
+            "rays pass through the gaps. Extend the segments until they meet.",
             tuple(sorted(found)),
         )
 

@@ -140,28 +140,29 @@ def _look(looker: Looker, wall: int, both_ways: Flags, counts: tuple[Floats, Flo
 
 
 def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:
-    """Tell whether directions mean what they should."""
+    """List the findings about the directions of segments."""
     wrong = sides.against_left & sides.against_right
     if sides.reversed:
         yield Finding(
             "reversed",
-            "Free space seems to lie on the right of the segments, or outside of all that is drawn: begins and ends of "
-            "the whole map are exchanged.",
+            "Free space seems to lie on the right of the segments, or outside of the drawing; expected is their left. "
+            "Exchange begin and end of every segment.",
         )
     elif sides.meaningless:
         either = sides.against_left | sides.against_right
         yield Finding(
             "mixed_directions",
-            f"Directions contradict one another: {100.0 * sides.contradiction:.0f} % of what is seen from the left of "
-            "segments shows its back, or from their right its front. Lines along the middle of walls, or without "
-            'directions: say "oriented": false.',
+            f"Directions contradict one another: {100.0 * sides.contradiction:.0f} % of the rays from the left of "
+            "segments meet a right side, or from their right a left side. Where lines are centre lines of walls, or "
+            "have "
+            'no directions, set "oriented": false.',
             segments_of(index, sides.walls[either]),
         )
     elif wrong.any():
         found = segments_of(index, sides.walls[wrong])
         yield Finding(
             "mixed_directions",
-            f"{len(found)} segments seem to have begin and end exchanged: what is seen from their left shows its back, "
-            "and what is seen from their right its front.",
+            f"{len(found)} segments seem to have begin and end exchanged: most rays from their left meet the right "
+            "side of other segments. Free space must lie on the left. Exchange their ends.",
             found,
         )

@@ -92,18 +92,19 @@ def _faces(index: MapIndex, *, oriented: bool) -> Segments:
 
 
 def thickness_finding(thicker: float, *, oriented: bool) -> Finding:
-    """Say that walls are thicker, or thinner, than they are drawn."""
+    """Describe walls that are thicker, or thinner, than they are drawn."""
     if not oriented:
         return Finding(
             "centre_lines",
-            f"The scans fit better where each line is the middle of a wall {thicker:.2f} m thick. Import the drawing "
-            f"with drawn centres and thickness {thicker:.2f}.",
+            f"The scans fit better if each line is the centre line of a wall {thicker:.2f} m thick. Import the drawing "
+            f"with drawn `centres` and thickness {thicker:.2f}.",
         )
-    more, which = ("thicker", "nearer to") if thicker > 0.0 else ("thinner", "farther from")
+    more, sign = ("thicker", "plus") if thicker > 0.0 else ("thinner", "minus")
     return Finding(
         "thickness",
-        f"The scans fit better where walls are {100.0 * abs(thicker):.0f} cm {more} than drawn: every face half of "
-        f"that {which} free space. Where the map was made of centre lines, import it with that thickness.",
+        f"The scans fit better if walls are {100.0 * abs(thicker):.0f} cm {more} than drawn. For a drawing that was "
+        f"imported with `centres`, import it again with its thickness {sign} {abs(thicker):.2f} m. For any other map, "
+        "for example a grid, state this uncertainty as `sigma`.",
     )
 
 

@@ -122,7 +122,7 @@ class Expansion:
         if self._external:
             notes.add_dropped(
                 "external_reference",
-                f"external references, whose drawings are other files: {listed(self._external)}; bind them (XREF, "
+                f"external references to other drawings: {listed(self._external)}; bind them (XREF, "
                 "Bind) and save the drawing again",
                 self._external.total(),
             )

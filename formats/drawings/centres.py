@@ -54,8 +54,8 @@ def are_centres(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> 
         return False
     drawing.notes.add_assumed(
         "centres",
-        "lines run in the middle of walls, for they meet in the middle of one another and none has a second face "
-        "beside it; say drawn faces where they do not",
+        "lines are centre lines of walls, because their ends meet other lines and none has a parallel second face; "
+        "set the option drawn to faces if they are faces",
         len(endpoints),
     )
     return True
@@ -72,15 +72,17 @@ def walls_of(widths: Floats, options: ImportOptions) -> Walls:
     """
     if options.thickness is not None:
         thickness = np.full(len(widths), options.thickness)
-        return Walls(thickness, "thickness_given", f"walls are {options.thickness:g} m thick, as was said")
+        return Walls(
+            thickness, "thickness_given", f"walls are {options.thickness:g} m thick, as the option thickness states"
+        )
     known = (widths >= THINNEST) & (widths <= THICKEST)
     if not known.any():
-        told = f"walls are {USUAL:g} m thick, as nobody says how thick they are; scans taken there can tell (map check)"
+        told = f"walls are assumed {USUAL:g} m thick; a map check with scans estimates the thickness"
         return Walls(np.full(len(widths), USUAL), "thickness_usual", told)
     middle = float(np.median(widths[known]))
-    told = f"walls are as thick as their lines are drawn, {middle:.2g} m in the median"
+    told = f"walls are as thick as the drawn lines, with a median of {middle:.2g} m"
     if not known.all():
-        told += f", which {int((~known).sum())} lines without a width are given"
+        told += f", which is assumed for {int((~known).sum())} lines without a width"
     return Walls(np.where(known, widths, middle), "thickness_drawn", told)
 
 

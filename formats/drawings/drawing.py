@@ -106,11 +106,11 @@ class Drawing:
         try:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
-            raise MalformedFileError("has a coordinate that is no number", argument=self.name) from error
+            raise MalformedFileError("has a coordinate that is not a number", argument=self.name) from error
         if array.size == 0:
             return np.zeros((0, columns))
         if array.ndim != 2 or array.shape[1] != columns or not (np.abs(array) <= MAX_UNITS).all():
-            raise MalformedFileError(f"has a coordinate that is no number up to {MAX_UNITS:g}", argument=self.name)
+            raise MalformedFileError(f"has a coordinate that is not a number up to {MAX_UNITS:g}", argument=self.name)
         return array
 
     @property

@@ -86,7 +86,7 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     except BROKEN as error:
         raise MalformedFileError("has a block that cannot be read", argument=name) from error
     if others:
-        what = f"entities on layers that were not asked for: {listed(others)}"
+        what = f"entities on layers that the option layers excludes: {listed(others)}"
         notes.add_dropped("other_layer", what, others.total())
     _note_paper_space(document, drawing)
     drawing.oriented = 0 < directed == len(drawing.segments)
@@ -96,17 +96,17 @@ def read_dxf(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 def _document(path: Path, notes: Notes) -> Document:
     name, content = name_of(path), read_bounded(path, MAX_MAP_BYTES)
     if content[:4] == b"AC10":
-        raise UnsupportedFormatError("is a DWG; save it as DXF", argument=name)
+        raise UnsupportedFormatError("is a DWG, which is not supported; save it as DXF", argument=name)
     if not content.strip():
-        raise MalformedFileError("is empty", argument=name)
+        raise MalformedFileError("is empty, expected a DXF", argument=name)
     if sum(1 for _ in islice(_OBJECT.finditer(content), MAX_DXF_OBJECTS + 1)) > MAX_DXF_OBJECTS:
         raise TooLargeError(f"expected at most {MAX_DXF_OBJECTS} entities and objects", argument=name)
     try:
         document, auditor = _parsed(path, content)
     except (OSError, *BROKEN) as error:
-        raise MalformedFileError("is no DXF", argument=name) from error
+        raise MalformedFileError("is not a DXF", argument=name) from error
     if auditor.fixes or auditor.errors:
-        notes.add_assumed("repairs", "broken places that were repaired", len(auditor.fixes) + len(auditor.errors))
+        notes.add_assumed("repairs", "errors of the file that were repaired", len(auditor.fixes) + len(auditor.errors))
     return document
 
 
@@ -126,9 +126,13 @@ def _layers_of_walls(document: Document, expansion: Expansion, notes: Notes) -> 
     if len(shown_names) < 2 or not others:
         return ()
     if not walls:
-        notes.add_assumed("layers", f"lines of all layers are walls: {listed(others)}; say layers where some are not")
+        notes.add_assumed(
+            "layers", f"lines of all layers are walls: {listed(others)}; set the option layers if some are not"
+        )
         return ()
-    what = f"walls are on {listed(walls)}, by the name, and not on {listed(others)}; say layers for others"
+    what = (
+        f"walls are on {listed(walls)}, by their names, and not on {listed(others)}; set the option layers for others"
+    )
     notes.add_assumed("layers", what)
     return NAMES_OF_WALLS
 

@@ -81,11 +81,11 @@ def near_lines(endpoints: Floats, layer_of: Integers, drawing: Drawing) -> Flags
     if extent > MAX_EXTENT:
         raise MalformedFileError(
             f"its lines lie {extent:.0f} m apart, expected at most {MAX_EXTENT:g} m: "
-            f"{_named(endpoints, layer_of, near, drawing)}; and {where}; delete those that are no walls, or set the "
-            "option layers",
+            f"{_named(endpoints, layer_of, near, drawing)}; and {where}; delete those that are not walls, or set "
+            "the option layers",
             argument=drawing.name,
         )
-    drawing.notes.add_assumed("far_lines", f"lines belong to the map although they lie {where}", int(far.sum()))
+    drawing.notes.add_assumed("far_lines", f"lines are part of the map, but lie {where}", int(far.sum()))
     return kept
 
 

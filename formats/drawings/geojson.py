@@ -39,11 +39,14 @@ def read_geojson(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
     name = name_of(path)
     root = load_json(read_bounded(path, MAX_MAP_BYTES), name)
     if not isinstance(root, dict) or not isinstance(root.get("type"), str):
-        raise MalformedFileError("is no GeoJSON", argument=name)
+        raise MalformedFileError("is not GeoJSON", argument=name)
     own = root.get(OWN)
     told = own if isinstance(own, dict) else {}
     if not options.local_metres and told.get("metres") is not True:
-        raise IncompleteFileError("has degrees by its standard; say local_metres if it has metres", argument=name)
+        raise IncompleteFileError(
+            "has degrees, as its standard requires; expected metres. If it has metres, set the option local_metres",
+            argument=name,
+        )
     drawing = Drawing(name, "geojson", options.layers, notes, 1.0, told.get("oriented") is True)
     features = root.get("features", []) if root["type"] == "FeatureCollection" else [root]
     if not isinstance(features, list):
@@ -72,7 +75,7 @@ def load_json(content: bytes, name: str) -> Any:
     try:
         return orjson.loads(text_of(content, name))
     except orjson.JSONDecodeError as error:
-        raise MalformedFileError("is no JSON", argument=name) from error
+        raise MalformedFileError("is not JSON", argument=name) from error
 
 
 def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
@@ -81,7 +84,7 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
     named = properties if isinstance(properties, dict) else {}
     layers = [value for key in ("layer", "name") if isinstance(value := named.get(key), str)]
     if not drawing.wants(*layers):
-        drawing.notes.add_dropped("other_layer", "features on layers that were not asked for", 1)
+        drawing.notes.add_dropped("other_layer", "features on layers that the option layers excludes", 1)
         return
     if geometry is None:
         drawing.drop("feature without geometry")
@@ -92,9 +95,9 @@ def _read_feature(feature: dict[str, Any], drawing: Drawing) -> None:
         try:
             pairs = [(p[0], p[1]) for p in points]
         except (TypeError, LookupError) as error:
-            raise MalformedFileError("has a position that is no [x, y]", argument=drawing.name) from error
+            raise MalformedFileError("has a position that is not [x, y]", argument=drawing.name) from error
         if not all(type(c) in (int, float) for pair in pairs for c in pair):
-            raise MalformedFileError("has a coordinate that is no number", argument=drawing.name)
+            raise MalformedFileError("has a coordinate that is not a number", argument=drawing.name)
         drawing.add(pairs, closed=closed, width=width, layer=layers[0] if layers else "")
 
 
@@ -105,9 +108,7 @@ def _width(value: Any) -> float | None:
 def _lines(geometry: Any, drawing: Drawing, depth: int = 0) -> Lines:
     """Yield the polylines of a geometry, and whether each is closed."""
     if not isinstance(geometry, dict) or depth > 4:
-        raise MalformedFileError(
-            "has a geometry that is no object, or collections in collections", argument=drawing.name
-        )
+        raise MalformedFileError("has a geometry that is not an object, or nested collections", argument=drawing.name)
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     if kind == "GeometryCollection":
         for inner in _listed(geometry.get("geometries"), drawing):

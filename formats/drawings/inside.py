@@ -78,7 +78,9 @@ def _filled(
         column, row = np.floor((np.asarray(place) - low) / cell + MARGIN).astype(int)
         inside = 0 <= row < shape[1] and 0 <= column < shape[0]
         if not inside or labels[row, column] == 0:
-            raise InvalidOptionError("lies on a line or outside of the drawing", argument="inside", index=k)
+            raise InvalidOptionError(
+                "lies on a line or outside of the drawing; expected a free place", argument="inside", index=k
+            )
         wanted.append(labels[row, column])
     return np.isin(labels, wanted)
 

@@ -33,7 +33,7 @@ def note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: Impor
     """
     corners = endpoints.reshape(-1, 2)
     width, height = corners.max(axis=0) - corners.min(axis=0)
-    who = "the option says" if options.metres is not None else "the file says"
+    who = "the option states" if options.metres is not None else "the file states"
     unit = _named(metres)
     drawing.notes.add_read("unit", f"1 unit is {unit}, as {who}: the drawing is {width:.4g} m by {height:.4g} m")
     lengths = np.sort(np.hypot(*(endpoints[:, 2:] - endpoints[:, :2]).T))
@@ -48,9 +48,9 @@ def note_unit(endpoints: Floats, metres: float, drawing: Drawing, options: Impor
     )
     drawing.notes.add_assumed(
         "unlikely_unit",
-        f"the unit is {unit}, although the usual line is then {usual:.3g} m long, and {LEAST_USUAL:g} to "
-        f"{GREATEST_USUAL:g} m in plans of buildings{'; ' if others else ''}{others}; set the option units where "
-        "another unit is right",
+        f"the unit is {unit}, but with it the usual line is {usual:.3g} m long, and {LEAST_USUAL:g} to "
+        f"{GREATEST_USUAL:g} m in plans of buildings{'; ' if others else ''}{others}; set the option units if "
+        "another unit is correct",
     )
 
 

@@ -43,7 +43,9 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     """
     metres = options.metres or drawing.metres
     if metres is None:
-        raise IncompleteFileError("does not say its unit; say units, such as mm or m", argument=drawing.name)
+        raise IncompleteFileError(
+            "does not state its unit; set the option units, for example to mm or m", argument=drawing.name
+        )
     if not drawing.segments:
         raise drawing.without_lines()
     endpoints = np.vstack(drawing.segments) * metres
@@ -63,8 +65,8 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     if not oriented:
         drawing.notes.add_assumed(
             "directions",
-            "directions mean nothing, for nobody says where free space is; a free place (point) tells, and where lines "
-            "run in the middle of walls their thickness (drawn centres, thickness)",
+            "directions are ignored, because the free side of the lines is unknown; set the option point to a free "
+            "place or, for centre lines, the options drawn (centres) and thickness",
         )
     drawing.notes.add_read("segments", "faces of walls" if oriented else "lines", len(endpoints))
     meta = drawing.meta if drawing.format == "json" and drawing.meta else {"source": drawing.name} | drawing.meta
@@ -85,7 +87,7 @@ def _without_doubles(endpoints: Floats, widths: Floats, oriented: bool, drawing:
     endpoints, widths = endpoints[long], widths[long]
     if len(endpoints) == 0:
         doubt = drawing.notes.assumed.get("unlikely_unit")
-        why = doubt.message if doubt is not None else "is the unit right?"
+        why = doubt.message if doubt is not None else "check the unit"
         raise MalformedFileError(f"has no line of {LEAST_LENGTH:g} m: {why}", argument=drawing.name)
     keys = np.rint(endpoints / SAME)
     if not oriented:
@@ -113,15 +115,15 @@ def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Fl
     backward = endpoints[:, [2, 3, 0, 1]]
     counts = {side: int((seen == side).sum()) for side in Sides}
     drawing.notes.add_assumed(
-        "inside", "directions found from the free places", counts[Sides.LEFT] + counts[Sides.RIGHT]
+        "inside", "directions derived from the free places", counts[Sides.LEFT] + counts[Sides.RIGHT]
     )
     if counts[Sides.BOTH]:
         drawing.notes.add_assumed(
-            "both_sides", "lines with free space on both sides: both directions", counts[Sides.BOTH]
+            "both_sides", "lines with free space on both sides; both directions are used", counts[Sides.BOTH]
         )
     if counts[Sides.NEITHER]:
         drawing.notes.add_assumed(
-            "not_reached", "lines that no free place reaches: both directions", counts[Sides.NEITHER]
+            "not_reached", "lines that no free place reaches; both directions are used", counts[Sides.NEITHER]
         )
     left, right = seen != Sides.RIGHT, seen != Sides.LEFT
     return np.vstack([endpoints[left], backward[right]])
@@ -131,4 +133,4 @@ def _segments(endpoints: Floats, drawing: Drawing) -> Segments:
     try:
         return Segments.from_array(endpoints, argument="line")
     except InputError as error:
-        raise MalformedFileError(f"a line {error.message}: is the unit right?", argument=drawing.name) from error
+        raise MalformedFileError(f"a line {error.message}; check the unit", argument=drawing.name) from error

@@ -93,7 +93,7 @@ def classify(grid: Grid, notes: Notes) -> Cells:
         above = (parted + 0.5) / (LEVELS - 1)
         notes.add_assumed(
             "thresholds",
-            f"the thresholds of the file leave out most {'dark' if few_occupied else 'light'} cells; cells are "
+            f"the thresholds of the file exclude most {'dark' if few_occupied else 'light'} cells; cells are "
             f"occupied above an occupancy of {above:.3f} instead",
             dark if few_occupied else light,
         )
@@ -144,7 +144,7 @@ def _note_unknown(grid: Grid, found: UnknownLevels, counts: Counts, parted: int,
         kind = "occupied" if level > parted else "free"
         notes.add_assumed(
             "unknown_grey",
-            f"cells of {grid.named(level)} are {kind}, as no others are, although many tools write this value for "
+            f"cells of {grid.named(level)} are {kind}, and no others are, but many tools write this value for "
             f"unknown cells; {option}",
             int(counts[level]),
         )

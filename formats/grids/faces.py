@@ -73,7 +73,10 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
         if len(lines):
             found.append(lines.segments.endpoints - np.tile(lines.segments.normals * depth * grid.resolution, 2))
         if sum(map(len, found)) > MAX_SEGMENTS:
-            raise TooLargeError(f"expected a grid of at most {MAX_SEGMENTS} segments", argument=name)
+            raise TooLargeError(
+                f"expected a grid of at most {MAX_SEGMENTS} segments, found more; crop it, or remove noise",
+                argument=name,
+            )
     if not found:
         counts = ", ".join(
             f"{int((cells == kind).sum())} {word}"
@@ -86,9 +89,9 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
         )
     if points > 0:
         notes.add_dropped(
-            "short_pieces", f"cell borders on no straight line of {LEAST_LENGTH:g} cells at least", points
+            "short_pieces", f"cell borders on no straight line of at least {LEAST_LENGTH:g} cells", points
         )
-    notes.add_assumed("surface", f"walls are taken to lie {depth:.2f} cells behind the border of the free cells")
+    notes.add_assumed("surface", f"wall surfaces are assumed {depth:.2f} cells behind the border of the free cells")
     return Segments.from_array(_placed(np.vstack(found), grid))
 
 

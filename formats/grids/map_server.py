@@ -119,13 +119,13 @@ def read_description(path: Path, notes: Notes) -> Description:
         raise MalformedFileError("expected a YAML mapping with image, resolution and origin", argument=name)
     missing = [key for key in ("image", "resolution", "origin") if key not in values]
     if missing:
-        raise IncompleteFileError(f"does not say {' and '.join(missing)}", argument=name)
+        raise IncompleteFileError(f"has no {' and '.join(missing)}; add it", argument=name)
     mode = values.get("mode", "trinary")
     if mode not in MODES:
-        raise UnsupportedFormatError(f"expected a mode of {', '.join(MODES)}", argument=name)
+        raise UnsupportedFormatError(f"has an unknown mode; expected one of {', '.join(MODES)}", argument=name)
     for key, assumed in (("negate", "0"), ("occupied_thresh", "0.65"), ("free_thresh", "0.196")):
         if key not in values:
-            notes.add_assumed(key, f"{key} is {assumed}, for the file does not say")
+            notes.add_assumed(key, f"{key} is {assumed}, because the file has none")
     return Description(
         _image(values["image"], name),
         _number(values, "resolution", name, MIN_RESOLUTION, MAX_RESOLUTION),
@@ -140,7 +140,7 @@ def read_description(path: Path, notes: Notes) -> Description:
 def _image(value: Any, name: str) -> str:
     image = PureWindowsPath(value).name if isinstance(value, str) else ""
     if not image or "\0" in image:
-        raise MalformedFileError("expected image to be a file's name", argument=name)
+        raise MalformedFileError("expected image to be the name of a file", argument=name)
     return image
 
 
@@ -156,7 +156,7 @@ def _number(
 def _origin(value: Any, name: str) -> RigidTransform:
     numbers = isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
     if not numbers or not all(math.isfinite(v) and abs(v) <= MAX_ORIGIN for v in value):
-        raise MalformedFileError(f"expected origin to be [x, y, yaw], at most {MAX_ORIGIN:g}", argument=name)
+        raise MalformedFileError(f"expected origin to be [x, y, yaw], numbers of at most {MAX_ORIGIN:g}", argument=name)
     return RigidTransform(*map(float, value))
 
 
@@ -191,7 +191,7 @@ def read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] |
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise TooLargeError(f"expected at most {MAX_CELLS} pixels", argument=name) from error
     except UnidentifiedImageError as error:
-        raise MalformedFileError("is no picture: expected PGM, PNG, BMP or JPEG", argument=name) from error
+        raise MalformedFileError("is not a picture; expected PGM, PNG, BMP or JPEG", argument=name) from error
     except (OSError, ValueError, SyntaxError, EOFError, Warning) as error:
         raise MalformedFileError(f"is a broken picture: {shown(str(error))}", argument=name) from error
 

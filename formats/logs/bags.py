@@ -210,9 +210,9 @@ def _mended_by(name: str) -> str:
     """Return how a file is mended that ends early, as of a robot whose power went; empty where no tool is known."""
     suffix = Path(name).suffix.lower()
     if suffix == ".bag":
-        return "; where it was cut off, `rosbag reindex` mends it"
+        return "; if it was cut off, `rosbag reindex` repairs it"
     if suffix == ".mcap":
-        return "; where it was cut off, `mcap recover` mends it"
+        return "; if it was cut off, `mcap recover` repairs it"
     return ""
 
 

@@ -66,7 +66,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
             continue
         except (ValueError, LookupError, OverflowError):
             first = first or f"line {number} is broken"
-            notes.add_dropped("broken_line", f"broken lines, the last of them {number}", 1)
+            notes.add_dropped("broken_line", f"broken lines, the last at {number}", 1)
             continue
         stamps.of(scan.stamp_ns)
         notes.add_read("scans", f"{kind} scans", 1)
@@ -110,7 +110,7 @@ def _messages(path: Path, notes: Notes) -> Iterator[tuple[int, list[str]]]:
             if words[0] in MESSAGES:
                 yield number, words
             else:
-                notes.add_dropped("other_lines", "lines that are no message of CARMEN", 1)
+                notes.add_dropped("other_lines", "lines that are not messages of CARMEN", 1)
 
 
 def _simple(words: list[str], kind: str) -> LoggedScan:

@@ -89,12 +89,13 @@ def _unlisted(folder: Path, notes: Notes) -> list[Path]:
     stems = sorted({_NUMBER.sub("", file.stem) for file in found})
     if len(stems) > 1 or len({file.suffix.lower() for file in found}) > 1:
         raise IncompleteFileError(
-            f"has no {METADATA}, and files of several recordings: {_named([f.name for f in found])}; name one of them",
+            f"has no {METADATA}, and files of several recordings: {_named([f.name for f in found])}; choose one of "
+            "them",
             argument=name_of(folder),
         )
     if not (folder / METADATA).is_file():
         notes.add_assumed(
-            "no_metadata", f"{METADATA} is missing, as where the recorder was killed: files read without it", len(found)
+            "no_metadata", f"{METADATA} is missing, as after a killed recorder; files are read without it", len(found)
         )
     return found[:MAX_RECORDED_FILES]
 
@@ -124,12 +125,12 @@ def _refuse_packed(folder: Path) -> None:
     packed, active = _packed(folder), _active(folder)
     if packed:
         raise UnsupportedFormatError(
-            f"is compressed file by file ({_named([file.name for file in packed])}); unpack it first, by zstd -d",
+            f"is compressed file by file ({_named([file.name for file in packed])}); decompress it first with zstd -d",
             argument=name_of(folder),
         )
     if active:
         raise UnsupportedFormatError(
-            f"is no bag of ROS 2, and has {_named([file.name for file in active])}; name one file",
+            f"is not a bag of ROS 2, and has {_named([file.name for file in active])}; choose one file",
             argument=name_of(folder),
         )
 
@@ -138,7 +139,7 @@ def _hint(path: Path) -> str | None:
     """Return what to do with a file that is a recording once something was done to it."""
     lower = path.name.lower()
     if lower.endswith(tuple(f"{kind}{packed}" for kind in SUFFIXES for packed in (PACKED, ".zst"))):
-        return "is compressed as a whole; unpack it first, by zstd -d"
+        return "is compressed as a whole; decompress it first with zstd -d"
     if lower.endswith(tuple(f"{kind}.gz" for kind in SUFFIXES)):
         return "is compressed as a whole; unpack it first, by gunzip"
     if lower.endswith(".bag.active"):

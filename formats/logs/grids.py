@@ -67,10 +67,12 @@ def read_bag_grid(path: Path, topic: str | None, notes: Notes) -> BagGrid:
         if not grids:
             raise MalformedFileError(f"has no grid with cells on {_listed(wanted)}", argument=bag.name)
         chosen = next(iter(grids)) if len(wanted) == 1 else _map_among(grids, bag.name, notes)
-        notes.add_read("grids", f"grids of {shown(chosen)}, of which the last is taken", counts[chosen])
+        notes.add_read("grids", f"grids of {shown(chosen)}, of which the last is used", counts[chosen])
         costmap = is_costmap(chosen, grids[chosen])
         if costmap:
-            said = f"{shown(chosen)} is a costmap: obstacles are inflated, walls may lie in front of their place"
+            said = (
+                f"{shown(chosen)} is a costmap with inflated obstacles; walls may lie in front of their true positions"
+            )
             notes.add_assumed("costmap", said)
         grid, frame = grid_of(grids[chosen], bag.name, notes)
         return BagGrid(grid, frame, bag.format, shown(chosen), costmap)
@@ -102,7 +104,9 @@ def _map_among(grids: dict[str, Any], name: str, notes: Notes) -> str:
     if chosen is None:
         sizes = [f"{shown(topic)} ({_size(grids[topic])})" for topic in grids][:NAMED]
         raise IncompleteFileError(
-            f"has several grids, and none is clearly the map: {', '.join(sizes)}; choose one by --topic", argument=name
+            f"has several grids, and none is clearly the map: {', '.join(sizes)}; choose one with the option topic "
+            "(--topic)",
+            argument=name,
         )
     others = [f"{shown(topic)} ({_size(grids[topic])})" for topic in grids if topic != chosen][:NAMED]
     notes.add_assumed(
@@ -196,13 +200,13 @@ def _origin(pose: Any, name: str, notes: Notes) -> RigidTransform:
             argument=name,
         )
     if max(map(abs, turn)) < ZERO:
-        notes.add_assumed("orientation", "the grid's orientation was never set (all 0): it is taken as not turned")
+        notes.add_assumed("orientation", "the grid's orientation is not set (all 0); no rotation is assumed")
         return RigidTransform(place[0], place[1], 0.0)
     length = math.hypot(*turn)
     x, y, z, w = (value / length for value in turn)
     if 1.0 - 2.0 * (x * x + y * y) < UPRIGHT:
         raise MalformedFileError(
-            f"has a grid that does not lie flat: info.origin.orientation is {_told(turn)}, expected a rotation about z",
+            f"has a grid that is not horizontal: info.origin.orientation is {_told(turn)}, expected a rotation about z",
             argument=name,
         )
     return RigidTransform(place[0], place[1], math.atan2(2.0 * (x * y + z * w), 1.0 - 2.0 * (y * y + z * z)))

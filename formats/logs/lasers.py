@@ -52,16 +52,18 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
 
 
 def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:
-    """Return the limits of the ranges that are believed, metres; 0 and infinity where a field says nothing."""
+    """Return the limits of valid ranges, metres; 0 and infinity where a field is not set."""
     if not 0.0 <= low < MAX_LENGTH:
-        notes.add_assumed("range_min", f"scans whose range_min is {low:g} m, which is no distance: taken as 0 m", 1)
+        notes.add_assumed(
+            "range_min", f"scans whose range_min is {low:g} m, which is not a distance; 0 m is assumed", 1
+        )
         low = 0.0
     if low < high <= MAX_LENGTH:
         return low, high
     if 0.0 < high <= low:  # which of the two is wrong is not known
-        told = f"scans whose range_max is {high:g} m and range_min {low:g} m: neither is believed"
+        told = f"scans whose range_max is {high:g} m and range_min {low:g} m; both are ignored"
         low = 0.0
     else:
         told = f"scans whose range_max is {high:g} m, which does not say how far the laser sees"
-    notes.add_assumed("range_max", f"{told}; infinite ranges are taken as unknown, not as free space", 1)
+    notes.add_assumed("range_max", f"{told}; infinite ranges count as unknown, not as free space", 1)
     return low, math.inf

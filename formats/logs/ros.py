@@ -57,7 +57,7 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
                 notes.add_dropped("broken_scan", f"scans that cannot be used, such as: {error.message}", 1)
                 continue
             if scan.pose is None and sensor.odometry is not None:
-                notes.add_dropped("no_pose", "scans whose pose the log does not say (they are kept)", 1)
+                notes.add_dropped("no_pose", "scans without a pose in the log (they are included)", 1)
             notes.add_read("scans", f"scans of {shown(connection.topic)}", 1)
             yield scan
         if "scans" not in notes.read:

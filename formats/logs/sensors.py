@@ -140,9 +140,7 @@ class Sensor:
         end = begin + round(increment * beams * NS)
         speed = None if self.odometry is None else self.odometry.speed(begin, end, mount)
         if speed is None or not max(math.hypot(speed.vx, speed.vy), abs(speed.omega)) <= FASTEST:
-            notes.add_assumed(
-                "motion", "scans with a time_increment during which the motion of the sensor is not known", 1
-            )
+            notes.add_assumed("motion", "scans with a time_increment, but without the motion of the sensor", 1)
             return None
         return Motion(increment, speed.vx, speed.vy, speed.omega)
 
@@ -161,8 +159,8 @@ def time_increment_of(message: Any, notes: Notes) -> float:
     taken = scan_time if 0.0 < scan_time <= LONGEST_SCAN else USUAL_SCAN
     notes.add_assumed(
         "time_increment",
-        f"by its time_increment a scan takes {seconds:.3g} s, expected at most {LONGEST_SCAN:.1f} s; {taken:.3g} s "
-        "are assumed",
+        f"according to time_increment a scan takes {seconds:.3g} s, expected at most {LONGEST_SCAN:.1f} s; "
+        f"{taken:.3g} s are assumed",
         1,
     )
     return taken / beams
@@ -231,7 +229,7 @@ class Sensors:
                 "odometry", f"odometry is that of {shown(found.source)}; not of {', '.join(map(shown, others))}"
             )
         if found.stands:
-            self._notes.add_assumed("odometry_stands", f"by {shown(found.source)} the robot stands still all the time")
+            self._notes.add_assumed("odometry_stands", f"the robot never moves according to {shown(found.source)}")
 
 
 def note_tilt(sensor: Sensor, place: Place, notes: Notes) -> None:
@@ -241,5 +239,5 @@ def note_tilt(sensor: Sensor, place: Place, notes: Notes) -> None:
         notes.add_assumed(
             "tilted",
             f"the scan plane of {shown(sensor.frame)} is {math.degrees(place.tilt):.1f} degrees from horizontal and is "
-            f"taken as horizontal: distances are up to {more:.1f} % too long",
+            f"assumed to be horizontal; distances are up to {more:.1f} % too long",
         )

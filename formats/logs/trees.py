@@ -94,8 +94,9 @@ class BagFrames:
             return chosen, self.trees.get(chosen) or Transforms(self.name)
         if len(others) > 1 or namespace_of(topic):
             raise IncompleteFileError(
-                f"it is not clear whose transforms hold for {shown(topic)}, with its frame {shown(frame)}: those in "
-                f"{_listed(others)}; choose one by tf_namespace (--tf-namespace {shown(others[0])})",
+                f"the namespace of the transforms is ambiguous for {shown(topic)}, with its frame {shown(frame)}: "
+                f"those in {_listed(others)}; choose one with the option tf_namespace (--tf-namespace "
+                f"{shown(others[0])})",
                 argument=self.name,
             )
         notes.add_assumed("tf_namespace", f"the transforms of {shown(others[0])} hold for {shown(topic)}")
@@ -213,12 +214,10 @@ def _note_doubts(tree: Transforms, notes: Notes) -> None:
     several = [frame for frame in tree.frames() if len(tree.parents(frame)) > 1]
     if several:
         told = "; ".join(f"{shown(one)} in {_listed(tree.parents(one))}" for one in several[:3])
-        notes.add_assumed(
-            "several_parents", f"frames with several parents, of which the way outwards takes one: {told}"
-        )
+        notes.add_assumed("several_parents", f"frames with several parents, of which one is used: {told}")
     for parent, child in _refixed(tree):
         notes.add_assumed(
-            "fixed_again", f"{shown(child)} is fixed in {shown(parent)} at different places; the last one is taken"
+            "fixed_again", f"{shown(child)} is fixed in {shown(parent)} at different places; the last one is used"
         )
 
 

@@ -90,6 +90,6 @@ def _require(grant: Grant, asked: Asked) -> None:
     # What is no route of the table may be one that nobody thought of there.
     allowed = grant.is_whole if access is None else access.role is None or access.role in grant.roles
     if not allowed:
-        raise MissingRoleError
+        raise MissingRoleError(None if access is None else access.role)
     if asked.map_id is not None and not grant.sees(asked.map_id):
         raise ForeignMapError

@@ -5,7 +5,7 @@
     AdmissionError
     ├── MissingKeyError      no key, and the service has keys
     ├── UnknownKeyError      a key that is none of the service's
-    ├── MissingRoleError     a key that is not for this
+    ├── MissingRoleError     a key without the role that the request needs
     ├── ForeignMapError      a map that there is not for this key
     ├── ForeignHostError     under a name that nobody has said to be the service's
     ├── ForeignOriginError   sent by the page of another site
@@ -29,28 +29,35 @@ class MissingKeyError(AdmissionError):
     """No key, and the service has keys."""
 
     def __init__(self) -> None:
-        super().__init__("send Authorization: Bearer <key>")
+        super().__init__("the request has no key; send the header `Authorization: Bearer <key>`")
 
 
 class UnknownKeyError(AdmissionError):
     """A key that is none of the service's."""
 
     def __init__(self) -> None:
-        super().__init__("this key is not known here")
+        super().__init__("the service does not know this key, or its token is expired; send a valid one")
 
 
 class MissingRoleError(AdmissionError):
-    """A key that is not for what is asked."""
+    """A key without the role that the request needs.
 
-    def __init__(self) -> None:
-        super().__init__("this key is not for that")
+    Parameters
+    ----------
+    role : str, optional
+        The role that it lacks; None for a path that is no route, for which it needs every role and all maps.
+    """
+
+    def __init__(self, role: str | None = None) -> None:
+        lacking = "every role and all maps, which this path requires" if role is None else f"the role `{role}`"
+        super().__init__(f"the key lacks {lacking}; send a key that has it")
 
 
 class ForeignMapError(AdmissionError):
     """A map that there is not for this key: whether there is one for others is not told."""
 
     def __init__(self) -> None:
-        super().__init__("no map is stored under this id")
+        super().__init__("no map is stored under this id; GET /v1/maps lists the ids")
 
 
 class ForeignHostError(AdmissionError):
@@ -58,7 +65,8 @@ class ForeignHostError(AdmissionError):
 
     def __init__(self) -> None:
         super().__init__(
-            "without keys the service answers to addresses and localhost only; LINEFIX_HOSTS names further hosts"
+            "the host name of the request is not allowed; a service without keys expects an IP address or localhost. "
+            "Set LINEFIX_HOSTS to allow further names"
         )
 
 
@@ -66,7 +74,10 @@ class ForeignOriginError(AdmissionError):
     """Sent by the page of another site."""
 
     def __init__(self) -> None:
-        super().__init__("without keys the service takes nothing that the page of another site sends")
+        super().__init__(
+            "a page of another site sent the request, which a service without keys rejects; send it from "
+            "the service's own page, or set up keys"
+        )
 
 
 class NotReadyError(AdmissionError):
@@ -77,39 +88,47 @@ class QueueFullError(AdmissionError):
     """Every place is taken."""
 
     def __init__(self) -> None:
-        super().__init__("every core is searching and the queue is full")
+        super().__init__("all searches are running and the queue is full; send the request again later")
 
 
 class ShareUsedError(AdmissionError):
     """Every place is taken, and this key, or address, has its share of them."""
 
     def __init__(self) -> None:
-        super().__init__("the queue is full, and this key, or address, has its share of it")
+        super().__init__(
+            "the queue is full, and this key or address has used its part of it; send the request again later"
+        )
 
 
 class TooManyConnectionsError(AdmissionError):
     """Every connection that may be open is at work."""
 
     def __init__(self) -> None:
-        super().__init__("too many connections at once")
+        super().__init__("too many connections are open; close some, or send the request again later")
 
 
 class TooMuchHeldError(AdmissionError):
     """Too many bytes of requests or answers are in memory."""
 
     def __init__(self) -> None:
-        super().__init__("too many large requests or answers at once")
+        super().__init__(
+            "large requests and answers use all memory that is reserved for them; send the request again later"
+        )
 
 
 class ShareHeldError(AdmissionError):
     """Of the bytes that are in memory this key, or address, has its share."""
 
     def __init__(self) -> None:
-        super().__init__("too many large requests or answers of this key, or address, at once")
+        super().__init__(
+            "large requests and answers of this key or address use its part of the memory; send fewer at once"
+        )
 
 
 class DeadlinePassedError(AdmissionError):
     """The deadline passed before the search started."""
 
     def __init__(self) -> None:
-        super().__init__("the deadline passed before the search started")
+        super().__init__(
+            "the deadline passed before the search started; extend deadline_ms, or send the request again later"
+        )

@@ -58,7 +58,7 @@ def read_keys(path: Path) -> dict[bytes, Grant]:
     keys = [key for file in _files(path) for key in _read(file)]
     found = {bytes.fromhex(key.sha256): key for key in keys}
     if len(found) < len(keys):
-        raise KeyFileError(f"{path}: a key stands there twice")
+        raise KeyFileError(f"{path}: contains a key twice; remove one")
     return {digest: Grant(digest, key.roles, key.maps) for digest, key in found.items()}
 
 
@@ -119,7 +119,7 @@ def _read(file: Path) -> tuple[Key, ...]:
         where = "; ".join(".".join(map(str, fault["loc"])) + ": " + fault["msg"] for fault in error.errors())
         raise KeyFileError(f"{file}: {where}") from None
     except ValueError:
-        raise KeyFileError(f"{file}: no TOML, or not UTF-8") from None
+        raise KeyFileError(f"{file}: is not TOML in UTF-8") from None
 
 
 def _state(path: Path) -> object:

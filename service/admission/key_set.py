@@ -92,7 +92,7 @@ def _fetched(url: str) -> bytes:
         with opener.open(url, timeout=READ_SECONDS) as answer:
             content: bytes = answer.read(MOST_BYTES + 1)
         if watch.is_over:
-            raise KeySetError(f"it takes more than {TOTAL_SECONDS:g} s")
+            raise KeySetError(f"expected an answer within {TOTAL_SECONDS:g} s")
     return _bounded(content)
 
 

@@ -35,11 +35,15 @@ class Readiness:
         if self.warm:
             return
         if self.compiled is None:
-            raise NotReadyError("the kernels are being loaded")
-        raise NotReadyError(f"the kernels are being compiled, {self.compiled():.0%} so far")
+            raise NotReadyError("the kernels are being loaded; send the request again later")
+        raise NotReadyError(
+            f"the kernels are being compiled, {self.compiled():.0%} so far; send the request again later"
+        )
 
     def require_all(self) -> None:
         """Raise `NotReadyError` when requests should go elsewhere."""
         if self.draining:
-            raise NotReadyError("the service is going down")
+            raise NotReadyError(
+                "the service is shutting down; send the request to another instance, or again after its restart"
+            )
         self.require_warm()

@@ -27,7 +27,9 @@ class NotHttpError(HttpError):
     """Not HTTP at all."""
 
     def __init__(self) -> None:
-        super().__init__("this is not HTTP/1.1 as RFC 9112 has it, or no method of HTTP")
+        super().__init__(
+            "the request is not valid HTTP/1.1 (RFC 9112), or has an unknown method; send it with an HTTP client"
+        )
 
 
 class ControlCharacterError(HttpError):
@@ -39,20 +41,22 @@ class ControlCharacterError(HttpError):
     """
 
     def __init__(self, character: str) -> None:
-        super().__init__(f"the path has the control character U+{ord(character):04X}; expected none: leave it out")
+        super().__init__(f"the path has the control character U+{ord(character):04X}; expected none; remove it")
 
 
 class BodyBrokenError(HttpError):
     """The body ends before the length that its head announces, or its chunks are no chunks."""
 
     def __init__(self) -> None:
-        super().__init__("the body ends early or its chunks are malformed: send it as its head announces it")
+        super().__init__(
+            "the body ends early, or its chunks are malformed; send it as Content-Length or Transfer-Encoding state"
+        )
 
 
 class NotFoundError(HttpError):
     """No such path."""
 
-    def __init__(self, message: str = "there is nothing under this path") -> None:
+    def __init__(self, message: str = "no resource has this path; see /openapi.json for the paths") -> None:
         super().__init__(message)
 
 
@@ -66,8 +70,8 @@ class MethodNotAllowedError(HttpError):
     """
 
     def __init__(self, allowed: Iterable[str]) -> None:
-        super().__init__("this path takes other methods; see Allow")
         self.allowed = tuple(allowed)
+        super().__init__(f"this path does not support the method; expected {', '.join(self.allowed)}")
 
 
 class MediaTypeError(HttpError):
@@ -79,14 +83,14 @@ class MediaTypeError(HttpError):
     """
 
     def __init__(self, taken: str) -> None:
-        super().__init__(f"the body has to be {taken}")
+        super().__init__(f"the media type of the body is not supported; send {taken} and state it as Content-Type")
 
 
 class EncodingError(HttpError):
     """The body is packed in a way that is not taken."""
 
     def __init__(self) -> None:
-        super().__init__("the only content encoding taken is gzip")
+        super().__init__("the content encoding is not supported; send the body as gzip, or without encoding")
 
 
 class BodyTooSlowError(HttpError):
@@ -99,11 +103,11 @@ class BodyTooSlowError(HttpError):
     """
 
     def __init__(self, seconds: float) -> None:
-        super().__init__(f"the request did not arrive within {seconds:g} seconds")
+        super().__init__(f"the request did not arrive within {seconds:g} s; send it faster, or a smaller one")
 
 
 class RefusedError(HttpError):
     """Anything else that the framework refuses."""
 
     def __init__(self) -> None:
-        super().__init__("the request is wrong")
+        super().__init__("the request does not match the API; see /openapi.json for its form")

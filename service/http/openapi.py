@@ -23,7 +23,7 @@ cannot be told.
   `p_map = R(theta) p_scan + [x, y]`.
 * A segment is `[x1, y1, x2, y2]`, directed: free space lies on its left.
 * `null` means none. No number is ever NaN or infinite, and none may be sent.
-* An honest "no answer" is 200 with a `status`; 4xx says that the request is wrong.
+* A scan without a usable pose is 200 with a `status`; 4xx states that the request is not valid.
 """
 _REF = "#/components/schemas/{model}"
 _REQUESTS = (

@@ -43,7 +43,7 @@ class StoreProbe:
             async with asyncio.timeout(ANSWERS_WITHIN):
                 await asyncio.shield(self._looking)
         except TimeoutError:
-            raise NotReadyError("the store does not answer") from None
+            raise NotReadyError("the store does not respond; check that its database runs and is reachable") from None
         except (ReadOnlyStoreError, BusyStoreError, StoreAwayError):
             raise
         except StoreError as error:

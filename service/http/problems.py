@@ -61,11 +61,11 @@ TABLE = (
         "The request is not HTTP",
         (http.NotHttpError, http.ControlCharacterError, http.BodyBrokenError),
     ),
-    Kind("unauthorized", 401, "A key is needed", (admission.MissingKeyError,)),
+    Kind("unauthorized", 401, "A key is required", (admission.MissingKeyError,)),
     Kind(
         "forbidden",
         403,
-        "This may not be asked",
+        "The request is not permitted",
         (
             admission.UnknownKeyError,
             admission.MissingRoleError,
@@ -73,14 +73,14 @@ TABLE = (
             admission.ForeignOriginError,
         ),
     ),
-    Kind("not_found", 404, "There is nothing here", (http.NotFoundError,)),
-    Kind("unknown_map", 404, "There is no such map", (maps.UnknownMapError, admission.ForeignMapError)),
-    Kind("method_not_allowed", 405, "The method is not allowed here", (http.MethodNotAllowedError,)),
-    Kind("request_timeout", 408, "The body came too slowly", (http.BodyTooSlowError,)),
+    Kind("not_found", 404, "No resource has this path", (http.NotFoundError,)),
+    Kind("unknown_map", 404, "No map has this id", (maps.UnknownMapError, admission.ForeignMapError)),
+    Kind("method_not_allowed", 405, "This path does not support the method", (http.MethodNotAllowedError,)),
+    Kind("request_timeout", 408, "The request did not arrive in time", (http.BodyTooSlowError,)),
     Kind("map_corrupt", 409, "The stored map is damaged", (maps.CorruptMapError,)),
-    Kind("revision_conflict", 412, "The map is not as demanded", (maps.RevisionConflictError,)),
+    Kind("revision_conflict", 412, "The precondition on the map's revision failed", (maps.RevisionConflictError,)),
     Kind(
-        "too_large", 413, "The request is over a limit", (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
+        "too_large", 413, "The request exceeds a limit", (TooManyError, BodyTooLargeError, importing.FileTooLargeError)
     ),
     Kind(
         "unsupported_media_type",
@@ -88,9 +88,14 @@ TABLE = (
         "The media type is not supported",
         (http.MediaTypeError, http.EncodingError, importing.FormatsMissingError, importing.UnknownFormatError),
     ),
-    Kind("invalid_request", 422, "The request is wrong", (InvalidRequestError, InputError, http.RefusedError)),
-    Kind("rate_limited", 429, "This key has used its share", (admission.ShareUsedError, admission.ShareHeldError)),
-    Kind("internal", 500, "A defect of the service"),
+    Kind("invalid_request", 422, "The request is not valid", (InvalidRequestError, InputError, http.RefusedError)),
+    Kind(
+        "rate_limited",
+        429,
+        "This key exceeds its part of the queue",
+        (admission.ShareUsedError, admission.ShareHeldError),
+    ),
+    Kind("internal", 500, "The service has a defect"),
     Kind("not_ready", 503, "The service is not ready", (admission.NotReadyError, maps.StoreAwayError, CancelledError)),
     Kind(
         "overloaded",
@@ -116,7 +121,7 @@ TABLE = (
 )
 KINDS: Mapping[str, Kind] = MappingProxyType({kind.code: kind for kind in TABLE})
 RAISED: Mapping[type[Exception], Kind] = MappingProxyType({error: kind for kind in TABLE for error in kind.raised_as})
-"""Every exception that is an answer; any other is a defect."""
+"""Every exception that becomes a problem; any other is a defect."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +156,10 @@ class Problem:
         return Response(orjson.dumps(self.as_json(request_id)), self.kind.status, headers, MEDIA_TYPE)
 
 
-INTERNAL = Problem(KINDS["internal"], "the service failed; the request id names the entry in its log")
-"""What is said of a defect: nothing but that it is one."""
+INTERNAL = Problem(
+    KINDS["internal"], "the service failed because of a defect; report it with the log entry that has this request id"
+)
+"""The answer to a defect, without any detail of it."""
 
 
 def problem_of(error: Exception) -> Problem | None:
@@ -162,7 +169,9 @@ def problem_of(error: Exception) -> Problem | None:
         return None
     match error:
         case CancelledError():
-            return Problem(kind, "the service is going down")
+            return Problem(
+                kind, "the service is shutting down; send the request to another instance, or again after its restart"
+            )
         case InputError():
             return _of_library(kind, error)
         case InvalidRequestError():

@@ -79,9 +79,14 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
     if status == 1:
         raise ReaderFailedError(failure.decode("ascii", "replace"))
     if status in (-signal.SIGXCPU, -signal.SIGKILL):
-        raise FileTooLargeError(f"reading it takes more than {bounds.cpu_seconds} s of a processor, or too much memory")
+        raise FileTooLargeError(
+            f"reading the file takes more than {bounds.cpu_seconds} s of processor time, or too "
+            "much memory; simplify it"
+        )
     if status != 0:
-        raise InvalidRequestError([Fault("/files", "ends the process that reads it: it is broken")])
+        raise InvalidRequestError(
+            [Fault("/files", "the process that reads the file crashed: the file is damaged; export it again")]
+        )
     head, _, line_map = said.partition(b"\n")
     return ReadMap(line_map, _report(orjson.loads(head)))
 

@@ -21,7 +21,10 @@ class FormatsMissingError(ImportingError):
     """The extra ``[formats]`` is not installed."""
 
     def __init__(self) -> None:
-        super().__init__('this service reads no files of other tools: pip install "linefix[formats]"')
+        super().__init__(
+            "the service cannot read files of other tools: it lacks the extra `formats`. Install it, for example with "
+            '`pip install ".[formats]"` in a checkout'
+        )
 
 
 class UnknownFormatError(ImportingError):
@@ -36,11 +39,11 @@ class TooLateError(ImportingError):
     """The deadline passed meanwhile."""
 
     def __init__(self) -> None:
-        super().__init__("the deadline passed while the file was read")
+        super().__init__("the deadline passed while the file was read; send a smaller file, or extend deadline_ms")
 
 
 class NoRoomError(ImportingError):
     """No room for the files, or for the process that reads them."""
 
     def __init__(self) -> None:
-        super().__init__("there is no room to read files now")
+        super().__init__("the service has no disk space or process left to read files; send the request again later")

@@ -28,7 +28,9 @@ def options_of(fields: Fields) -> ImportOptions:
     """
     from formats import ImportOptions, InvalidOptionError
 
-    unknown = [Fault(f"/{name}", f"expected one of {', '.join(KNOWN)}") for name in fields if name not in KNOWN]
+    unknown = [
+        Fault(f"/{name}", f"unknown field; expected one of {', '.join(KNOWN)}") for name in fields if name not in KNOWN
+    ]
     if unknown:
         raise InvalidRequestError(unknown)
     said: dict[str, Any] = {}
@@ -50,7 +52,7 @@ def pointer_of(option: str) -> str:
 
 def _text(values: Sequence[str]) -> str:
     if len(values) != 1:
-        raise ValueError("expected it once")
+        raise ValueError(f"expected this field once, found it {len(values)} times")
     return values[0].strip()
 
 

@@ -44,7 +44,7 @@ def read_form(content: bytes, content_type: str) -> Form:
     """
     boundary = parse_options_header(content_type)[1].get(b"boundary")
     if not boundary:
-        raise _refused("expected a boundary in Content-Type")
+        raise _refused("expected a boundary in Content-Type, found none")
     form, parts = Form(), _Parts()
     try:
         parser = MultipartParser(boundary, parts.callbacks())
@@ -52,7 +52,7 @@ def read_form(content: bytes, content_type: str) -> Form:
     except (FormParserError, ValueError):
         parts.whole = False
     if not parts.whole:
-        raise _refused("is no multipart/form-data as Content-Type says")
+        raise _refused(f"is not multipart/form-data as Content-Type states, or has more than {MOST_PARTS} parts")
     for disposition, data in parts.found:
         _take(form, disposition, data)
     return form
@@ -118,11 +118,13 @@ def _take(form: Form, disposition: bytes, data: bytearray) -> None:
     if b"filename" in told:
         own = _own_name(told[b"filename"])
         if own in form.files:
-            raise InvalidRequestError([Fault("/files", "two files have one name")])
+            raise InvalidRequestError([Fault("/files", "two files have the same name; rename one of them")])
         form.files[own] = data
         return
     if len(data) > MOST_FIELD_BYTES:
-        raise InvalidRequestError([Fault("", f"a field has at most {MOST_FIELD_BYTES} bytes")])
+        raise InvalidRequestError(
+            [Fault("", f"expected fields of at most {MOST_FIELD_BYTES} bytes, found {len(data)}")]
+        )
     form.fields.setdefault(name, []).append(_decoded(bytes(data)))
 
 
@@ -130,7 +132,9 @@ def _own_name(name: str) -> str:
     """Return a file's name without folders, whichever system they are of."""
     own = PurePosixPath(PureWindowsPath(name).name).name
     if not own or own in (".", "..") or "\0" in own or len(own.encode()) > MOST_NAME_BYTES:
-        raise InvalidRequestError([Fault("/files", f"a file has a name, of at most {MOST_NAME_BYTES} bytes")])
+        raise InvalidRequestError(
+            [Fault("/files", f"expected a file name of 1 to {MOST_NAME_BYTES} bytes; rename the file")]
+        )
     return own
 
 
@@ -138,7 +142,7 @@ def _decoded(value: bytes) -> str:
     try:
         return value.decode("utf-8")
     except UnicodeDecodeError:
-        raise _refused("has names or values that are no UTF-8") from None
+        raise _refused("has names or values that are not UTF-8; encode them in UTF-8") from None
 
 
 def _refused(message: str) -> InvalidRequestError:

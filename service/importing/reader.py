@@ -31,7 +31,7 @@ NICE = 5  # searches go before it, at three times as much of a core that both wa
 FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
 METADATA, BAG = "metadata.yaml", "bag"
 PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9 ._()+=@-]*")
-PLAIN_NAMES = "expected the name of a file of a bag to be letters, digits, spaces and any of ._()+=@- only; rename it"
+PLAIN_NAMES = "expected a file name of letters, digits, spaces and ._()+=@- for a file of a bag; rename the file"
 ENDING = re.compile(r"\.[a-z0-9]{1,8}")
 OOM_SCORE = "1000"  # the first to go where the machine's memory ends
 
@@ -48,7 +48,7 @@ def main(told: str, folder: str) -> None:
     except ModuleNotFoundError:
         lines = [{"missing": True}]
     except (MemoryError, RecursionError):
-        lines = [{"too_large": "reading it takes more memory than it may have"}]
+        lines = [{"too_large": "reading the file takes more memory than is allowed; simplify the file"}]
     sys.stdout.buffer.write(_printed(lines, bounds.file_bytes))
     sys.stdout.flush()
 
@@ -59,7 +59,10 @@ def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
     printed = b"".join(orjson.dumps(line, option=option) for line in lines)
     if len(printed) <= most:
         return printed
-    return orjson.dumps({"too_large": f"the map, or its report, takes more than {most} bytes"}, option=option)
+    return orjson.dumps(
+        {"too_large": f"expected a map and a report of at most {most} bytes, found more; simplify the file"},
+        option=option,
+    )
 
 
 def _bind(bounds: Bounds) -> None:
@@ -110,7 +113,12 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
     except FormatError as error:
         raise InvalidRequestError([_fault(error, files)]) from None
     if len(imported.map.segments) > bounds.segments:
-        return [{"too_large": f"at most {bounds.segments} segments are taken"}]
+        return [
+            {
+                "too_large": f"expected at most {bounds.segments} segments, found {len(imported.map.segments)}; "
+                "simplify the file"
+            }
+        ]
     return _answer(imported, files)
 
 
@@ -177,12 +185,20 @@ def _map_among(names: list[str]) -> str:
         return METADATA
     maps = [name for name in names if PurePosixPath(name).suffix.lower() in MAP_SUFFIXES]
     if len(maps) > 1:
-        raise InvalidRequestError([Fault("/files", "expected one map, and beside it what it names, such as a picture")])
+        raise InvalidRequestError(
+            [
+                Fault(
+                    "/files", f"expected one map and the files that it names, such as a picture; found {len(maps)} maps"
+                )
+            ]
+        )
     if not names:
-        raise InvalidRequestError([Fault("/files", "expected a file: a part of the form with a filename")])
+        raise InvalidRequestError(
+            [Fault("/files", "expected a file, found none; send a part of the form that has a filename")]
+        )
     if not maps:
         known = ", ".join(MAP_SUFFIXES)
-        raise UnsupportedFormatError(f"expected a file that ends in one of {known}", argument="files")
+        raise UnsupportedFormatError(f"found no map; expected a file that ends in one of {known}", argument="files")
     return maps[0]
 
 
@@ -194,7 +210,7 @@ def _fault(error: FormatError, files: OwnFiles) -> Fault:
 
     pointer, number = pointer_of(error.argument), files.number_of(error.argument)
     if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in KNOWN:
-        return Fault("/files", "the file that the map names, such as its picture, was not sent")
+        return Fault("/files", "the map names a file that was not sent, such as its picture; send it, too")
     if pointer[1:] not in KNOWN:
         pointer = "/files" if number is None else f"/files/{number}"
     elif error.index is not None:

@@ -78,7 +78,9 @@ class DatabaseFile:
         try:
             found = os.stat(self._path)
         except OSError as error:
-            raise StoreAwayError("the file of the maps is gone") from error
+            raise StoreAwayError(
+                "the database file of the maps is missing; restore it, or restart the service for an empty one"
+            ) from error
         self._known = (found.st_dev, found.st_ino)
         self._may_make = False
 
@@ -95,7 +97,9 @@ class DatabaseFile:
         try:
             make_file(self._path)
         except OSError as error:
-            raise ReadOnlyStoreError("the file of the maps, or its directory, cannot be made") from error
+            raise ReadOnlyStoreError(
+                "the database file of the maps, or its folder, cannot be created; check the permissions"
+            ) from error
 
 
 def _prepare_sqlite(connection: Any, _: Any) -> None:

@@ -24,13 +24,13 @@ class UnknownMapError(StoreError):
     """Nothing is stored under the id."""
 
     def __init__(self) -> None:
-        super().__init__("no map is stored under this id")
+        super().__init__("no map is stored under this id; GET /v1/maps lists the ids")
 
 
 class CorruptMapError(StoreError):
     """What is stored is damaged."""
 
-    def __init__(self, message: str = "the stored map does not match its checksum; put it again") -> None:
+    def __init__(self, message: str = "the stored map does not match its checksum; send it again with PUT") -> None:
         super().__init__(message)
 
 
@@ -44,22 +44,24 @@ class RevisionConflictError(StoreError):
     """
 
     def __init__(self, revision: int | None) -> None:
-        now = "there is no map under this id" if revision is None else f"the map's present revision is {revision}"
-        super().__init__(f"{now}, which is not what was demanded")
+        now = "no map is stored under this id" if revision is None else f"the map's present revision is {revision}"
+        super().__init__(f"{now}; If-Match or If-None-Match expects another state. Read the map again, then write")
         self.revision = revision
 
 
 class StoreFullError(StoreError):
     """The disk is full, or the maps take all that they may."""
 
-    def __init__(self, message: str = "the disk that holds the maps is full") -> None:
+    def __init__(
+        self, message: str = "the disk that stores the maps is full; delete maps, or enlarge the disk"
+    ) -> None:
         super().__init__(message)
 
 
 class ReadOnlyStoreError(StoreError):
     """Nothing can be written."""
 
-    def __init__(self, message: str = "the maps cannot be written") -> None:
+    def __init__(self, message: str = "the store of maps is read-only; make its database writable") -> None:
         super().__init__(message)
 
 
@@ -67,13 +69,13 @@ class BusyStoreError(StoreError):
     """Others write for too long."""
 
     def __init__(self) -> None:
-        super().__init__("the store is busy with other writes")
+        super().__init__("the store is busy with other writes; send the request again")
 
 
 class StoreAwayError(StoreError):
     """The database does not answer, or cannot be used."""
 
-    def __init__(self, message: str = "the database does not answer") -> None:
+    def __init__(self, message: str = "the database does not respond; check that it runs and is reachable") -> None:
         super().__init__(message)
 
 
@@ -81,4 +83,4 @@ class IndexNotReadyError(StoreError):
     """Another request indexes the map, and is not done in time."""
 
     def __init__(self) -> None:
-        super().__init__("the map is being indexed for another request; ask again")
+        super().__init__("the map is being indexed for another request; send the request again")

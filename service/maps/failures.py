@@ -23,7 +23,7 @@ Failure = Callable[[], StoreError]
 
 def damaged() -> CorruptMapError:
     """Return the error of a database whose own pages or tables are damaged."""
-    return CorruptMapError("the database that holds the maps is damaged")
+    return CorruptMapError("the database of the maps is damaged; restore it from a backup")
 
 
 _SQLITE: dict[int, Failure] = {

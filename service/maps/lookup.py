@@ -166,10 +166,12 @@ def outline_of(document: MapDocument) -> MapOutline:
     """
     segments = Segments.from_array(document.segments, argument="segments")
     if len(segments) == 0:
-        raise InvalidMapError("a map has at least one segment", argument="segments")
+        raise InvalidMapError("expected at least one segment, found none", argument="segments")
     corners = segments.endpoints.reshape(-1, 2)
     if np.ptp(corners, axis=0).max() > MAX_EXTENT:
-        raise InvalidMapError(f"its extent is beyond {MAX_EXTENT:g} m", argument="segments")
+        raise InvalidMapError(
+            f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit", argument="segments"
+        )
     # No negative zeros: not every database keeps them.
     low, high = (corners.min(axis=0) + 0.0).tolist(), (corners.max(axis=0) + 0.0).tolist()
     return MapOutline(len(segments), (low[0], low[1], high[0], high[1]), document.sigma, document.oriented)

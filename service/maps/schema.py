@@ -69,5 +69,5 @@ def _version(connection: Connection) -> str | None:
     found = inspect(connection).has_table(VERSION_TABLE)
     version = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar() if found else None
     if version is not None and version not in VERSIONS:
-        raise StoreAwayError("the database was made by a newer version of the service")
+        raise StoreAwayError("the database was made by a newer version of the service; start that version")
     return version

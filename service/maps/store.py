@@ -124,7 +124,10 @@ class MapStore:
             return
         size += BYTES_OF_ID
         if _taken(connection, map_id) + size > self._most_bytes:
-            raise StoreFullError(f"all maps together may take {self._most_bytes} bytes, and with this one take more")
+            raise StoreFullError(
+                f"with this map the store exceeds its limit of {self._most_bytes} bytes; delete "
+                "maps, or raise the limit"
+            )
         share = int(SHARE * self._most_bytes)
         if prefix and _taken(connection, map_id, prefix) + size > share:
             raise StoreFullError(

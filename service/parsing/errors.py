@@ -22,4 +22,4 @@ class ParserEndedError(ParsingError):
     """The process that parses large bodies has ended meanwhile; the next call has a new one."""
 
     def __init__(self) -> None:
-        super().__init__("the process that parses large bodies has ended")
+        super().__init__("the process that parses large bodies ended meanwhile; send the request again")

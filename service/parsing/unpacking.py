@@ -44,10 +44,12 @@ def unpack(packed: bytes | bytearray, max_bytes: int, take: Callable[[int], None
                 if len(unpacked) > max_bytes:
                     raise BodyTooLargeError(max_bytes)
             if stream.eof and (stream.unused_data or begin + _PIECE < len(whole)):
-                raise NotJsonError("something follows the gzip body")
+                raise NotJsonError("more bytes follow the gzip body; expected a single gzip member")
         unpacked += stream.flush()
     except zlib.error:
-        raise NotJsonError("the body is not gzip, though Content-Encoding says so") from None
+        raise NotJsonError(
+            "the body is not gzip, but Content-Encoding states it; send gzip, or omit the header"
+        ) from None
     if not stream.eof:
-        raise NotJsonError("the gzip body is cut short")
+        raise NotJsonError("the gzip body is cut short; send it completely")
     return unpacked

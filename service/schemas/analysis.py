@@ -25,7 +25,7 @@ class ScannerFields(Strict):
 
     fov: Annotated[
         float,
-        AfterValidator(in_radians(1e-3, 6.2832, "a full turn at most")),
+        AfterValidator(in_radians(1e-3, 6.2832, "at most a full turn")),
         Field(json_schema_extra={"minimum": 1e-3, "maximum": 6.2832}),
     ] = Field(math.tau, description="field of view about straight ahead, radians")
     beams: Annotated[int, Field(ge=8, le=20_000)] = Field(720, description="over the field of view")
@@ -34,28 +34,29 @@ class ScannerFields(Strict):
 
 
 class AnalyzeRequest(Strict):
-    """A robot that is to stand all over a map."""
+    """Options of an analysis of a map."""
 
     laser: ScannerFields = ScannerFields()
     spacing: Annotated[float, Field(ge=0.3, le=100.0)] | None = Field(
-        None, description="metres from place to place; null: some 400 places over the box around the map"
+        None, description="metres between places; null: about 400 places over the box around the map"
     )
     point: Point | None = Field(
-        None, description="metres in the map; only places that can be reached from there without crossing a wall"
+        None,
+        description="a free point in the map, metres; only places that are reachable from it without crossing a wall",
     )
     drive: Annotated[float, Field(ge=0.0, le=MOST_DRIVE)] = Field(
-        0.0, description="metres that the robot may drive from where it does not know where it is; 0: not at all"
+        0.0, description="metres that the robot may drive where a single scan is not usable; 0: none"
     )
     landmark: Annotated[list[Row], Field(max_length=MOST_LANDMARK)] = Field(
         default=[],
-        description="segments of a landmark that may be put up, in the map frame: each place is also tried with it, "
-        "in the building and on the map; the free side of a box is outside",
+        description="segments of a possible landmark, in the map frame: each place is also tried with it in the "
+        "building and on the map; the free side of a box is its outside",
     )
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of the scanner's noise")
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
-        None, description="milliseconds; what it leaves no time for is left out"
+        None, description="milliseconds; places that it leaves no time for are omitted"
     )
-    client_ref: FreeJson = Field(None, description="given back as it was sent")
+    client_ref: FreeJson = Field(None, description="returned as it was sent")
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> AnalyzeRequest:
@@ -66,13 +67,13 @@ class AnalyzeRequest(Strict):
 
 
 class MapAnalyzeRequest(AnalyzeRequest):
-    """The same on a map of the request's own."""
+    """The same, with a map in the request."""
 
     map: AnyMap = Field(description="the map to analyze, or the id of a stored one")
 
 
 class WithLandmarkAnswer(Answer):
-    """What a robot would know with the landmark."""
+    """Result at a place with the landmark."""
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
@@ -80,28 +81,29 @@ class WithLandmarkAnswer(Answer):
 
 
 class AnalyzedPlaceAnswer(Answer):
-    """What a robot would know at a place."""
+    """Result at a place."""
 
-    pose: PoseAnswer = Field(description="where it stands")
+    pose: PoseAnswer = Field(description="true pose of the robot")
     status: Literal["ok", "ambiguous", "degenerate", "no_match"] = Field(
-        description="as of /v1/associate; `ambiguous`, too, where a sure answer is another place"
+        description="as of /v1/associate; `ambiguous` also for a usable answer at a wrong place"
     )
-    usable: bool = Field(description="whether the answer is usable, and this place")
+    usable: bool = Field(description="whether the answer is usable and correct")
     probability: Share | None = Field(description="as of /v1/associate; null for `degenerate`")
-    similar_pose: PoseAnswer | None = Field(description="another place that explains the scan about as well")
-    unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
+    similar_pose: PoseAnswer | None = Field(description="another pose that fits the scan about as well")
+    unobservable: Row2 | None = Field(
+        description="unit vector in the map frame along which the position is unobservable"
+    )
     reasons: list[ReasonCode] = Field(description="codes of why it is not usable, as of /v1/associate")
     resolved_after: float | None = Field(
-        description="metres to drive until it knows where it is: 0 where it knows at once, null where it does not "
-        "within `drive`, or none was asked for"
+        description="metres to drive until the answer is usable; 0: at once; null: not within `drive`, or `drive` is 0"
     )
     with_landmark: WithLandmarkAnswer | None = Field(
-        description="null where there is no landmark, or it leaves the robot no room there"
+        description="null without a landmark, or where it occupies the place"
     )
 
 
 class AnalysisSummaryAnswer(Answer):
-    """How many of the places are what."""
+    """Counts of the places."""
 
     places: Index
     usable: Index
@@ -109,22 +111,22 @@ class AnalysisSummaryAnswer(Answer):
     ambiguous: Index
     degenerate: Index
     no_match: Index
-    similar_pose: Index = Field(description="places for which another one is named")
+    similar_pose: Index = Field(description="places with a similar pose")
     resolved_within: Index | None = Field(
-        description="places at which it knows where it is at once or within `drive`; null where none was asked for"
+        description="places with a usable answer at once or within `drive`; null: `drive` is 0"
     )
     usable_with_landmark: Index | None = Field(description="places usable with the landmark; null where there is none")
-    not_free: Index = Field(description="poses of the grid at which no robot can stand")
-    left_out: Index = Field(description="poses of the grid for which no time was left")
+    not_free: Index = Field(description="poses of the grid that are not free")
+    left_out: Index = Field(description="poses of the grid that the deadline left no time for")
 
 
 class AnalyzeAnswer(Answer):
-    """Where a map will fail."""
+    """Analysis of a map."""
 
     places: list[AnalyzedPlaceAnswer] = Field(description="row by row")
     summary: AnalysisSummaryAnswer
-    spacing: float = Field(description="metres from place to place")
-    complete: bool = Field(description="false where the deadline left something out")
+    spacing: float = Field(description="metres between places")
+    complete: bool = Field(description="false if the deadline ended the analysis early")
     map: MapReference | None = Field(description="null where the map came with the request")
     client_ref: Any = Field(description="as sent")
     request_id: str

@@ -177,13 +177,14 @@ def _symmetric(value: Any) -> Floats:
         raise PydanticCustomError("not_an_array", "expected an array")
     if len(value) in (6, 36):
         raise PydanticCustomError(
-            "covariance", "expected 3 rows of 3 numbers, of x, y and yaw: of ROS's 36 those of rows and columns 0, 1, 5"
+            "covariance",
+            "expected 3 rows of 3 numbers, of x, y and yaw; of the 36 in ROS send rows and columns 0, 1, 5",
         )
     if len(value) != 3:
-        raise PydanticCustomError("covariance", "expected 3 rows of 3 numbers")
+        raise PydanticCustomError("covariance", f"expected 3 rows of 3 numbers, found {len(value)} items")
     matrix = _rows(value, 3, NUMBERS, -_M, _M)
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
-        raise PydanticCustomError("covariance", "expected a symmetric matrix")
+        raise PydanticCustomError("covariance", "expected a symmetric matrix; symmetrize it")
     return matrix
 
 
@@ -192,14 +193,16 @@ def _covariance(value: Any) -> Floats:
     try:
         np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError as error:
-        raise PydanticCustomError("covariance", "expected a positive definite matrix") from error
+        raise PydanticCustomError(
+            "covariance", "expected a positive definite matrix; for an unknown direction send a large variance"
+        ) from error
     return matrix
 
 
 def _semidefinite(value: Any) -> Floats:
     matrix = _symmetric(value)
     if np.linalg.eigvalsh(matrix).min() < -1e-9 * np.abs(matrix).max():
-        raise PydanticCustomError("covariance", "expected a covariance: no negative eigenvalue")
+        raise PydanticCustomError("covariance", "expected a covariance, found a negative eigenvalue")
     return matrix
 
 

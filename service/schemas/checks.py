@@ -13,72 +13,72 @@ from .strict import Answer
 
 
 class FindingAnswer(Answer):
-    """Something doubtful."""
+    """A finding of a check."""
 
-    code: FindingCode = Field(description="stable; further ones may come")
+    code: FindingCode = Field(description="stable; later versions may add codes")
     message: str = Field(description="what is doubtful and what to do, for people")
     segments: list[Index] = Field(description="indices of the map's segments, the first 1,000")
     count: Index = Field(description="of all of them")
 
 
 class SizeAnswer(Answer):
-    """How much of a map there is."""
+    """Size of a map."""
 
     segment_count: Index = Field(description="how many segments it has, as sent")
-    walls: Index = Field(description="what they come to where collinear ones are one")
+    walls: Index = Field(description="number of walls, with collinear segments joined")
     length: float = Field(description="of the walls together, metres")
     diagonal: float = Field(description="of the box around them, metres")
 
 
 class AdviceAnswer(Answer):
-    """What the map's properties should be; null where nothing speaks for a value."""
+    """Recommended properties of the map; null: no recommendation."""
 
     sigma: float | None = Field(description="metres")
     oriented: bool | None
 
 
 class PlaceAnswer(Answer):
-    """A pose from which the map shows what it shows from another, too."""
+    """A pose at which a scan looks as at another one."""
 
     pose: PoseAnswer
-    similar_pose: PoseAnswer = Field(description="from where it shows about the same")
+    similar_pose: PoseAnswer = Field(description="the other pose")
 
 
 class SampleAnswer(Answer):
-    """What came of one scan in the map as it is."""
+    """Result of one scan in the map as it is."""
 
     index: Index
-    status: Literal["ok", "ambiguous", "degenerate", "no_match"] | None = Field(description="null: no time was left")
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"] | None = Field(
+        description="null: the deadline left no time for it"
+    )
     usable: bool
     pose: PoseAnswer | None
 
 
 class SamplesAnswer(Answer):
-    """What came of the sample scans."""
+    """Results of the sample scans."""
 
     usable: Index = Field(description="of them, in the map as it is")
     usable_as_advised: Index = Field(description="with the map's properties as advised")
-    wall_thickness: float | None = Field(
-        description="metres by which walls are thicker than drawn; null: nothing says so"
-    )
+    wall_thickness: float | None = Field(description="metres by which walls are thicker than drawn; null: no estimate")
     scans: list[SampleAnswer]
 
 
 class MapCheckAnswer(Answer):
-    """What is doubtful in a map by itself."""
+    """Check of a map without scans."""
 
-    findings: list[FindingAnswer] = Field(description="the weightiest first")
+    findings: list[FindingAnswer] = Field(description="the most important first")
     size: SizeAnswer
     advice: AdviceAnswer
-    places: list[PlaceAnswer] = Field(description="poses from which the map shows about the same as from another")
+    places: list[PlaceAnswer] = Field(description="poses at which a scan looks as at another pose")
     viewpoints: Index = Field(description="number of poses that were compared")
-    complete: bool = Field(description="false where the deadline left something out")
+    complete: bool = Field(description="false if the deadline ended the check early")
 
 
 class CheckAnswer(MapCheckAnswer):
-    """What is doubtful in a map, also beside sample scans."""
+    """Check of a map, with or without sample scans."""
 
-    samples: SamplesAnswer | None = Field(description="null where no scans were sent")
+    samples: SamplesAnswer | None = Field(description="null without scans")
     map: MapReference
     client_ref: Any = Field(description="as sent")
     request_id: str

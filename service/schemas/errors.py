@@ -76,7 +76,7 @@ class TooManyError(RequestError):
 
     def __str__(self) -> str:
         """Name the limit."""
-        return f"at most {self.limit} {self.what} are taken"
+        return f"expected at most {self.limit} {self.what}, found more; see /v1/limits"
 
 
 class BodyTooLargeError(RequestError):
@@ -93,4 +93,4 @@ class BodyTooLargeError(RequestError):
 
     def __str__(self) -> str:
         """Name the limit."""
-        return f"a body has at most {self.max_bytes} bytes, unpacked"
+        return f"expected a body of at most {self.max_bytes} bytes, unpacked; found more"

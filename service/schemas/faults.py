@@ -1,4 +1,4 @@
-"""What pydantic complains of, in words of the contract: places of the request, and no echo of what was sent."""
+"""Faults that pydantic finds, in words of the contract, without an echo of the request."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .limits import MAX_FAULTS
 from .parts import TAGS
 
 _PLAIN = re.compile(r"^[A-Za-z0-9_.-]{1,40}$")
-# pydantic's own messages for these types repeat what was sent, or speak of Python.
+# pydantic's own messages for these types repeat the request, or use terms of Python.
 _MESSAGES: dict[str, str] = {
-    "extra_forbidden": "unknown field",
-    "missing": "missing",
+    "extra_forbidden": "unknown field; correct its name or remove it",
+    "missing": "expected this field, found none",
     "model_type": "expected an object",
     "model_attributes_type": "expected an object",
     "union_tag_invalid": "expected an object",
@@ -25,7 +25,17 @@ _MESSAGES: dict[str, str] = {
     "int_from_float": "expected an integer",
     "bool_type": "expected true or false",
     "string_type": "expected a string",
-    "string_pattern_mismatch": "does not match the pattern",
+    "literal_error": "expected {expected}",
+    "greater_than_equal": "expected at least {ge}",
+    "greater_than": "expected more than {gt}",
+    "less_than_equal": "expected at most {le}",
+    "less_than": "expected less than {lt}",
+    "string_too_short": "expected at least {min_length} characters",
+    "string_too_long": "expected at most {max_length} characters",
+    "too_short": "expected at least {min_length} items, found {actual_length}",
+    "too_long": "expected at most {max_length} items, found {actual_length}",
+    # All patterns of the contract are those of ids.
+    "string_pattern_mismatch": "expected only letters (A to Z, a to z), digits and the characters . _ -",
 }
 
 
@@ -36,12 +46,17 @@ def faults_of(items: Iterable[Mapping[str, Any]]) -> list[Fault]:
         place = _pointer(item["loc"])
         rows = item.get("ctx", {}).get("rows")
         if rows is None:
-            faults.append(Fault(place, _MESSAGES.get(item["type"], item["msg"])))
+            faults.append(Fault(place, _message(item)))
         else:
             faults.extend(Fault(f"{place}/{index}", message) for index, message in rows)
         if len(faults) >= MAX_FAULTS:
             break
     return faults[:MAX_FAULTS]
+
+
+def _message(item: Mapping[str, Any]) -> str:
+    message = _MESSAGES.get(item["type"])
+    return item["msg"] if message is None else message.format_map(item.get("ctx", {}))
 
 
 def _pointer(parts: Sequence[object]) -> str:

@@ -20,14 +20,14 @@ class NoteAnswer(Answer):
 
 
 class ReportAnswer(Answer):
-    """What was made of the files."""
+    """Report of an import."""
 
     format: str = Field(description="such as map_server, dxf, rosbag2")
     files: list[str]
     read: list[NoteAnswer]
-    merged: list[NoteAnswer] = Field(description="what became one")
-    dropped: list[NoteAnswer] = Field(description="what was left out, and why")
-    assumed: list[NoteAnswer] = Field(description="what nobody said")
+    merged: list[NoteAnswer] = Field(description="parts that were merged")
+    dropped: list[NoteAnswer] = Field(description="parts that were omitted, and why")
+    assumed: list[NoteAnswer] = Field(description="assumptions, where the files state nothing")
 
 
 class ImportedMapAnswer(Answer):
@@ -67,7 +67,8 @@ FORM: dict[str, Any] = {
             "type": "array",
             "minItems": 1,
             "items": {"type": "string", "format": "binary"},
-            "description": "the map and what it names: a yaml and its picture; told from fields by its filename",
+            "description": "the map and the files that it names, such as a yaml and its picture; a part with a "
+            "filename is a file",
         },
         "unknown": {
             "type": "string",
@@ -75,11 +76,14 @@ FORM: dict[str, Any] = {
         },
         "units": {"type": "string", "description": "of a drawing: mm, cm, dm, m, km, in, ft, yd, or metres per unit"},
         "layers": {"type": "string", "description": "patterns such as *WALL*, comma separated"},
-        "point": {"type": "string", "description": "a free place, `x y` in metres; may be there several times"},
-        "drawn": {"enum": ["faces", "centres"], "description": "what the lines of a drawing are of walls"},
-        "thickness": {"type": "string", "description": "of walls drawn by their centre line, metres"},
+        "point": {"type": "string", "description": "a free place, `x y` in metres; may be repeated"},
+        "drawn": {
+            "enum": ["faces", "centres"],
+            "description": "whether lines of a drawing are faces or centre lines of walls",
+        },
+        "thickness": {"type": "string", "description": "of walls drawn as centre lines, metres"},
         "directions": {"enum": ["drawn", "none"], "description": "whether free space lies on the left of the lines"},
-        "local_metres": {"enum": ["true", "false"], "description": "whether a GeoJSON has metres"},
+        "local_metres": {"enum": ["true", "false"], "description": "whether a GeoJSON is in metres"},
         "topic": {"type": "string", "description": "of the grid in a bag"},
     },
 }

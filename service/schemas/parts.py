@@ -39,20 +39,21 @@ class MapDocument(Strict):
 
     segments: MapSegmentRows = Field(description="`[x1, y1, x2, y2]` each, metres, free space on the left")
     sigma: MapSigma | None = Field(
-        None, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
+        None, description="standard deviation of the map's lines, normal to the lines, metres; null: estimated"
     )
     oriented: bool | None = Field(
         None,
-        description="false: directions of its segments mean nothing; null: they do; a request's option goes first",
+        description="whether free space lies on the left of its segments; null: true; a request's option has "
+        "precedence",
     )
     frame_id: FrameId = Field("map", description="frame of the map, as `frame_id` of the answer")
-    meta: FreeJson = Field(None, description="given back as it was sent")
+    meta: FreeJson = Field(None, description="returned as it was sent")
 
 
 class InlineMap(MapDocument):
     """A map in the request itself."""
 
-    meta: FreeJson = Field(None, description="taken, so that a map's file may be sent as it is, and not used")
+    meta: FreeJson = Field(None, description="not used; allowed, so that a map file may be sent unchanged")
 
 
 class StoredMap(Strict):
@@ -73,17 +74,20 @@ def _map_kind(value: Any) -> str | None:
 AnyMap = Annotated[
     Annotated[InlineMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)],
     Discriminator(
-        _map_kind, custom_error_type="one_of", custom_error_message="expected exactly one of segments and map_id"
+        _map_kind,
+        custom_error_type="one_of",
+        custom_error_message="expected exactly one of segments and map_id, found both or neither",
     ),
 ]
 
 
 class _Scan(Strict):
     frame_id: FrameId = Field("laser", description="frame of the scan, as `child_frame_id` of the answer")
-    stamp: FreeJson = Field(None, description="given back as it was sent")
+    stamp: FreeJson = Field(None, description="returned as it was sent")
     viewpoint: Point | None = Field(
         default_factory=lambda: [0.0, 0.0],
-        description="where the sensor stood, metres; null: not from one place, so lines of sight are no evidence",
+        description="position of the sensor, metres; null: several positions, and lines of sight are not used as "
+        "evidence",
     )
 
     @property
@@ -100,7 +104,10 @@ class _Scan(Strict):
 def require_at_the_sensor(viewpoint: list[float] | None) -> None:
     """Refuse another viewpoint of ranges than where they were measured."""
     if viewpoint is not None and any(viewpoint):
-        raise PydanticCustomError("viewpoint", "beams start at the sensor: viewpoint is [0, 0] or null")
+        raise PydanticCustomError(
+            "viewpoint",
+            "expected [0, 0] or null for ranges, because beams start at the sensor; send the mount as `pose` of a view",
+        )
 
 
 class MeasuredFields(Strict):
@@ -111,7 +118,7 @@ class MeasuredFields(Strict):
         0.02, description="standard deviation of single points normal to the wall, metres; of all or of each segment"
     )
     point_counts: PointCounts | None = Field(
-        None, description="points behind each segment; default length / 0.05, and 2 behind all of one wall"
+        None, description="number of points on each segment; default length / 0.05, and at least 2 on each wall"
     )
     centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
     spreads: Spreads | None = Field(None, description="their second moment along the segment, m^2; with `centroids`")
@@ -119,7 +126,9 @@ class MeasuredFields(Strict):
     @model_validator(mode="after")
     def _both_moments(self) -> MeasuredFields:
         if (self.centroids is None) != (self.spreads is None):
-            raise PydanticCustomError("moments", "centroids and spreads come together")
+            raise PydanticCustomError(
+                "moments", "expected both centroids and spreads, found one of them; send both or neither"
+            )
         return self
 
 
@@ -130,7 +139,7 @@ class SegmentScan(_Scan, MeasuredFields):
 class Header(Strict):
     """The header of a LaserScan message: `stamp` and `frame_id` of the scan, where it says nothing of them itself."""
 
-    stamp: FreeJson = Field(None, description="given back as it was sent")
+    stamp: FreeJson = Field(None, description="returned as it was sent")
     frame_id: FrameId = Field("", description="frame of the scan where it names none itself")
     seq: Any = Field(None, description="of ROS 1; not used")
 
@@ -148,9 +157,9 @@ class Laser(Strict):
     """One turn of a scanner, as in a LaserScan message."""
 
     angle_min: Angle = Field(description="radians, of the first beam")
-    angle_increment: Increment = Field(description="radians from beam to beam; negative for one that turns clockwise")
+    angle_increment: Increment = Field(description="radians from beam to beam; negative for a clockwise scanner")
     ranges: Ranges = Field(
-        description="metres; null or below range_min: nothing is known of that beam; above range_max: nothing came back"
+        description="metres; null or below range_min: unknown; above range_max: no return, so free space"
     )
     range_min: Annotated[float, Field(ge=0.0, le=1e9)] | None = Field(None, description="metres")
     range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
@@ -159,11 +168,11 @@ class Laser(Strict):
     header: Header | None = Field(None, description="of a LaserScan message")
     time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
         None,
-        description="seconds from beam to beam; with a `twist` every beam is taken to where the sensor was; without "
-        "it the covariance is wider, and the answer has the warning `motion_unknown`",
+        description="seconds from beam to beam; with a `twist` the motion during the scan is corrected; without it "
+        "the covariance is wider, and the answer has the warning `motion_unknown`",
     )
     angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
-        None, description="radians, of the last beam; has to agree with the other angles within 1.5 beams"
+        None, description="radians, of the last beam; must agree with the other angles within 1.5 beams"
     )
     scan_time: Any = Field(None, description="of a LaserScan message; not used")
     intensities: Any = Field(None, description="of a LaserScan message; not used")
@@ -183,7 +192,9 @@ class Twist(Strict):
 def require_times(laser: Laser, twist: Twist | None) -> None:
     """Refuse a motion of which it is not known when each beam was measured."""
     if twist is not None and laser.time_increment is None:
-        raise PydanticCustomError("twist", "a twist needs the laser's time_increment")
+        raise PydanticCustomError(
+            "twist", "a twist requires time_increment of the laser, found none; send time_increment, or omit the twist"
+        )
 
 
 class LaserScan(_Scan):
@@ -193,8 +204,8 @@ class LaserScan(_Scan):
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
     twist: Twist | None = Field(
         None,
-        description="how the sensor moved meanwhile, in its own frame, 0 where it stood still; the pose is that at the "
-        "first beam",
+        description="velocity of the sensor during the scan, in its own frame; 0: at rest; the pose of the answer is "
+        "that of the first beam",
     )
 
     @property
@@ -241,13 +252,13 @@ def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None
 
 
 class SoftPriorFields(Pose):
-    """A Gaussian over the pose: it scores, and is never fused into pose or covariance."""
+    """A Gaussian over the pose. It is part of the score, and never fused into pose or covariance."""
 
     covariance: Covariance = Field(description="of additive (x, y, theta); m^2, m rad, rad^2; positive definite")
 
 
 class HardPriorFields(Pose):
-    """A window that the answer must lie in."""
+    """A window that must contain the answer."""
 
     radius: Annotated[float, Field(gt=0.0, le=1e6)] = Field(description="metres around (x, y)")
     angle: Annotated[
@@ -269,7 +280,7 @@ AnyPrior = Annotated[
     Discriminator(
         _prior_kind,
         custom_error_type="one_of",
-        custom_error_message="expected exactly one of covariance, and radius with angle",
+        custom_error_message="expected exactly one of covariance, or radius with angle",
     ),
 ]
 
@@ -278,22 +289,22 @@ class SearchOptions(Strict):
     """How to search, and what to put into the answer."""
 
     max_alternatives: Annotated[int, Field(ge=0, le=50)] = Field(
-        5, description="how many other poses to report at most"
+        5, description="largest number of other poses to return"
     )
     confidence: Annotated[float, Field(ge=0.5, le=1.0)] = Field(
         0.9999, description="probability of not missing a better pose at which the search ends"
     )
-    exhaustive: bool = Field(False, description="try every base, whatever the confidence")
+    exhaustive: bool = Field(False, description="try every base, independent of `confidence`")
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of random sampling")
     sampling: Literal["ordered", "random"] = Field(
-        "ordered", description="how bases are drawn: the telling and cheap ones first, or by `seed`"
+        "ordered", description="order of the bases: informative and cheap ones first, or random by `seed`"
     )
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
-        None, description="milliseconds; at most `max_deadline_ms` of /v1/limits, which a longer one is cut to"
+        None, description="milliseconds; a longer one than `max_deadline_ms` of /v1/limits is shortened to it"
     )
     oriented: bool | None = Field(
         None,
-        description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
+        description="whether free space lies on the left of segments; null: as the map states, else true",
     )
     offset_tolerance: Annotated[float, Field(ge=1e-3, le=0.4)] | None = Field(
         None, description="gate for offsets between scan lines and walls, metres; null: from the sigmas"
@@ -302,7 +313,7 @@ class SearchOptions(Strict):
         None, description="gate for angles between scan lines and walls, radians; null: from the sigmas"
     )
     min_overlap: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        0.5, description="fraction of a scan segment's length that has to lie on the map"
+        0.5, description="fraction of a scan segment's length that must lie on the map"
     )
     estimator: Literal["joint", "one_step"] = Field(
         "joint", description="estimator of the final pose; `one_step` is the published closed form"
@@ -311,5 +322,5 @@ class SearchOptions(Strict):
     include: list[IncludeName] = Field(
         default_factory=lambda: list(EVERYTHING),
         max_length=16,
-        description="parts of the answer; `causes`, which costs time, only where it is named",
+        description="parts of the answer; `causes` takes additional time and is not among the defaults",
     )

@@ -68,7 +68,7 @@ class AmbiguityAnswer(Answer):
 
 
 class RegistrationDiagnosticsAnswer(Answer):
-    """Numbers beside the pose."""
+    """Diagnostics of a registration."""
 
     ambiguity: AmbiguityAnswer = Field(description="at the answered pose")
     ambiguity_before: AmbiguityAnswer = Field(description="at T = 0")
@@ -84,7 +84,7 @@ class RegistrationDiagnosticsAnswer(Answer):
 
 
 class Residual(Answer):
-    """How far one pair is from fitting."""
+    """Residuals of one pair."""
 
     scan: Index
     map: Index
@@ -100,7 +100,9 @@ class RegisterAnswer(Answer):
     usable: bool = Field(description="ok, and chi2 below its 99.9 % quantile")
     pose: PoseAnswer | None
     covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
-    unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is free")
+    unobservable: Row2 | None = Field(
+        description="unit vector in the map frame along which the position is unobservable"
+    )
     residuals: list[Residual]
     diagnostics: RegistrationDiagnosticsAnswer
     request_id: str
@@ -118,7 +120,7 @@ class CorrespondenceAnswer(Residual):
     """A scan segment found on a map segment."""
 
     view: Index | None = Field(None, description="of a scan of several views; `scan` is an index in it")
-    overlap: Share = Field(description="share of the scan segment's length that lies on the map")
+    overlap: Share = Field(description="fraction of the scan segment's length that lies on the map")
     alternatives: list[Index] = Field(description="other map segments that pass the gates")
 
 
@@ -145,10 +147,10 @@ class CriticalWallAnswer(Answer):
 
 
 class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
-    """Numbers beside the pose."""
+    """Diagnostics of a search."""
 
-    inlier_fraction: float = Field(description="share of the scan's length that is matched")
-    score: float = Field(description="log-likelihood over that of a scan that is all clutter, nats")
+    inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
+    score: float = Field(description="log-likelihood minus that of a scan of clutter alone, nats")
     runner_up: float | None = Field(
         description="score of the best other pose over `score`; null: no other pose above `search.complete_above` of it"
     )
@@ -156,41 +158,41 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
         description="`score` minus that of the best other pose, nats; null: no other pose above "
         "`search.complete_above` of `score`"
     )
-    significance: float = Field(description="probability that chance scores as high; small is good")
+    significance: float = Field(description="probability of a score as high by chance; small is good")
     critical_wall: CriticalWallAnswer | None = Field(
-        description="the wall without which the pose would move most or be free"
+        description="the wall whose removal would move the pose most, or make it unobservable"
     )
 
 
 class SearchAnswer(Answer):
-    """How the search went."""
+    """Statistics of the search."""
 
     complete: bool = Field(description="false when deadline or budget ended it early")
-    exhaustive: bool = Field(description="whether every pair of segments was tried; only of a complete search")
-    confidence: float = Field(description="reached probability of not having missed a better pose")
+    exhaustive: bool = Field(description="whether every pair of segments was tried; true only for a complete search")
+    confidence: float = Field(description="reached probability that no better pose was missed")
     bases: Index = Field(description="bases that were tried")
     hypotheses: Index = Field(description="poses that the bases proposed")
-    verified: Index = Field(description="poses that were scored to the end")
+    verified: Index = Field(description="poses that were scored completely")
     seed: int = Field(description="as of the options")
     sampling: Literal["ordered", "random"] = Field(description="as of the options")
     complete_above: float = Field(
-        description="share of the best score above which no pose was missed whose matches agree within their "
-        "tolerances; 1 where the search is not complete"
+        description="fraction of the best score above which no pose was missed whose matches agree within their "
+        "tolerances; 1 for an incomplete search"
     )
 
 
 class WarningAnswer(Answer):
-    """Something to know about the scan, the map or the search."""
+    """A warning about the scan, the map or the search."""
 
-    code: WarningCode = Field(description="stable; further ones may come")
+    code: WarningCode = Field(description="stable; later versions may add codes")
     message: str = Field(description="what is wrong and what to do, for people")
 
 
 class ReasonAnswer(Answer):
     """Why an answer is not usable."""
 
-    code: ReasonCode = Field(description="stable; further ones may come")
-    message: str = Field(description="the reason in one sentence, for people")
+    code: ReasonCode = Field(description="stable; later versions may add codes")
+    message: str = Field(description="the reason and what to do, for people")
 
 
 class MapReference(Answer):
@@ -201,13 +203,13 @@ class MapReference(Answer):
 
 
 class FoundAnswer(Answer):
-    """Where in a map a scan was taken."""
+    """Pose of a scan in a map, with the verdict."""
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
-    usable: bool = Field(description="the one flag that a robot gates on")
+    usable: bool = Field(description="whether a robot may use the pose")
     probability: Share | None = Field(
         description="calibrated probability that the pose is right, given that the robot is on this map; 0 for "
-        "`no_match`, null for `degenerate`, whose position is open along `unobservable`"
+        "`no_match`, null for `degenerate`, whose position is unobservable along `unobservable`"
     )
     message: str = Field(description="the verdict in words, for people")
     pose: PoseAnswer | None
@@ -217,16 +219,20 @@ class FoundAnswer(Answer):
     child_frame_id: str = Field(description="the scan's")
     stamp: Any = Field(description="as sent")
     correspondences: list[CorrespondenceAnswer] = Field([], description="where included")
-    unmatched_scan: list[Index] | list[SegmentOfView] = Field(description="of several views with the view")
-    missing_map: list[Index] = Field([], description="where included: map segments that should have been seen")
+    unmatched_scan: list[Index] | list[SegmentOfView] = Field(
+        description="scan segments without a match; of several views with the view"
+    )
+    missing_map: list[Index] = Field(
+        [], description="where included: map segments that the scan should contain, but does not"
+    )
     diagnostics: AssociationDiagnosticsAnswer | None
-    reasons: list[ReasonAnswer] = Field(description="why not usable, the weightiest first")
+    reasons: list[ReasonAnswer] = Field(description="why it is not usable, the most important first")
     alternatives: list[AlternativeAnswer] = Field([], description="where included: distinct poses, best first")
     search: SearchAnswer
     segments: list[Row4] | list[list[Row4] | None] | None = Field(
         None,
-        description="where included, and the scan came as ranges or points; of several views one list each, in the "
-        "frame that they share",
+        description="where included, for a scan of ranges or points: its segments; of several views one list each, "
+        "in their common frame",
     )
     warnings: list[WarningAnswer]
 
@@ -241,7 +247,7 @@ class AssociateAnswer(FoundAnswer):
 
 
 class Place(Answer):
-    """One wrong place of a request."""
+    """One fault of a request."""
 
     pointer: str = Field(description="JSON pointer")
     message: str
@@ -253,14 +259,14 @@ class Problem(Answer):
     type: str
     title: str
     status: Annotated[int, Field(ge=400, le=599)]
-    detail: str = Field(description="what is wrong; where `errors` are, the pointer and message of the first")
-    code: ProblemCode = Field(description="stable, for programs; further ones may come")
+    detail: str = Field(description="what is wrong; with `errors` the pointer and message of the first")
+    code: ProblemCode = Field(description="stable, for programs; later versions may add codes")
     request_id: str
     errors: Annotated[list[Place], Field(max_length=20)] = Field([])
 
 
 class BatchResult(Answer):
-    """One scan's answer, or why there is none."""
+    """One scan's answer, or its problem."""
 
     index: Index
     status_code: int
@@ -279,7 +285,7 @@ class BatchAnswer(Answer):
 
 
 class VectorizeAnswer(Answer):
-    """Segments, and what may be sent back with them in a scan."""
+    """Segments, with the fields that a scan of segments takes."""
 
     segments: list[Row4] = Field(description="`[x1, y1, x2, y2]`, metres, free space on the left")
     point_counts: list[int] = Field(description="points behind each")
@@ -300,15 +306,17 @@ class MapSummaryAnswer(Answer):
     revision: Annotated[int, Field(ge=1)]
     segment_count: Index = Field(description="how many segments it has")
     bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
-    sigma: float | None = Field(description="of its lines, metres; null where the map says nothing")
-    oriented: bool | None = Field(description="whether directions mean anything; null where the map says nothing")
+    sigma: float | None = Field(description="of its lines, metres; null: not stated")
+    oriented: bool | None = Field(description="whether free space lies on the left of its segments; null: not stated")
 
 
 class MapList(Answer):
     """One page of maps, by id."""
 
     maps: list[MapSummaryAnswer]
-    corrupt: list[str] = Field(description="ids on this page that are damaged: not served until they are put again")
+    corrupt: list[str] = Field(
+        description="ids of damaged maps on this page; each is rejected until it is stored again with PUT"
+    )
     next: str | None = Field(description="`cursor` of the next page")
 
 
@@ -319,7 +327,7 @@ class Live(Answer):
 
 
 class Version(Answer):
-    """What runs here."""
+    """Name and version of the service."""
 
     name: str
     version: str
@@ -327,7 +335,7 @@ class Version(Answer):
 
 
 class Limits(Answer):
-    """Beyond these a request is refused."""
+    """Limits of requests; a request beyond one is rejected."""
 
     max_body_bytes: int = Field(description="of a request, unpacked")
     max_values: int = Field(description="numbers, strings, arrays and objects in a request")
@@ -343,8 +351,8 @@ class Limits(Answer):
     max_segments_together: int = Field(description="segments of all views of one scan")
     max_correspondences: int = Field(description="of one registration")
     max_batch: int = Field(description="scans of one batch")
-    max_deadline_ms: float = Field(description="and the deadline where none is asked for")
-    searches: int = Field(description="that run at once")
+    max_deadline_ms: float = Field(description="largest deadline, and the default, milliseconds")
+    searches: int = Field(description="searches that run at once")
     queue: int = Field(description="requests that may wait for a search")
     max_magnitude: float = Field(description="of any number")
     min_segment_length: float = Field(description="metres")

@@ -30,7 +30,7 @@ class KnownMap(InlineMap):
     """The map side of known correspondences."""
 
     sigma: Sigma | None = Field(
-        0.0, description="standard deviation of the map's lines normal to themselves, metres; null: estimated"
+        0.0, description="standard deviation of the map's lines, normal to the lines, metres; null: estimated"
     )
 
 
@@ -50,7 +50,7 @@ class EstimatorOptions(Strict):
     evaluate_at: Pose | None = Field(None, description="also give the ambiguity at this pose")
     oriented: bool | None = Field(
         None,
-        description="false: directions of segments mean nothing; null: as the map says, true where it says nothing",
+        description="whether free space lies on the left of segments; null: as the map states, else true",
     )
 
 
@@ -72,9 +72,9 @@ class AssociateRequest(Strict):
 
     map: AnyMap = Field(description="the map to search, or the id of a stored one")
     scan: AnyScan = Field(description="as segments, ranges, points or views")
-    prior: AnyPrior | None = Field(None, description="what is known of the pose; null: nothing")
+    prior: AnyPrior | None = Field(None, description="prior knowledge of the pose; null: none")
     options: SearchOptions = SearchOptions()
-    client_ref: FreeJson = Field(None, description="given back as it was sent")
+    client_ref: FreeJson = Field(None, description="returned as it was sent")
 
 
 class BatchRequest(Strict):
@@ -87,7 +87,7 @@ class BatchRequest(Strict):
         None, description="as `prior` of /v1/associate or null, one per scan"
     )
     options: SearchOptions = SearchOptions()
-    client_ref: FreeJson = Field(None, description="given back as it was sent")
+    client_ref: FreeJson = Field(None, description="returned as it was sent")
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
@@ -95,7 +95,9 @@ class BatchRequest(Strict):
         if limits is not None and len(self.scans) > limits.batch:
             raise TooManyError("/scans", limits.batch, "scans")
         if self.priors is not None and len(self.priors) != len(self.scans):
-            raise PydanticCustomError("priors", "expected one prior, or null, per scan")
+            raise PydanticCustomError(
+                "priors", f"expected one prior or null for each of {len(self.scans)} scans, found {len(self.priors)}"
+            )
         return self
 
 
@@ -116,17 +118,19 @@ class CheckRequest(Strict):
         description="each as `scan` of /v1/associate"
     )
     poses: Annotated[list[Pose | None], Field(max_length=MOST_SAMPLES)] | None = Field(
-        None, description="one per scan, or null; of the scan's frame in the map's, as their sender has it"
+        None, description="one per scan, or null: the known or assumed pose of the scan's frame in the map frame"
     )
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
-        None, description="milliseconds; what it leaves no time for is left out"
+        None, description="milliseconds; parts that it leaves no time for are omitted"
     )
-    client_ref: FreeJson = Field(None, description="given back as it was sent")
+    client_ref: FreeJson = Field(None, description="returned as it was sent")
 
     @model_validator(mode="after")
     def _as_many(self) -> CheckRequest:
         if self.poses is not None and len(self.poses) != len(self.scans):
-            raise PydanticCustomError("poses", "expected one pose, or null, per scan")
+            raise PydanticCustomError(
+                "poses", f"expected one pose or null for each of {len(self.scans)} scans, found {len(self.poses)}"
+            )
         return self
 
 
@@ -134,8 +138,8 @@ class VectorizeOptions(Strict):
     """How to cut points into segments."""
 
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
-    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(4, description="least number behind a segment")
-    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.1, description="of a segment, metres")
+    min_points: Annotated[int, Field(ge=3, le=1000)] = Field(4, description="least number of points on a segment")
+    min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.1, description="least length of a segment, metres")
     max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(
         None, description="metres between neighbours on one segment; null: by the angle between the beams"
     )
@@ -148,24 +152,26 @@ class VectorizeRequest(Strict):
     points: PointRows | None = Field(None, description="`[x, y]` each, metres, in scanning order")
     twist: Twist | None = Field(
         None,
-        description="how the sensor moved meanwhile, in its own frame, 0 where it stood still; segments are in that of "
-        "the first beam",
+        description="velocity of the sensor during the scan, in its own frame; 0: at rest; segments are in the frame "
+        "of the first beam",
     )
     viewpoint: Point | None = Field(
         default_factory=lambda: [0.0, 0.0],
-        description="where the sensor stood, metres: on the left of every segment; null: not from one place, as a "
-        "contour, and segments run as their points do",
+        description="position of the sensor, metres, on the left of every segment; null: several positions, for "
+        "example of a contour, and segments run in the order of their points",
     )
     options: VectorizeOptions = VectorizeOptions()
 
     @model_validator(mode="after")
     def _exactly_one(self) -> VectorizeRequest:
         if (self.laser is None) == (self.points is None):
-            raise PydanticCustomError("one_of", "expected either laser or points")
+            raise PydanticCustomError("one_of", "expected exactly one of laser and points, found both or neither")
         if self.laser is not None:
             require_times(self.laser, self.twist)
         elif self.twist is not None:
-            raise PydanticCustomError("twist", "a twist needs a laser: of points nobody knows when they were measured")
+            raise PydanticCustomError(
+                "twist", "a twist requires a laser, because points have no times; send a laser, or omit the twist"
+            )
         return self
 
     @field_validator("viewpoint")

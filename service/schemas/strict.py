@@ -49,9 +49,9 @@ def _free_json(value: Any) -> Any:
         depth += 1
         count += len(layer)
         if count > MAX_FREE_BYTES:  # each takes one at least
-            raise PydanticCustomError("too_long", f"longer than {MAX_FREE_BYTES} bytes of JSON")
+            raise PydanticCustomError("json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
         if depth > MAX_FREE_DEPTH:
-            raise PydanticCustomError("too_deep", f"nested more than {MAX_FREE_DEPTH} levels deep")
+            raise PydanticCustomError("too_deep", f"expected at most {MAX_FREE_DEPTH} levels of nesting, found more")
         inner: list[Any] = []
         for item in layer:
             if isinstance(item, dict):
@@ -60,7 +60,7 @@ def _free_json(value: Any) -> Any:
                 inner.extend(item)
         layer = inner
     if len(orjson.dumps(value)) > MAX_FREE_BYTES:
-        raise PydanticCustomError("too_long", f"longer than {MAX_FREE_BYTES} bytes of JSON")
+        raise PydanticCustomError("json_too_long", f"expected at most {MAX_FREE_BYTES} bytes of JSON, found more")
     return value
 
 
@@ -73,7 +73,7 @@ def in_radians(low: float, high: float, said: str) -> Callable[[float], float]:
 
     def check(value: float) -> float:
         if not low <= value <= high:
-            raise PydanticCustomError("radians", f"expected radians, {said}; is it in degrees?")
+            raise PydanticCustomError("radians", f"expected radians, {said}; check whether it is in degrees")
         return value
 
     return check
@@ -84,7 +84,7 @@ Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
 _TURNS = 4.0 * math.pi
 Angle = Annotated[
     float,
-    AfterValidator(in_radians(-_TURNS, _TURNS, "two turns either way at most")),
+    AfterValidator(in_radians(-_TURNS, _TURNS, "within 4 pi (two turns) of 0")),
     Field(json_schema_extra={"minimum": -_TURNS, "maximum": _TURNS}),
 ]
 Sigma = Annotated[float, Field(ge=0.0, le=1e3)]

@@ -39,15 +39,15 @@ class _View(Strict):
     flipped: bool = Field(False, description="mounted upside down: y becomes -y in the sensor's data before `pose`")
     covariance: StepCovariance | None = Field(
         None,
-        description="what is not known of the step from the view `relative_to`: of additive (x, y, theta) of this "
-        "pose in that one's frame; m^2, m rad, rad^2, deviations of 10 m and 10 rad at most; null: exact",
+        description="covariance of the step from the view `relative_to`: of additive (x, y, theta) of this pose in the "
+        "frame of that view; m^2, m rad, rad^2; deviations of at most 10 m and 10 rad; null: exact",
     )
     relative_to: Annotated[int, Field(ge=0)] | None = Field(
         None, description="index of the view that `covariance` is relative to; null: the scan's frame itself"
     )
     viewpoint: Point | None = Field(
         default_factory=lambda: [0.0, 0.0],
-        description="where the sensor stood in its own frame, metres; null: not from one place",
+        description="position of the sensor in its own frame, metres; null: several positions",
     )
 
 
@@ -60,7 +60,9 @@ class LaserView(_View):
 
     laser: Laser
     sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
-    twist: Twist | None = Field(None, description="how the sensor moved meanwhile, in its own frame; 0: it stood still")
+    twist: Twist | None = Field(
+        None, description="velocity of the sensor during the scan, in its own frame; 0: at rest"
+    )
 
     @model_validator(mode="after")
     def _from_the_sensor(self) -> LaserView:
@@ -97,7 +99,7 @@ class ViewsScan(Strict):
 
     views: list[AnyView] = Field(min_length=1, description="at most `max_views`")
     frame_id: FrameId = Field("base_link", description="frame that the views share; `child_frame_id` of the answer")
-    stamp: FreeJson = Field(None, description="given back as it was sent")
+    stamp: FreeJson = Field(None, description="returned as it was sent")
 
     @model_validator(mode="before")
     @classmethod
@@ -148,6 +150,6 @@ AnyScan = Annotated[
     Discriminator(
         _any_kind,
         custom_error_type="one_of",
-        custom_error_message="expected exactly one of segments, laser and points",
+        custom_error_message="expected exactly one of segments, laser, points and views",
     ),
 ]

@@ -56,7 +56,7 @@ def test_begins_and_ends_exchanged() -> None:
 def test_other_units(factor: float) -> None:
     """What was multiplied is to be divided again."""
     assert list(told(scaled(SCAN, factor))) == ["unit_scale"]
-    assert f"times {1.0 / factor:.4g} the scan" in told(scaled(SCAN, factor))["unit_scale"]
+    assert f"with all lengths times {1.0 / factor:.4g}: the" in told(scaled(SCAN, factor))["unit_scale"]
 
 
 def test_feet_are_named() -> None:
@@ -69,7 +69,7 @@ def test_a_map_of_another_unit(factor: float, said: str) -> None:
     found = told(SCAN, index_of(ROOM * factor))
     assert list(found) == ["unit_scale"]
     assert (
-        f"With all lengths times {factor:.4g} the scan fits much better: the map seems to be in {said}"
+        f"The scan fits much better with all lengths times {factor:.4g}: the map seems to be in {said}"
         in found["unit_scale"]
     )
 

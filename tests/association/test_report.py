@@ -44,7 +44,7 @@ from .scenes import (
 )
 
 SURE = Verdict(Status.OK, 0.97, True, pose(1.0, 2.0, 0.3), 20.0, 0.75, False, (), True)
-WHY = (Reason("similar_place", "Another pose explains the scan about as well."),)
+WHY = (Reason("similar_place", "Another pose fits the scan about as well."),)
 ROOMS = index_of(equal_rooms(4))
 
 

@@ -43,7 +43,7 @@ def test_most_of_the_returns_at_one_value(stuck: int, told: bool) -> None:
 def test_the_value_is_named() -> None:
     scan = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0), beams=beams_with(30, 0.05))
     [warning] = [w for w in answer_of(ROOM_INDEX, scan).warnings if w.code == "stuck_ranges"]
-    assert warning.message.startswith("30 of 40 ranges are 0.05 m to the digit")
+    assert warning.message.startswith("30 of 40 ranges are exactly 0.05 m")
 
 
 def test_a_few_returns_prove_nothing() -> None:

@@ -26,32 +26,33 @@ def searched(world: World, seen: Segments | None = None) -> AssociationResult:
 def test_one_place() -> None:
     result = searched(l_room())
     assert result.probability is not None
-    assert message_of(result) == f"The robot is here, with a chance of {100 * min(result.probability, 0.9999):.2f} %."
+    percent = 100 * min(result.probability, 0.9999)
+    assert message_of(result) == f"The robot is at this pose with a probability of {percent:.2f} %."
 
 
 @pytest.mark.parametrize(
-    ("world", "said"), [(rectangle_room(), "1 other place explains"), (square_room(), "3 other places explain")]
+    ("world", "said"), [(rectangle_room(), "1 other pose fits"), (square_room(), "3 other poses fit")]
 )
 def test_others_as_good(world: World, said: str) -> None:
-    assert message_of(searched(world)) == f"{said} the scan about as well: the robot cannot know which is right."
+    assert message_of(searched(world)) == f"{said} the scan about as well. The scan alone does not decide between them."
 
 
 def test_a_free_direction() -> None:
     sentence = message_of(searched(corridor()))
     assert sentence in (
-        "It cannot be told where along (1.00, 0.00) the robot is, nor which way round.",
-        "It cannot be told where along (-1.00, 0.00) the robot is, nor which way round.",
+        "The position along the direction (1.00, 0.00) is unknown, and the heading may be reversed.",
+        "The position along the direction (-1.00, 0.00) is unknown, and the heading may be reversed.",
     )
 
 
 def test_nothing() -> None:
-    assert message_of(searched(l_room(), NOTHING)) == "Nothing on this map explains the scan."
+    assert message_of(searched(l_room(), NOTHING)) == "No pose on this map explains the scan."
 
 
 def test_what_is_not_to_be_relied_on() -> None:
     room = l_room()
     result = searched(room)
     unsure = replace(result, usable=False, reasons=(), probability=0.62)
-    assert message_of(unsure) == (
-        "Most likely the robot is here, with a chance of 62.00 %, but that is not to be relied on."
+    assert (
+        message_of(unsure) == "The most likely pose has a probability of 62.00 %, which is not reliable: see `reasons`."
     )

@@ -95,7 +95,7 @@ def test_a_single_segment_is_degenerate() -> None:
     result = answer_of(index_of(ROOM), scan_of(seen(ROOM[:1], pose(3.0, 2.0, 0.2))[0]))
     assert result.status is Status.DEGENERATE
     assert (result.usable, result.probability) == (False, None)
-    assert message_of(result).startswith("It cannot be told where along")
+    assert message_of(result).startswith("The position along the direction")
 
 
 def test_an_empty_scan_matches_nothing() -> None:

@@ -36,7 +36,7 @@ def test_a_grid_becomes_a_map_file(linefix: Linefix, folder: Path, patient: Runn
     assert json.loads((folder / "room.json").read_text())["segments"] == expected.segments.endpoints.tolist()
     assert [row.split()[0] for row in told.out.splitlines()[:3]] == ["from", "map", "read"]
     assert "room.yaml, room.pgm (map_server)" in told.out
-    assert "walls are taken to lie" in told.out
+    assert "wall surfaces are assumed" in told.out
     assert "finding" in told.out
     with Image.open(folder / "room.png") as picture:
         assert picture.size[0] > 1000
@@ -57,7 +57,7 @@ def test_what_a_drawing_does_not_say_is_said_by_options(linefix: Linefix) -> Non
         (("plan.csv", "--units", "parsec"), 3, "--units: expected one of mm"),
         (("plan.csv", "--point", "99", "99"), 3, "--point: lies on a line or outside"),
         (("plan.csv", "--out", "plan.dwg"), 3, "plan.dwg: expected a name"),
-        (("broken.svg", "--units", "m"), 3, "broken.svg: is no XML"),
+        (("broken.svg", "--units", "m"), 3, "broken.svg: is not XML"),
     ],
     ids=["file", "units", "point", "out", "content"],
 )
@@ -71,7 +71,7 @@ def test_what_is_wrong_is_told_in_one_line(
 def test_a_server_names_the_file_and_the_option(linefix: Linefix, folder: Path, patient: RunningService) -> None:
     (folder / "plan.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><rect width="4" height="3"/></svg>')
     asked = ("map", "import", "plan.svg", "--server", patient.url)
-    assert "linefix: plan.svg: does not say its unit" in refused(linefix(*asked), 3)
+    assert "linefix: plan.svg: does not state its unit" in refused(linefix(*asked), 3)
     assert "linefix: --units: expected one of mm" in refused(linefix(*asked, "--units", "parsec"), 3)
 
 
@@ -120,7 +120,7 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
         *asked, "--thickness", str(2 * THICK)
     ).out  # who says how thick they are is not contradicted, but told
     assert "finding  mirrored" not in told  # though scans that fit badly fit a little better so
-    assert re.search("finding  thickness: The scans fit better where walls are (19|20) cm thinner", told)
+    assert re.search("finding  thickness: The scans fit better if walls are (19|20) cm thinner", told)
     assert "of 5 usable" in told
     assert "leave --server out" in refused(linefix(*asked, "--server", "http://127.0.0.1:9"), 2)
 

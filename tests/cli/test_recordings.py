@@ -106,7 +106,7 @@ def test_the_grid_of_a_recording_that_is_the_map_is_named(linefix: Linefix, fold
         ended = linefix(*command)
         assert ended.code == 0, ended.err
         assert ended.err.count("the grid of /map (140 x 120 cells of 0.1 m) is the map; not /local_costmap") == 1
-        assert ended.err.count("grids of /map, of which the last is taken (1)") == 1
+        assert ended.err.count("grids of /map, of which the last is used (1)") == 1
     assert "the grid of" not in linefix("locate", "room.json", "points.json").err
 
 

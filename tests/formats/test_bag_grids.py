@@ -62,7 +62,7 @@ def test_a_topic_called_map_goes_before_others(tmp_path: Path) -> None:
 )
 def test_where_it_is_not_clear_the_topics_are_listed(tmp_path: Path, grids: dict[str, Any]) -> None:
     first, second = grids
-    with pytest.raises(IncompleteFileError, match=rf"{first} \(60 x 50 .*\), {second} \(60 x 50 .*\); .* --topic"):
+    with pytest.raises(IncompleteFileError, match=rf"{first} \(60 x 50 .*\), {second} \(60 x 50 .*\); .*--topic"):
         read(tmp_path, grids)
     if "costmap" not in first:
         assert len(read(tmp_path, grids, second.lstrip("/")).map.segments) == 4
@@ -113,8 +113,8 @@ def test_a_turned_grid_is_turned(tmp_path: Path) -> None:
         ((0.0, 0.0, 0.0), (0.0, 0.0, math.nan, 1.0), "info.origin is not finite: .* orientation .*nan"),
         ((math.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "info.origin is not finite: position .*nan"),
         ((0.0, math.inf, 0.0), (0.0, 0.0, 0.0, 0.0), "info.origin is not finite"),
-        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "does not lie flat"),
-        ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0, 0.9), "does not lie flat"),
+        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), "is not horizontal"),
+        ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0, 0.9), "is not horizontal"),
     ],
 )
 def test_an_origin_that_is_none_is_refused(

@@ -53,7 +53,7 @@ def test_lines_that_meet_in_the_middle_of_others_are_centre_lines(tmp_path: Path
     assert thickness(imported) == [0.2] * len(HOUSE)
     assert list(assumed(imported)) == ["centres", "thickness_usual"]
     assert "0.2 m thick" in assumed(imported)["thickness_usual"]
-    assert "drawn faces" in assumed(imported)["centres"]
+    assert "drawn to faces" in assumed(imported)["centres"]
     # Outside four faces, four in a room, in the two that the door parts five, and two ends at the door.
     assert len(imported.map.segments) == 4 + 4 + 2 * 5 + 2
     corners = {tuple(point) for point in imported.map.segments.endpoints.round(4).reshape(-1, 2).tolist()}

@@ -65,7 +65,7 @@ def test_the_unit_of_a_dxf_is_its_own_or_the_callers(tmp_path: Path) -> None:
     closed(document, [(1e3 * x, 1e3 * y) for x, y in SQUARE])
     assert rows(read_map(dxf(tmp_path, document))) == lines_of(SQUARE)
     document.header["$INSUNITS"] = 0
-    with pytest.raises(IncompleteFileError, match="say units"):
+    with pytest.raises(IncompleteFileError, match="set the option units"):
         read_map(dxf(tmp_path, document))
     assert rows(read_map(dxf(tmp_path, document), ImportOptions(units="mm"))) == lines_of(SQUARE)
     assert rows(read_map(dxf(tmp_path, document), ImportOptions(units=0.001))) == lines_of(SQUARE)
@@ -241,9 +241,9 @@ DEEP = '{"type": "GeometryCollection", "geometries": [' * 8 + "]}" * 8
     ("name", "content", "kind", "message"),
     [
         ("a.dxf", "  \n", MalformedFileError, "is empty"),
-        ("a.dxf", "nothing of the kind", MalformedFileError, "is no DXF"),
+        ("a.dxf", "nothing of the kind", MalformedFileError, "is not a DXF"),
         ("a.dxf", "AC1032\0\0\0", UnsupportedFormatError, "save it as DXF"),
-        ("a.svg", "<svg", MalformedFileError, "is no XML"),
+        ("a.svg", "<svg", MalformedFileError, "is not XML"),
         ("a.svg", "<html/>", MalformedFileError, "expected an svg element"),
         ("a.svg", LAUGHS, MalformedFileError, "declares XML entities"),
         ("a.svg", SVG.format(NESTED_SVG), TooLargeError, "64 in one another"),
@@ -261,17 +261,17 @@ DEEP = '{"type": "GeometryCollection", "geometries": [' * 8 + "]}" * 8
             "line 1: x1 of a line element",
         ),
         ("a.svg", SVG.format("<text/>"), MalformedFileError, "has no lines"),
-        ("a.geojson", "[1, 2]", MalformedFileError, "is no GeoJSON"),
-        ("a.geojson", '{"type": "LineString", "coordinates": [["a", 1], [2, 3]]}', MalformedFileError, "no number"),
-        ("a.geojson", '{"type": "LineString", "coordinates": [1, 2]}', MalformedFileError, "no [x, y]"),
-        ("a.geojson", DEEP, MalformedFileError, "collections in collections"),
-        ("a.json", "[" * 5000, MalformedFileError, "is no JSON"),
+        ("a.geojson", "[1, 2]", MalformedFileError, "is not GeoJSON"),
+        ("a.geojson", '{"type": "LineString", "coordinates": [["a", 1], [2, 3]]}', MalformedFileError, "not a number"),
+        ("a.geojson", '{"type": "LineString", "coordinates": [1, 2]}', MalformedFileError, "not [x, y]"),
+        ("a.geojson", DEEP, MalformedFileError, "nested collections"),
+        ("a.json", "[" * 5000, MalformedFileError, "is not JSON"),
         ("a.json", '{"segments": [[0, 0, 1]]}', MalformedFileError, "[x1, y1, x2, y2]"),
         ("a.json", '{"segments": [[0, 0, 1, true]]}', MalformedFileError, "[x1, y1, x2, y2]"),
-        ("a.json", '{"segments": [[0, 0, 1e10, 0]]}', MalformedFileError, "beyond 1e+09 m: is the unit right?"),
+        ("a.json", '{"segments": [[0, 0, 1e10, 0]]}', MalformedFileError, "beyond 1e+09 m; check the unit"),
         ("a.json", '{"segments": [[0, 0, 1, 0]], "sigma": -1}', MalformedFileError, "sigma"),
         ("a.csv", "0,0,4\n", MalformedFileError, "expected rows"),
-        ("a.csv", "0,0,4,nan\n", MalformedFileError, "no number up to 1e+13"),
+        ("a.csv", "0,0,4,nan\n", MalformedFileError, "not a number up to 1e+13"),
         ("a.csv", "\xff", MalformedFileError, "has no lines|UTF-8|expected rows"),
         ("a.dwg", "", UnsupportedFormatError, "ends in one of"),
     ],

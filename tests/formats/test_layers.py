@@ -30,7 +30,7 @@ def test_layers_whose_names_say_wall_are_taken_alone(tmp_path: Path) -> None:
     imported = read_map(saved(tmp_path, document))
     assert len(imported.map.segments) == 4
     (said,) = [note.message for note in imported.report.assumed if note.code == "layers"]
-    assert said.startswith("walls are on Außenwand, by the name, and not on A-FURN")
+    assert said.startswith("walls are on Außenwand, by their names, and not on A-FURN")
     assert len(read_map(saved(tmp_path, document), ImportOptions(layers=("*",))).map.segments) == 8
     document.layers.add("A-FURN")
     document.layers.get("A-FURN").off()

@@ -318,7 +318,11 @@ def test_where_it_is_not_clear_the_user_chooses(tmp_path: Path) -> None:
     bag = Robots("mcap", tmp_path)
     two_robots(bag, scans=("/scan",))
     path = bag.done()
-    with pytest.raises(IncompleteFileError, match=r"/robot1, /robot2; choose one by tf_namespace") as caught:
+    with pytest.raises(
+        IncompleteFileError,
+        match=r"/robot1, /robot2; choose one with the option "
+        "tf_namespace",
+    ) as caught:
         list(read_log(path))
     assert "/scan" in str(caught.value)
     for wanted in ("/robot2", "robot2/", "/robot2/tf"):
@@ -334,7 +338,7 @@ def test_another_robots_transforms_are_never_taken(tmp_path: Path) -> None:
     bag.drive("/robot2/tf", "odom", "base_link")
     bag.scan(SECOND, "/robot1/scan")
     bag.scan(SECOND, "/robot2/scan")
-    with pytest.raises(IncompleteFileError, match="not clear whose transforms"):
+    with pytest.raises(IncompleteFileError, match="the namespace of the transforms is ambiguous"):
         read(bag, LogOptions(topic="/robot1/scan"))
 
 

@@ -278,8 +278,14 @@ def test_a_bag_names_no_files_but_its_own(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "spoilt", "how", "error", "message"),
     [
-        ("bag", "robot.bag", cut, MalformedFileError, "is a broken bag: .*; .* `rosbag reindex` mends it"),
-        ("mcap", "robot_mcap/robot_mcap.mcap", cut, MalformedFileError, "is a broken bag: .*; .* `mcap recover` mends"),
+        ("bag", "robot.bag", cut, MalformedFileError, "is a broken bag: .*; .* `rosbag reindex` repairs it"),
+        (
+            "mcap",
+            "robot_mcap/robot_mcap.mcap",
+            cut,
+            MalformedFileError,
+            "is a broken bag: .*; .* `mcap recover` repairs",
+        ),
         ("sqlite3", "robot_sqlite3/robot_sqlite3.db3", cut, MalformedFileError, "is a broken bag: [^;]*$"),
     ],
 )

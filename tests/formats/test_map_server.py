@@ -144,16 +144,16 @@ def test_the_report_counts_what_it_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("yaml", "kind", "message"),
     [
-        ("image: [", MalformedFileError, "is no YAML"),
+        ("image: [", MalformedFileError, "is not YAML"),
         ("- 1", MalformedFileError, "expected a YAML mapping"),
-        ("!!python/object/apply:os.system ['true']", MalformedFileError, "is no YAML"),
-        ("image: map.pgm\norigin: [0, 0, 0]", IncompleteFileError, "does not say resolution"),
+        ("!!python/object/apply:os.system ['true']", MalformedFileError, "is not YAML"),
+        ("image: map.pgm\norigin: [0, 0, 0]", IncompleteFileError, "has no resolution"),
         (YAML.replace("0.05", "-1"), MalformedFileError, "expected resolution to be a number from 0.001 to 10"),
         (YAML.replace("0.05", ".nan"), MalformedFileError, "expected resolution"),
         (YAML.replace("[{origin}]", "[0, .inf, 0]"), MalformedFileError, "expected origin"),
         (YAML.replace("{image}", "nothing.pgm"), IncompleteFileError, "nothing.pgm: there is no such file"),
-        (YAML.replace("{image}", "map.yaml"), MalformedFileError, "is no picture"),
-        ("[" * 3_000, MalformedFileError, "is no YAML"),
+        (YAML.replace("{image}", "map.yaml"), MalformedFileError, "is not a picture"),
+        ("[" * 3_000, MalformedFileError, "is not YAML"),
         ("#" * 17_000, TooLargeError, "at most 16384 bytes"),
     ],
 )

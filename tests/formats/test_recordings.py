@@ -269,10 +269,14 @@ def packed_under_its_name(path: Path) -> None:
 @pytest.mark.parametrize(
     ("how", "error", "message"),
     [
-        (several, IncompleteFileError, "several recordings: drive_0.mcap, other_0.mcap; name one"),
-        (packed, UnsupportedFormatError, r"compressed file by file \(drive_0.mcap.zstd\); unpack it first, by zstd -d"),
-        (packed_unlisted, UnsupportedFormatError, "unpack it first, by zstd -d"),
-        (packed_under_its_name, FormatError, "compressed as a whole; unpack it first"),
+        (several, IncompleteFileError, "several recordings: drive_0.mcap, other_0.mcap; choose one"),
+        (
+            packed,
+            UnsupportedFormatError,
+            r"compressed file by file \(drive_0.mcap.zstd\); decompress it first with zstd -d",
+        ),
+        (packed_unlisted, UnsupportedFormatError, "decompress it first with zstd -d"),
+        (packed_under_its_name, FormatError, "compressed as a whole; decompress it first"),
         (emptied, FormatError, "expected the folder of a bag, or a file that ends in one of"),
     ],
 )

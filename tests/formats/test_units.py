@@ -28,7 +28,7 @@ def noted(tmp_path: Path, units: int, drawn_in: float, options: ImportOptions | 
 def test_a_right_unit_is_not_doubted(tmp_path: Path, units: int) -> None:
     found = noted(tmp_path, units, IN_METRES[units])
     assert "unlikely_unit" not in found
-    assert found["unit"].endswith("as the file says: the drawing is 8 m by 5 m")
+    assert found["unit"].endswith("as the file states: the drawing is 8 m by 5 m")
 
 
 @pytest.mark.parametrize(
@@ -59,4 +59,4 @@ def test_a_drawing_of_millimetres_that_is_in_metres(tmp_path: Path) -> None:
 def test_the_unit_that_the_caller_says(tmp_path: Path) -> None:
     found = noted(tmp_path, 1, 0.001, ImportOptions(units="mm"))
     assert "unlikely_unit" not in found
-    assert found["unit"] == "1 unit is 0.001 m (mm), as the option says: the drawing is 8 m by 5 m"
+    assert found["unit"] == "1 unit is 0.001 m (mm), as the option states: the drawing is 8 m by 5 m"

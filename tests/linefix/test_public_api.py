@@ -55,4 +55,4 @@ def test_it_is_there_without_the_libraries_of_formats() -> None:
         "except ModuleNotFoundError as error: print(error)\n"
     )
     ended = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert 'pip install "linefix[formats]"' in ended.stdout
+    assert "linefix.read_map requires the extra `formats`" in ended.stdout

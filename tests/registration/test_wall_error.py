@@ -80,7 +80,7 @@ def test_walls_that_fit_to_the_millimetre_are_taken_for_better_than_usual() -> N
 def test_without_any_noise_declared_there_is_an_answer() -> None:
     room = Segments.from_array(ROOM)
     scan = MeasuredSegments.from_segments(seen_from(POSE, room), 0.0)
-    with pytest.raises(InvalidArgumentError, match="no information weight"):
+    with pytest.raises(InvalidArgumentError, match="sigma of scan and map are both 0"):
         register(room, scan, diagonal(6))
     result = register_estimating(room, scan, diagonal(6))
     assert result.usable

@@ -95,7 +95,7 @@ def test_what_is_not_utf_8_is_named(name: str) -> None:
     environment = {**os.environb, name.encode(): b"/tmp/\xff\xfe"}
     command = [sys.executable, "-m", "service"]
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
-    assert (ended.returncode, ended.stderr) == (2, f"linefix: {name}: not UTF-8\n")
+    assert (ended.returncode, ended.stderr) == (2, f"linefix: {name}: expected UTF-8\n")
 
 
 def test_the_help_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:

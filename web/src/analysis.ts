@@ -14,7 +14,7 @@ const LONG_TIME = 30_000; // ms; a drive takes many searches
 
 button.addEventListener("click", async () => {
   if (!state.map) {
-    told.textContent = "There is no map yet.";
+    told.textContent = "There is no map yet. Open one, or choose an example.";
     return;
   }
   const { own, landmark } = kept();
@@ -30,7 +30,7 @@ button.addEventListener("click", async () => {
   const stored = asStored() || (state.mapId !== null && own.length === state.own);
   const map = stored ? { map_id: state.mapId } : { ...state.map, segments: own };
   button.disabled = true;
-  told.textContent = drive || landmark.length ? "Looking about, which may take half a minute ..." : "Looking about ...";
+  told.textContent = drive || landmark.length ? "Analyzing, which may take half a minute ..." : "Analyzing ...";
   const of = state.walls;
   try {
     const found = await analyze({ map, laser, spacing, drive, landmark, deadline_ms: drive ? LONG_TIME : TIME });
@@ -48,12 +48,12 @@ button.addEventListener("click", async () => {
 
 function summaryOf({ places: found, summary, complete }: Analysis, drive: number): string {
   const { places, usable, similar_pose, left_out, resolved_within, usable_with_landmark } = summary;
-  const rest = complete ? "" : ` There was no time for ${left_out} more.`;
-  if (!places) return `There is no place where a robot could stand.${rest}`;
-  const driven = resolved_within === null ? "" : ` After a drive of up to ${drive} m it would at ${resolved_within}.`;
-  const landmark = usable_with_landmark === null ? "" : ` With the boxes that you put up it would at ${usable_with_landmark}.`;
+  const rest = complete ? "" : ` The time limit left out ${left_out} more.`;
+  if (!places) return `The map has no free place for a robot.${rest}`;
+  const driven = resolved_within === null ? "" : ` After a drive of up to ${drive} m: at ${resolved_within}.`;
+  const landmark = usable_with_landmark === null ? "" : ` With the added boxes: at ${usable_with_landmark}.`;
   const each = found.some((one) => one.pose.theta !== found[0].pose.theta) ? "places, four headings at each" : "places";
-  return `A robot would know where it is at ${usable} of ${places} ${each}; ${similar_pose} look like another.${driven}${landmark}${rest}`;
+  return `Localization succeeds at ${usable} of ${places} ${each}; ${similar_pose} have a similar place.${driven}${landmark}${rest}`;
 }
 
 show.addEventListener("change", () => {

@@ -27,7 +27,7 @@ async function call<T>(method: string, path: string, body?: BodyInit, type?: str
     response = await fetch(path, { method, headers, body, signal });
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new Problem("The service does not answer. Is it still running?", 0, "no_connection");
+    throw new Problem("The service does not respond. Check that it is running.", 0, "no_connection");
   }
   if (response.status === 204) return undefined as T;
   const text = await response.text();
@@ -35,7 +35,7 @@ async function call<T>(method: string, path: string, body?: BodyInit, type?: str
   try {
     answer = JSON.parse(text);
   } catch {
-    throw new Problem(`The service answered ${response.status} with something else than JSON.`, response.status, "no_json");
+    throw new Problem(`The service returned status ${response.status} with a body that is not JSON. Check the address, and proxies in between.`, response.status, "no_json");
   }
   if (!response.ok) throw problemOf(response.status, answer);
   return answer as T;
@@ -43,8 +43,8 @@ async function call<T>(method: string, path: string, body?: BodyInit, type?: str
 
 function problemOf(status: number, answer: unknown): Problem {
   const { detail, code, errors } = answer as { detail?: string; code?: string; errors?: { pointer: string; message: string }[] };
-  if (status === 401 || status === 403) return new Problem("The service asks for a key, or for another one: see Key below.", status, code ?? "");
-  const told = errors?.length ? `${errors[0].pointer}: ${errors[0].message}` : (detail ?? "The request was refused");
+  const stated = errors?.length ? `${errors[0].pointer}: ${errors[0].message}` : (detail ?? `The service rejected the request with status ${status}.`);
+  const told = status === 401 ? "The service requires a key. Enter it under Key below." : status === 403 ? `${stated} (see Key below).` : stated;
   return new Problem(told, status, code ?? "");
 }
 
@@ -79,7 +79,7 @@ export async function importMap(files: File[], units: string): Promise<Imported>
     return await call<Imported>("POST", "/v1/maps:import", form);
   } catch (error) {
     if (error instanceof Problem && [404, 405, 415].includes(error.status))
-      throw new Problem("This service reads maps as JSON only: the packages for other formats are not installed.", error.status, error.code);
+      throw new Problem("This service reads maps as JSON only. Install its extra formats for other files.", error.status, error.code);
     if (error instanceof Problem) error.message = named(error.message, files);
     throw error;
   }
@@ -88,5 +88,5 @@ export async function importMap(files: File[], units: string): Promise<Imported>
 /** Say which file is wrong, and where its unit can be chosen. */
 function named(message: string, files: File[]): string {
   const told = message.replace(/^\/files\/(\d+)/, (whole, k: string) => files[Number(k)]?.name ?? whole);
-  return told.includes("does not say its unit") ? `${told}. Choose it below.` : told;
+  return told.includes("does not state its unit") ? `${told}. Choose it below.` : told;
 }

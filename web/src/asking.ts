@@ -30,7 +30,7 @@ export async function ask(): Promise<void> {
   clearTimeout(due);
   const made = request();
   if (!made) {
-    tellProblem(state.map ? "There is no scan yet: open one, or let a virtual robot take it." : "There is no map yet.");
+    tellProblem(state.map ? "There is no scan yet. Open one, or switch on the virtual robot." : "There is no map yet. Open one, or choose an example.");
     return;
   }
   running?.abort();

@@ -280,8 +280,8 @@ function toldOf(one: Place): string {
   const at = ({ x, y }: Pose) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;
   const told = ({ status, usable, probability }: { status: string; usable: boolean; probability: number | null }) =>
     `${status.replace("_", " ")}, ${usable ? "" : "not "}usable${probability === null ? "" : `, ${(100 * probability).toFixed(1)} %`}`;
-  const like = one.similar_pose ? `, looks like ${at(one.similar_pose)}` : "";
-  const drive = one.resolved_after ? `; knows after ${one.resolved_after} m` : "";
+  const like = one.similar_pose ? `, similar place at ${at(one.similar_pose)}` : "";
+  const drive = one.resolved_after ? `; resolved after ${one.resolved_after} m` : "";
   const landmark = one.with_landmark ? `; with the boxes: ${told(one.with_landmark)}` : "";
   return `${at(one.pose)}: ${told(one)}${like}${drive}${landmark}`;
 }

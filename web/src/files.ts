@@ -1,4 +1,4 @@
-// Files that a user brings: what they are is told by what is in them.
+// Files that a user opens; their content determines their kind.
 
 import { importMap } from "./api";
 import { tellImport } from "./imported";
@@ -48,15 +48,15 @@ function take(name: string, text: string): void {
   try {
     content = JSON.parse(text);
   } catch {
-    throw new Error(`${name} is not JSON.`);
+    throw new Error(`${name} is not JSON. Open a map, a scan or a log in JSON.`);
   }
   if (Array.isArray(content)) return takeMap({ segments: content } as MapDocument);
-  if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan.`);
+  if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan. Expected a JSON object, or an array of segments.`);
   const told = content as Record<string, unknown>;
   if ("map" in told && "scan" in told) {
     // A request as it is sent.
     const { map, scan } = told as { map: MapDocument; scan: Scan };
-    if (!("segments" in map)) throw new Error(`${name} names a stored map: open that one first, and a file with the scan.`);
+    if (!("segments" in map)) throw new Error(`${name} refers to a stored map. Open that map first, then a file with the scan.`);
     takeMap(map);
     takeScan(scan);
   } else if ("ranges" in told) takeScan({ laser: told } as unknown as Scan);
@@ -65,13 +65,13 @@ function take(name: string, text: string): void {
     // Both are lists of segments: a scan says so in its name, or by what only scans have.
     if (/scan/i.test(name) || "viewpoint" in told || "stamp" in told || "points" in told) takeScan(told as Scan);
     else takeMap(told as unknown as MapDocument);
-  } else throw new Error(`${name} is neither a map nor a scan: it has none of segments, points, laser and ranges.`);
+  } else throw new Error(`${name} is neither a map nor a scan. Expected segments, points, laser or ranges.`);
 }
 
 function takeMap(map: MapDocument): void {
-  if (!Array.isArray(map.segments) || !map.segments.length) throw new Error("The map has no segments.");
+  if (!Array.isArray(map.segments) || !map.segments.length) throw new Error("The map has no segments. Expected at least one.");
   if (!map.segments.every((s) => Array.isArray(s) && s.length === 4 && s.every(Number.isFinite)))
-    throw new Error("A segment of the map is not four numbers.");
+    throw new Error("A segment of the map is not valid. Expected four numbers, x1, y1, x2, y2.");
   setMap(map); // a scan stays: it may be waiting for this map
   showAll("A map from a file.");
 }
@@ -79,7 +79,7 @@ function takeMap(map: MapDocument): void {
 function takeScan(scan: Scan): void {
   Object.assign(state, { scan, virtual: false });
   forget();
-  if (!state.map) about.textContent = "A scan from a file. Now bring the map to find it in.";
+  if (!state.map) about.textContent = "A scan from a file. Now open its map.";
   document.querySelector<HTMLInputElement>("#virtual")!.checked = false;
   changed();
 }
@@ -89,7 +89,7 @@ input.addEventListener("change", () => {
   void open([...(input.files ?? [])]);
   input.value = "";
 });
-// Whoever is told that a drawing does not say its unit need not bring it again.
+// After a message about a missing unit the drawing need not be opened again.
 units.addEventListener("change", () => {
   if (drawing.length) void open(drawing);
 });

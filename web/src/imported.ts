@@ -22,15 +22,15 @@ export function tellImport({ map, report, check }: Imported): void {
   const lines = (notes: Note[]) => notes.map(({ message, count }) => (count ? `${message}: ${count}` : message));
   const doubts = check.findings.map((one) => one.message);
   const parts: [string, string[]][] = [
-    ["Doubtful", doubts],
+    ["Findings", doubts],
     ["Read", lines(read)],
-    ["Made one", lines(merged)],
-    ["Left out", lines(dropped)],
+    ["Merged", lines(merged)],
+    ["Omitted", lines(dropped)],
     ["Assumed", lines(assumed)],
   ];
   of = map;
   document.querySelector("#about")!.textContent = `${map.segments.length} walls, read of ${report.files.join(", ")} (${report.format}).`;
-  document.querySelector("#imported summary")!.textContent = doubts.length ? `How it was read: ${doubts.length} doubtful` : "How it was read";
+  document.querySelector("#imported summary")!.textContent = doubts.length ? `Import report: ${doubts.length} findings` : "Import report";
   told.replaceChildren(...parts.flatMap(([title, lines]) => section(title, lines)));
   box.hidden = false;
   box.open = doubts.length + dropped.length + assumed.length > 0;

@@ -6,7 +6,7 @@ const told = document.querySelector<HTMLElement>("#copied")!;
 
 function body(): string | null {
   const made = request();
-  if (!made) told.textContent = "There is nothing to ask yet.";
+  if (!made) told.textContent = "There is no request yet. Open a map and a scan.";
   return made ? JSON.stringify(made.asked) : null;
 }
 

@@ -34,7 +34,7 @@ async function load(from: string): Promise<void> {
   for (const one of page.maps) maps.append(row(one.map_id, one.segment_count));
   if (!maps.children.length) {
     const none = document.createElement("li");
-    none.textContent = "None is stored yet.";
+    none.textContent = "No map is stored yet.";
     maps.append(none);
   }
   cursor = page.next ?? "";
@@ -70,11 +70,11 @@ async function use(id: string): Promise<void> {
 async function check(id: string): Promise<void> {
   tell(`Checking ${id} ...`);
   const found = await checkMap(id);
-  tell(...(found.findings.length ? found.findings.map((one) => `${one.message} (${one.count} segments)`) : [`Nothing is doubtful in ${id}.`]));
+  tell(...(found.findings.length ? found.findings.map((one) => `${one.message} (${one.count} segments)`) : [`The check has no findings about ${id}.`]));
 }
 
 async function remove(id: string): Promise<void> {
-  if (!confirm(`Delete the map ${id}? It cannot be had back.`)) return;
+  if (!confirm(`Delete the map ${id}? This cannot be undone.`)) return;
   await deleteMap(id);
   if (state.mapId === id) state.mapId = null;
   await load("");
@@ -82,8 +82,8 @@ async function remove(id: string): Promise<void> {
 }
 
 async function upload(): Promise<void> {
-  if (!state.map) throw new Error("There is no map yet.");
-  if (!name.value || !name.checkValidity()) throw new Error("A name has letters, digits, dots, dashes and underscores only.");
+  if (!state.map) throw new Error("There is no map yet. Open one, or choose an example.");
+  if (!name.value || !name.checkValidity()) throw new Error("The name is not valid. Use 1 to 128 letters, digits, dots, dashes and underscores.");
   const { own, landmark } = kept();
   const told = await putMap(name.value, { ...state.map, segments: [...own, ...landmark] });
   await load("");

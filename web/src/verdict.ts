@@ -1,4 +1,4 @@
-// The verdict in words and numbers, and the other places.
+// The verdict in words and numbers, and the other poses.
 
 import { enlarged } from "./drawing";
 import { changed, onChange, state } from "./state";
@@ -16,9 +16,9 @@ export function tellProblem(message: string): void {
 function show(): void {
   const { answer } = state;
   card.dataset.state = problem ? "problem" : answer ? (answer.usable ? "usable" : answer.status) : "none";
-  element("#verdict-title").textContent = problem ? "That did not work" : answer ? title() : "Verdict";
+  element("#verdict-title").textContent = problem ? "Error" : answer ? title() : "Verdict";
   if (problem || answer) element("#message").textContent = problem || answer!.message;
-  else if (state.map) element("#message").textContent = "Not asked yet.";
+  else if (state.map) element("#message").textContent = "No search yet.";
   list(element("#reasons"), answer && !problem ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
   numbers();
   others();
@@ -44,7 +44,7 @@ function numbers(): void {
   const { answer } = state;
   const rows: [string, string][] = [];
   if (answer && !problem) {
-    if (answer.probability !== null) rows.push(["chance", `${(100 * answer.probability).toFixed(2)} %`]);
+    if (answer.probability !== null) rows.push(["probability", `${(100 * answer.probability).toFixed(2)} %`]);
     if (answer.pose) {
       const { x, y, theta } = answer.pose;
       rows.push(["pose", `${x.toFixed(3)} m, ${y.toFixed(3)} m, ${degrees(theta).toFixed(2)}°`]);
@@ -57,7 +57,7 @@ function numbers(): void {
     const critical = answer.diagnostics?.critical_wall;
     if (critical) {
       const walls = critical.map.map((k) => state.sentTo[k]).join(", ");
-      rows.push(["critical wall", `${walls}: without it the pose could move ${critical.displacement.toFixed(2)} m`]);
+      rows.push(["critical wall", `${walls}: without it the pose may move by ${critical.displacement.toFixed(2)} m`]);
     }
     const seen = answer.correspondences.length + answer.unmatched_scan.length;
     rows.push(["matched", `${answer.correspondences.length} of ${seen} segments, ${answer.missing_map.length} walls missing`]);
@@ -77,15 +77,15 @@ function others(): void {
   const count = state.answer?.alternatives.length ?? 0;
   element("#others").hidden = count === 0 || problem !== "";
   element("#other").textContent =
-    state.other < 0 ? `${count} other ${count === 1 ? "place" : "places"}` : `other place ${state.other + 1} of ${count}${share()}`;
+    state.other < 0 ? `${count} other ${count === 1 ? "pose" : "poses"}` : `other pose ${state.other + 1} of ${count}${share()}`;
 }
 
 function share(): string {
   const [best, one] = [state.answer?.diagnostics?.score, state.answer?.alternatives[state.other]];
-  return best && one ? `: explains ${Math.round((100 * one.score) / best)} % as much` : "";
+  return best && one ? `: score ${Math.round((100 * one.score) / best)} % of the best` : "";
 }
 
-/** Show the next of the other places, after the last the answer itself. */
+/** Show the next of the other poses, and after the last the answer itself. */
 export function step(by: number): void {
   const count = state.answer?.alternatives.length ?? 0;
   if (count) state.other = ((state.other + 1 + by + count + 1) % (count + 1)) - 1;
@@ -101,16 +101,16 @@ export function legend(): void {
   const larger = enlarged();
   const parts: [string, string][] = [];
   if (state.answer?.pose) {
-    parts.push(["pair", "seen on a wall"]);
-    if (state.answer.unmatched_scan.length) parts.push(["unmatched", "on no wall"]);
-    if (state.answer.missing_map.length) parts.push(["missing", "not seen, though it should"]);
-    if (state.answer.diagnostics?.critical_wall) parts.push(["critical", "critical wall: without it the pose could move"]);
-    parts.push([state.answer.usable ? "ok" : state.answer.status, "where it was found"]);
-    parts.push(state.virtual ? ["robot", "where it stands"] : ["before", "where you put the scan"]);
-    if (state.answer.unobservable) parts.push(["degenerate", "free along this"]);
+    parts.push(["pair", "scan segment on a wall"]);
+    if (state.answer.unmatched_scan.length) parts.push(["unmatched", "scan segment on no wall"]);
+    if (state.answer.missing_map.length) parts.push(["missing", "wall missing in the scan"]);
+    if (state.answer.diagnostics?.critical_wall) parts.push(["critical", "critical wall: without it the pose may move"]);
+    parts.push([state.answer.usable ? "ok" : state.answer.status, "estimated pose"]);
+    parts.push(state.virtual ? ["robot", "true pose"] : ["before", "initial pose of the scan"]);
+    if (state.answer.unobservable) parts.push(["degenerate", "unobservable direction"]);
     if (larger !== null) parts.push(["sigma", `3 sigma${larger > 1.05 ? `, drawn ${larger.toFixed(0)} times larger` : ""}`]);
   }
-  if (state.other >= 0) parts.push(["ghost", "another place"]);
+  if (state.other >= 0) parts.push(["ghost", "other pose"]);
   if (state.analysis || state.log.length)
     for (const kind of ["ok", "ambiguous", "degenerate", "no_match"]) parts.push([kind, kind.replace("_", " ")]);
   element("#legend").replaceChildren(

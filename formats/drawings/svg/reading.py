@@ -58,7 +58,7 @@ def read_svg(path: Path, options: ImportOptions, notes: Notes) -> Drawing:
 def _read_shapes(root: Element, drawing: Drawing) -> None:
     for element, place in Visible(root, drawing).shapes():
         if not drawing.wants(*place.layers):
-            drawing.notes.add_dropped("other_layer", "elements on layers that were not asked for", 1)
+            drawing.notes.add_dropped("other_layer", "elements on layers that the option layers excludes", 1)
             continue
         kind = kind_of(element)
         layer = " ".join(place.layers[-1:])

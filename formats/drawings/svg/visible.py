@@ -153,7 +153,9 @@ class Visible:
         clipped = any(style.get(key, "none").lower() != "none" for key in ("clip-path", "mask"))
         if clipped:
             self._drawing.notes.add_assumed(
-                "clipped", "elements with a clip-path or a mask are taken whole, although it may hide a part of them", 1
+                "clipped",
+                "elements with a clip-path or a mask are used whole, although a part of them may be hidden",
+                1,
             )
         transform = style.get("transform", "")
         visibility = style.get("visibility", "").lower()

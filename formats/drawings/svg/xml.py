@@ -85,10 +85,12 @@ def parse_xml(content: bytes, name: str) -> Element:
     except FormatError:
         raise
     except LookupError as error:
-        raise MalformedFileError("has an encoding that is not known; save it in UTF-8", argument=name) from error
+        raise MalformedFileError("has an unknown encoding; save it in UTF-8", argument=name) from error
     except (expat.ExpatError, ParseError, AssertionError, ValueError) as error:
         line = builder.parser.CurrentLineNumber
-        raise MalformedFileError(f"is no XML from line {line} on; is it cut off?", argument=name) from error
+        raise MalformedFileError(
+            f"is not XML from line {line} on; check whether the file is cut off", argument=name
+        ) from error
 
 
 def kind_of(element: Element) -> str:

@@ -35,7 +35,7 @@ _FAILS = (*EVERYWHERE, *SEARCHES, "unknown_map", "map_corrupt", "read_only")
     summary="Analyze a stored map",
 )
 async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
-    """Stand a robot all over a map, and say where it would know where it is, and where not."""
+    """Simulate scans on a grid of poses and report where localization succeeds."""
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, AnalyzeRequest))
     return await _answer(exchange, StoredMap(map_id=map_id), asked)
@@ -50,7 +50,7 @@ async def post_analyze(request: Request, map_id: MapIdPath) -> Response:
     summary="Analyze a map that comes with the request",
 )
 async def post_analyze_inline(request: Request) -> Response:
-    """Say it of a map that need not be stored."""
+    """Simulate scans on a grid of poses of a map in the request."""
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, MapAnalyzeRequest))
     return await _answer(exchange, asked.map, asked)

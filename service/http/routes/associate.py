@@ -30,7 +30,7 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
     summary="Find the pose without knowing correspondences",
 )
 async def post_associate(request: Request) -> Response:
-    """Find where in the map the scan was taken, and say how sure that is."""
+    """Estimate the pose of a scan in a map, with a verdict and its probability."""
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)

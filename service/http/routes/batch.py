@@ -40,7 +40,7 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
     summary="Find several scans in one map",
 )
 async def post_batch(request: Request) -> Response:
-    """Find several scans in one map; a scan that is wrong is one error item and nothing else."""
+    """Estimate the poses of several scans in one map; an invalid scan yields one problem item."""
     exchange = begin_search(request)
     asked, items = await read(exchange, read_batch)
     job = exchange.job(asked.options.deadline_ms)

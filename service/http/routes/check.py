@@ -42,10 +42,11 @@ async def get_check(
     request: Request,
     map_id: MapIdPath,
     deadline_ms: Annotated[
-        float | None, Query(ge=0.0, le=600_000.0, description="milliseconds; what it leaves no time for is left out")
+        float | None,
+        Query(ge=0.0, le=600_000.0, description="milliseconds; parts that it leaves no time for are omitted"),
     ] = None,
 ) -> Response:
-    """Say what is doubtful in a map: its directions, how it was drawn, its size, and what of it looks alike."""
+    """Check a map: its directions, its drawing, its size, and its similar places."""
     exchange = begin_search(request)
     job = exchange.job(deadline_ms)
     return exchange.answer(await unless_hung_up(exchange, _work(exchange, map_id, None, job), job.deadline))
@@ -57,10 +58,10 @@ async def get_check(
     response_model=CheckAnswer,
     responses=problems(*dict.fromkeys((*_FAILS, *READS_BODY))),
     openapi_extra=takes(CheckRequest, {"two scans": examples.CHECK}),
-    summary="Check a map beside sample scans",
+    summary="Check a map with sample scans",
 )
 async def post_check(request: Request, map_id: MapIdPath) -> Response:
-    """Say also whether scans taken there would fit better mirrored, undirected, at another scale, or moved."""
+    """Check a map, and whether sample scans fit better mirrored, undirected, scaled or moved."""
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, CheckRequest))
     job = exchange.job(asked.deadline_ms)

@@ -39,7 +39,7 @@ _TAKES: dict[str, Any] = {
     summary="Read the map of another tool",
 )
 async def post_import(request: Request) -> Response:
-    """Make a map of the files of another tool, say what was done for that and what is doubtful; nothing is stored."""
+    """Convert files of another tool to a map, and report conversions and findings; nothing is stored."""
     exchange = begin_search(request)
     async with receive(exchange, form=True) as content:
         job = exchange.job()

@@ -1,4 +1,4 @@
-"""/v1/maps: maps kept by id."""
+"""/v1/maps: maps stored by id."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _conditional(*names: str) -> list[dict[str, Any]]:
     summary="Store a map",
 )
 async def put_map(request: Request, map_id: MapIdPath) -> Response:
-    """Store a map; once answered it survives the loss of process and power."""
+    """Store a map durably: after the answer it survives the loss of process and power."""
     exchange, demands = begin(request), demands_of(request)
     services = exchange.services
     asked, document = await read(exchange, read_map)
@@ -80,7 +80,7 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     summary="Get a map",
 )
 async def get_map(request: Request, map_id: MapIdPath) -> Response:
-    """Give a map back as it was stored."""
+    """Return a map as it was stored."""
     services = begin(request).services
     if is_conditional(request):
         record = await ask_store(services, partial(services.store.record, map_id))
@@ -103,7 +103,7 @@ async def list_maps(
         str, Query(max_length=128, pattern="^[A-Za-z0-9._-]*$", description="`next` of the page before")
     ] = "",
 ) -> Response:
-    """List what is stored, by id."""
+    """List the stored maps, by id."""
     exchange = begin(request)
     services = exchange.services
     page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
@@ -122,7 +122,7 @@ async def list_maps(
     summary="Delete a map",
 )
 async def delete_map(request: Request, map_id: MapIdPath) -> Response:
-    """Forget a map."""
+    """Delete a map."""
     exchange, demands = begin(request), demands_of(request)
     services = exchange.services
     await ask_store(services, partial(services.store.delete, map_id, demands))

@@ -14,7 +14,7 @@ from .documenting import EVERYWHERE, problems
 router = APIRouter(tags=["operations"])
 
 
-@router.get("/livez", response_model=Live, responses=problems("internal"), summary="Is the process alive?")
+@router.get("/livez", response_model=Live, responses=problems("internal"), summary="Report that the process is alive")
 async def livez() -> Response:
     """Answer as long as the event loop turns."""
     return json_response(b'{"status":"ok"}')
@@ -24,7 +24,7 @@ async def livez() -> Response:
     "/readyz",
     response_model=Live,
     responses=problems("internal", "not_ready", "read_only"),
-    summary="Send it requests?",
+    summary="Report whether the service is ready for requests",
 )
 async def readyz(request: Request) -> Response:
     """Answer 200 once the kernels are warm and the store answers, and until the service is told to end."""
@@ -34,13 +34,15 @@ async def readyz(request: Request) -> Response:
     return json_response(b'{"status":"ok"}')
 
 
-@router.get("/version", response_model=Version, responses=problems("internal"), summary="Which version is this?")
+@router.get("/version", response_model=Version, responses=problems("internal"), summary="Return the version")
 async def version() -> Response:
     """Name the version of the service and of its contract."""
     return json_response(encode({"name": "linefix", "version": VERSION, "api": "v1"}))
 
 
-@router.get("/v1/limits", response_model=Limits, responses=problems(*EVERYWHERE), summary="What is too much?")
+@router.get(
+    "/v1/limits", response_model=Limits, responses=problems(*EVERYWHERE), summary="Return the limits of requests"
+)
 async def limits(request: Request) -> Response:
     """Name the limits beyond which a request is refused with 413, or waits no longer."""
     settings = services_of(request.scope).settings

@@ -60,3 +60,6 @@ def test_the_sentence_says_what_to_do() -> None:
     assert thin.code == thick.code == "thickness"
     assert "8 cm thicker than drawn" in thin.message
     assert "8 cm thinner than drawn" in thick.message
+    assert "thickness plus 0.08 m" in thin.message
+    assert "thickness minus 0.08 m" in thick.message
+    assert all("any other map, for example a grid" in one.message for one in (thin, thick))  # which has no thickness

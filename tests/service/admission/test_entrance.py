@@ -106,13 +106,13 @@ def test_a_lesser_key_is_for_what_was_said_and_no_more(tmp_path: Path) -> None:
                 door.ask("GET", "/v1/maps", key(name))
             for name, path in (("reads", "/v1/maps/hq-3"), ("all", "/v1/maps/hq-3"), ("all", "/v1/nothing")):
                 door.ask("GET", path, key(name))
-            for name, method, path in (
-                ("reads", "PUT", "/v1/maps/hq-3"),
-                ("reads", "POST", "/v1/associate"),
-                ("reads", "GET", "/v1/nothing"),
-                ("all of hq", "GET", "/v1/nothing"),
+            for name, method, path, lacking in (
+                ("reads", "PUT", "/v1/maps/hq-3", "the role `write`"),
+                ("reads", "POST", "/v1/associate", "the role `associate`"),
+                ("reads", "GET", "/v1/nothing", "every role"),
+                ("all of hq", "GET", "/v1/nothing", "every role"),
             ):
-                with pytest.raises(MissingRoleError):
+                with pytest.raises(MissingRoleError, match=f"the key lacks {lacking}"):
                     door.ask(method, path, key(name))
             with pytest.raises(ForeignMapError):
                 door.ask("GET", "/v1/maps/other", key("all of hq"))

@@ -35,7 +35,7 @@ def test_a_byte_order_mark_is_no_part_of_a_key(tmp_path: Path) -> None:
     path.write_text(key_lines("sesame", ["read"]), encoding="utf-8-sig")
     assert [grant.roles for grant in read_keys(path).values()] == [{Role.READ}]
     path.write_text(key_lines("sesame", ["read"]), encoding="utf-16")
-    with pytest.raises(KeyFileError, match="not UTF-8"):
+    with pytest.raises(KeyFileError, match="is not TOML in UTF-8"):
         read_keys(path)
 
 
@@ -48,7 +48,7 @@ def test_a_key_for_nothing_is_not_made(capsys: pytest.CaptureFixture[str], argum
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("key", "no TOML"),
+        ("key", "is not TOML"),
         ('[[key]]\nname = "a"\nsha256 = "sesame"', "sha256"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = ["all"]', "roles"),
         (f'[[key]]\nname = "a"\nsha256 = "{DIGEST}"\nroles = []', "roles"),

@@ -23,5 +23,5 @@ def test_it_takes_requests_from_warm_until_it_goes_down() -> None:
     readiness.draining = True
     assert not readiness.takes_requests
     readiness.require_warm()  # what was let in goes on
-    with pytest.raises(NotReadyError, match="going down"):
+    with pytest.raises(NotReadyError, match="shutting down"):
         readiness.require_all()

@@ -9,6 +9,9 @@ import pytest
 
 from .test_refusals import ROOM, associate_body, refused
 
+MISSING = "expected this field, found none"
+UNKNOWN = "unknown field; correct its name or remove it"
+
 
 def test_angles_in_degrees_are_not_taken(client: httpx.Client) -> None:
     prior = {"x": 0.0, "y": 0.0, "theta": 80.0}
@@ -47,9 +50,9 @@ def test_a_covariance_of_another_shape_is_one_fault(client: httpx.Client, matrix
 
 def test_a_misspelt_field_is_named(client: httpx.Client) -> None:
     for body, wanted in (
-        (associate_body(scan={"segement": ROOM}), {"/scan/segments": "missing", "/scan/segement": "unknown field"}),
-        (associate_body(map={"id": "hq"}), {"/map/segments": "missing", "/map/id": "unknown field"}),
-        (associate_body(scan={"ranges": [1.0]}), {"/scan/laser": "missing", "/scan/ranges": "unknown field"}),
+        (associate_body(scan={"segement": ROOM}), {"/scan/segments": MISSING, "/scan/segement": UNKNOWN}),
+        (associate_body(map={"id": "hq"}), {"/map/segments": MISSING, "/map/id": UNKNOWN}),
+        (associate_body(scan={"ranges": [1.0]}), {"/scan/laser": MISSING, "/scan/ranges": UNKNOWN}),
     ):
         problem = refused(client.post("/v1/associate", json=body), 422, "invalid_request")
         assert {error["pointer"]: error["message"] for error in problem["errors"]} == wanted

@@ -114,7 +114,7 @@ def test_before_the_kernels_are_there_nothing_is_searched(
     for path, body in (("/v1/associate", orjson.dumps(examples.ASSOCIATE)), ("/v1/register", b"not even read")):
         answer = running.client.post(path, content=body)
         assert (answer.status_code, answer.json()["code"]) == (503, "not_ready")
-    until(lambda: told("the kernels are being compiled, [1-9][0-9]?% so far"))
+    until(lambda: told("the kernels are being compiled, [1-9][0-9]?% so far; send the request again later"))
     until(lambda: '"message":"compiling","share":0.' in running.log())
     assert running.client.put("/v1/maps/m", json=examples.MAP).status_code == 201
     assert running.client.get("/v1/maps/m").json() == examples.MAP

@@ -72,7 +72,7 @@ def test_what_comes_with_a_problem(error: Exception, expected: dict[str, str]) -
     document = orjson.loads(bytes(answer.body))
     kind = RAISED[type(error)]
     errors = document.pop("errors", None)
-    assert errors in (None, [{"pointer": "/scans", "message": "at most 2 scans are taken"}])
+    assert errors in (None, [{"pointer": "/scans", "message": "expected at most 2 scans, found more; see /v1/limits"}])
     assert document == {
         "type": f"urn:linefix:problem:{kind.code}",
         "title": kind.title,
@@ -132,4 +132,7 @@ def test_the_first_place_stands_in_the_detail() -> None:
 def test_who_is_cancelled_is_told_why() -> None:
     problem = problem_of(CancelledError())
     assert problem is not None
-    assert (problem.kind.code, problem.detail) == ("not_ready", "the service is going down")
+    assert (problem.kind.code, problem.detail) == (
+        "not_ready",
+        "the service is shutting down; send the request to another instance, or again after its restart",
+    )

@@ -37,11 +37,11 @@ def press(page: Page, key: str, times: int) -> None:
 @pytest.mark.parametrize(
     ("title", "state", "said"),
     [
-        ("A flat", "usable", "The robot is here"),
-        ("An office", "usable", "The robot is here"),
-        ("Look-alike rooms", "ambiguous", "2 other places explain the scan about as well"),
-        ("A corridor", "degenerate", "cannot be told where along"),
-        ("A warehouse", "usable", "The robot is here"),
+        ("A flat", "usable", "The robot is at this pose"),
+        ("An office", "usable", "The robot is at this pose"),
+        ("Look-alike rooms", "ambiguous", "2 other poses fit the scan about as well"),
+        ("A corridor", "degenerate", "is unknown"),
+        ("A warehouse", "usable", "The robot is at this pose"),
     ],
 )
 def test_every_example(page: Page, title: str, state: str, said: str) -> None:
@@ -61,7 +61,7 @@ def test_the_keyboard_alone(page: Page) -> None:
             break
     assert page.evaluate("document.activeElement.id") == "plan"
     press(page, "n", 1)
-    expect(page.locator("#other")).to_contain_text("other place 1 of")
+    expect(page.locator("#other")).to_contain_text("other pose 1 of")
     press(page, "Shift+ArrowLeft", 2)
     press(page, "Shift+ArrowDown", 3)
     press(page, "q", 3)
@@ -119,7 +119,7 @@ def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
     page.goto("/")
     room, scan = files(tmp_path, room={"segments": examples.WALLS}, scan=SCAN)
     page.set_input_files("#files", [scan])
-    expect(page.locator("#about")).to_contain_text("Now bring the map")
+    expect(page.locator("#about")).to_contain_text("Now open its map")
     page.set_input_files("#files", [room])
     verdict(page, "usable")
     expect(page.locator("#numbers")).to_contain_text("1.000 m, 0.500 m")
@@ -148,10 +148,21 @@ def test_a_refusal_and_a_lost_connection(page: Page) -> None:
     page.unroute("**/v1/associate")
     page.route("**/v1/associate", lambda route: route.abort())
     page.get_by_role("button", name="Ask").click()
-    expect(page.locator("#message")).to_contain_text("does not answer")
+    expect(page.locator("#message")).to_contain_text("does not respond")
     page.unroute("**/v1/associate")
     page.get_by_role("button", name="Ask").click()
     verdict(page, "usable")
+
+
+def test_a_key_without_a_role(page: Page) -> None:
+    shown(page, "flat", "usable")
+    detail = "the key lacks the role `associate`; send a key that has it"
+    page.route(
+        "**/v1/associate", lambda route: route.fulfill(status=403, json={**PROBLEM, "status": 403, "detail": detail})
+    )
+    page.get_by_role("button", name="Ask").click()
+    verdict(page, "problem")
+    expect(page.locator("#message")).to_have_text(f"{detail} (see Key below).")
 
 
 def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
@@ -169,7 +180,7 @@ def test_where_a_map_will_fail(page: Page) -> None:
     page.locator("#analysis summary").click()
     page.get_by_label("Spacing").fill("1")
     page.get_by_role("button", name="Analyze").click()
-    expect(page.locator("#analyzed")).to_contain_text("A robot would know where it is at", timeout=60_000)
+    expect(page.locator("#analyzed")).to_contain_text("Localization succeeds at", timeout=60_000)
     expect(page.locator("#legend")).to_contain_text("ambiguous")
     box = page.locator("#plan").bounding_box()
     assert box is not None
@@ -178,7 +189,7 @@ def test_where_a_map_will_fail(page: Page) -> None:
     page.mouse.move(
         box["x"] + box["width"] / 2 + (9.3 - 5.8) * scale, box["y"] + box["height"] / 2 - (4.3 - 2.575) * scale
     )
-    expect(page.locator("#hover")).to_contain_text("looks like (")
+    expect(page.locator("#hover")).to_contain_text("similar place at (")
     told = page.locator("#hover").bounding_box()
     assert told is not None
     assert told["x"] + told["width"] < box["x"] + box["width"]
@@ -212,10 +223,10 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     page.get_by_label("It may drive").fill("2")
     page.get_by_role("button", name="Analyze").click()
     told = page.locator("#analyzed")
-    expect(told).to_contain_text("would know where it is at 0 of 8 places", timeout=60_000)
-    expect(told).to_contain_text("After a drive of up to 2 m it would at 0. With the boxes that you put up it would at")
-    assert "it would at 0." in told.inner_text()
-    assert not told.inner_text().endswith("it would at 0.")
+    expect(told).to_contain_text("Localization succeeds at 0 of 8 places", timeout=60_000)
+    expect(told).to_contain_text("After a drive of up to 2 m: at 0. With the added boxes: at")
+    assert "2 m: at 0." in told.inner_text()
+    assert not told.inner_text().endswith("boxes: at 0.")
     show = page.get_by_label("Show")
     expect(show).to_have_value("landmark")
     show.select_option("driven")
@@ -260,14 +271,14 @@ def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
     shown(page, "flat", "usable")
     about = page.locator("#about").inner_text()
     page.set_input_files("#files", [tmp_path / "plan.svg"])
-    expect(page.locator("#message")).to_contain_text("plan.svg: does not say its unit", timeout=60_000)
+    expect(page.locator("#message")).to_contain_text("plan.svg: does not state its unit", timeout=60_000)
     expect(page.locator("#numbers")).to_be_empty()  # of an answer to something else
     expect(page.locator("#about")).to_have_text(about)
     page.get_by_label("Unit of a drawing").select_option("metres")
     expect(page.locator("#about")).to_contain_text("read of plan.svg (svg)", timeout=60_000)
     report = page.locator("#report")
     expect(report).to_be_visible()
-    for title in ("Doubtful", "Read", "Left out", "Assumed"):
+    for title in ("Findings", "Read", "Omitted", "Assumed"):
         expect(report.get_by_role("heading", name=title)).to_be_visible()
     expect(report).to_contain_text("text is not read: 1")
     expect(page.get_by_label("Example")).to_have_value("")

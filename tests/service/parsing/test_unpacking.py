@@ -55,7 +55,7 @@ def test_a_body_in_many_pieces() -> None:
     with pytest.raises(BodyTooLargeError):
         unpack(packed, len(data) - 1)
     for end in (b"x", packed):
-        with pytest.raises(NotJsonError, match="follows"):
+        with pytest.raises(NotJsonError, match="follow"):
             unpack(packed + end, 2 * len(data))
     with pytest.raises(NotJsonError, match="cut short"):
         unpack(packed[: 2 * MEGABYTE], len(data))
@@ -66,8 +66,8 @@ def test_a_body_in_many_pieces() -> None:
     [
         (b"not gzip", "is not gzip"),
         (gzip.compress(b"{}", mtime=0)[:-4], "cut short"),
-        (gzip.compress(b"{}", mtime=0) + b"more", "follows"),
-        (gzip.compress(b"{}", mtime=0) * 2, "follows"),
+        (gzip.compress(b"{}", mtime=0) + b"more", "follow"),
+        (gzip.compress(b"{}", mtime=0) * 2, "follow"),
         (b"", "cut short"),
     ],
 )

@@ -36,7 +36,10 @@ def test_sigterm_drains_and_ends(start_service: Callable[..., RunningService]) -
     running.process.send_signal(signal.SIGTERM)
     until(lambda: running.client.get("/readyz").status_code == 503)
     drained = running.client.get("/readyz")
-    assert (drained.status_code, drained.json()["detail"]) == (503, "the service is going down")
+    assert (drained.status_code, drained.json()["detail"]) == (
+        503,
+        "the service is shutting down; send the request to another instance, or again after its restart",
+    )
     assert running.client.get("/livez").status_code == 200
     running.process.send_signal(signal.SIGTERM)  # told again: it ends no sooner
     assert running.ended() == 0
