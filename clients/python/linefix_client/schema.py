@@ -9,7 +9,7 @@ from typing_extensions import NotRequired, TypedDict
 
 class AdviceAnswer(TypedDict):
     """
-    What the map's properties should be; null where nothing speaks for a value.
+    Recommended properties of the map; null: no recommendation.
     """
 
     sigma: float | None
@@ -28,7 +28,7 @@ class AmbiguityAnswer(TypedDict):
 
 class AnalysisSummaryAnswer(TypedDict):
     """
-    How many of the places are what.
+    Counts of the places.
     """
 
     places: int
@@ -61,7 +61,7 @@ class CorrespondenceAnswer(TypedDict):
 
 class FindingAnswer(TypedDict):
     """
-    Something doubtful.
+    A finding of a check.
     """
 
     code: Literal[
@@ -110,7 +110,7 @@ class ImportedMapAnswer(TypedDict):
 
 class Limits(TypedDict):
     """
-    Beyond these a request is refused.
+    Limits of requests; a request beyond one is rejected.
     """
 
     max_body_bytes: int
@@ -190,7 +190,7 @@ class NoteAnswer(TypedDict):
 
 class Place(TypedDict):
     """
-    One wrong place of a request.
+    One fault of a request.
     """
 
     pointer: str
@@ -262,7 +262,7 @@ class ReasonAnswer(TypedDict):
 
 class RegistrationDiagnosticsAnswer(TypedDict):
     """
-    Numbers beside the pose.
+    Diagnostics of a registration.
     """
 
     ambiguity: AmbiguityAnswer
@@ -280,7 +280,7 @@ class RegistrationDiagnosticsAnswer(TypedDict):
 
 class ReportAnswer(TypedDict):
     """
-    What was made of the files.
+    Report of an import.
     """
 
     format: str
@@ -293,7 +293,7 @@ class ReportAnswer(TypedDict):
 
 class Residual(TypedDict):
     """
-    How far one pair is from fitting.
+    Residuals of one pair.
     """
 
     scan: int
@@ -305,7 +305,7 @@ class Residual(TypedDict):
 
 class SampleAnswer(TypedDict):
     """
-    What came of one scan in the map as it is.
+    Result of one scan in the map as it is.
     """
 
     index: int
@@ -316,7 +316,7 @@ class SampleAnswer(TypedDict):
 
 class SamplesAnswer(TypedDict):
     """
-    What came of the sample scans.
+    Results of the sample scans.
     """
 
     usable: int
@@ -327,7 +327,7 @@ class SamplesAnswer(TypedDict):
 
 class SearchAnswer(TypedDict):
     """
-    How the search went.
+    Statistics of the search.
     """
 
     complete: bool
@@ -352,7 +352,7 @@ class SegmentOfView(TypedDict):
 
 class SizeAnswer(TypedDict):
     """
-    How much of a map there is.
+    Size of a map.
     """
 
     segment_count: int
@@ -373,7 +373,7 @@ class TimingAnswer(TypedDict):
 
 class Version(TypedDict):
     """
-    What runs here.
+    Name and version of the service.
     """
 
     name: str
@@ -383,7 +383,7 @@ class Version(TypedDict):
 
 class WarningAnswer(TypedDict):
     """
-    Something to know about the scan, the map or the search.
+    A warning about the scan, the map or the search.
     """
 
     code: Literal[
@@ -407,7 +407,7 @@ class WarningAnswer(TypedDict):
 
 class WithLandmarkAnswer(TypedDict):
     """
-    What a robot would know with the landmark.
+    Result at a place with the landmark.
     """
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
@@ -417,7 +417,7 @@ class WithLandmarkAnswer(TypedDict):
 
 class HardPriorFields(TypedDict):
     """
-    A window that the answer must lie in.
+    A window that must contain the answer.
     """
 
     x: float
@@ -570,7 +570,7 @@ class SensorPose(TypedDict):
 
 class SoftPriorFields(TypedDict):
     """
-    A Gaussian over the pose: it scores, and is never fused into pose or covariance.
+    A Gaussian over the pose. It is part of the score, and never fused into pose or covariance.
     """
 
     x: float
@@ -635,7 +635,7 @@ class AlternativeAnswer(TypedDict):
 
 class AnalyzedPlaceAnswer(TypedDict):
     """
-    What a robot would know at a place.
+    Result at a place.
     """
 
     pose: PoseAnswer
@@ -683,7 +683,7 @@ class MapList(TypedDict):
 
 class PlaceAnswer(TypedDict):
     """
-    A pose from which the map shows what it shows from another, too.
+    A pose at which a scan looks as at another one.
     """
 
     pose: PoseAnswer
@@ -708,7 +708,7 @@ class RegisterAnswer(TypedDict):
 
 class VectorizeAnswer(TypedDict):
     """
-    Segments, and what may be sent back with them in a scan.
+    Segments, with the fields that a scan of segments takes.
     """
 
     segments: list[list[float]]
@@ -725,7 +725,7 @@ class VectorizeAnswer(TypedDict):
 
 class AnalyzeRequest(TypedDict):
     """
-    A robot that is to stand all over a map.
+    Options of an analysis of a map.
     """
 
     laser: NotRequired[ScannerFields]
@@ -781,7 +781,7 @@ class LaserView(TypedDict):
 
 class MapAnalyzeRequest(TypedDict):
     """
-    The same on a map of the request's own.
+    The same, with a map in the request.
     """
 
     laser: NotRequired[ScannerFields]
@@ -851,7 +851,7 @@ class ViewsScan(TypedDict):
 
 class AnalyzeAnswer(TypedDict):
     """
-    Where a map will fail.
+    Analysis of a map.
     """
 
     places: list[AnalyzedPlaceAnswer]
@@ -866,7 +866,7 @@ class AnalyzeAnswer(TypedDict):
 
 class AssociationDiagnosticsAnswer(TypedDict):
     """
-    Numbers beside the pose.
+    Diagnostics of a search.
     """
 
     ambiguity: AmbiguityAnswer
@@ -890,7 +890,7 @@ class AssociationDiagnosticsAnswer(TypedDict):
 
 class CheckAnswer(TypedDict):
     """
-    What is doubtful in a map, also beside sample scans.
+    Check of a map, with or without sample scans.
     """
 
     findings: list[FindingAnswer]
@@ -908,7 +908,7 @@ class CheckAnswer(TypedDict):
 
 class FoundAnswer(TypedDict):
     """
-    Where in a map a scan was taken.
+    Pose of a scan in a map, with the verdict.
     """
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
@@ -934,7 +934,7 @@ class FoundAnswer(TypedDict):
 
 class MapCheckAnswer(TypedDict):
     """
-    What is doubtful in a map by itself.
+    Check of a map without scans.
     """
 
     findings: list[FindingAnswer]
@@ -1012,7 +1012,7 @@ class AssociateAnswer(TypedDict):
 
 class BatchResult(TypedDict):
     """
-    One scan's answer, or why there is none.
+    One scan's answer, or its problem.
     """
 
     index: int
