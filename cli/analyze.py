@@ -120,11 +120,12 @@ def _analyzed(target: Json, asked: Asked) -> Json:
     from service.work.analyzing import analysis_json
 
     from .all_cores import look_on_all_cores
-    from .stored import map_here, settings_here
+    from .stored import map_here, require_size, settings_here
 
     if asked.deadline_ms is not None and not asked.deadline_ms >= 0.0:
         raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {asked.deadline_ms:g}")
     found, cores = map_here(target), settings_here().searches
+    require_size(found.document)
     compile_first()
     begun = time.monotonic()
     try:

@@ -182,7 +182,7 @@ def needing_formats(what: str, asked: Asked = NOTHING) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError:
-        raise RefusedError(f'{what} needs more packages: pip install "linefix[formats]"') from None
+        raise RefusedError(f'{what} needs the extra formats: in a checkout, pip install ".[formats]"') from None
     except InputError as error:
         if asked.files and error.argument == "inside":
             raise RefusedError(f"--point: {error.message}") from None

@@ -6,10 +6,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import orjson
 
 import linefix
 from registration import InputError, RigidTransform
@@ -76,10 +75,11 @@ def locating(on: Json, server: str | None) -> Iterator[Locator]:
         with answering(server) as service:
             yield Remote(service, on)
         return
-    from .stored import settings_here
+    from .stored import require_size, settings_here
 
     seconds = 1e-3 * settings_here().max_deadline_ms
     document = whole_map(on, None)
+    require_size(document)
     compile_first()
     try:
         index = linefix.index_map(document)
@@ -130,7 +130,7 @@ class Remote:
 
     def __init__(self, service: Service, on: Json) -> None:
         self._service = service
-        self._map: Any = orjson.Fragment(orjson.dumps(on)) if "map_id" not in on else on
+        self._map = on
 
     def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
         """Return where a scan was taken."""

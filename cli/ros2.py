@@ -146,7 +146,9 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
     try:
         from ros2 import ConnectionRefusedError, Node, NodeOptions, OptionError, domain_of
     except ModuleNotFoundError:
-        raise RefusedError('linefix ros2 needs more packages: pip install "linefix[formats,ros2]"') from None
+        raise RefusedError(
+            'linefix ros2 needs the extras formats and ros2: in a checkout, pip install ".[formats,ros2]"'
+        ) from None
 
     on = source.on
     scans = tuple(sources.scan or ("scan",))

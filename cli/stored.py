@@ -17,7 +17,7 @@ from service.settings import Settings
 from service.work.answers import outline_json
 
 from .contract import Json, id_of
-from .errors import NOTHING, Asked, CommandError, WrongUseError, error_of
+from .errors import NOTHING, Asked, CommandError, RefusedError, WrongUseError, error_of
 
 MAPS_AT_ONCE = 1000
 
@@ -92,6 +92,15 @@ def settings_here() -> Settings:
         wrong = error.errors()[0]
         name = ".".join(str(part) for part in wrong["loc"])
         raise WrongUseError(f"LINEFIX_{name.upper()} in the environment: {wrong['msg']}") from None
+
+
+def require_size(document: Json) -> None:
+    """Raise `RefusedError` where a map has more segments than the settings of the environment allow."""
+    most, segments = settings_here().max_map_segments, len(document["segments"])
+    if segments > most:
+        raise RefusedError(
+            f"the map has {segments} segments, expected at most {most} map segments; set LINEFIX_MAX_MAP_SEGMENTS"
+        )
 
 
 @contextmanager

@@ -30,7 +30,7 @@ def put(
     if as_json:
         print_json(told)
     else:
-        print_rows([("stored", f"{told['map_id']}, revision {told['revision']}, {told['segments']} segments")])
+        print_rows([("stored", f"{told['map_id']}, revision {told['revision']}, {told['segment_count']} segments")])
 
 
 def list_maps(server: Server = None, as_json: AsJson = False) -> None:

@@ -149,7 +149,7 @@ def test_what_is_not_usable_has_its_other_poses() -> None:
     result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())
     assert not result.usable
     assert len(result.alternatives) == 2
-    assert "2 other places" in message_of(result)
+    assert "2 other poses" in message_of(result)
 
 
 @pytest.mark.parametrize("most", [0, 2, 50])

@@ -214,7 +214,7 @@ UNUSABLE: dict[str, tuple[Callable[[], messages.TFMessage], messages.LaserScan, 
     "degrees": (
         mount,
         replace(scan(1), angle_min=-180.0, angle_max=179.5, angle_increment=0.5),
-        "expected radians, not degrees",
+        "Check for degrees in the driver",
     ),
     "nothing but unknown ranges": (mount, replace(scan(1), ranges=[math.nan] * 720), "none of 720 ranges is a number"),
     "steep": (

@@ -204,7 +204,7 @@ def test_a_motion_that_is_not_known_is_published(domain: int, room: linefix.MapI
         told = robot.until(
             robot.diagnostics,
             lambda: robot.scans.publish(scan),
-            lambda one: "motion of its sensor" in one.status[0].message,
+            lambda one: "motion of the sensor" in one.status[0].message,
         )
         assert told.status[0].level == 1
         assert '"laser": By its time_increment of' in told.status[0].message

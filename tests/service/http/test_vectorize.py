@@ -114,8 +114,8 @@ def test_null_is_unknown_and_beyond_the_range_is_free(client: httpx.Client) -> N
 
 def test_null_has_one_meaning_in_all_that_is_said_of_it(client: httpx.Client) -> None:
     field = client.get("/openapi.json").json()["components"]["schemas"]["Laser"]["properties"]["ranges"]
-    assert "null or below range_min: nothing is known" in field["description"]
-    assert "above range_max: nothing came back" in field["description"]
+    assert "null or below range_min: unknown" in field["description"]
+    assert "above range_max: no return" in field["description"]
 
 
 TWIST = {"vx": 0.5, "vy": -0.2, "omega": 1.5}

@@ -47,7 +47,7 @@ def test_one_that_is_moved_away_is_missed(tmp_path: Path) -> None:
     put(store)
     path.rename(away)
     for call in (store.open, lambda: store.load("m"), lambda: put(store), lambda: store.list(10, "")):
-        with pytest.raises(StoreAwayError, match="gone"):
+        with pytest.raises(StoreAwayError, match="missing"):
             call()
     assert not path.exists()
     away.rename(path)

@@ -106,7 +106,7 @@ def test_a_directory_is_made_where_there_is_none(tmp_path: Path) -> None:
     with opened(f"sqlite:///{tmp_path / 'a' / 'b' / 'maps.sqlite3'}") as store:
         store.put("m", b"one", BOX, ANY)
     (tmp_path / "file").touch()
-    with pytest.raises(ReadOnlyStoreError, match="directory"), opened(f"sqlite:///{tmp_path / 'file' / 'maps'}"):
+    with pytest.raises(ReadOnlyStoreError, match="folder"), opened(f"sqlite:///{tmp_path / 'file' / 'maps'}"):
         pass
 
 
