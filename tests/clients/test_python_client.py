@@ -63,14 +63,14 @@ def test_a_map_of_another_tool_is_imported_checked_by_scans_and_analyzed(patient
         with pytest.raises(ProblemError) as refused:
             client.import_map([("room.csv", b"x1,y1,x2,y2\n")], {"units": ["m", "mm"]})
         assert refused.value.errors[0]["pointer"] == "/units"
-        client.put_map("imported", {"segments": imported["map"]["segments"]})
-        checked = client.check_map("imported", {"scans": [QUESTION["scan"]]})
+        client.put_map("imported-by-client", {"segments": imported["map"]["segments"]})
+        checked = client.check_map("imported-by-client", {"scans": [QUESTION["scan"]]})
         assert checked["samples"] is not None
         assert [one["usable"] for one in checked["samples"]["scans"]] == [True]
-        analyzed = client.analyze({"map": {"map_id": "imported"}, "spacing": 2.0})
-        assert analyzed["map"] == {"map_id": "imported", "revision": 1}
+        analyzed = client.analyze({"map": {"map_id": "imported-by-client"}, "spacing": 2.0})
+        assert analyzed["map"] == {"map_id": "imported-by-client", "revision": 1}
         assert analyzed["complete"]
-        client.delete_map("imported")
+        client.delete_map("imported-by-client")
 
 
 def test_the_event_loop_imports_as_well(patient: RunningService) -> None:
