@@ -191,7 +191,7 @@ def _rows(answer: Json) -> Iterator[tuple[str, str]]:
     counts = answer["summary"]
     share = 100.0 * counts["usable"] / counts["places"] if counts["places"] else 0.0
     yield "places", f"{counts['places']} poses, {answer['spacing']:g} m apart, {counts['not_free']} more are not free"
-    yield "usable", f"{counts['usable']} ({share:.0f} %)"
+    yield "usable", f"{counts['usable']} ({share:.0f} %), simulated without people and furniture that the map lacks"
     if counts.get("resolved_within") is not None:
         yield "driven", f"{counts['resolved_within']} know where they are at once or on the way"
     if counts.get("usable_with_landmark") is not None:

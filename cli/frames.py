@@ -65,8 +65,9 @@ class Frames:
             return
         self.name = one.base_frame
         by = "as --mount says" if self.given is not None else "as the log says"
+        way = "upside down " if one.flipped else ""
         where = f"({mount.x:.3f}, {mount.y:.3f}) m, {math.degrees(mount.theta):.1f} degrees"
-        self.told = f"of {self.name}, the robot, with {one.frame_id} mounted at {where}, {by}"
+        self.told = f"of {self.name}, the robot, with {one.frame_id} mounted {way}at {where}, {by}"
 
 
 def odometry_of(one: LoggedScan) -> RigidTransform | None:

@@ -8,9 +8,10 @@ import typer
 
 from .answering import answering
 from .contract import Json
-from .inputs import read_map_or_id, read_scan
+from .inputs import read_map_or_id
 from .options import AsJson, MapArgument, ScanArgument, Server
 from .printing import print_json, print_rows, verdict_rows
+from .scans import read_scan
 
 
 def locate(

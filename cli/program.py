@@ -41,9 +41,10 @@ def linefix(
         bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
     ] = False,
 ) -> None:
-    """Tell a robot where it is, from a map and a scan.
+    """Find the pose of a robot on a map of walls from a laser scan.
 
-    Exit codes: 0 done, whatever the verdict; 2 wrong use; 3 refused input; 4 no server.
+    Exit codes: 0 done, whatever the verdict; 1 a defect, or a service that cannot start; 2 wrong use;
+    3 rejected input; 4 no server.
     """
 
 

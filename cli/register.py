@@ -8,9 +8,10 @@ import typer
 
 from .answering import answering
 from .contract import Json
-from .inputs import read_json, read_map_file, read_scan
+from .inputs import read_json, read_map_file
 from .options import AsJson, ScanArgument, Server
 from .printing import print_json, print_rows, verdict_rows
+from .scans import read_scan
 
 
 def register(

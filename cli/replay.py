@@ -189,6 +189,7 @@ def _line(one: LoggedScan, found: Found | CommandError, frames: Frames) -> Json:
         "usable": bool(taken and taken.usable),
         "probability": taken and taken.probability,
         "pose": pose and {"x": pose.x, "y": pose.y, "theta": pose.theta},
+        "covariance": taken and taken.covariance,
         "reasons": taken.reasons if taken else [],
         "timing_ms": taken and taken.timing_ms,
         "child_frame_id": frames.name,

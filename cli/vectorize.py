@@ -11,9 +11,9 @@ import typer
 
 from .answering import answering
 from .contract import Json
-from .inputs import read_scan
 from .options import AsJson, ScanArgument, Server
 from .printing import print_json, print_rows, print_table
+from .scans import read_scan
 
 TAKEN = ("laser", "points", "viewpoint")  # of a scan; its frame and stamp make no difference to its segments
 

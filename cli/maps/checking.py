@@ -11,10 +11,11 @@ import typer
 
 from ..answering import answering
 from ..contract import Json
-from ..inputs import read_map_or_id, read_scan
+from ..inputs import read_map_or_id
 from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Server
 from ..printing import print_json, print_rows
+from ..scans import read_scan
 
 SAMPLES = 10  # of a log: ten from all over the building tell more than a hundred from one room
 
