@@ -5,8 +5,8 @@ commit, date and machine. A document quotes a figure and names it in a comment b
 
     right in 95 %<!--= localization: scan: right first --> of the scans
 
-``--check`` lists the figures in documents that are not in the file or differ from it. ``--write`` corrects them, with as
-many digits as the document has.
+``--check`` lists the figures in documents that are not in the file or differ from it. ``--write`` corrects them, with
+as many digits as the document has.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def expected(quote: Quote, measured: str) -> str:
     if first is None:
         return "not measured"
     value = float(first[0].replace(",", ""))
-    if quote.unit == "%" and "%" not in measured:
+    if quote.unit == "%" and "%" not in measured + quote.what:
         value *= 100.0
     digits = len(quote.shown.partition(".")[2])
     return f"{value:,.{digits}f}"
