@@ -1,4 +1,4 @@
-"""What a request costs beside its search: ``python -m benchmarks request``.
+"""What a request costs without its search: ``python -m benchmarks request``.
 
 Processor time by part, what a client sees that asks one request after the other, and requests per second, all beside a
 bare route of the same server that answers a constant. The turns of what is compared alternate.
@@ -131,7 +131,7 @@ def request(quick: int) -> list[Row]:
 
 
 def _by_part(cost: dict[str, tuple[float, float]], each: dict[str, float]) -> list[Row]:
-    """Print what a request for a stored map costs beside its search, by part."""
+    """Print what a request for a stored map costs without its search, by part."""
     whole, seen = cost["a stored map, no walls seen"]
     layers, _ = cost["a probe (/livez)"]
     # What stands for a search where there is nothing to search for is no part; 25 walls are read and written besides.
@@ -145,8 +145,8 @@ def _by_part(cost: dict[str, tuple[float, float]], each: dict[str, float]) -> li
         [(name, f"{ms:.3f}", f"{100 * ms / beside:.0f} %") for name, ms in {**shown, "together": beside}.items()],
     )
     rows = [
-        at_most("beside its search, processor ms", beside, BESIDE_MS),
-        at_most("beside its search, times a bare route", beside / cost["a bare route"][0]),
+        at_most("without its search, processor ms", beside, BESIDE_MS),
+        at_most("without its search, times a bare route", beside / cost["a bare route"][0]),
         at_most("as a client sees it, its search left out, ms", seen + more, CLIENT_MS),
     ]
     print_rows("A request for a stored map", rows)
