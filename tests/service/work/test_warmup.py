@@ -108,7 +108,8 @@ def search_long() -> None:
     """Search as where it takes long: looking at the clock all the time, and beyond the deadline."""
     from unittest.mock import patch
 
-    from association import AssociationOptions, Deadline, MapIndex, Scan, associate, candidates
+    from association import AssociationOptions, Deadline, MapIndex, Scan, associate
+    from association.search import candidates
     from registration import MeasuredSegments, Segments
 
     walls = Segments.from_array(WALLS)
