@@ -50,7 +50,7 @@ def bytes_of(name: str) -> bytes:
     except OSError as error:
         raise WrongUseError(f"{name}: {error.strerror}") from None
     if data.startswith(WIDE):
-        raise RefusedError(f"{name}: is text in UTF-16; save it as UTF-8")
+        raise RefusedError(f"{name}: found text in UTF-16, expected UTF-8; save the file as UTF-8")
     return data.removeprefix(BYTE_ORDER_MARK)
 
 

@@ -38,7 +38,7 @@ def _tell_version(asked: bool) -> None:
 @app.callback()
 def linefix(
     version: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Find the pose of a robot on a map of walls from a laser scan.
@@ -54,7 +54,7 @@ def linefix(
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
 )
 def run_service(context: typer.Context) -> None:
-    """Start the service; linefix serve --help lists every setting."""
+    """Start the HTTP service; linefix serve --help lists all settings."""
     raise typer.Exit(serve(context.args))
 
 
@@ -74,5 +74,5 @@ def call(arguments: list[str]) -> int:
         context = getattr(error, "ctx", None)
         path = "linefix" if context is None else context.command_path
         wrong = " ".join(error.format_message().split()).rstrip(".")
-        raise WrongUseError(f"{wrong}; {path} --help says how") from None
+        raise WrongUseError(f"{wrong}; {path} --help lists the options") from None
     return code if isinstance(code, int) else 0

@@ -112,7 +112,7 @@ def test_without_odometry_its_covariance_says_how_far_it_may_be_off(linefix: Lin
     assert "no odometry was found" in ended.err
     assert "each scan is searched on the whole map" in ended.err
     assert "scans with a time_increment, but without the motion of the sensor" in ended.err
-    assert "covariances allow for a motion of 0.5 m/s and 1.0 rad/s" in ended.err
+    assert "covariances include an unknown motion of 0.5 m/s and 1.0 rad/s" in ended.err
 
 
 @pytest.mark.parametrize("odometry", [True, False])
