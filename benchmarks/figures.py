@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import re
 import subprocess
 import sys
@@ -81,6 +82,7 @@ def record(path: Path, name: str, command: str, rows: Sequence[Row]) -> None:
         "commit": commit.stdout.strip() + (", with changes" if changed.stdout.strip() else ""),
         "date": date.today().isoformat(),
         "machine": machine(),
+        "load": f"{os.getloadavg()[0]:.1f} at the end of the run, 1 or less: idle",
         "figures": {row.what.strip(): row.measured for row in rows},
     }
     path.write_text(json.dumps(dict(sorted(runs.items())), indent=1, ensure_ascii=False) + "\n")

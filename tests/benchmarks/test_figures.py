@@ -49,7 +49,7 @@ def test_the_documents_quote_many() -> None:
 
 def test_every_run_names_its_origin() -> None:
     for name, run in results().items():
-        assert run.keys() == {"command", "commit", "date", "machine", "figures"}, name
+        assert run.keys() == {"command", "commit", "date", "machine", "load", "figures"}, name
         assert all(run.values()), name
 
 
