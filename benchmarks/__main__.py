@@ -1,4 +1,4 @@
-"""All figures beside their goals, quality and speed: ``python -m benchmarks [table ...]``."""
+"""All figures with their goals, quality and speed: ``python -m benchmarks [table ...]``."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _ranges(quick: int) -> list[Row]:
 
 def _analyze(quick: int) -> list[Row]:
     rows = analysis(quick)
-    print_rows("Analysis of maps beside the logs", rows)
+    print_rows("Analysis of maps next to the logs", rows)
     return rows
 
 

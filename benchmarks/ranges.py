@@ -34,7 +34,7 @@ PRIOR_DISTANCE, PRIOR_ANGLE = 1.0, math.radians(20.0)  # standard deviations
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of one scan: without a prior, and with the previous scan's pose as a soft one."""
+    """The result of one scan: without a prior, and with the previous scan's pose as a soft one."""
 
     log: str
     right: bool

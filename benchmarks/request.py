@@ -1,6 +1,6 @@
-"""What a request costs without its search: ``python -m benchmarks request``.
+"""The cost of a request without its search: ``python -m benchmarks request``.
 
-Processor time by part, what a client sees that asks one request after the other, and requests per second, all beside a
+Processor time by part, what a client sees that asks one request after the other, and requests per second, all next to a
 bare route of the same server that answers a constant. The turns of what is compared alternate.
 """
 
@@ -59,7 +59,7 @@ server.serve(target_loader=load, wrap_loader=False)
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A process that serves, and a request that it is asked again and again."""
+    """A service process, and a request that is sent to it repeatedly."""
 
     port: int
     pid: int
@@ -134,13 +134,13 @@ def _by_part(cost: dict[str, tuple[float, float]], each: dict[str, float]) -> li
     """Print what a request for a stored map costs without its search, by part."""
     whole, seen = cost["a stored map, no walls seen"]
     layers, _ = cost["a probe (/livez)"]
-    # What stands for a search where there is nothing to search for is no part; 25 walls are read and written besides.
+    # The time of an empty search is not a part; the other request reads and writes 25 walls in addition.
     more = each["parsing and checking"] + each["encoding"] - each.pop("an empty search")
     shown = {"server, framework, admission, log (a probe)": layers} | each
     beside = whole + more
     shown["hand-over between threads, and what is left"] = beside - sum(shown.values())
     print_table(
-        "By part, beside the search",
+        "By part, next to the search",
         ("part", "processor ms", "share"),
         [(name, f"{ms:.3f}", f"{100 * ms / beside:.0f} %") for name, ms in {**shown, "together": beside}.items()],
     )
