@@ -1,7 +1,7 @@
 """Find each peer's best settings for each level, on queries of their own: ``python -m benchmarks.peers.tuning``.
 
-Coordinate search: one setting after another takes each of its values, twice around. The objective is the fraction of right
-answers; ten times the processor time must buy two points of it. Prints what is to be pasted into `settings`.
+Coordinate search: one setting after another takes each of its values, twice around. The objective is the fraction of
+right answers; ten times the processor time must buy two points of it. Prints what is to be pasted into `settings`.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ class Look:
     ----------
     scan : Scan
     pose : RigidTransform
-    ranges : (m,) metres, or None if only segments are used
+    ranges : (m,) metres, or None if they are not compared with a map
     """
 
     scan: Scan
