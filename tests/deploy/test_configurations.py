@@ -16,7 +16,7 @@ import trustme
 from ruamel.yaml import YAML
 
 from examples.running import free_port
-from service.database_url import database_url
+from service.database_location import database_url
 from service.schemas import examples
 from service.settings import Settings
 from tests.running import JSON, RunningService, until

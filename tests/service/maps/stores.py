@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from sqlalchemy import Engine, event, text
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.database import open_engine
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapRecord, MapStore, MapSummary, Preconditions
 from service.maps.errors import (
     CorruptMapError,
