@@ -16,8 +16,8 @@ ANY = Preconditions()
 
 
 @contextmanager
-def opened(url: str) -> Iterator[MapStore]:
-    store = MapStore(database_url(url))
+def opened(url: str, most_bytes: int | None = None) -> Iterator[MapStore]:
+    store = MapStore(database_url(url), most_bytes=most_bytes)
     try:
         store.open()
         yield store
