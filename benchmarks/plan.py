@@ -20,7 +20,7 @@ from association import HardPrior, MapIndex, Scan, associate
 from batch.blocks import SIGMA
 from examples.running import running_service
 from registration import MeasuredSegments, RigidTransform, Segments
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapStore
 from service.maps.preconditions import Preconditions
 from service.maps.records import MapOutline

@@ -24,7 +24,7 @@ import orjson
 
 from association import Deadline
 from examples.running import free_port, running_service
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.lookup import MapLookup
 from service.parsing.parser_process import ParserProcess

@@ -16,9 +16,9 @@ from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_valid
 from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
-from .admission.issuer import ALGORITHMS, Issuer
 from .admission.key_file import KeyFileError, read_keys
-from .database_url import database_url
+from .admission.keys import ALGORITHMS, Issuer
+from .database_location import database_url
 from .schemas.limits import Limits
 
 Finite = Annotated[float, AllowInfNan(False)]

@@ -1,11 +1,37 @@
-"""The file that SQLite keeps maps in; light to import, since the process above several workers asks for it, too."""
+"""Where the maps are kept: the database that an operator names, and the file of one of SQLite's.
+
+Light to import: the supervisor of the workers asks, too.
+"""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-from sqlalchemy import URL
+from sqlalchemy import URL, make_url
+from sqlalchemy.exc import ArgumentError
+
+_POSTGRESQL = ("postgres", "postgresql", "postgresql+psycopg")
+_SQLITE = ("sqlite", "sqlite+pysqlite")
+
+
+def database_url(text: str) -> URL:
+    """Return a database's URL with the driver that is used for it.
+
+    Raises
+    ------
+    ValueError
+        When it is none, or of a database that the store cannot use. Never names the URL: it may hold a password.
+    """
+    try:
+        url = make_url(text)
+    except (ArgumentError, ValueError):
+        raise ValueError("expected a URL such as postgresql://user@host/database") from None
+    if url.drivername in _POSTGRESQL:
+        return url.set(drivername="postgresql+psycopg")
+    if url.drivername in _SQLITE:
+        return url
+    raise ValueError("expected a URL that begins with sqlite:// or postgresql://")
 
 
 def file_of(url: URL) -> Path | None:
