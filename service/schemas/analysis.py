@@ -30,7 +30,9 @@ class ScannerFields(Strict):
     ] = Field(math.tau, description="field of view about straight ahead, radians")
     beams: Annotated[int, Field(ge=8, le=20_000)] = Field(720, description="over the field of view")
     range_max: Annotated[float, Field(ge=0.5, le=1000.0)] = Field(20.0, description="metres")
-    sigma: Annotated[float, Field(ge=1e-6, le=10.0)] = Field(0.02, description="standard deviation of the ranges, metres")
+    sigma: Annotated[float, Field(ge=1e-6, le=10.0)] = Field(
+        0.02, description="standard deviation of the ranges, metres"
+    )
 
 
 class AnalyzeRequest(Strict):

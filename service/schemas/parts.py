@@ -121,7 +121,9 @@ class MeasuredFields(Strict):
         None, description="number of points on each segment; default length / 0.05, and at least 2 on each wall"
     )
     centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
-    spreads: Spreads | None = Field(None, description="second moment of those points along the segment, m^2; send it with `centroids`")
+    spreads: Spreads | None = Field(
+        None, description="second moment of those points along the segment, m^2; send it with `centroids`"
+    )
 
     @model_validator(mode="after")
     def _both_moments(self) -> MeasuredFields:
@@ -254,7 +256,9 @@ def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None
 class SoftPriorFields(Pose):
     """A Gaussian over the pose. It is part of the score, and never fused into pose or covariance."""
 
-    covariance: Covariance = Field(description="covariance of additive (x, y, theta); m^2, m rad, rad^2; positive definite")
+    covariance: Covariance = Field(
+        description="covariance of additive (x, y, theta); m^2, m rad, rad^2; positive definite"
+    )
 
 
 class HardPriorFields(Pose):

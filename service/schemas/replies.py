@@ -99,7 +99,9 @@ class RegisterAnswer(Answer):
     status: Literal["ok", "degenerate"]
     usable: bool = Field(description="ok, and chi2 below its 99.9 % quantile")
     pose: PoseAnswer | None
-    covariance: Matrix | None = Field(description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
+    covariance: Matrix | None = Field(
+        description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2"
+    )
     unobservable: Row2 | None = Field(
         description="unit vector in the map frame along which the position is unobservable"
     )
@@ -119,7 +121,9 @@ class SegmentOfView(Answer):
 class CorrespondenceAnswer(Residual):
     """A scan segment found on a map segment."""
 
-    view: Index | None = Field(None, description="index of the view, for a scan of several views; `scan` is then an index in this view")
+    view: Index | None = Field(
+        None, description="index of the view, for a scan of several views; `scan` is then an index in this view"
+    )
     overlap: Share = Field(description="fraction of the scan segment's length that lies on the map")
     alternatives: list[Index] = Field(description="other map segments that pass the gates")
 
@@ -128,7 +132,9 @@ class AlternativeAnswer(Answer):
     """Another pose that explains part of the scan."""
 
     pose: PoseAnswer
-    covariance: Matrix | None = Field(description="covariance of this pose, as `covariance` of the answer; null if the pose is degenerate")
+    covariance: Matrix | None = Field(
+        description="covariance of this pose, as `covariance` of the answer; null if the pose is degenerate"
+    )
     score: float = Field(description="score of this pose, as `diagnostics.score`, nats")
     ambiguity: AmbiguityAnswer
     reliability: float = Field(description="reliability of this pose, as `diagnostics.reliability`")
@@ -152,7 +158,7 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
     inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
     score: float = Field(description="log-likelihood minus that of a scan of clutter alone, nats")
     runner_up: float | None = Field(
-        description="score of the best other pose as a fraction of `score`; null: no other pose above the fraction `search.complete_above`"
+        description="best other score as a fraction of `score`; null: none above `search.complete_above`"
     )
     margin: float | None = Field(
         description="`score` minus that of the best other pose, nats; null: no other pose above "
@@ -213,7 +219,9 @@ class FoundAnswer(Answer):
     )
     message: str = Field(description="the verdict in words, for people")
     pose: PoseAnswer | None
-    covariance: Matrix | None = Field(description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
+    covariance: Matrix | None = Field(
+        description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2"
+    )
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is not fixed")
     frame_id: str = Field(description="the map's")
     child_frame_id: str = Field(description="the scan's")
@@ -292,7 +300,9 @@ class VectorizeAnswer(Answer):
     centroids: list[Row2] = Field(description="mean of those points, metres")
     spreads: list[float] = Field(description="second moment of those points along the segment, m^2")
     sigma: float = Field(description="standard deviation of single ranges or points, metres; as sent, or estimated")
-    sigmas: list[float] = Field(description="standard deviation of each segment's points normal to the wall, metres; send it as `sigma` of a scan")
+    sigmas: list[float] = Field(
+        description="standard deviation of each segment's points normal to the wall, metres; `sigma` of a scan"
+    )
     rms: list[float] = Field(description="root mean square of the points' distances from their segment, metres")
     warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, `motion_unknown`, as of /v1/associate")
     request_id: str

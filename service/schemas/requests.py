@@ -82,7 +82,9 @@ class BatchRequest(Strict):
 
     map: AnyMap = Field(description="the map to search, or the id of a stored one")
     # Each is validated by itself, as `BatchItem`.
-    scans: list[Annotated[AnyScan, SkipValidation]] = Field(min_length=1, description="scans, each as `scan` of /v1/associate")
+    scans: list[Annotated[AnyScan, SkipValidation]] = Field(
+        min_length=1, description="scans, each as `scan` of /v1/associate"
+    )
     priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = Field(
         None, description="one prior per scan, as `prior` of /v1/associate, or null"
     )
