@@ -28,9 +28,9 @@ COPY registration registration
 COPY vectorization vectorization
 COPY association association
 COPY simulation simulation
-COPY analysis analysis
 COPY formats formats
-COPY fleet fleet
+COPY map_quality map_quality
+COPY batch batch
 COPY linefix linefix
 COPY ros2 ros2
 COPY service service
@@ -47,7 +47,7 @@ ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE compiled registration vectorization association simulation analysis formats fleet linefix ros2 service cli \
+    && $COMPILE compiled registration vectorization association simulation formats map_quality batch linefix ros2 service cli \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}

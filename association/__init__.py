@@ -2,8 +2,9 @@
 
 from registration import Beams
 
+from .associating import associate
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
-from .map_index import MapIndex
+from .index.map_index import MapIndex
 from .options import (
     PARTS,
     AssociationOptions,
@@ -26,9 +27,8 @@ from .result import (
     Status,
     WarningCode,
 )
-from .scan import Scan, Views, mirrored
-from .search import associate
-from .views import MAX_VIEWS, View, assemble
+from .scan.scan import Scan, Views, mirrored
+from .scan.views import MAX_VIEWS, View, assemble
 from .words import AS_WELL, message_of
 
 __all__ = [

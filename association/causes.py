@@ -15,14 +15,14 @@ from registration import Segments
 from registration.layout import Floats
 from registration.limits import MAX_LENGTH, MIN_LENGTH
 
-from .candidates import Effort, allowed_by
+from .consensus.scaling import scale_near_one
 from .context import SearchContext
 from .explain import search_and_explain
 from .explanations import Explanations
-from .extents import inner_extent
-from .map_index import MapIndex
-from .scaling import scale_near_one
-from .scan import Scan, mirrored, scaled, turned_round
+from .index.map_index import MapIndex
+from .scan.extents import inner_extent
+from .scan.scan import Scan, mirrored, scaled, turned_round
+from .search.candidates import Effort, allowed_by
 from .tuning import (
     CAUSE_CONFIDENCE,
     CAUSE_GAP,
@@ -39,7 +39,7 @@ from .tuning import (
     USUAL_EXTENT,
     USUAL_PART,
 )
-from .verdict import Verdict, judge
+from .verdict.verdict import Verdict, judge
 
 LEAST_EXTENT = 1.5  # m; what is seen of any room
 # What a scan has to be multiplied with where the map's lengths are of one unit and are taken for another, which is the

@@ -12,7 +12,7 @@ from registration.layout import Records
 from registration.observability import most_parallel_up_to
 from registration.values import value
 
-from .alignment import aligned
+from .index.map_index import MapIndex
 from .layout import (
     ENDS,
     GATES,
@@ -28,10 +28,10 @@ from .layout import (
     as_records,
     record,
 )
-from .map_index import MapIndex
 from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
-from .scan import Scan
-from .scan_lines import ScanLines, gates
+from .scan.alignment import aligned
+from .scan.scan import Scan
+from .scan.scan_lines import ScanLines, gates
 from .tables import KnownWalls, Question, Sights, Workspace
 from .tuning import (
     COMPARED_BEAMS,

@@ -6,18 +6,18 @@ from dataclasses import replace
 
 from registration import RigidTransform
 
-from .acceptance import accept, register_accepted
-from .candidates import Candidates, Effort, find_candidates
+from .consensus.acceptance import accept, register_accepted
+from .consensus.ranking import Ranked, rank_candidates
+from .consensus.settling import settle
+from .consensus.sight import agreement, compare_beams
 from .context import SearchContext
 from .explanations import Answer, Explanations
-from .kernels.chance import worth_of
 from .layout import FOUND, record
-from .ranking import Ranked, rank_candidates
 from .result import SearchReport
-from .settling import settle
-from .sight import agreement, compare_beams
-from .significance import significance
-from .views import corrected
+from .scan.views import corrected
+from .search.candidates import Candidates, Effort, find_candidates
+from .verdict.kernels.chance import worth_of
+from .verdict.significance import significance
 
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 

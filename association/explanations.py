@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from registration import RegistrationResult
 from registration.values import value
 
-from .acceptance import Accepted
-from .ranking import Ranked
+from .consensus.acceptance import Accepted
+from .consensus.ranking import Ranked
+from .consensus.settling import Settled
+from .consensus.sight import BeamShares
 from .result import SearchReport
-from .settling import Settled
-from .sight import BeamShares
 
 
 @value(frozen=True, slots=True)

@@ -20,10 +20,10 @@ from .context import SearchContext
 from .explain import search_and_explain
 from .report import report
 from .result import AssociationResult, AssociationWarning
-from .scan import Indices, Scan, Views
+from .scan.scan import Indices, Scan, Views
 from .to_scale import put_to_scale
 from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
-from .verdict import Verdict, judge
+from .verdict.verdict import Verdict, judge
 from .warnings import warnings_of_scan
 
 LAST_VIEW_ONLY = AssociationWarning(

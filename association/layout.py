@@ -227,7 +227,7 @@ WEIGHED = _fields((_F, "gap counted"))
 # that chance scores as high; length of the longest segment that is not matched, and of all of these, m.
 FACTS = _fields((_F, "weakest moves hinge_deviation walls agreement farther nearer significance longest unmatched"))
 
-# The numbers of an answer that the verdict goes by: see `association.features.Features`.
+# The numbers of an answer that the verdict goes by: see `association.verdict.features.Features`.
 FEATURES = _fields(
     (
         _F,

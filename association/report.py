@@ -11,13 +11,15 @@ import numpy as np
 
 from registration import Ambiguity
 
-from .acceptance import correspondences, overlaps_at
 from .causes import Cause
+from .consensus.acceptance import correspondences, overlaps_at
+from .consensus.kernels.measures import paper_measures
+from .consensus.ranking import Ranked, matches_of, with_lines_of_sight
+from .consensus.settling import Settled, settle, slices_between_looks
+from .consensus.sight import missing_segments
 from .context import SearchContext
 from .explanations import Answer, Explanations
-from .kernels.measures import paper_measures
 from .layout import POSE_AMONG_WALLS
-from .ranking import Ranked, matches_of, with_lines_of_sight
 from .result import (
     Alternative,
     AssociationDiagnostics,
@@ -26,11 +28,9 @@ from .result import (
     CriticalWall,
     Status,
 )
-from .settling import Settled, settle, slices_between_looks
-from .sight import missing_segments
 from .to_scale import Factor
 from .tuning import HINGES
-from .verdict import Verdict
+from .verdict.verdict import Verdict
 from .warnings import warnings_of
 
 

@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 from registration import wrap_angle
 from registration.values import value
 
-from .acceptance import register_accepted
-from .candidates import Candidates, find_candidates
+from .consensus.acceptance import register_accepted
+from .consensus.ranking import Ranked, rank_candidates
+from .consensus.similarity import Similarity, fit_similarity
 from .context import SearchContext
 from .explain import search_and_explain
 from .explanations import Explanations
-from .ranking import Ranked, rank_candidates
-from .scan import scaled
-from .similarity import Similarity, fit_similarity
+from .scan.scan import scaled
+from .search.candidates import Candidates, find_candidates
 from .tuning import (
     DISTINCT_ANGLE,
     DOUBTING_DEVIATIONS,

@@ -10,13 +10,13 @@ from registration import Beams
 
 from .causes import Cause, Mistake, unit_mistake
 from .context import SearchContext
-from .extents import extent, inner_extent
-from .kernels.extents import facing_away
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
+from .scan.extents import extent, inner_extent
+from .scan.kernels.extents import facing_away
 from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
-from .verdict import Verdict
+from .verdict.verdict import Verdict
 
 # The factor from each unit to metres.
 UNITS = {

@@ -20,8 +20,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from association import MapIndex, Scan, associate
-from fleet import FleetOptions, Processes, associate_many
-from fleet.blocks import SIGMA
+from batch import FleetOptions, Processes, associate_many
+from batch.blocks import SIGMA
 from registration import MeasuredSegments, Segments
 
 from .growth import campus, draw_query

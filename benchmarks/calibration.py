@@ -1,6 +1,6 @@
-"""Fits the verdict's models, reports them by cross-validation over buildings, and writes them for `association.models`.
+"""Fits the verdict's models, reports them by cross-validation over buildings, writes `association.verdict.models`.
 
-The chance that the best explanation is right is a logistic function of `association.features`, shared between
+The chance that the best explanation is right is a logistic function of `association.verdict.features`, shared between
 explanations that are about as good. Scans of floor plans (three levels of clutter), of logs and of drawn worlds, as
 segments and with their raw ranges, and scans that were searched in the map of another building or of another part of
 it, where nothing is right: these count next to nothing for the one probability, which is about scans of this map, and
@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 import association
-from association.features import Features
-from association.models import FILE, FITTED_ON, MODELS, USUAL, Model, as_document
 from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
+from association.verdict.features import Features
+from association.verdict.models import FILE, FITTED_ON, MODELS, USUAL, Model, as_document
 
 from .curves import Fitted, Task, fit, log_loss, tellable
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
@@ -163,7 +163,7 @@ def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dic
 
 
 def write(models: dict[str, Model], fitted_on: dict[str, str], usual: Features) -> Path:
-    """Write the file that `association.models` reads; return where it is."""
+    """Write the file that `association.verdict.models` reads; return where it is."""
     path = Path(association.__file__).with_name(FILE)
     document = {
         "fitted_on": fitted_on,

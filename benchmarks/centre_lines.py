@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Deadline, MapIndex
-from association.checking import find_thickness
 from formats import ImportOptions, LineMap, read_map, write_map
 from linefix import scan_of
+from map_quality.check import find_thickness
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 from vectorization import LaserScan

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from association.models import Curve, Model, Pair
+from association.verdict.models import Curve, Model, Pair
 
 from .examples import DRAWN, DRAWN_STRANGERS, Example
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 
-from fleet import Engine, OnRay, Processes
+from batch import Engine, OnRay, Processes
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:

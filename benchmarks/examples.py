@@ -12,9 +12,9 @@ import numpy as np
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.explain import search_and_explain
-from association.features import Features, features_of, weigh, with_null
-from association.null import null_of
 from association.to_scale import put_to_scale
+from association.verdict.features import Features, features_of, weigh, with_null
+from association.verdict.null import null_of
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES
 from simulation import Case as DrawnCase

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from association.models import MODELS
 from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_CAUTIOUS_WITH_BEAMS, USABLE_PROBABILITY
+from association.verdict.models import MODELS
 
 from .calibration import TASKS
 from .curves import Fitted

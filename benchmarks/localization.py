@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from association import Status
-from fleet import Engine
+from batch import Engine
 
 from .collection import LEVELS
 from .engines import add_engine, engine_of

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from association import AssociationResult, MapIndex, Scan, WarningCode, associate
-from association.scan import mirrored, scaled, turned_round
+from association.scan.scan import mirrored, scaled, turned_round
 
 from .collection import Collection, MapKey, Query
 from .outcomes import OPTIONS, WARM_UP, other_map

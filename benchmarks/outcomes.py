@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import AssociationOptions, AssociationResult, Deadline, associate
-from association.candidates import find_candidates
 from association.context import SearchContext
-from fleet import Engine, Lost
+from association.search.candidates import find_candidates
+from batch import Engine, Lost
 from registration import RigidTransform, wrap_angle
 
 from .collection import Collection, MapKey, Query, building

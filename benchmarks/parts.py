@@ -13,8 +13,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from association import scan_lines
-from association.kernels.scans import as_lines, describe_labelled, join_labelled, longest_first, seen_at_once
+from association.scan import scan_lines
+from association.scan.kernels.scans import as_lines, describe_labelled, join_labelled, longest_first, seen_at_once
 from association.tables import Measured
 from registration.layout import Records
 

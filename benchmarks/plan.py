@@ -17,8 +17,8 @@ import orjson
 import psycopg
 
 from association import HardPrior, MapIndex, Scan, associate
+from batch.blocks import SIGMA
 from examples.running import running_service
-from fleet.blocks import SIGMA
 from registration import MeasuredSegments, RigidTransform, Segments
 from service.database_location import database_url
 from service.maps import MapStore

@@ -11,8 +11,8 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis import Analysis, PlaceVerdict, Robot, Standing
 from association import Deadline, MapIndex
+from map_quality.analyze import Analysis, PlaceVerdict, Robot, Standing
 from registration import Segments
 
 from .contract import Progress

@@ -116,7 +116,7 @@ class Asked:
 def _analyzed(target: Json, asked: Asked) -> Json:
     """Return the answer of ``POST /v1/analyze``, worked out here on all cores, however long it takes."""
     import linefix
-    from analysis import Analysis, Robot
+    from map_quality.analyze import Analysis, Robot
     from service.work.analyzing import analysis_json
 
     from .all_cores import look_on_all_cores

@@ -24,7 +24,7 @@ from .options import AsJson
 from .printing import noted, print_json, print_rows
 
 if TYPE_CHECKING:
-    from fleet import Engine, FleetOptions, LogNote, Progress, Summary
+    from batch import Engine, FleetOptions, LogNote, Progress, Summary
 
 
 def batch(
@@ -50,7 +50,7 @@ def batch(
         raise WrongUseError(f"{out}: is a folder")
     begun = time.monotonic()
     try:
-        from fleet import associate_many
+        from batch import associate_many
 
         with shown_progress() as watch:
             options = _options(block, deadline_ms, undirected=undirected)
@@ -77,14 +77,14 @@ def _first_error(out: Path) -> str:
 
 def _options(block: int, deadline_ms: float, *, undirected: bool) -> FleetOptions:
     from association import AssociationOptions
-    from fleet import FleetOptions
+    from batch import FleetOptions
 
     search = AssociationOptions(max_alternatives=0, parts=(), oriented=not undirected)
     return FleetOptions(search, deadline_ms, block, compile_kernels)
 
 
 def _engine(workers: int | None, *, ray: bool) -> Engine | None:
-    from fleet import OnRay, Processes
+    from batch import OnRay, Processes
 
     if ray:
         if workers is not None:

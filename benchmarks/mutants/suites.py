@@ -54,15 +54,23 @@ SUITES = {
         )
     ),
     "vectorization/": Suite(("tests/vectorization",)),
-    "association/kernels/view_settling.py": Suite(("tests/association/test_views.py",)),
-    "association/kernels/": Suite(("tests/association/kernels",)),
-    "association/verdict.py": Suite(
-        tuple(f"tests/association/test_{name}.py" for name in ("verdict", "drawn_verdicts", "views"))
+    "association/consensus/kernels/view_settling.py": Suite(("tests/association/scan/test_views.py",)),
+    "association/index/kernels/": Suite(("tests/association/index/kernels",)),
+    "association/scan/kernels/": Suite(("tests/association/scan/kernels",)),
+    "association/consensus/kernels/": Suite(("tests/association/consensus/kernels",)),
+    "association/search/kernels/": Suite(("tests/association/search/kernels",)),
+    "association/verdict/kernels/": Suite(("tests/association/verdict/kernels",)),
+    "association/verdict/verdict.py": Suite(
+        tuple(
+            f"tests/association/{name}.py"
+            for name in ("verdict/test_verdict", "test_drawn_verdicts", "scan/test_views")
+        )
     ),
-    "association/checking/": Suite(("tests/association/checking",)),
+    "map_quality/check/": Suite(("tests/map_quality/check",)),
     "association/": Suite(("tests/association",)),
     "simulation/": Suite(("tests/simulation",)),
-    "analysis/": Suite(("tests/analysis",)),
+    "map_quality/analyze/": Suite(("tests/map_quality/analyze",)),
+    "map_quality/": Suite(("tests/map_quality",)),
     "service/admission/": Suite(("tests/service/admission", "tests/service/http/test_fairness.py")),
     "service/maps/": Suite(("tests/service/maps", "tests/service/http/test_maps.py")),
     "service/parsing/": Suite(("tests/service/parsing", "tests/service/http/test_bodies.py")),

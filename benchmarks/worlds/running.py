@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 from functools import cache
 
-from fleet import Engine, Lost, Processes
+from batch import Engine, Lost, Processes
 from simulation import CONDITIONS, FAMILIES
 
 from .cases import FORMS, in_map, questions

@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from analysis import Analysis, PlaceVerdict, Robot
 from association import CancelledError, Deadline, Status
+from map_quality.analyze import Analysis, PlaceVerdict, Robot
 from registration import Segments
 
 from ..admission.errors import DeadlinePassedError

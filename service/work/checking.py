@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from association import CancelledError, IndexingEndedError, Scan
-from association.checking import (
+from map_quality.check import (
     Advice,
     Finding,
     MapCheck,

@@ -7,7 +7,7 @@ from typing import Any
 import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
-from association.checking import check_map
+from map_quality.check import check_map
 
 from ..admission.errors import DeadlinePassedError
 from ..importing.bounded import ReadMap

@@ -7,8 +7,6 @@ import threading
 
 import numpy as np
 
-from analysis import Analysis, Robot, standing_places
-from analysis.standing import is_free
 from association import (
     AssociationOptions,
     Deadline,
@@ -21,13 +19,15 @@ from association import (
     assemble,
     associate,
 )
-from association.checking import check_map, try_sample
+from association.consensus.sight import missing_segments
+from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
 from association.explain import explain_at
-from association.null import symmetry_of
-from association.sight import missing_segments
-from association.similarity import fit_similarity
-from association.verdict import judge
+from association.verdict.null import symmetry_of
+from association.verdict.verdict import judge
+from map_quality.analyze import Analysis, Robot, standing_places
+from map_quality.analyze.standing import is_free
+from map_quality.check import check_map, try_sample
 from registration import (
     Beams,
     Correspondences,

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from association import Prior, SearchReport
-from association.acceptance import Accepted
+from association.consensus.acceptance import Accepted
+from association.consensus.ranking import Ranked
+from association.consensus.settling import Settled
+from association.consensus.sight import BeamShares
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
 from association.layout import HINGE, MATCH
-from association.ranking import Ranked
-from association.settling import Settled
-from association.sight import BeamShares
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 

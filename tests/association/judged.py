@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from association import HardPrior, SoftPrior, loosening, reasons, verdict
+from association import HardPrior, SoftPrior
 from association.context import SearchContext
 from association.explanations import Explanations
-from association.models import USUAL, as_model
 from association.options import Prior
-from association.verdict import Verdict, judge
+from association.verdict import loosening, reasons, verdict
+from association.verdict.models import USUAL, as_model
+from association.verdict.verdict import Verdict, judge
 
 from .answers import (
     answer_with,

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from association.consensus.ranking import beam_rows
 from association.layout import ESTIMATE, POINT, SIGHTING, record
-from association.ranking import beam_rows
 from association.tables import Rays, Sights
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records

@@ -12,10 +12,10 @@ import pytest
 
 from association import AssociationOptions, Beams, CancelledError, Deadline, MapIndex, Scan, associate
 from association.causes import UNITS, find_causes
+from association.consensus.scaling import scale_near_one
 from association.explain import search_and_explain
-from association.scaling import scale_near_one
-from association.scan import mirrored, scaled, turned_round
-from association.verdict import judge
+from association.scan.scan import mirrored, scaled, turned_round
+from association.verdict.verdict import judge
 from association.warnings import warnings_of
 
 from .scenes import INSIDE, ROOM, beams_of, context_of, index_of, maze, pose, scan_of, seen

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from association import Deadline, HardPrior
+from association.consensus.settling import settle
+from association.consensus.sight import agreement
 from association.explain import explain_at, search_and_explain
-from association.settling import settle
-from association.sight import agreement
-from association.significance import significance
+from association.verdict.significance import significance
 
 from .answers import ROOM_INDEX, SCAN, answer_with, explanations_of, ranked
 from .scenes import INSIDE, ROOM, context_of, equal_rooms, index_of, pose, same_pose, scan_of

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior, associate, candidates
+from association import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior, associate
+from association.search import candidates
 
 from .scenes import index_of, maze, pose, scan_of, seen
 

@@ -13,7 +13,7 @@ from association.context import SearchContext
 from association.explain import search_and_explain
 from association.last_view import LAST_VIEW_ONLY, last_view, search_last_view
 from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
-from association.verdict import Verdict, judge
+from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
 
 from .scenes import (

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from association import AssociationResult, MapIndex, Reason, Status, View, assemble, message_of
-from association.acceptance import Accepted
+from association.consensus.acceptance import Accepted
 from association.explain import search_and_explain
 from association.explanations import Answer
 from association.report import report
-from association.verdict import Verdict, judge
+from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 

@@ -19,11 +19,11 @@ from association import (
     associate,
     to_scale,
 )
+from association.consensus.ranking import Ranked
+from association.consensus.similarity import Similarity, fit_similarity
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.explanations import Explanations
-from association.ranking import Ranked
-from association.similarity import Similarity, fit_similarity
 from association.to_scale import put_to_scale
 from registration import RigidTransform, Segments
 from registration.layout import Floats
@@ -31,9 +31,10 @@ from registration.options import Estimator
 from simulation import Scanner, l_room, scan
 from vectorization import LaserScan, vectorize
 
+from ..map_quality.check.drawn import faces, sampled
+from ..map_quality.check.drawn import index_of as index_of_floor
 from .answers import answer_with, explanations_of, ranked
-from .checking.drawn import faces, sampled
-from .checking.drawn import index_of as index_of_floor
+from .consensus.test_settling import off_by
 from .scenes import (
     INSIDE,
     ROOM,
@@ -48,7 +49,6 @@ from .scenes import (
     scan_of,
     seen,
 )
-from .test_settling import off_by
 
 WALLS = maze(1)
 AT = pose(15.0, 14.0, 0.5)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from association import Beams, MapIndex, Scan
-from association.extents import inner_extent
+from association.scan.extents import inner_extent
 from registration import Segments
 
 from .answers import ROOM_INDEX

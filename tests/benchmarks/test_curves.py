@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from association.models import MODELS, USUAL, Curve
+from association.verdict.models import MODELS, USUAL, Curve
 from benchmarks.curves import AGAINST, EITHER, FOR, Task, fit, knots, log_loss, pieces
 from benchmarks.examples import DRAWN_STRANGERS, SEGMENTS, Example
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from batch import Processes
 from benchmarks.drawn import drawn_offices
 from benchmarks.outcomes import PIECE, Outcome, Piece, run, strangers
-from fleet import Processes
 
 
 def answers(outcomes: list[Outcome]) -> list[tuple[object, ...]]:

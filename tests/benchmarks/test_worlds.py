@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from association import Status
+from batch import Processes
 from benchmarks.worlds.__main__ import _worlds as worlds_named
 from benchmarks.worlds.__main__ import main
 from benchmarks.worlds.cases import FORMS, question, questions
@@ -17,7 +18,6 @@ from benchmarks.worlds.outcomes import WorldOutcome, answer, read, share_read, w
 from benchmarks.worlds.pictures import draw_worlds
 from benchmarks.worlds.running import IN_MAP, STRANGERS, Choice, Chunk, outcomes_of, run
 from benchmarks.worlds.tables import could_be_told, held, quantile_bins, worst_gap
-from fleet import Processes
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES, draw_case
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
-from tests.association.checking.drawn import faces
+from tests.map_quality.check.drawn import faces
 
 BEAMS = 360
 SCANNER = Scanner(beams=BEAMS, angle_increment=math.tau / BEAMS)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from tests.fleet.logs import rows, write_log, write_room
+from tests.batch.logs import rows, write_log, write_room
 
 from .running import Linefix, refused
 

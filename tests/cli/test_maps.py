@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from formats import read_map
-from tests.association.checking.drawn import THICK, centre_lines, faces
+from tests.map_quality.check.drawn import THICK, centre_lines, faces
 from tests.running import RunningService
 from tests.service.importing.forms import SQUARE, room_grid
 

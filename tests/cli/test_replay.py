@@ -14,7 +14,7 @@ from PIL import Image
 from cli.locators import Found
 from cli.tracking import LOST, Tracker
 from registration import RigidTransform
-from tests.association.checking.drawn import faces
+from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 
 from .drives import ODOM_FROM_MAP, write_log

@@ -15,7 +15,7 @@ from cli.frames import Frames, odometry_of
 from cli.replay import HOPELESS
 from formats import LoggedScan
 from registration import RigidTransform
-from tests.association.checking.drawn import faces
+from tests.map_quality.check.drawn import faces
 from tests.running import RunningService
 from vectorization import LaserScan
 

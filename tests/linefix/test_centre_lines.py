@@ -7,7 +7,7 @@ from pathlib import Path
 
 import linefix
 from formats import ImportedMap, ImportOptions
-from tests.association.checking.drawn import centre_lines, sampled
+from tests.map_quality.check.drawn import centre_lines, sampled
 
 SCANS = 12
 

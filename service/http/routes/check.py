@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from association.checking import Sample
+from map_quality.check import Sample
 
 from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap

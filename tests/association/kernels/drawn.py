@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from association import AssociationOptions, MapIndex
 from association.layout import Indices
-from association.scan_lines import gates
+from association.scan.scan_lines import gates
 from association.tables import Workspace
 from registration import RigidTransform
 from registration.layout import Floats, Records

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from association.grids import listed
-from association.kernels import planning
-from association.kernels.looking_up import look_up
-from association.kernels.sweeping import measure
+from association.index.grids import listed
 from association.layout import CROSSING, FIGURE, LISTED, RULES, record
-from association.planning_tables import Costs, Plan, Samples
+from association.search.kernels import planning
+from association.search.kernels.looking_up import look_up
+from association.search.kernels.sweeping import measure
+from association.search.planning_tables import Costs, Plan, Samples
 from association.tables import Crossings, Walls
 from association.tuning import MOST_LISTS, REUSE
 from registration.layout import Records

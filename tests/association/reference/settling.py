@@ -91,7 +91,7 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Settled:
-    """A pose worked out; see `association.settling`."""
+    """A pose worked out; see `association.consensus.settling`."""
 
     at: Moved
     variance: float

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from association import HardPrior, Status, tuning
+from association.consensus.ranking import Ranked
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
-from association.loosening import loose_twin_share
-from association.null import Null, null_of
-from association.ranking import Ranked
+from association.verdict.loosening import loose_twin_share
+from association.verdict.null import Null, null_of
 from registration.observability import MAX_DEVIATION
 
 Numbers = dict[str, float]

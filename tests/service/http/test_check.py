@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from service.schemas import examples
-from tests.association.checking.drawn import THICK, centre_lines, faces, sampled
+from tests.map_quality.check.drawn import THICK, centre_lines, faces, sampled
 
 URL = "/v1/maps/checked:check"
 

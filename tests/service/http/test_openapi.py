@@ -12,8 +12,8 @@ import httpx
 import pytest
 
 from association import Status, WarningCode
-from association.checking import FindingCode
-from association.reasons import SENTENCES
+from association.verdict.reasons import SENTENCES
+from map_quality.check import FindingCode
 from service.http.openapi import Contract
 from service.http.problems import KINDS
 from service.schemas import examples

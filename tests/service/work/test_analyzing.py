@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis import Analysis, Robot, standing_places
 from association import CancelledError, Deadline, MapIndex
+from map_quality.analyze import Analysis, Robot, standing_places
 from registration import Segments
 from service.work import analyzing
 from service.work.analyzing import Tally, take_looks

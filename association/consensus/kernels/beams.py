@@ -1,0 +1,189 @@
+"""Compiled evidence of single beams: what a laser should read at a pose, and what it did."""
+
+import math
+
+from compiled import kernel
+from registration.kernels import joint_add, joint_solve
+from registration.layout import Record, Records
+
+from ...layout import Integers
+from ...tables import Place, Rays, Workspace
+from ...tuning import (
+    BEAM_GATES,
+    BEHIND,
+    CERTAIN,
+    FARTHER_BY,
+    LEAST_INCIDENCE,
+    LEAST_POINTS,
+    NEAR,
+    NEARER_BY,
+    PASSED_SLACK,
+    SURE_LENGTH,
+    WALL_BEHIND,
+)
+from .consensus import clear, hold
+from .sight import first_hit
+
+
+@kernel
+def across_wall(
+    ray: Record, distance: float, walls: Records, starts: Integers, items: Integers, shape: Record
+) -> tuple[float, int]:
+    """Return how much farther than the map shows a beam reads, metres across the wall, and the wall; -1 for none.
+
+    At a grazing angle the pose decides the range, so that it counts across the wall.
+    """
+    expected, w = first_hit(ray, walls, starts, items, shape)
+    if w < 0:
+        return 0.0, w
+    return (distance - expected) * max(LEAST_INCIDENCE, abs(walls[w].dx * ray.dy - walls[w].dy * ray.dx)), w
+
+
+@kernel
+def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> None:
+    """Let a ray go where a beam did; `c` and `s` are cosine and sine of the pose's heading."""
+    ray.x = c * beam.x - s * beam.y + pose.x
+    ray.y = s * beam.x + c * beam.y + pose.y
+    ray.dx = c * beam.dx - s * beam.dy
+    ray.dy = s * beam.dx + c * beam.dy
+
+
+@kernel
+def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
+    """Write the shares of the beams that read the wall they should, and that passed through one, to `evidence`.
+
+    A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
+    proves little, black or mirror walls give none.
+    """
+    beams = rays.beams
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    read = 0.0
+    passed = 0.0
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
+            continue
+        put_beam(ray, beams[i], c, s, pose)
+        ray.limit = min(rays.reach, beams[i].range + BEHIND)
+        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
+        if w < 0:
+            continue
+        read += math.exp(-0.5 * across * across / (NEAR * NEAR))
+        if across > CERTAIN:
+            passed += min(1.0, (walls[w].end - walls[w].begin) / SURE_LENGTH)
+    n = max(1, len(beams))
+    evidence.read = read / n
+    evidence.passed = passed / n
+
+
+@kernel
+def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
+    """Return the shares of the beams that read farther, and nearer, than the map shows from the first pose.
+
+    Where the map shows nothing, and where nothing came back, nothing is compared. `poses` (1,).
+    """
+    beams = rays.beams
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    pose = poses[0]
+    ray = work.scratch[0].ray
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    farther = 0
+    nearer = 0
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
+            continue
+        put_beam(ray, beams[i], c, s, pose)
+        ray.limit = min(rays.reach, beams[i].range + WALL_BEHIND)
+        across, w = across_wall(ray, beams[i].range, walls, starts, items, shape)
+        if w < 0:
+            continue
+        if across > FARTHER_BY:
+            farther += 1
+        elif across < -NEARER_BY:
+            nearer += 1
+    n = max(1, len(beams))
+    return farther / n, nearer / n
+
+
+@kernel
+def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: Workspace) -> None:
+    """Move `pose` to where the ends of the beams lie on the walls nearest to them, up to `gate` metres off.
+
+    One round of point-to-line least squares by the same sums; a point is a pair without spread. A direction that no
+    wall fixes is held where it is.
+    """
+    beams = rays.beams
+    walls = place.walls
+    starts = place.grid.starts
+    items = place.grid.items
+    shape = place.grid.shape[0]
+    sums = work.scratch[0].sums
+    point = work.scratch[0].point
+    clear(sums)
+    c = math.cos(pose.theta)
+    s = math.sin(pose.theta)
+    for i in range(len(beams)):
+        if math.isinf(beams[i].range):
+            continue
+        px = beams[i].x + beams[i].range * beams[i].dx
+        py = beams[i].y + beams[i].range * beams[i].dy
+        x = c * px - s * py + pose.x
+        y = s * px + c * py + pose.y
+        fx = (x - shape.x0) / shape.cell
+        fy = (y - shape.y0) / shape.cell
+        if not (fx >= 0.0 and fy >= 0.0 and fx < shape.columns and fy < shape.rows):
+            continue
+        here = int(fy) * shape.columns + int(fx)
+        nearest = -1
+        least = gate
+        for k in range(starts[here], starts[here + 1]):
+            w = items[k]
+            along = walls[w].dx * x + walls[w].dy * y
+            off = abs(walls[w].dx * y - walls[w].dy * x - walls[w].offset)
+            if off < least and along >= walls[w].begin - NEAR and along <= walls[w].end + NEAR:
+                least = off
+                nearest = w
+        if nearest >= 0:
+            point.centroid_x = px
+            point.centroid_y = py
+            joint_add(sums, walls[nearest], point, 1.0, 1.0)
+    if sums.count < LEAST_POINTS:
+        return
+    hold(sums, pose.x, pose.y, 1.0)
+    theta, tx, ty, _, _ = joint_solve(sums, pose.theta, False)
+    pose.theta = theta
+    pose.x = tx
+    pose.y = ty
+
+
+@kernel
+def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Workspace, out: Records) -> None:
+    """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.
+
+    The first `refined` poses are moved to where the beams fit best, if they fit better there.
+    """
+    moved = work.scratch[0].estimate
+    evidence = work.scratch[0].evidence
+    for k in range(len(poses)):
+        beam_evidence(rays, poses[k], place, work.scratch[0].ray, out[k])
+        if k < refined:
+            moved.theta = poses[k].theta
+            moved.x = poses[k].x
+            moved.y = poses[k].y
+            for gate in BEAM_GATES:
+                refine_by_beams(rays, moved, place, gate, work)
+            beam_evidence(rays, moved, place, work.scratch[0].ray, evidence)
+            if evidence.read > out[k].read and evidence.passed <= out[k].passed + PASSED_SLACK:
+                out[k].read = evidence.read
+                out[k].passed = evidence.passed
+                poses[k].theta = moved.theta
+                poses[k].x = moved.x
+                poses[k].y = moved.y

@@ -1,0 +1,98 @@
+"""Lines of sight at the answer: what should have been seen, and whether it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from registration.layout import Records
+from registration.values import value
+
+from ..context import SearchContext
+from ..layout import ESTIMATE, record
+from ..tuning import COMPARED_BEAMS, NEUTRAL
+from .kernels import agreement as agreement_kernels
+from .kernels.acceptance import missing_pieces
+from .kernels.beams import beam_shares
+from .ranking import Ranked, beam_evidence_at, rays_of
+from .settling import Settled
+
+
+@value(frozen=True, slots=True)
+class BeamShares:
+    """How far the beams do not read what the map shows.
+
+    Shares of them all; both 0 without beams.
+
+    Attributes
+    ----------
+    farther : float
+        That read farther than the wall before them: it is not there, or the robot is not.
+    nearer : float
+        That read nearer: something stands before the wall.
+    in_step : float
+        What the views that are exact read of the map's walls over what all views do; 1 where none is uncertain. Where
+        it is low the others may be placed well, and the scan's frame not.
+    """
+
+    farther: float = 0.0
+    nearer: float = 0.0
+    in_step: float = 1.0
+
+
+NO_BEAMS = BeamShares()
+
+_agreement = agreement_kernels.agreement
+
+
+def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
+    """List the map segments of walls that rays to the consensus set pass through.
+
+    None without a viewpoint, where rays cannot be followed, and where the deadline has passed and that would take long.
+    """
+    if context.scan.viewpoint is None or context.too_late_to_look:
+        return ()
+    index = context.index
+    pieces = missing_pieces(
+        context.sights, best.matches, best.estimate, index.tables.place, index.pieces, context.workspace
+    )
+    return tuple(sorted(set((pieces % index.directed).tolist())))
+
+
+def agreement(context: SearchContext, best: Ranked) -> float:
+    """Return the share of directions in which the scan shows what the map does, 0 to 1.
+
+    `NEUTRAL` without a viewpoint, and where rays cannot be followed.
+    """
+    if context.scan.viewpoint is None or not context.can_look:
+        return NEUTRAL
+    pose, place = best.estimate, context.index.tables.place
+    return float(_agreement(context.sights, pose, place, context.workspace))
+
+
+def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
+    """Return how many beams do not read what the map shows from the settled pose."""
+    if not context.with_beams or not context.can_look:
+        return NO_BEAMS
+    pose, place = settled.pose, context.index.tables.place
+    at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
+    farther, nearer = beam_shares(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)
+    return BeamShares(farther, nearer, _in_step(context, at))
+
+
+def _in_step(context: SearchContext, at: Records) -> float:
+    views, beams = context.scan.views, context.scan.beams
+    if views is None or beams is None or beams.origins is None or not views.uncertain:
+        return 1.0
+    exact = ~views.root.reshape(len(views), -1).any(axis=1)
+    if not exact.any() or context.deadline.passed:
+        return 1.0
+    reads = []
+    for view in range(len(views)):
+        own = views.of_beam == view
+        alone = replace(beams, angles=beams.angles[own], ranges=beams.ranges[own], origins=beams.origins[own])
+        of_view = replace(context, scan=replace(context.scan, beams=alone))
+        reads.append(float(beam_evidence_at(of_view, at, COMPARED_BEAMS, 0)["read"][0]))
+    every = float(np.mean(reads))
+    return float(np.mean(np.array(reads)[exact])) / every if every > 0.0 else 1.0

@@ -1,0 +1,149 @@
+"""Grids over the walls of a map, their memory bounded whatever its extent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration.layout import Records
+
+from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
+from ..tables import Crossings, Grid, Raster, Sweep, Walls
+from ..tuning import (
+    APART_STEP,
+    CELL,
+    CELL_GROWTH,
+    CROSSING_BAND,
+    CROSSING_CELL,
+    CROSSING_REACHES,
+    CROSSING_SAMPLE,
+    CROSSING_SAMPLE_LOOKS,
+    CROSSINGS_A_RUN,
+    FEW_RUNS,
+    MAX_CELLS,
+    MAX_ENTRIES,
+    MAX_SWEEP_CELLS,
+    MOST_BANDS,
+    MOST_CROSSINGS,
+    NARROW_REACH,
+    NEIGHBOURHOOD,
+    RASTER_CELL,
+    REACH,
+    SECTORS,
+    SWEEP_CELL,
+    SWEEP_REACH,
+)
+from .kernels.crossings import find_crossings, list_crossings, sample_crossings
+from .kernels.walls import direction_raster, grid_cells
+from .walls import ends_of, ends_of_rows
+
+Floats = NDArray[np.float64]
+
+
+def near_walls(walls: Walls) -> Grid:
+    """List in each cell the walls within `REACH` of it."""
+    return _grid(ends_of(walls), CELL, REACH, MAX_CELLS)
+
+
+def swept_runs(runs: Walls) -> Sweep:
+    """Return the runs, those that are near one another together, and which of them lie on each cell."""
+    ends = ends_of(runs)
+    squares = np.round(0.5 * (ends[:, :2] + ends[:, 2:]) / NEIGHBOURHOOD)
+    order = np.lexsort((squares[:, 0], squares[:, 1]))
+    rows, swept = runs.rows[order], _grid(ends[order], SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+    sectors = _sectors(rows)[swept.items]
+    present = np.zeros(len(swept.starts) - 1, np.uint16)
+    np.bitwise_or.at(
+        present, np.repeat(np.arange(len(present)), np.diff(swept.starts)), (1 << sectors).astype(np.uint16)
+    )
+    swept = swept._replace(items=swept.items * np.int32(SECTORS) + sectors)
+    return Sweep(rows, rows["end"] - rows["begin"], swept, present)
+
+
+def crossing_runs(runs: Records) -> Crossings:
+    """List the pairs of runs (m,) that cross, up to as far from there as their number allows, or none."""
+    ends, counted = ends_of_rows(runs), max(len(runs), FEW_RUNS)
+    most = [min(a_run * counted, at_most) for a_run, at_most in zip(CROSSINGS_A_RUN, MOST_CROSSINGS, strict=True)]
+    boxed = boxes_in_bands(ends)
+    # No farther than from one end of the map to the other: the fewer lists there are the sooner one is found.
+    across = float(np.hypot(*np.ptp(ends.reshape(-1, 2), axis=0)))
+    reaches = np.array([reach for reach in CROSSING_REACHES if reach <= across] or CROSSING_REACHES[-1:])
+    every = max(1, len(runs) // CROSSING_SAMPLE)
+    counts = sample_crossings(runs, *boxed, reaches, every, CROSSING_SAMPLE_LOOKS)
+    allowed = (counts <= most).all(axis=1)
+    for reach, count in zip(reaches[allowed].tolist(), counts[allowed, 0].tolist(), strict=True):
+        found = np.empty(int(1.2 * count) + FEW_RUNS, CROSSING)
+        number, looks = find_crossings(runs, *boxed, reach, 2 * most[2], found)
+        if number > 2 * most[0] or looks > 2 * most[2]:
+            continue  # the sample was not like the rest
+        if number > len(found):
+            found = np.empty(number, CROSSING)
+            find_crossings(runs, *boxed, reach, 2 * most[2], found)
+        return listed(runs, found[:number], reach)
+    return listed(runs, np.zeros(0, CROSSING), -1.0)
+
+
+def boxes_in_bands(ends: Floats, height: float = CROSSING_BAND) -> tuple[Records, NDArray[np.int32], Records]:
+    """Return the boxes around runs (m, 4), by bands of y and there by their left sides, their order, and the bands.
+
+    (m,) of `ENDS`, (m,) and (b,) of `BAND`, each some `height` metres or more.
+    """
+    boxes = np.hstack([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])])
+    bottom, extent = boxes[:, 1].min(initial=np.inf), np.ptp(boxes[:, 1]) if len(boxes) else 0.0
+    band_of = np.floor((boxes[:, 1] - bottom) / max(height, extent / MOST_BANDS))
+    order = np.lexsort((boxes[:, 0], band_of))
+    boxes, band_of = boxes[order], band_of[order]
+    begins = np.flatnonzero(np.diff(band_of, prepend=-1.0))
+    bands = np.zeros(len(begins), BAND)
+    if len(begins):
+        bands["begin"], bands["end"] = begins, np.append(begins[1:], len(boxes))
+        bands["low"] = np.minimum.reduceat(boxes[:, 1], begins)
+        bands["high"] = np.maximum.reduceat(boxes[:, 3], begins)
+    return as_records(ENDS, boxes), order.astype(np.int32), bands
+
+
+def listed(runs: Records, found: Records, reach: float) -> Crossings:
+    """List crossings (k,) of `CROSSING`, all those of the runs that there are up to `reach` metres."""
+    shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / CROSSING_CELL)))
+    return Crossings(shape, *list_crossings(runs, found, shape))
+
+
+def directions_near(walls: Walls, runs: Walls) -> Raster:
+    """Set in each cell the sectors of the walls and runs near it: runs also have directions over their doorways."""
+    # The line of a run may pass its walls by as much as they were joined with.
+    both = np.vstack([ends_of(walls), ends_of(runs)])
+    shape = _shape(both, RASTER_CELL, REACH + APART_STEP, MAX_CELLS)
+    sectors, ends = np.concatenate([_sectors(walls.rows), _sectors(runs.rows)]), as_records(ENDS, both)
+    bits = np.zeros(int(shape["columns"][0] * shape["rows"][0]), dtype=np.uint32)
+    direction_raster(ends, REACH + APART_STEP, shape, sectors, bits)
+    direction_raster(ends, NARROW_REACH + APART_STEP, shape, sectors + SECTORS, bits)
+    return Raster(shape, bits)
+
+
+def _sectors(walls: Records) -> NDArray[np.int32]:
+    """Return the sector of the direction of each wall, of `SECTORS`."""
+    return np.floor((walls["angle"] + np.pi) * (SECTORS / math.tau) + 0.5).astype(np.int32) % np.int32(SECTORS)
+
+
+def _grid(ends: Floats, size: float, reach: float, most: int) -> Grid:
+    """Lay a grid of at most about `most` cells of `size` metres over what is within `reach` metres of the walls."""
+    shape = _shape(ends, size, reach, most)
+    return Grid(shape, *grid_cells(as_records(ENDS, ends), reach, shape))
+
+
+def _shape(ends: Floats, size: float, reach: float, most: int) -> Records:
+    """Return corner, size and number of cells of `size` metres, (1,) of `GRID_SHAPE`.
+
+    Or larger ones, where there would be more than `most`, or many long walls would be listed too often.
+    """
+    corners = ends.reshape(-1, 2)
+    low = corners.min(axis=0) - reach - size
+    extent = corners.max(axis=0) + reach + size - low
+    cell = max(size, math.sqrt(extent[0] * extent[1] / most), extent.max() / most)
+    spans = np.abs(ends[:, 2:] - ends[:, :2]).sum(axis=1)
+    while float((spans / cell + 1.0).sum()) * (1.0 + 2.0 * reach / cell) > MAX_ENTRIES:
+        cell *= CELL_GROWTH
+    columns, rows = (math.ceil(e / cell) for e in extent)
+    return record(GRID_SHAPE, x0=low[0], y0=low[1], cell=cell, columns=columns, rows=rows)

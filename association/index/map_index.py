@@ -1,0 +1,248 @@
+"""The map as the search wants it: recentred, collinear pieces merged to walls, sorted by direction, in a grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Segments
+
+from ..errors import IndexingEndedError, InvalidMapError
+from ..layout import ENDS, Integers, as_records
+from ..options import Deadline
+from ..scan.extents import diagonal
+from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
+from ..tuning import (
+    BLENDED_SIGMAS,
+    BLENDED_STEP,
+    LEAST_ONE_LINE,
+    MAX_EXTENT,
+    MAX_MAP_SIGMA,
+    ONE_LINE,
+    ONE_LINE_SHARE,
+    WHOLE_GAP,
+)
+from .grids import crossing_runs, directions_near, near_walls, swept_runs
+from .walls import blended, both_ways, merge, runs_of, tie
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MapIndex:
+    """What is computed once per map; immutable, shared between threads.
+
+    Build with :meth:`build`.
+
+    Attributes
+    ----------
+    segments : Segments
+        As sent, in the map frame.
+    sigma : float or None
+        Standard deviation of the map's lines normal to themselves, metres; None: estimated for each answer.
+    origin : (2,)
+        Centre of the map, metres in the map frame; the index works relative to it, so that maps far out lose nothing.
+    directed : int
+        Number of segments as sent; piece i stands for segment ``i % directed``.
+    wall_of_piece : (n,) the wall that each segment is part of
+    pieces : Pieces
+        Which segments each wall consists of.
+    walls : Walls
+    ties : (m,) how walls that continue one another are tied: see `tables.Place`
+    runs : Walls
+        Lines through what nearly continues one another, also across doorways: where a segment of a base may lie.
+    grid : Grid
+        Walls within `REACH` of each cell, whatever their direction: what lies at a point?
+    sweep : Sweep
+        Which runs of a direction does a sweep meet? Told from the list alone, since a look at a run costs more than all
+        else.
+    crossings : Crossings
+        On which pairs of runs may two segments of a scan lie? As far as they are listed no sweep is needed.
+    raster : Raster
+        The quickest way to see that a segment cannot lie at a place.
+    """
+
+    segments: Segments
+    sigma: float | None
+    origin: Floats
+    directed: int
+    wall_of_piece: Integers
+    pieces: Pieces
+    walls: Walls
+    ties: Floats
+    runs: Walls
+    grid: Grid
+    sweep: Sweep
+    crossings: Crossings
+    raster: Raster
+
+    @classmethod
+    def build(
+        cls,
+        segments: Segments,
+        sigma: float | None = None,
+        *,
+        oriented: bool = True,
+        deadline: Deadline | None = None,
+    ) -> MapIndex:
+        """Index a map; some 10 microseconds a segment.
+
+        Parameters
+        ----------
+        segments : Segments
+            At least one, within an extent of 100 km.
+        sigma : float or None
+            Standard deviation of the map's lines normal to themselves, metres, 0 to 10; None: it is not known, and
+            each answer estimates it from what its walls leave.
+        oriented : bool
+            False lists every segment in both directions, for scans whose directions mean nothing.
+        deadline : Deadline, optional
+            Looked at every few tenths of a second.
+
+        Raises
+        ------
+        InvalidMapError
+            When the map is empty or too wide, or sigma out of range.
+        IndexingEndedError
+            When the deadline passes, or is cancelled, first.
+        """
+        if len(segments) == 0:
+            raise InvalidMapError("expected at least one segment, found none", argument="map.segments")
+        if sigma is not None and not 0.0 <= sigma <= MAX_MAP_SIGMA:
+            raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument="map.sigma")
+        corners = segments.endpoints.reshape(-1, 2)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        if (high - low).max() > MAX_EXTENT:
+            raise InvalidMapError(
+                f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit", argument="map.segments"
+            )
+        origin = np.round(0.5 * (low + high))
+        either = segments if oriented else both_ways(segments)
+        return cls._of(either, sigma, origin, len(segments), deadline)
+
+    @classmethod
+    def _of(
+        cls, segments: Segments, sigma: float | None, origin: Floats, directed: int, deadline: Deadline | None
+    ) -> MapIndex:
+        local = segments.shifted(-origin)
+        one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_ONE_LINE, ONE_LINE_SHARE * sigma))
+        walls, wall_of_piece = merge(local, WHOLE_GAP, one_line, deadline)
+        blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
+        if blends > one_line:
+            walls, wall_of_piece = blended(local, walls, wall_of_piece.astype(np.intp), blends, deadline)
+        runs = runs_of(walls, deadline)
+        ties, firsts = tie(walls, deadline)
+        order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
+        starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
+        pieces = Pieces(order, starts, as_records(ENDS, local.endpoints), firsts)
+        _require_time(deadline)
+        sweep = swept_runs(runs)
+        _require_time(deadline)
+        crossings = crossing_runs(sweep.runs)
+        _require_time(deadline)
+        grids = near_walls(walls), sweep, crossings, directions_near(walls, runs)
+        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, ties, runs, *grids)
+        for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
+            getattr(index, name)  # kept from here on, so that the first search does not wait for them
+        return index
+
+    @cached_property
+    def undirected(self) -> MapIndex:
+        """The same map with every segment in both directions; itself where it was built so."""
+        return self._undirected(None)
+
+    def undirected_by(self, deadline: Deadline) -> MapIndex:
+        """Return `undirected`, which is kept, if it is there before a deadline.
+
+        Raises
+        ------
+        IndexingEndedError
+            When the deadline passes, or is cancelled, first.
+        """
+        kept = vars(self)
+        if "undirected" not in kept:
+            kept["undirected"] = self._undirected(deadline)
+        return self.undirected
+
+    def _undirected(self, deadline: Deadline | None) -> MapIndex:
+        if len(self.segments) > self.directed:
+            return self
+        return MapIndex._of(both_ways(self.segments), self.sigma, self.origin, self.directed, deadline)
+
+    @cached_property
+    def wall_lengths(self) -> WallLengths:
+        """How long its walls are."""
+        lengths = np.sort(self.walls.longest)
+        beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+        return WallLengths(lengths, beyond, self._agreeing_share(), self.area)
+
+    @cached_property
+    def crowd(self) -> float:
+        """How many walls are on the list of a cell, seen from the walls: the mean over all entries of all lists."""
+        counts = np.diff(self.grid.starts).astype(np.float64)
+        return float((counts * counts).sum() / max(1.0, counts.sum()))
+
+    @cached_property
+    def most_near(self) -> int:
+        """How many walls the longest list of a cell holds."""
+        return int(np.diff(self.grid.starts).max())
+
+    def _agreeing_share(self) -> float:
+        """Return the chance that two points of walls have the same direction, up to a neighbouring bin."""
+        shares = np.add.reduceat(
+            np.append(self.walls.longest, 0.0), np.minimum(self.walls.bin_starts[:-1], len(self.walls.rows))
+        )
+        shares = np.where(np.diff(self.walls.bin_starts) > 0, shares, 0.0) / self.walls.summed[-1]
+        return float((shares * (shares + np.roll(shares, 1) + np.roll(shares, -1))).sum())
+
+    @cached_property
+    def area(self) -> float:
+        """Of the map's bounding box with a margin, m^2."""
+        cell, columns, rows = self.grid.shape[["cell", "columns", "rows"]][0]
+        return float(cell**2 * columns * rows)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Of the box around the map, metres."""
+        return diagonal(self.segments)
+
+    @cached_property
+    def tables(self) -> MapTables:
+        """What the kernels of the search are handed."""
+        return MapTables(
+            Place(self.walls.rows, self.walls.bin_starts, self.grid, self.ties), self.sweep, self.crossings, self.raster
+        )
+
+    def is_one_wall(self, walls: Integers, wall: int) -> NDArray[np.bool_]:
+        """Tell of `walls` (k,) which are rather one with another one than walls of their own."""
+        ties, tie = self.ties[walls], self.ties[wall]
+        near = 2.0 * np.abs(ties - tie) < math.log(2.0)
+        return np.asarray((walls == wall) | (near & (ties >= 0.0) & (tie >= 0.0)))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory held, bytes."""
+        tables: list[Any] = [
+            self.pieces,
+            self.walls,
+            self.runs,
+            self.grid,
+            self.sweep.sectors,
+            self.crossings,
+            self.raster,
+        ]
+        tables.append((self.sweep.runs, self.sweep.lengths, self.sweep.present))
+        lines = [getattr(self.segments, field.name) for field in fields(Segments)]
+        return sum(
+            array.nbytes for array in [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
+        )
+
+
+def _require_time(deadline: Deadline | None) -> None:
+    if deadline is not None and deadline.passed:
+        raise IndexingEndedError

@@ -1,0 +1,245 @@
+"""From a map's segments to walls: collinear pieces joined, one line through each group, sorted by direction.
+
+Walls are joined where they are one line to rounding. Those that nearly are keep lines of their own, and are tied: how
+much they are one wall falls smoothly with the step and the gap between them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Segments
+from registration.layout import LINE, Records
+
+from ..errors import IndexingEndedError
+from ..layout import ENDS, POINT, WALL, Integers, as_records
+from ..options import Deadline
+from ..tables import Walls
+from ..tuning import (
+    APART_STEP,
+    BASE_SLACK,
+    BASE_SLACK_SHARE,
+    BEGIN_CELL,
+    DIRECTION_BINS,
+    LINK_GAP,
+    MERGE_ANGLE,
+    MERGE_GAP,
+    MERGE_LATERAL,
+    PIECES_A_LOOK,
+    RUN_GAP,
+)
+from .kernels.walls import blend_walls, join_collinear, label_groups, list_begins, tie_walls
+
+Floats = NDArray[np.float64]
+
+
+def both_ways(segments: Segments) -> Segments:
+    """Return the segments, and behind them the same with begin and end exchanged."""
+    return Segments.derived(np.concatenate([segments.endpoints, segments.endpoints[:, [2, 3, 0, 1]]]))
+
+
+def merge(local: Segments, gap: float, beside: float, deadline: Deadline | None = None) -> tuple[Walls, Integers]:
+    """Put one line through each group of collinear pieces up to `gap` apart, and `beside` one another, metres.
+
+    A group that is not straight stays apart.
+
+    Returns
+    -------
+    Walls
+    (n,) the wall that each piece is part of
+
+    Raises
+    ------
+    IndexingEndedError
+        When the deadline passes first.
+    """
+    ends, directions = as_records(ENDS, local.endpoints), as_records(POINT, local.directions)
+    labels = collinear_groups(ends, directions, gap, beside, math.cos(MERGE_ANGLE), deadline)
+    wall, lines = _lines(local, labels)
+    lateral = np.maximum(
+        np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, :2]) - lines.offsets[wall]),
+        np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, 2:]) - lines.offsets[wall]),
+    )
+    crooked = np.zeros(len(lines), dtype=bool)
+    np.logical_or.at(crooked, wall, lateral > beside)
+    if crooked.any():
+        wall, lines = _lines(local, np.where(crooked[wall], np.arange(len(labels)) + len(labels), labels))
+    return _sorted(local, wall, lines)
+
+
+def collinear_groups(
+    ends: Records,
+    directions: Records,
+    max_gap: float,
+    max_lateral: float,
+    min_cos: float,
+    deadline: Deadline | None = None,
+) -> Integers:
+    """Label pieces that continue or repeat one another, see `join_collinear`: (n,) the lowest index of each group.
+
+    Raises
+    ------
+    IndexingEndedError
+        When the deadline passes first.
+    """
+    labels = np.arange(len(ends))
+    # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
+    cell = max(BEGIN_CELL, 1.01 * math.hypot(max_gap, max_lateral))
+    heads, following = list_begins(ends, cell)
+    gates = (cell, float(max_gap), float(max_lateral), float(min_cos))
+    for first in range(0, len(ends), PIECES_A_LOOK):
+        if deadline is not None and deadline.passed:
+            raise IndexingEndedError
+        last = min(first + PIECES_A_LOOK, len(ends))
+        join_collinear(ends, directions, heads, following, gates, labels, first, last)
+    label_groups(labels)
+    return labels
+
+
+class _Lines:
+    """A line through each group of pieces: unit directions (m, 2), left normals (m, 2), offsets (m,)."""
+
+    def __init__(self, local: Segments, wall: NDArray[np.intp], count: int) -> None:
+        d = np.zeros((count, 2))
+        np.add.at(d, wall, local.directions * local.lengths[:, None])
+        d /= np.linalg.norm(d, axis=1)[:, None]
+        self.directions = d
+        self.normals = np.stack([-d[:, 1], d[:, 0]], axis=1)
+        weight = np.bincount(wall, local.lengths, count)
+        offsets = np.einsum("ij,ij->i", self.normals[wall], local.midpoints)
+        self.offsets = np.bincount(wall, local.lengths * offsets, count) / weight
+
+    def __len__(self) -> int:
+        return len(self.offsets)
+
+    def take_over(self, lines: Records) -> None:
+        """Take other lines, (m,) of `LINE`, in place of these."""
+        self.directions = np.column_stack([lines["dx"], lines["dy"]])
+        self.normals = np.stack([-self.directions[:, 1], self.directions[:, 0]], axis=1)
+        self.offsets = lines["offset"].copy()
+
+
+def _lines(local: Segments, labels: Integers) -> tuple[NDArray[np.intp], _Lines]:
+    """Return the group of each piece, counted from 0, and the groups' lines."""
+    _, wall = np.unique(labels, return_inverse=True)
+    return wall, _Lines(local, wall, int(wall.max()) + 1)
+
+
+def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Walls, Integers]:
+    """Order the lines by direction bin, the longest of a bin first, as far as their pieces reach."""
+    m, d = len(lines), lines.directions
+    begins, ends = np.full(m, np.inf), np.full(m, -np.inf)
+    np.minimum.at(begins, wall, np.einsum("ij,ij->i", d[wall], local.endpoints[:, :2]))
+    np.maximum.at(ends, wall, np.einsum("ij,ij->i", d[wall], local.endpoints[:, 2:]))
+    angles = np.arctan2(d[:, 1], d[:, 0])
+    bins = direction_bin(angles)
+    order = np.lexsort((np.arange(m), begins - ends, bins))
+    rows = np.zeros(m, WALL)
+    columns = (d[:, 0], d[:, 1], lines.offsets, begins, ends, angles)
+    for name, values in zip(("dx", "dy", "offset", "begin", "end", "angle"), columns, strict=True):
+        rows[name] = values[order]
+    rows["before"] = rows["after"] = -1
+    longest = (ends - begins)[order]
+    place = np.empty(m, dtype=np.int32)
+    place[order] = np.arange(m)
+    starts = np.searchsorted(bins[order], np.arange(DIRECTION_BINS + 1))
+    return Walls(rows, starts, longest, np.concatenate([[0.0], np.cumsum(longest)])), place[wall]
+
+
+def runs_of(walls: Walls, deadline: Deadline | None = None) -> Walls:
+    """Return the lines that a segment of a base may lie on, though it lies on several walls.
+
+    Those through walls that nearly continue one another, across doorways, too; and beside these those through what does
+    so with larger steps, for a wall with a step is then still found.
+    """
+    nearly, _ = merge(Segments.derived(ends_of(walls)), MERGE_GAP, MERGE_LATERAL, deadline)
+    runs, _ = merge(Segments.derived(ends_of(nearly)), RUN_GAP, MERGE_LATERAL, deadline)
+    stepped, line = merge(Segments.derived(ends_of(runs)), RUN_GAP, APART_STEP, deadline)
+    longest = np.zeros(len(stepped.rows))
+    np.maximum.at(longest, line, runs.longest)
+    # As much as a segment may stick out it may lie on one of them.
+    joined = stepped.rows[longest < (1.0 - BASE_SLACK_SHARE) * stepped.longest - BASE_SLACK]
+    if not len(joined):
+        return runs
+    both = np.vstack([ends_of(runs), ends_of_rows(joined)])
+    local, each = Segments.derived(both), np.arange(len(both))
+    every, _ = _sorted(local, each, _Lines(local, each, len(both)))
+    return every
+
+
+class _Chains:
+    """Walls that continue one another: the chain of each, (m,), and their order chain by chain, by begin and by end."""
+
+    def __init__(self, walls: Walls, deadline: Deadline | None) -> None:
+        ends = ends_of(walls)
+        directions = np.column_stack([walls.rows["dx"], walls.rows["dy"]])
+        records = as_records(ENDS, ends), as_records(POINT, directions)
+        self.of_wall = collinear_groups(*records, LINK_GAP, APART_STEP, math.cos(MERGE_ANGLE), deadline)
+        # Along what the walls of a chain have in common, for their own directions differ.
+        common = np.zeros((len(ends), 2))
+        np.add.at(common, self.of_wall, directions * walls.longest[:, None])
+        common = common[self.of_wall]
+        begins, stops = np.einsum("ij,ij->i", common, ends[:, :2]), np.einsum("ij,ij->i", common, ends[:, 2:])
+        self.by_begin, self.by_end = np.lexsort((begins, self.of_wall)), np.lexsort((stops, self.of_wall))
+
+
+def tie(walls: Walls, deadline: Deadline | None = None) -> tuple[Floats, Integers]:
+    """Name in each wall the next ones of its chain.
+
+    The wall before another is that which ends next before it, the one after it that which begins next.
+
+    Returns
+    -------
+    (m,) how the walls are tied: see `Place.ties`
+    (m,) of the chain of each, the wall that begins first
+    """
+    chains = _Chains(walls, deadline)
+    for name, order in (("after", chains.by_begin), ("before", chains.by_end[::-1])):
+        one, other = order[:-1], order[1:]
+        same = chains.of_wall[one] == chains.of_wall[other]
+        walls.rows[name][one[same]] = other[same]
+    begins = chains.of_wall[chains.by_begin]
+    firsts = chains.by_begin[np.searchsorted(begins, chains.of_wall)]
+    return np.asarray(tie_walls(walls.rows, chains.by_begin, chains.of_wall, APART_STEP)), firsts
+
+
+def blended(
+    local: Segments, walls: Walls, wall_of_piece: NDArray[np.intp], apart: float, deadline: Deadline | None = None
+) -> tuple[Walls, Integers]:
+    """Return the walls on lines that they have in common with those that continue or repeat them.
+
+    The more so the smaller the step is; with one of `apart`, metres, not at all.
+
+    Returns
+    -------
+    Walls
+    (n,) the wall that each piece is part of
+    """
+    chains = _Chains(walls, deadline)
+    ties = tie_walls(walls.rows, chains.by_begin, chains.of_wall, apart)
+    on = np.zeros(len(walls.rows), LINE)
+    blend_walls(walls.rows, walls.longest, chains.by_begin, chains.of_wall, ties, on)
+    lines = _Lines(local, wall_of_piece, len(on))
+    lines.take_over(on)
+    return _sorted(local, wall_of_piece, lines)
+
+
+def direction_bin(angles: Floats) -> NDArray[np.intp]:
+    """Return the direction bin of each angle, radians in (-pi, pi]."""
+    return np.minimum(((angles + np.pi) * (DIRECTION_BINS / math.tau)).astype(np.intp), DIRECTION_BINS - 1)
+
+
+def ends_of(walls: Walls) -> Floats:
+    """Return (m, 4) begin and end, metres in the index frame."""
+    return ends_of_rows(walls.rows)
+
+
+def ends_of_rows(rows: Records) -> Floats:
+    """Return the same of walls or runs, (m,) of `WALL`."""
+    dx, dy, offset, begin, end = (rows[name] for name in ("dx", "dy", "offset", "begin", "end"))
+    a = np.column_stack([dx * begin - dy * offset, dy * begin + dx * offset])
+    b = np.column_stack([dx * end - dy * offset, dy * end + dx * offset])
+    return np.hstack([a, b])

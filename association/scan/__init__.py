@@ -1,0 +1,1 @@
+"""A scan as the search reads it: its lines, several views put together."""

@@ -1,0 +1,160 @@
+"""What the robot saw: segments and beams, from one place or from several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import Beams, MeasuredSegments, RigidTransform, Segments
+
+from ..result import AssociationWarning
+from ..tuning import VIEWS_APART
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+MIRROR = np.array([1.0, -1.0])
+NOTHING_MEASURED = MeasuredSegments.from_segments(Segments.from_array(()))
+_MIRRORED_ERROR = np.array([1.0, -1.0, -1.0])  # of (x, y, theta)
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """The places from which a scan was put together.
+
+    Attributes
+    ----------
+    poses : tuple of RigidTransform
+        scan_from_view, as far as it is known.
+    viewpoints : (v, 2)
+        Where each sensor stood, metres in the scan frame; nan where the view is not from one place.
+    of_segment, of_beam : (n,), (m,)
+        The view of each segment and of each beam.
+    root : (3 v, 3 u)
+        What is not known of the poses: their errors, of additive (x, y, theta) in the scan frame, are `root` times u
+        independent standard normal variates. No columns where all are exact.
+    found : (3 u,)
+        What these variates have been found to be, as far as the poses reckon with it already.
+    spread : (3 u, 3 u)
+        Covariance of what remains of them.
+    """
+
+    poses: tuple[RigidTransform, ...]
+    viewpoints: Floats
+    of_segment: Indices
+    of_beam: Indices
+    root: Floats
+    found: Floats
+    spread: Floats
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether any pose is not exact."""
+        return bool(self.root.shape[1] > 0)
+
+    @property
+    def covariance(self) -> Floats:
+        """Of the errors that remain, (3 v, 3 v)."""
+        return self.root @ self.spread @ self.root.T
+
+    @property
+    def weights(self) -> Floats:
+        """What each view counts, (v,): one, or less where others see from the same place, so that these count as one.
+
+        Views without a viewpoint count fully.
+        """
+        gaps = self.viewpoints[:, None] - self.viewpoints
+        squares = np.einsum("ijk,ijk->ij", gaps, gaps) / (2.0 * VIEWS_APART**2)
+        near = np.where(np.isnan(squares), np.eye(len(self)), np.exp(-squares))
+        return np.asarray(1.0 / near.sum(axis=1))
+
+    def mirrored(self) -> Views:
+        """Return them with left and right exchanged; beams are in reverse order then."""
+        poses = tuple(RigidTransform(p.x, -p.y, -p.theta) for p in self.poses)
+        root = self.root * np.tile(_MIRRORED_ERROR, len(self))[:, None]
+        of_beam = np.ascontiguousarray(self.of_beam[::-1])
+        return replace(self, poses=poses, viewpoints=self.viewpoints * MIRROR, of_beam=of_beam, root=root)
+
+    def scaled(self, factor: float) -> Views:
+        """Return them with all lengths multiplied."""
+        poses = tuple(RigidTransform(p.x * factor, p.y * factor, p.theta) for p in self.poses)
+        root = self.root * np.tile([factor, factor, 1.0], len(self))[:, None]
+        return replace(self, poses=poses, viewpoints=self.viewpoints * factor, root=root)
+
+    def blind(self) -> Views:
+        """Return them without lines of sight and beams."""
+        return replace(self, viewpoints=np.full_like(self.viewpoints, np.nan), of_beam=self.of_beam[:0])
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What the robot saw, in the sensor's frame; of several views, in the frame that they share.
+
+    Attributes
+    ----------
+    measured : MeasuredSegments
+    viewpoint : (float, float) or None
+        Where the sensor stood, metres; None when the segments were not seen from one place, then lines of sight are no
+        evidence. Of several views it is that of the first that has one.
+    beams : Beams or None
+        The raw ranges, where the scan came as such; they start at `viewpoint`, or where each of them says.
+    views : Views or None
+        Where it was put together of several.
+    ordered : bool
+        True unless the scan was made of points that are not in scanning order.
+    warnings : tuple of AssociationWarning
+        What is wrong with how it was taken; each answer has them.
+    """
+
+    measured: MeasuredSegments
+    viewpoint: tuple[float, float] | None = (0.0, 0.0)
+    beams: Beams | None = None
+    views: Views | None = None
+    ordered: bool = True
+    warnings: tuple[AssociationWarning, ...] = ()
+
+
+def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
+    """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left.
+
+    Without its `segments` for who has them otherwise.
+    """
+    at, views = scan.viewpoint, scan.views
+    beams = None if scan.beams is None else scan.beams.mirrored()
+    measured = _mirrored(scan.measured) if segments else NOTHING_MEASURED
+    return Scan(measured, at and (at[0], -at[1]), beams, views and views.mirrored(), scan.ordered, scan.warnings)
+
+
+def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
+    return replace(seen, segments=seen.segments.mirrored(), centroids=seen.centroids * MIRROR)
+
+
+def turned_round(scan: Scan) -> Scan:
+    """Return a scan whose segments begin where they ended.
+
+    What it sees then has its back to the viewpoint, and where it came as ranges it is the map that is the wrong way
+    round: neither beams nor lines of sight count.
+    """
+    ends = scan.measured.segments.endpoints[:, [2, 3, 0, 1]]
+    measured = replace(scan.measured, segments=Segments.derived(ends))
+    return Scan(measured, None, None, scan.views and scan.views.blind(), warnings=scan.warnings)
+
+
+def scaled(scan: Scan, factor: float) -> Scan:
+    """Return a scan of which all lengths are multiplied."""
+    seen, at, beams, views = scan.measured, scan.viewpoint, scan.beams, scan.views
+    measured = replace(
+        seen,
+        segments=Segments.derived(seen.segments.endpoints * factor),
+        sigma=seen.sigma * factor,
+        centroids=seen.centroids * factor,
+        spreads=seen.spreads * factor**2,
+    )
+    place = at and (at[0] * factor, at[1] * factor)
+    views = views and views.scaled(factor)
+    return Scan(measured, place, beams and beams.scaled(factor), views, scan.ordered, scan.warnings)

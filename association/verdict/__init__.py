@@ -1,0 +1,1 @@
+"""How likely the best pose is right, and whether a robot may use it."""

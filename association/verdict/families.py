@@ -1,0 +1,55 @@
+"""Poses that differ along a direction that nothing fixes: which of them is given."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from registration import RigidTransform
+
+from ..consensus.ranking import Ranked
+from ..context import SearchContext
+from ..explanations import Answer
+
+
+def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | None:
+    """Choose among poses that differ along the free direction only; a pose that is fixed, if weakly, is that.
+
+    The nearest to the prior, else to where the raw beams fit best, else the one that centres what was seen on the walls
+    that it matched.
+    """
+    pose, direction = answer.registered.pose, answer.settled.direction
+    if pose is None or not answer.settled.free:
+        return pose
+    anchor = _anchor(context, answer.best)
+    u = np.array(direction)
+    if anchor is None:
+        shift = _centring_shift(context, answer, pose, direction)
+    else:
+        shift = float(np.array([anchor.x - pose.x, anchor.y - pose.y]) @ u)
+    return RigidTransform(pose.x + shift * direction[0], pose.y + shift * direction[1], pose.theta)
+
+
+def _anchor(context: SearchContext, best: Ranked) -> RigidTransform | None:
+    """Return what picks one pose of a family: the prior, else where the raw beams fit best, else nothing."""
+    if context.prior is not None:
+        return context.prior.pose
+    return context.in_map(best.pose) if context.with_beams else None
+
+
+def _centring_shift(
+    context: SearchContext, answer: Answer, pose: RigidTransform, direction: tuple[float, float]
+) -> float:
+    """Return how far along the direction the middle of what was seen comes to lie on that of the walls it matched."""
+    u, matched = np.array(direction), answer.best.matched
+    walls = context.index.walls.rows[answer.best.matches["wall"][matched]]
+    d = np.stack([walls["dx"], walls["dy"]], axis=1)
+    normals = np.stack([-d[:, 1], d[:, 0]], axis=1)
+    spans = np.stack([walls["begin"], walls["end"]], axis=1)
+    ends = d[:, None] * spans[:, :, None]
+    ends = ends + normals[:, None] * walls["offset"][:, None, None] + context.index.origin
+    seen = context.lines.rows[matched]
+    middles, towards = np.stack([seen["x"], seen["y"]], axis=1), np.stack([seen["dx"], seen["dy"]], axis=1)
+    half = 0.5 * seen["length"][:, None] * towards
+    points = pose.apply(np.stack([middles - half, middles + half], axis=1))
+    on_map, on_scan = ends @ u, points @ u
+    return 0.5 * float(on_map.min() + on_map.max() - on_scan.min() - on_scan.max())

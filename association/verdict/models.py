@@ -1,0 +1,137 @@
+"""The fitted models of the verdict, read from the file that ``python -m benchmarks.calibration --write`` makes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..layout import BEND, CURVE, TWO_FEATURES
+from ..tables import Odds
+from .features import Features
+from .kernels.odds import log_odds
+
+FILE = "models.json"
+LEAST, MOST = "least", "most"  # kinds of pairs
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """What one feature adds to the logarithm of the odds: a line that bends at some values.
+
+    Attributes
+    ----------
+    slope : float
+        Nats per unit of the feature, below the first bend.
+    bends : tuple of (float, float)
+        From which value on the slope is more, and by how much.
+    """
+
+    slope: float
+    bends: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """What two features add together: the one counts as far as the other lets it.
+
+    Attributes
+    ----------
+    kind : str
+        `LEAST`: both have to speak for the answer. `MOST`: one of them is enough.
+    first, second : str
+        Names, of `Features`.
+    nats : float
+        What it adds where both speak for the answer.
+    from_to : ((float, float), (float, float))
+        For each the value that does not speak for the answer at all and the one that does in full. In between it is
+        linear.
+    """
+
+    kind: str
+    first: str
+    second: str
+    nats: float
+    from_to: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Model:
+    """An additive model: the logarithm of the odds is a sum of curves, one for each feature, and of some pairs of them.
+
+    Attributes
+    ----------
+    curves : mapping
+        By the name of the feature, of `Features`.
+    pairs : tuple of Pair
+    """
+
+    curves: Mapping[str, Curve]
+    pairs: tuple[Pair, ...] = ()
+
+    def logit(self, features: Features | Floats) -> float:
+        """Return the logarithm of the odds; several models are sooner asked with an array (n,) of the features."""
+        return float(log_odds(self.odds, np.asarray(features)))
+
+    @cached_property
+    def odds(self) -> Odds:
+        """The same for the kernels."""
+        place = Features._fields.index
+        curves, bends = np.zeros(len(self.curves), CURVE), [bend for c in self.curves.values() for bend in c.bends]
+        end = 0
+        for row, (name, curve) in zip(curves, self.curves.items(), strict=True):
+            end += len(curve.bends)
+            row["feature"], row["begin"], row["end"], row["slope"] = (
+                place(name),
+                end - len(curve.bends),
+                end,
+                curve.slope,
+            )
+        pairs = [
+            (place(pair.first), place(pair.second), pair.kind == LEAST, pair.nats, *pair.from_to[0], *pair.from_to[1])
+            for pair in self.pairs
+        ]
+        return Odds(np.array(curves, CURVE), np.array(bends, BEND), np.array(pairs, TWO_FEATURES))
+
+
+def as_model(document: Mapping[str, Sequence[float]]) -> Model:
+    """Read a model.
+
+    For each feature its slope, then the value and the change of slope of each bend in turn. For a pair, whose key is
+    its kind and the names of both, what it adds, then for each where it begins to count and where it does in full.
+    """
+    curves, pairs = {}, []
+    for key, (first, *rest) in document.items():
+        if " " in key:
+            kind, one, other = key.split(" ")
+            start, end, begin, finish = rest
+            pairs.append(Pair(kind, one, other, first, ((start, end), (begin, finish))))
+        else:
+            curves[key] = Curve(first, tuple(zip(rest[::2], rest[1::2], strict=True)))
+    return Model(curves, tuple(pairs))
+
+
+def as_document(model: Model) -> dict[str, list[float]]:
+    """Do the opposite of `as_model`."""
+    numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
+    for pair in model.pairs:
+        numbers[f"{pair.kind} {pair.first} {pair.second}"] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
+    return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
+
+
+def _read() -> tuple[dict[str, Model], dict[str, str], Features]:
+    document = json.loads(files(__package__).joinpath(FILE).read_bytes())
+    models = {name: as_model(curves) for name, curves in document["models"].items()}
+    return models, document["fitted_on"], Features(**document["usual"])
+
+
+# "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are reckoned
+# with; each also "_with_beams". What each was fitted on, and the medians of the features of right answers.
+MODELS, FITTED_ON, USUAL = _read()

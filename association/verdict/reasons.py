@@ -1,0 +1,149 @@
+"""Reasons why an answer is not usable: a code for programs and a message for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from registration.values import value
+
+from ..result import Reason, ReasonCode, Status
+from ..tuning import NO_TWIN, TELLING_REASON
+from .features import Features
+from .models import USUAL, Model
+
+
+@value(frozen=True, slots=True)
+class Standing:
+    """What the verdict is, beside its probabilities.
+
+    Attributes
+    ----------
+    status : Status
+    complete, contradicted : bool
+        Whether the search was, and whether the prior speaks against the answer.
+    elsewhere : bool
+        Whether little speaks for this map at all.
+    thin : bool
+        Whether few walls fix the pose, and one of them alone decides.
+    twin : bool
+        Whether another explanation alone makes the answer too uncertain.
+    alone : bool
+        Whether no other explanation was found where the prior lets one be.
+    mirrored : bool
+        Whether the scan fits the map better with left and right exchanged.
+    out_of_step : bool
+        Whether what is seen from the scan's own place fits far worse than what was seen on the way.
+    off_scale : bool
+        Whether scan and map differ by a factor that is too great to be made up for.
+    """
+
+    status: Status
+    complete: bool
+    contradicted: bool
+    elsewhere: bool
+    thin: bool = False
+    twin: bool = False
+    alone: bool = False
+    mirrored: bool = False
+    out_of_step: bool = False
+    off_scale: bool = False
+
+
+INCOMPLETE: Literal["search_incomplete"] = "search_incomplete"
+SENTENCES: Mapping[ReasonCode, str] = {
+    "prior_contradicted": "The pose that the scan supports contradicts the prior. Check the prior, or search without "
+    "it.",
+    INCOMPLETE: "The search is incomplete: the deadline passed, or too many walls of the map lie in one place. A "
+    "better pose may have been missed. Extend the deadline, or see `warnings`.",
+    "unobservable_direction": "The observed walls do not fix the position along one direction (`unobservable`). Move "
+    "until other walls are in view, and scan again.",
+    "not_on_map": "The scan fits this map no better than an unrelated scan would. The robot may be in a place that "
+    "the map does not contain.",
+    "similar_place": "Another pose fits the scan about as well: see `alternatives`. Send a prior, or move and scan "
+    "again.",
+    "single_wall": "The pose depends on a single wall (`critical_wall`). Move and scan again.",
+    "map_mismatch": "The scan and the map differ: much of the scan is not on the map, or mapped walls are not in the "
+    "scan. Check that the map is up to date.",
+    "insufficient_evidence": "The scan has too few walls to distinguish this place from others. Move and scan again.",
+}
+
+MIRRORED = (
+    "The scan fits this map better with left and right exchanged. Check whether the laser is mounted upside down, and "
+    "whether this is the right map."
+)
+OFF_SCALE = (
+    "The scan fits this map better with its lengths changed by more than 4 %. Check that scan and map are in metres, "
+    "and that this is the right map."
+)
+
+# What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
+FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
+    "similar_place": ("lead", "solitude", "squared_solitude"),
+    "single_wall": ("hinge_moves", "hinge_deviation", "deviation"),
+    "map_mismatch": (
+        "share", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
+        "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
+    ),
+    "insufficient_evidence": ("root_count", "inverse_count", "root_length", "chance", "root_score", "walls"),
+    "not_on_map": ("null", "null_gap", "null_better"),
+}  # fmt: skip
+
+
+def reasons_of(standing: Standing, features: Features | None, cautious: Model | None) -> tuple[Reason, ...]:
+    """List why an answer is not usable, the weightiest first.
+
+    Parameters
+    ----------
+    standing : Standing
+    features : Features or None
+        Of the best explanation; None where there is none.
+    cautious : Model or None
+        Whose odds fall short.
+    """
+    codes: list[ReasonCode] = []
+    if standing.contradicted:
+        codes.append("prior_contradicted")
+    if not standing.complete:
+        codes.append(INCOMPLETE)
+    if standing.elsewhere or (standing.mirrored and standing.status is Status.AMBIGUOUS):
+        codes.append("not_on_map")
+    if standing.status is Status.DEGENERATE:
+        codes.append("unobservable_direction")
+    elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
+        codes += ["insufficient_evidence", "single_wall"] if standing.thin else []
+        codes += ["map_mismatch"] if standing.out_of_step or standing.off_scale else []
+        codes += ["similar_place"] if standing.twin else []
+        codes += [code for code in _weighed(features, cautious, alone=standing.alone) if code not in codes]
+    sentences = dict(SENTENCES)
+    if standing.mirrored:
+        sentences["not_on_map"] = MIRRORED
+    if standing.off_scale:
+        sentences["map_mismatch"] = OFF_SCALE
+    return tuple(Reason(code, sentences[code]) for code in codes)
+
+
+def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[ReasonCode]:
+    """Order the reasons by what their features take from the logarithm of the odds; at least the first of them.
+
+    `alone`: whether there is no other explanation; then the lead is the answer's own score.
+    """
+    lacking = {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
+    if alone or features.lead > NO_TWIN:
+        # Many places explain a little of the scan, and none explains it about as well.
+        lacking["insufficient_evidence"] += max(0.0, lacking.pop("similar_place"))
+    ordered = sorted(lacking, key=lambda code: -lacking[code])
+    return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]
+
+
+def _taken(features: Features, cautious: Model, names: tuple[str, ...]) -> float:
+    """Return what some features take from the logarithm of the odds, nats.
+
+    That is the mean of what it loses when these become, of a usual right answer, what they are here, and of what it
+    gains when they become here what they usually are: what pairs of features add is shared between both by that.
+    """
+    here = {name: getattr(features, name) for name in names}
+    usual = {name: getattr(USUAL, name) for name in names}
+    loses = cautious.logit(USUAL) - cautious.logit(USUAL._replace(**here))
+    gains = cautious.logit(features._replace(**usual)) - cautious.logit(features)
+    return 0.5 * (loses + gains)

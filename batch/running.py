@@ -1,0 +1,190 @@
+"""The main path: logs and maps to one file of poses."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import pyarrow as pa
+
+from .blocks import Block
+from .engine import Engine, Lost
+from .errors import UnreadableScansError
+from .logs import Layout, LogNote, lay_out, layout_of, merged_notes
+from .maps import MapShelf
+from .parts import Parts, opened
+from .processes import Processes
+from .searching import BlockSearch, FleetOptions, lost_row
+
+PathLike = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    stage : "reading" or "searching"
+        Logs are read, then scans are searched.
+    done, total : int
+        Of them.
+    """
+
+    stage: Literal["reading", "searching"]
+    done: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What is in the output.
+
+    Attributes
+    ----------
+    scans : int
+        Rows.
+    taken_over : int
+        How many of them an earlier run had done.
+    usable : int
+    errors : int
+        Rows with an error.
+    statuses : dict of str to int
+        How many of each; those with an error have none.
+    notes : tuple of LogNote
+        Assumptions and omissions of logs of other tools.
+    """
+
+    scans: int
+    taken_over: int
+    usable: int
+    errors: int
+    statuses: dict[str, int]
+    notes: tuple[LogNote, ...] = ()
+
+
+def associate_many(
+    logs: Sequence[PathLike],
+    maps: PathLike,
+    out: PathLike,
+    options: FleetOptions | None = None,
+    engine: Engine | None = None,
+    watch: Callable[[Progress], None] = lambda _: None,
+) -> Summary:
+    """Find where the scans of many logs were taken; write one row for each.
+
+    A run that was killed goes on where it was when it is called again.
+
+    Parameters
+    ----------
+    logs : sequence of path
+        Parquet files with the columns of `batch.tables`, or what `formats.read_log` reads.
+    maps : path
+        A map, or a folder of them. A scan lies on the one that its column ``map_id`` names, else on the one named as
+        its log, else on the only one.
+    out : path
+        The Parquet file to write, with the columns `POSES`, in the order of logs and scans. It is there when all is
+        done, and whole; until then a folder beside it grows.
+    options : FleetOptions, optional
+    engine : Engine, optional
+        Who does the work; this machine's processes, one for each core, where none is given.
+    watch : callable, optional
+        Told after each step.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    FleetError
+        When a log or the maps are not there, or an unfinished run of another kind is.
+    WorkerError
+        When a worker raised, which is a defect.
+    """
+    options = FleetOptions() if options is None else options
+    engine = Processes(len(os.sched_getaffinity(0))) if engine is None else engine
+    names = [os.fspath(log) for log in logs]
+    shelf, target = MapShelf.at(maps), Path(out)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with opened(target, _told(names, shelf, options)) as parts:
+        layouts = [layout_of(number, name, parts.scans, options.block) for number, name in enumerate(names)]
+        _lay_out(layouts, engine, watch)
+        blocks = [block for layout in layouts for block in layout.blocks()]
+        left = parts.left(blocks)
+        total, searched = _scans(blocks), _scans(left)
+        _search(left, BlockSearch(shelf, options), engine, parts, _counting(watch, total - searched, total))
+        notes = merged_notes(layouts)  # before the parts are removed
+        return replace(_summary(parts.assemble(target), total - searched), notes=notes)
+
+
+def _lay_out(layouts: list[Layout], engine: Engine, watch: Callable[[Progress], None]) -> None:
+    missing = [layout for layout in layouts if not layout.done]
+    for done, (layout, outcome) in enumerate(engine.run(lay_out, missing), start=1):
+        if isinstance(outcome, Lost):
+            raise UnreadableScansError("reading it ended each worker early", argument=layout.log)
+        watch(Progress("reading", len(layouts) - len(missing) + done, len(layouts)))
+
+
+def _search(
+    blocks: list[Block], search: BlockSearch, engine: Engine, parts: Parts, count: Callable[[int], None]
+) -> None:
+    """Search all blocks; what ends its workers is halved until the one scan is found that does."""
+    count(0)
+    while blocks:
+        halves: list[Block] = []
+        for block, outcome in engine.run(search, blocks):
+            if not isinstance(outcome, Lost):
+                parts.keep(block, outcome)
+            elif block.stop - block.start > 1:
+                halves += block.halves
+                continue
+            else:
+                parts.keep(block, lost_row(block))
+            count(block.stop - block.start)
+        blocks = halves
+
+
+def _counting(watch: Callable[[Progress], None], done: int, total: int) -> Callable[[int], None]:
+    def count(more: int) -> None:
+        nonlocal done
+        done += more
+        watch(Progress("searching", done, total))
+
+    return count
+
+
+def _scans(blocks: Sequence[Block]) -> int:
+    return sum(block.stop - block.start for block in blocks)
+
+
+def _summary(tables: Iterator[pa.Table], taken_over: int) -> Summary:
+    scans = usable = errors = 0
+    statuses: Counter[str] = Counter()
+    for table in tables:
+        scans += len(table)
+        usable += sum(table.column("usable").to_pylist())
+        errors += len(table) - table.column("error").null_count
+        statuses.update(status for status in table.column("status").to_pylist() if status is not None)
+    return Summary(scans, taken_over, usable, errors, dict(statuses))
+
+
+def _told(names: list[str], shelf: MapShelf, options: FleetOptions) -> dict[str, Any]:
+    """Return what makes two runs the same: files by path, size and time of change."""
+    return {
+        "logs": [_stamped(name) for name in names],
+        "maps": [_stamped(path) for path in shelf.files.values()],
+        "options": [asdict(options.search), options.deadline_ms, options.block],
+    }
+
+
+def _stamped(path: str) -> tuple[str, int, int]:
+    try:
+        state = Path(path).stat()
+    except OSError as error:
+        raise UnreadableScansError(error.strerror or "cannot be read", argument=path) from None
+    return str(Path(path).resolve()), state.st_size, state.st_mtime_ns

@@ -1,0 +1,1 @@
+"""What is doubtful in a map, and where on it localization fails."""

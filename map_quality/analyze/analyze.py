@@ -1,0 +1,249 @@
+"""What a robot would know at a place: a scan taken there, searched in the map that it was taken in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+
+import numpy as np
+
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    Deadline,
+    MapIndex,
+    Scan,
+    Status,
+    associate,
+)
+from registration import RigidTransform, Segments, wrap_angle
+from simulation import scan
+from vectorization import LaserScan, VectorizationOptions, vectorize
+
+from .drive import STEP, seen_on_the_way, ways_from
+from .errors import AnalysisError
+from .robot import Robot
+from .standing import Standing, is_free, standing_places
+
+MOST_DRIVE = 30.0  # m
+SAME_PLACE, SAME_HEADING = 0.5, 0.5  # m, rad; nearer than that a pose is the one where the robot stood
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceVerdict:
+    """What a robot would know at a place.
+
+    Attributes
+    ----------
+    number : int
+        Of the pose in `Standing.poses`.
+    pose : RigidTransform
+        Where it stands, map_from_scan.
+    status : Status
+        Of the answer; ambiguous where that is another place, however sure the search was.
+    usable : bool
+        Whether the answer was usable, and this place.
+    probability : float or None
+        As answered, 0 to 1; None where the position stays free along a direction.
+    similar_pose : RigidTransform or None
+        Another place that explains the scan about as well, or was taken for this one.
+    unobservable : (float, float) or None
+        Along which the position stays free; a unit vector in the map frame.
+    reasons : tuple of str
+        Codes of why it is not usable, the weightiest first.
+    resolved_after : float or None
+        How far it drives until it knows where it is, metres, on the better of the two ways of
+        `map_quality.analyze.drive`; 0 where it knows at once, None where it does not within what was asked for, or
+        nothing was.
+    with_landmark : PlaceVerdict or None
+        What it would know with the landmark; None where there is none, or it stands in the way.
+    """
+
+    number: int
+    pose: RigidTransform
+    status: Status
+    usable: bool
+    probability: float | None
+    similar_pose: RigidTransform | None
+    unobservable: tuple[float, float] | None
+    reasons: tuple[str, ...]
+    resolved_after: float | None = None
+    with_landmark: PlaceVerdict | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """A map that is gone over; shared between threads.
+
+    Attributes
+    ----------
+    index : MapIndex
+        Where scans are searched.
+    segments : Segments
+        What the scanner sees: the map as sent.
+    robot : Robot
+    standing : Standing
+    oriented : bool
+        Whether directions mean something.
+    seed : int
+        Of the noise.
+    drive : float
+        How far the robot may drive from a place where it does not know where it is, metres; 0: not at all.
+    landmark : Analysis or None
+        The same of a map with the landmark.
+    """
+
+    index: MapIndex
+    segments: Segments
+    robot: Robot
+    standing: Standing
+    oriented: bool = True
+    seed: int = 0
+    drive: float = 0.0
+    landmark: Analysis | None = None
+
+    @classmethod
+    def over(
+        cls,
+        index: MapIndex,
+        robot: Robot,
+        spacing: float | None = None,
+        point: Sequence[float] | None = None,
+        *,
+        seed: int = 0,
+        drive: float = 0.0,
+        landmark: Segments | None = None,
+    ) -> Analysis:
+        """Lay a grid of poses over a map.
+
+        Parameters
+        ----------
+        index : MapIndex
+            Directions count as they do in the index.
+        robot : Robot
+        spacing, point
+            As of `standing_places`.
+        seed, drive
+            As of `Analysis`; metres to drive from 0 to 30.
+        landmark : Segments, optional
+            As of `with_segments`.
+
+        Raises
+        ------
+        AnalysisError
+            When the places cannot be had, or the drive is out of range.
+        """
+        if not 0.0 <= drive <= MOST_DRIVE:
+            raise AnalysisError(f"expected from 0 to {MOST_DRIVE:g} m, got {drive:g}", argument="drive")
+        # Of a map without directions the index holds each segment twice.
+        segments = Segments.derived(index.segments.endpoints[: index.directed])
+        standing = standing_places(segments, robot, spacing, point)
+        oriented = len(index.segments) == index.directed
+        analysis = cls(index, segments, robot, standing, oriented, seed, drive)
+        return analysis if landmark is None or not len(landmark) else analysis.with_segments(landmark)
+
+    def with_segments(self, landmark: Segments) -> Analysis:
+        """Return the same, which also says what would be known with more segments, on the map and in the building.
+
+        Parameters
+        ----------
+        landmark : Segments
+            In the map frame; such as a box, its free side outside.
+        """
+        ends = np.vstack([self.segments.endpoints, landmark.endpoints])
+        segments = Segments.derived(ends)
+        index = MapIndex.build(segments, self.index.sigma, oriented=self.oriented)
+        return replace(self, landmark=replace(self, index=index, segments=segments, drive=0.0, landmark=None))
+
+    def look(self, number: int, deadline: Deadline | None = None) -> PlaceVerdict | None:
+        """Take a scan at one of the poses and search it; None where a robot cannot stand there.
+
+        Raises
+        ------
+        CancelledError
+            When the deadline was cancelled.
+        """
+        steps = self.looking(number, deadline)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                found: PlaceVerdict | None = done.value
+                return found
+
+    def looking(self, number: int, deadline: Deadline | None = None) -> Generator[None, None, PlaceVerdict | None]:
+        """Do what `look` does, one search at a step, and return the same; between steps others may have their turn.
+
+        Raises
+        ------
+        CancelledError
+            When the deadline was cancelled.
+        """
+        pose = self.standing.pose(number)
+        if not is_free(self.segments, pose, self.robot.range_max, oriented=self.oriented):
+            return None
+        seen = self._scan(pose, number)
+        found = _verdict(number, pose, self._search(seen, deadline))
+        if self.drive:
+            metres = 0.0 if found.usable else (yield from self._knows_after(number, pose, seen, deadline))
+            found = replace(found, resolved_after=metres)
+        if self.landmark is not None:
+            yield
+            found = replace(found, with_landmark=self.landmark.look(number, deadline))
+        return found
+
+    def _search(self, seen: Scan, deadline: Deadline | None) -> AssociationResult:
+        return associate(self.index, seen, None, AssociationOptions(oriented=self.oriented), deadline)
+
+    def _knows_after(
+        self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None
+    ) -> Generator[None, None, float | None]:
+        """Return how far it drives until all that it has seen is told to be where it is by then; metres."""
+        ways = ways_from(self.segments, pose, self.drive, self.robot.range_max)
+        seen_so_far = [[(pose, seen)] for _ in ways]
+        for step in zip_longest(*ways):
+            for way, (there, views) in enumerate(zip(step, seen_so_far, strict=True)):
+                if there is None:
+                    continue
+                if deadline is not None and deadline.passed:
+                    return None
+                yield
+                views.append((there, self._scan(there, number, way, len(views))))
+                result = self._search(seen_on_the_way(views, np.random.default_rng((self.seed, number))), deadline)
+                if result.usable and result.pose is not None and _is_same(result.pose, there):
+                    return STEP * (len(views) - 1)
+        return None
+
+    def _scan(self, pose: RigidTransform, *number: int) -> Scan:
+        """Return what the robot would send from there; the noise of a place is the same whenever it is tried."""
+        scanner = self.robot.scanner
+        ranges = scan(self.segments, pose, scanner, np.random.default_rng((self.seed, *number))).ranges
+        laser = LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max)
+        found = vectorize(laser, VectorizationOptions(sigma=self.robot.sigma))
+        return Scan(found.measured, (0.0, 0.0), found.beams)
+
+
+def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> PlaceVerdict:
+    codes = tuple(reason.code for reason in result.reasons)
+    other = None
+    mistaken = result.usable and result.pose is not None and not _is_same(result.pose, pose)
+    if mistaken or "similar_place" in codes:
+        poses = [result.pose, *(one.pose for one in result.alternatives)]
+        other = next((one for one in poses if one is not None and not _is_same(one, pose)), None)
+    return PlaceVerdict(
+        number=number,
+        pose=pose,
+        status=Status.AMBIGUOUS if mistaken else result.status,
+        usable=result.usable and not mistaken,
+        probability=result.probability,
+        similar_pose=other,
+        unobservable=result.unobservable,
+        reasons=("similar_place",) if mistaken else codes,
+    )
+
+
+def _is_same(found: RigidTransform, pose: RigidTransform) -> bool:
+    away = math.hypot(found.x - pose.x, found.y - pose.y)
+    return away < SAME_PLACE and abs(wrap_angle(found.theta - pose.theta)) < SAME_HEADING

@@ -1,0 +1,71 @@
+"""Checking a map by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from association.index.map_index import MapIndex
+from association.options import CancelledError, Deadline
+
+from .likeness import find_look_alikes, likeness_findings
+from .pieces import drawing_findings, drawn_sigma, find_near_walls
+from .result import Advice, Finding, MapCheck, Size
+from .sides import Sides, direction_findings, look_from_walls
+from .tuning import LARGEST, SMALLEST
+
+
+def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bool = True) -> MapCheck:
+    """Look for what is doubtful in a map: its directions, how it was drawn, its size, what of it looks alike.
+
+    Parameters
+    ----------
+    index : MapIndex
+        Built with its directions, whatever they mean.
+    deadline : Deadline, optional
+        When it passes, what was found so far is the answer and ``complete`` is False.
+    oriented : bool
+        Whether the map says that directions mean something.
+
+    Returns
+    -------
+    MapCheck
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    until = deadline or Deadline()
+    size = Size(index.directed, len(index.walls.rows), float(index.walls.longest.sum()), index.diagonal)
+    findings = list(_size_findings(size))
+    advice, near = Advice(drawn_sigma(index)), find_near_walls(index, until)
+    if oriented and not findings:  # of another unit walls are too far apart to see one another
+        sides = look_from_walls(index, near.opposite, until)
+        findings += direction_findings(index, sides)
+        advice = Advice(advice.sigma, _directed(sides, findings))
+    for found in () if until.passed else drawing_findings(index, near, until):
+        findings.append(found)
+        if until.passed:
+            break
+    means_something = oriented and advice.oriented is not False
+    likeness = find_look_alikes(index, until, oriented=means_something)
+    findings += likeness_findings(index, likeness)
+    if until.cancelled:
+        raise CancelledError
+    return MapCheck(size, tuple(findings), advice, likeness.places, likeness.viewpoints, not until.passed)
+
+
+def _directed(sides: Sides, findings: list[Finding]) -> bool | None:
+    """Return what speaks for directions that mean something; None where too little was seen to say."""
+    if sides.meaningless:
+        return False
+    return None if findings or not sides.left.sum() else True
+
+
+def _size_findings(size: Size) -> Iterator[Finding]:
+    if not SMALLEST <= size.diagonal <= LARGEST:
+        yield Finding(
+            "unlikely_size",
+            f"The map's diagonal is {size.diagonal:.3g} m, expected {SMALLEST:g} to {LARGEST:g} m. Check that it is "
+            "in metres.",
+        )

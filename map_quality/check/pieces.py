@@ -1,0 +1,262 @@
+"""How a map is drawn: short pieces, gaps, overlaps, faces that stand doubled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from association.index.map_index import MapIndex
+from association.options import Deadline
+from association.tables import Grid
+from registration.layout import Floats, Records
+
+from .looking import segments_of
+from .result import Finding
+from .tuning import (
+    DOUBLE,
+    DOUBLE_LENGTH,
+    DOUBLE_SHARE,
+    ENDS_AT_A_TIME,
+    GREATEST_GAP,
+    LARGEST_PIXEL,
+    LEAST_GAP,
+    MANY_ENDS,
+    MOST_ENDS,
+    MOST_IN_CELL,
+    MOST_PAIRS,
+    ON_STEP,
+    OVERLAP,
+    PAIRS_AT_A_TIME,
+    PARALLEL,
+    SAME_LINE,
+    SHORT,
+    STEPS,
+)
+
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+
+def drawing_findings(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
+    """Tell what is doubtful in how the lines of a directed map were drawn; `near` are its walls beside others."""
+    yield from _short(index)
+    yield from _doubled(index, near)
+    yield from _overlapping(index, near, deadline)
+    yield from _gaping(index, deadline)
+
+
+@dataclass(frozen=True, slots=True)
+class NearWalls:
+    """Which walls of a map run beside another one: (walls,) flags each.
+
+    Attributes
+    ----------
+    opposite : of two that lie on one another and run in opposite ways: a wall without thickness
+    doubled : of two that are nearer to each other than two faces of a building, and look one way, or at each other
+    overlapping : of two that lie on one another and run the same way
+    """
+
+    opposite: Flags
+    doubled: Flags
+    overlapping: Flags
+
+
+def find_near_walls(index: MapIndex, deadline: Deadline) -> NearWalls:
+    """Compare the walls of a directed map that are near to each other, as many as the deadline allows."""
+    walls = index.walls.rows
+    near = NearWalls(*(np.zeros(len(walls), dtype=bool) for _ in range(3)))
+    for pairs in near_pairs(index.grid):
+        if deadline.passed:
+            break
+        _compare(walls, pairs, near)
+    return near
+
+
+def near_pairs(grid: Grid) -> Iterator[Indices]:
+    """Yield the pairs of walls that one cell lists, (p, 2), the lower index first, up to `PAIRS_AT_A_TIME` together.
+
+    Those of cells with few walls come first. A pair comes once for each cell that lists both.
+    """
+    sizes, left = np.diff(grid.starts), MOST_PAIRS
+    for size in range(2, MOST_IN_CELL + 1):
+        cells = np.flatnonzero(sizes == size if size < MOST_IN_CELL else sizes >= size)
+        first, second = np.triu_indices(size, 1)
+        cells = cells[: left // len(first)]
+        left -= len(cells) * len(first)
+        step = PAIRS_AT_A_TIME // len(first)
+        for begin in range(0, len(cells), step):
+            listed = grid.items[grid.starts[cells[begin : begin + step]][:, None] + np.arange(size)]
+            yield np.stack([listed[:, first].reshape(-1), listed[:, second].reshape(-1)], axis=1)
+
+
+def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
+    """Note how the second wall of each pair, (p, 2), runs beside the first."""
+    one, other = walls["dx"][pairs], walls["dy"][pairs]
+    pairs = pairs[np.abs(one[:, 0] * other[:, 1] - other[:, 0] * one[:, 1]) < PARALLEL]
+    a, b = walls[pairs[:, 0]], walls[pairs[:, 1]]
+    along = a["dx"] * b["dx"] + a["dy"] * b["dy"] > 0.0
+    places = []
+    for name in ("begin", "end"):
+        x = b["dx"] * b[name] - b["dy"] * b["offset"]
+        y = b["dy"] * b[name] + b["dx"] * b["offset"]
+        places.append((a["dx"] * x + a["dy"] * y, a["dx"] * y - a["dy"] * x - a["offset"]))
+    (s1, o1), (s2, o2) = places
+    low, high = np.maximum(a["begin"], np.minimum(s1, s2)), np.minimum(a["end"], np.maximum(s1, s2))
+    slope = (o2 - o1) / np.where(np.abs(s2 - s1) > 1e-9, s2 - s1, 1.0)
+    # The length that both run beside each other, and how far the second lies to the left of the first there, metres.
+    shared, off = high - low, o1 + slope * (0.5 * (low + high) - s1)
+    shorter = np.minimum(a["end"] - a["begin"], b["end"] - b["begin"])
+    for_long = (shared > DOUBLE_LENGTH) & (shared > DOUBLE_SHARE * shorter)
+    on_it, apart = np.abs(off) < SAME_LINE, np.abs(off)
+    near.opposite[pairs[for_long & on_it & ~along]] = True
+    # Back to back they are the two faces of one wall, as they should be.
+    near.doubled[pairs[for_long & ~on_it & (apart < DOUBLE) & (along | (off > 0.0))]] = True
+    near.overlapping[pairs[along & on_it & (shared > OVERLAP)]] = True
+
+
+def _short(index: MapIndex) -> Iterator[Finding]:
+    lengths = index.walls.longest
+    short = lengths < SHORT
+    if short.any():
+        share = lengths[short].sum() / lengths.sum()
+        found = segments_of(index, short)
+        yield Finding(
+            "short_pieces",
+            f"{len(found)} segments, {100.0 * share:.2g} % of the length, are shorter than {100.0 * SHORT:g} cm, also "
+            "together with the segments that they continue. A search does not profit from them. Omit or join them.",
+            found,
+        )
+
+
+def _doubled(index: MapIndex, near: NearWalls) -> Iterator[Finding]:
+    if near.doubled.any():
+        found = segments_of(index, near.doubled)
+        yield Finding(
+            "doubled_faces",
+            f"{len(found)} segments run less than {100.0 * DOUBLE:g} cm next to another that faces the same way, or "
+            "faces them. Either one face of a wall is drawn twice, or free space is drawn inside of it. A scan of the "
+            "wall fits both. Keep one of them.",
+            found,
+        )
+    if near.opposite.any():
+        found = segments_of(index, near.opposite)
+        yield Finding(
+            "both_ways",
+            f"{len(found)} segments lie on another that runs the opposite way: walls without thickness. Scans from "
+            "both sides fit better if the two faces are drawn apart by the thickness of the wall.",
+            found,
+        )
+
+
+def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
+    found = set(segments_of(index, near.overlapping)) | _lapping(index, deadline)
+    if found:
+        yield Finding(
+            "overlaps",
+            f"{len(found)} segments lie on others that run the same way: they are drawn twice. Remove one of them.",
+            tuple(sorted(found)),
+        )
+
+
+def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
+    """Tell where an end nearly meets another segment: at no other end, on no other line, and yet near one."""
+    ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
+    # What is as near as this to its own begin is too short to tell.
+    alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
+    if not alone.any() or deadline.passed:
+        return
+    found = set()
+    for end, gap in _loose_ends(ends, np.flatnonzero(alone), deadline):
+        if deadline.passed:
+            break
+        apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
+        if apart > LEAST_GAP + SAME_LINE and min(apart, gap) <= GREATEST_GAP:
+            found.add(end // 2)
+    if found:
+        yield Finding(
+            "gaps",
+            f"{len(found)} segments end {100.0 * LEAST_GAP:g} to {100.0 * GREATEST_GAP:g} cm before another segment: "
+            "rays pass through the gaps. Extend the segments until they meet.",
+            tuple(sorted(found)),
+        )
+
+
+def _alone(ends: Floats) -> Flags:
+    """Tell of each end, (n, 2) metres, whether no other is at the same place."""
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    same = (np.diff(ends[order], axis=0) == 0.0).all(axis=1)
+    alone = np.empty(len(ends), dtype=bool)
+    alone[order] = ~(np.append(same, False) | np.append(False, same))
+    return alone
+
+
+def _loose_ends(ends: Floats, chosen: Indices, deadline: Deadline) -> Iterator[tuple[int, float]]:
+    """Yield those of the chosen ends (k,) that touch no other, `MOST_ENDS` at most, and how far the nearest is, metres.
+
+    It is infinitely far where none is within `GREATEST_GAP`.
+    """
+    from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
+
+    tree, left = cKDTree(ends), MOST_ENDS
+    for begin in range(0, len(chosen), ENDS_AT_A_TIME):
+        some = chosen[begin : begin + ENDS_AT_A_TIME]
+        if left <= 0 or deadline.passed:
+            return
+        nearest = np.asarray(tree.query(ends[some], k=2, distance_upper_bound=GREATEST_GAP)[0])[:, 1]
+        free = np.flatnonzero(nearest > LEAST_GAP)[:left]  # after the end itself
+        left -= len(free)
+        yield from zip(some[free].tolist(), nearest[free].tolist(), strict=True)
+
+
+def _distance_to_others(index: MapIndex, end: Floats, own: int) -> float:
+    """Return how far a place is from the nearest wall but its own, metres, as far as its cell lists them.
+
+    The line of several pieces is a little off each of them: what touches it may seem to be that far away.
+    """
+    shape, grid = index.grid.shape[0], index.grid
+    column, row = (int((end[k] - shape[name]) / shape["cell"]) for k, name in enumerate(("x0", "y0")))
+    cell = row * int(shape["columns"]) + column
+    listed = grid.items[grid.starts[cell] : grid.starts[cell + 1]]
+    walls = index.walls.rows[listed[listed != own]]
+    along = np.clip(walls["dx"] * end[0] + walls["dy"] * end[1], walls["begin"], walls["end"])
+    x = walls["dx"] * along - walls["dy"] * walls["offset"] - end[0]
+    y = walls["dy"] * along + walls["dx"] * walls["offset"] - end[1]
+    return float(np.hypot(x, y).min(initial=np.inf))
+
+
+def _lapping(index: MapIndex, deadline: Deadline) -> set[int]:
+    """Return the segments of one wall that begin before another of it ends, and those others."""
+    starts, order = index.pieces.starts, index.pieces.items
+    ends = index.segments.shifted(-index.origin).endpoints
+    found: set[int] = set()
+    for wall in np.flatnonzero(np.diff(starts) > 1):
+        if deadline.passed:
+            break
+        row, pieces = index.walls.rows[wall], order[starts[wall] : starts[wall + 1]]
+        d = np.array([row["dx"], row["dy"]])
+        begins, stops = ends[pieces, :2] @ d, ends[pieces, 2:] @ d
+        by = np.argsort(begins, kind="stable")
+        pieces, begins, stops = pieces[by], begins[by], stops[by]
+        reach = np.maximum.accumulate(stops)
+        # Which piece reaches so far: the last that reached farther than all before it.
+        farther = np.append(True, stops[1:] > reach[:-1])
+        last = np.maximum.accumulate(np.where(farther, np.arange(len(by)), 0))
+        lapping = np.flatnonzero(begins[1:] - reach[:-1] < -OVERLAP)
+        found.update(pieces[last[lapping]].tolist(), pieces[lapping + 1].tolist())
+    return found
+
+
+def drawn_sigma(index: MapIndex) -> float | None:
+    """Return how far lines may be off by how they were drawn, metres: by the raster that all their ends lie on.
+
+    None where they lie on none that pixels have. Few segments, or a coarser raster, are a drawing in round numbers.
+    """
+    ends = index.segments.endpoints[: index.directed]
+    ends = ends - ends[0, [0, 1, 0, 1]]
+    step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
+    # A caller copies what is advised: to a tenth of a millimetre.
+    return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None

@@ -1,0 +1,261 @@
+"""The map index keeps every wall findable, whatever the map is like."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+
+from association import InvalidMapError, MapIndex
+from association.index.walls import ends_of
+from association.tables import Walls
+from association.tuning import (
+    CELL,
+    MAX_CELLS,
+    MAX_ENTRIES,
+    MAX_SWEEP_CELLS,
+    MERGE_LATERAL,
+    NEIGHBOURHOOD,
+    REACH,
+    SECTORS,
+    SWEEP_CELL,
+)
+from registration import Segments
+from registration.layout import Floats
+
+from ..reference.geometry import cell_of, direction, listed, normal, point
+from ..reference.walls import distance_to_cell
+from ..scenes import ROOM, index_of, maze
+
+MAZE_INDEX = index_of(maze(1))
+
+
+def lengths(walls: Walls) -> Floats:
+    return np.asarray(walls.rows["end"] - walls.rows["begin"])
+
+
+def test_collinear_pieces_become_one_wall() -> None:
+    """Through all of them."""
+    index = index_of([[0, 0, 2, 0], [2.1, 0.0, 4.1, 0.0], [4.1, 0.0, 5.1, 0.0], [0, 3, 5.1, 3]])
+    first, other = (index.walls.rows[index.wall_of_piece[k]] for k in (0, 3))
+    assert index.wall_of_piece[0] == index.wall_of_piece[1] == index.wall_of_piece[2] != index.wall_of_piece[3]
+    assert (first["dx"], first["dy"], first["angle"]) == pytest.approx((1.0, 0.0, 0.0))
+    begin, end = np.array([first["begin"], first["end"]]) + index.origin[0]
+    assert (begin, end) == pytest.approx((0.0, 5.1))
+    assert first["offset"] + index.origin[1] == pytest.approx(0.0)
+    assert other["offset"] + index.origin[1] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "why"),
+    [
+        ([2.6, 0, 4, 0], "a doorway between"),
+        ([2.1, 0.2, 4, 0.2], "a step to the side"),
+        ([2.1, 0, 4, 0.3], "another direction"),
+        ([4, 0, 2.1, 0], "the opposite face"),
+    ],
+)
+def test_what_does_not_continue_stays_apart(other: list[float], why: str) -> None:
+    assert len(index_of([[0, 0, 2, 0], other]).walls.rows) == 2, why
+
+
+@pytest.mark.parametrize("oriented", [True, False])
+def test_pieces_may_make_a_wall_longer_than_a_segment_may_be(oriented: bool) -> None:
+    """What is taken is limited so that numbers make sense; a wall of allowed pieces does."""
+    rows = [[0, 0, 6e3, 0], [6e3, 0, 1.2e4, 0], [1.2e4, 0, 1.2e4, 9e3], [1.2e4, 9e3, 1.2e4, 1.8e4]]
+    index = MapIndex.build(Segments.from_array(rows), oriented=oriented)
+    np.testing.assert_allclose(np.unique(lengths(index.walls).round(6)), [1.2e4, 1.8e4])
+    assert len(index.undirected.walls.rows) == 4
+
+
+def test_a_slow_bend_is_not_straightened() -> None:
+    """Twenty pieces, each within the merging angle of the last, turn by 30 degrees together; a wall beside them not."""
+    turns = np.cumsum(np.full(20, math.radians(1.5)))
+    corners = np.concatenate([[[0.0, 0.0]], np.cumsum(np.stack([np.cos(turns), np.sin(turns)], axis=1), axis=0)])
+    straight = [[0.0, -5.0, 3.0, -5.0], [3.1, -5.0, 6.0, -5.0]]
+    index = index_of(np.vstack([np.hstack([corners[:-1], corners[1:]]), straight]))
+    assert len(index.walls.rows) == 21
+    assert len(set(index.wall_of_piece.tolist())) == 21
+
+
+def test_walls_name_their_neighbours_across_doorways() -> None:
+    walls = [[0, 0, 3, 0], [4, 0, 6, 0], [7.2, 0.02, 9, 0.02], [12.1, 0, 13, 0], [6, 0.5, 4, 0.5]]
+    index = index_of(walls)
+    place = index.wall_of_piece
+    rows = index.walls.rows[place]
+    assert rows["before"].tolist() == [-1, place[0], place[1], -1, -1]
+    assert rows["after"].tolist() == [place[1], place[2], -1, -1, -1]
+
+
+def test_grid_lists_every_wall_within_reach() -> None:
+    rows = MAZE_INDEX.walls.rows
+    for at in np.random.default_rng(0).uniform(-14.0, 14.0, (400, 2)):
+        along, across = direction(rows) @ at, normal(rows) @ at - rows["offset"]
+        beyond = np.maximum(0.0, np.maximum(rows["begin"] - along, along - rows["end"]))
+        near = np.nonzero(np.hypot(across, beyond) <= REACH)[0]
+        assert set(near.tolist()) <= set(listed(MAZE_INDEX.grid, at))
+
+
+def test_raster_has_the_directions_of_what_is_near() -> None:
+    """Of walls and of runs, so that a doorway has the direction of its wall."""
+    index = index_of([*maze(2)[:12], [40.0, 0.0, 43.0, 0.0], [44.4, 0.0, 48.0, 0.0]])
+    ends = np.vstack([ends_of(index.walls), ends_of(index.runs)])
+    angles = np.concatenate([index.walls.rows["angle"], index.runs.rows["angle"]])
+    sectors = np.round((angles + math.pi) * SECTORS / math.tau).astype(int) % SECTORS
+    for at in np.random.default_rng(0).uniform(-25.0, 25.0, (300, 2)):
+        cell = cell_of(index.raster.shape, at)
+        bits = 0 if cell is None else int(index.raster.bits[cell])
+        for end, sector in zip(ends, sectors, strict=True):
+            span, gap = end[2:] - end[:2], at - end[:2]
+            nearest = end[:2] + np.clip(gap @ span / (span @ span), 0.0, 1.0) * span
+            if np.hypot(*(at - nearest)) <= REACH + MERGE_LATERAL:
+                assert bits >> sector & 1
+    assert np.count_nonzero(index.raster.bits) < 0.8 * len(index.raster.bits), "it tells something"
+
+
+def test_directions_are_sorted_longest_first() -> None:
+    for walls in (index_of(maze(5)).walls, MAZE_INDEX.runs):
+        count = len(walls.bin_starts) - 1
+        bins = np.minimum(np.floor((walls.rows["angle"] + math.pi) / math.tau * count), count - 1)  # pi is in the last
+        for b in range(count):
+            inside = slice(walls.bin_starts[b], walls.bin_starts[b + 1])
+            assert (np.diff(walls.longest[inside]) <= 0.0).all()
+            assert (bins[inside] == b).all()
+        assert walls.bin_starts[-1] == len(walls.rows)
+        np.testing.assert_allclose(walls.longest, lengths(walls))
+        np.testing.assert_allclose(walls.summed, [walls.longest[:k].sum() for k in range(len(walls.rows) + 1)])
+
+
+def test_far_from_the_origin_nothing_is_lost() -> None:
+    near, far = index_of(ROOM), index_of(ROOM + 5e6)
+    for name in near.walls.rows.dtype.names or ():
+        np.testing.assert_allclose(far.walls.rows[name], near.walls.rows[name], atol=1e-8)
+
+
+def test_built_without_directions_it_is_its_own_undirected() -> None:
+    segments = Segments.from_array(maze(1))
+    index = MapIndex.build(segments, oriented=False)
+    assert index.undirected is index
+    assert np.array_equal(index.walls.rows, MapIndex.build(segments).undirected.walls.rows)
+    assert (len(index.segments), index.directed) == (2 * len(segments), len(segments))
+    turned = segments.endpoints[:, [2, 3, 0, 1]]
+    assert np.array_equal(index.segments.endpoints, np.vstack([segments.endpoints, turned]))
+
+
+def test_the_sweep_lists_the_sector_of_every_run() -> None:
+    runs, sectors = np.divmod(MAZE_INDEX.sweep.sectors.items, SECTORS)
+    off = (MAZE_INDEX.sweep.runs["angle"][runs] + math.pi - sectors * math.tau / SECTORS) % math.tau
+    assert set(runs) == set(range(len(MAZE_INDEX.runs.rows)))
+    assert np.minimum(off, math.tau - off).max() <= math.pi / SECTORS + 1e-9
+
+
+def test_the_sweep_lists_runs_where_they_are() -> None:
+    sweep = MAZE_INDEX.sweep
+    starts, shape, ends = sweep.sectors.starts, sweep.sectors.shape, ends_of(MAZE_INDEX.runs._replace(rows=sweep.runs))
+    runs = sweep.sectors.items // SECTORS
+    cells = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    for cell, run in zip(cells[::3].tolist(), runs[::3].tolist(), strict=True):
+        assert distance_to_cell(ends[run], cell, shape) < 0.1
+    for cell, present in enumerate(sweep.present.tolist()):
+        there = set((sweep.sectors.items[starts[cell] : starts[cell + 1]] % SECTORS).tolist())
+        assert {s for s in range(SECTORS) if present >> s & 1} == there
+
+
+def test_runs_that_are_near_one_another_are_numbered_together() -> None:
+    """What is swept one after the other is then read from one place."""
+    corners = np.random.default_rng(0).uniform(0.0, 300.0, (400, 2))
+    index = index_of(np.hstack([corners, corners + np.array([3.0, 0.0])]))
+    assert sorted(index.sweep.runs.tolist()) == sorted(index.runs.rows.tolist())
+    np.testing.assert_array_equal(index.sweep.lengths, index.sweep.runs["end"] - index.sweep.runs["begin"])
+    middles = ends_of(index.runs._replace(rows=index.sweep.runs)).reshape(-1, 2, 2).mean(axis=1)
+    squares = [tuple(square) for square in np.round(middles / NEIGHBOURHOOD).tolist()]
+    assert len([*itertools.groupby(squares)]) == len(set(squares)) > 20
+
+
+def test_what_the_verdict_takes_from_a_map() -> None:
+    """Two walls of 4 m and 2 m the same way, one of 3 m across, one of 1 m the other way round."""
+    index = index_of([[0, 0, 4, 0], [0, 5, 2, 5], [8, 0, 8, 3], [3, 3, 2, 3]])
+    ascending, beyond, agreeing, area = index.wall_lengths
+    np.testing.assert_allclose(ascending, [1, 2, 3, 4])
+    np.testing.assert_allclose(beyond, [10, 9, 7, 4, 0])
+    assert agreeing == pytest.approx(0.6 * 0.6 + 0.3 * 0.3 + 0.1 * 0.1)
+    columns, rows = index.grid.shape["columns"][0], index.grid.shape["rows"][0]
+    assert index.area == area == pytest.approx(CELL**2 * columns * rows)
+    assert (8.0 + 2.0 * REACH) * (5.0 + 2.0 * REACH) < index.area < 13.0 * 10.0
+    counts = np.diff(index.grid.starts)
+    assert index.crowd == pytest.approx((counts**2).sum() / counts.sum())
+
+
+def test_neighbouring_directions_agree() -> None:
+    """Also over the bin where the directions begin."""
+    small = math.radians(3.0)
+    ends = [
+        [0.0, 3.0 * k, math.cos(a), 3.0 * k + math.sin(a)] for k, a in enumerate((math.pi - small, small - math.pi))
+    ]
+    assert index_of(ends).wall_lengths.agreeing == pytest.approx(1.0)
+    ends[1] = [0.0, 3.0, math.cos(3.0 * small - math.pi), 3.0 + math.sin(3.0 * small - math.pi)]
+    assert index_of(ends).wall_lengths.agreeing == pytest.approx(0.5)
+
+
+def test_its_memory_is_known() -> None:
+    """What a cache counts is what is held, within a tenth."""
+    ends = np.random.default_rng(0).uniform(0.0, 300.0, (20_000, 2))
+    segments = np.hstack([ends, ends + 0.5])
+    index_of(segments)
+    tracemalloc.start()
+    index = index_of(segments)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert index.nbytes == pytest.approx(held, rel=0.1)
+
+
+def test_memory_is_capped_however_long_the_walls_are() -> None:
+    rng = np.random.default_rng(0)
+    along, none, far = rng.uniform(0, 400, (5000, 2)), np.zeros(5000), np.full(5000, 9990.0)
+    index = index_of(np.column_stack([none, along[:, 0], far, along[:, 1]]))
+    assert index.nbytes < 100e6
+    assert len(index.grid.items) < 1.5 * MAX_ENTRIES
+
+
+def test_memory_is_capped_whatever_the_extent() -> None:
+    index = index_of([[0, 0, 1, 0], [99_000, 99_000, 99_001, 99_000]])
+    for grid, size, most in ((index.grid, CELL, MAX_CELLS), (index.sweep.sectors, SWEEP_CELL, MAX_SWEEP_CELLS)):
+        shape = grid.shape[0]
+        assert shape["cell"] > size
+        assert shape["columns"] * shape["rows"] < 1.01 * most
+        assert all(cell_of(grid.shape, end) is not None for end in (point(index.pieces.ends, "x1", "y1")))
+
+
+def test_a_heap_of_equal_pieces_is_indexed_in_bounded_time() -> None:
+    """Where thousands begin in one place a look at all others would go with the square of their number."""
+    begun = time.thread_time()  # what others take of the processor does not count
+    index_of(np.tile(ROOM, (5000, 1)))
+    assert time.thread_time() - begun < 10.0  # by the square: more than a minute
+
+
+@pytest.mark.parametrize(
+    ("endpoints", "sigma", "argument"),
+    [
+        (np.zeros((0, 4)), 0.0, "map.segments"),
+        ([[0, 0, 1, 0], [2e5, 0, 2e5 + 1, 0]], 0.0, "map.segments"),
+        (ROOM, -1.0, "map.sigma"),
+        (ROOM, 11.0, "map.sigma"),
+        (ROOM, math.nan, "map.sigma"),
+    ],
+)
+def test_refusals(endpoints: Any, sigma: float, argument: str) -> None:
+    with pytest.raises(InvalidMapError) as refused:
+        index_of(endpoints, sigma)
+    assert refused.value.argument == argument
+
+
+def test_what_every_search_asks_of_a_map_is_there_before_the_first() -> None:
+    """Else that one takes as long again, in a small map."""
+    index = index_of(ROOM)
+    assert vars(index).keys() >= {"wall_lengths", "crowd", "area", "diagonal", "tables"}
+    assert "undirected" not in vars(index), "which is as large, and seldom asked for"

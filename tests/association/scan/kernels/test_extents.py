@@ -1,0 +1,49 @@
+"""How wide a scan is, and which way its segments face, beside plain numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+
+from association.layout import ENDS, POINT, as_records
+from association.scan.extents import DIRECTIONS
+from association.scan.kernels import extents
+from registration.layout import Records
+
+from ...kernels.drawn import SEEDS
+
+
+def sent(rows: np.ndarray) -> Records:
+    records = as_records(ENDS, rows)
+    records.flags.writeable = False
+    return records
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_extent_along(seed: int) -> None:
+    ends = np.random.default_rng(seed).uniform(-9.0, 9.0, (7, 4))
+    along = DIRECTIONS @ ends.reshape(-1, 2).T
+    expected = float(np.ptp(along, axis=1).max())
+    np.testing.assert_allclose(extents.extent_along(sent(ends), as_records(POINT, DIRECTIONS)), expected, rtol=1e-12)
+
+
+def test_nothing_has_no_extent() -> None:
+    assert extents.extent_along(sent(np.zeros((0, 4))), as_records(POINT, DIRECTIONS)) == 0.0
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_facing_away(seed: int) -> None:
+    """From one place, and from a place of its own for each segment, one of which nobody knows."""
+    rng = np.random.default_rng(seed)
+    ends, places = rng.uniform(-9.0, 9.0, (8, 4)), rng.uniform(-9.0, 9.0, (8, 2))
+    places[3] = np.nan
+    along = ends[:, 2:] - ends[:, :2]
+    normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    middles = 0.5 * (ends[:, :2] + ends[:, 2:])
+    for seen_from in (places, places[:1]):
+        beside = np.sum(normals * (seen_from - middles), axis=1)
+        for least in (0.0, 1.5):
+            expected = np.count_nonzero(beside < -least)
+            assert extents.facing_away(sent(ends), as_records(POINT, seen_from), least) == expected

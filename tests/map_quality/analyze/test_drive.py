@@ -1,0 +1,149 @@
+"""How far a robot drives until it knows, and what something more on the map would do, in drawn worlds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from association import Deadline, MapIndex, Scan, Status
+from map_quality.analyze import Analysis, PlaceVerdict, Robot, standing_places
+from map_quality.analyze.drive import CLEARANCE, STEP, seen_on_the_way, ways_from
+from registration import RigidTransform, Segments
+from registration.layout import Floats
+from simulation import corridor, rectangle_room
+from simulation.worlds import outline
+
+# 40 m long and 2 m wide, with a niche near its right end.
+NICHE = 32.0
+HALL = [(0.0, 0.0), (40.0, 0.0), (40.0, 2.0), (34.0, 2.0), (34.0, 4.0), (NICHE, 4.0), (NICHE, 2.0), (0.0, 2.0)]
+REACH = 6.0
+BOX = np.array([[-2.5, -1.5, -2.5, 0.0], [-2.5, 0.0, -1.0, 0.0], [-1.0, 0.0, -1.0, -1.5], [-1.0, -1.5, -2.5, -1.5]])
+
+
+def analyzed(segments: Segments, spacing: float, drive: float = 0.0, robot: Robot | None = None) -> Analysis:
+    robot = robot or Robot()
+    standing = standing_places(segments, robot, spacing)
+    return Analysis(MapIndex.build(segments, 0.0), segments, robot, standing, drive=drive)
+
+
+def looks(analysis: Analysis) -> list[PlaceVerdict]:
+    found = (analysis.look(k) for k in range(len(analysis.standing.poses)))
+    return [one for one in found if one is not None]
+
+
+def hall(drive: float) -> Analysis:
+    return analyzed(Segments.from_array(outline(HALL)), 2.0, drive, Robot(range_max=REACH, beams=360))
+
+
+def test_who_drives_to_what_is_like_no_other_place_knows_then() -> None:
+    found = {one.pose.x: one for one in looks(hall(10.0)) if one.pose.y < 2.0}
+    at_once = [x for x, one in found.items() if one.usable]
+    assert at_once
+    assert all(found[x].resolved_after == 0.0 for x in at_once)
+    assert min(at_once) > NICHE - REACH
+    driven = {x: one.resolved_after for x, one in found.items() if one.resolved_after}
+    nearer = [driven[x] for x in sorted(driven) if x < NICHE]
+    assert len(nearer) > 2
+    assert nearer == sorted(nearer, reverse=True)
+    for x, metres in driven.items():
+        assert not found[x].usable
+        assert metres % STEP == 0.0
+        assert metres <= 10.0
+        assert abs(NICHE + 1.0 - x) - metres < REACH  # it has come to see the niche
+    far = [x for x in found if x < NICHE - REACH - 10.0]
+    assert len(far) > 5
+    assert all(found[x].resolved_after is None for x in far)
+
+
+def test_a_corridor_is_driven_along_in_vain() -> None:
+    analysis = analyzed(corridor().segments, 4.0, 3.0, Robot(range_max=8.0))
+    inside = [one for one in looks(analysis) if abs(one.pose.x) < 15.0]
+    assert inside
+    assert all(one.resolved_after is None for one in inside)
+
+
+def test_nothing_is_said_of_drives_that_nobody_asked_for() -> None:
+    assert {one.resolved_after for one in looks(hall(0.0))} == {None}
+
+
+def test_a_drive_keeps_from_walls_and_ends_where_there_is_no_room() -> None:
+    segments = Segments.from_array(outline(HALL))
+    ways = [list(way) for way in ways_from(segments, RigidTransform(20.0, 1.0, 0.0), 30.0, REACH)]
+    assert sorted(way[0].x for way in ways) == pytest.approx([19.0, 21.0], abs=0.01)
+    for way in ways:
+        assert len(way) == 30
+        for before, after in pairwise([RigidTransform(20.0, 1.0, 0.0), *way]):
+            moved = (after.x - before.x, after.y - before.y)
+            assert moved == pytest.approx((STEP * math.cos(after.theta), STEP * math.sin(after.theta)))
+            assert CLEARANCE * 0.9 < after.y < (4.0 if NICHE < after.x < 34.0 else 2.0) - CLEARANCE * 0.9
+            assert CLEARANCE * 0.9 < after.x < 40.0 - CLEARANCE * 0.9
+    closet = Segments.from_array(outline([(0.0, 0.0), (1.2, 0.0), (1.2, 1.2), (0.0, 1.2)]))
+    assert [list(way) for way in ways_from(closet, RigidTransform(0.6, 0.6, 0.0), 30.0, REACH)] == [[], []]
+
+
+def test_it_sets_out_to_where_most_room_is() -> None:
+    """Of four wings of different length, one this way and one that way, and on the other drive to the next longest."""
+    wings = [(9.0, 0.4), (3.0, 0.4 + 0.5 * math.pi), (6.0, 0.4 + math.pi), (4.0, 0.4 - 0.5 * math.pi)]
+    corners = []
+    for long, way in sorted(wings, key=lambda wing: math.remainder(wing[1], math.tau)):
+        ahead, aside = np.array([math.cos(way), math.sin(way)]), np.array([-math.sin(way), math.cos(way)])
+        corners += [ahead - aside, long * ahead - aside, long * ahead + aside]
+    segments = Segments.from_array(outline([(float(x), float(y)) for x, y in corners]))
+    ways = [list(way) for way in ways_from(segments, RigidTransform(0.0, 0.0, 1.0), 5.5, 20.0)]
+    assert [len(way) for way in ways] == [5, 5]
+    assert ways[0][0].theta == pytest.approx(0.4, abs=math.radians(5.0))
+    assert abs(math.remainder(ways[1][0].theta - 0.4 - math.pi, math.tau)) < math.radians(10.0)
+
+
+def test_what_was_seen_is_told_in_the_frame_of_the_last_view() -> None:
+    """Without errors each view would be where it was; with them it is off by a few centimetres."""
+    analysis = hall(10.0)
+    poses = [RigidTransform(x, 1.0, theta) for x, theta in ((20.0, 1.4), (21.0, 0.0), (21.0, 1.5), (22.0, 1.5))]
+    views = [(pose, analysis._scan(pose, k)) for k, pose in enumerate(poses)]
+    together = seen_on_the_way(views, np.random.default_rng(3))
+    assert together.views is not None
+    in_order = [poses[-1].inverse().compose(pose) for pose in reversed(poses)]
+    for told, true in zip(together.views.poses, in_order, strict=True):
+        assert (told.x, told.y, told.theta) == pytest.approx((true.x, true.y, true.theta), abs=0.15)
+    assert together.views.poses[1:] != tuple(in_order[1:])
+    assert isinstance(seen_on_the_way(views[:1], np.random.default_rng(3)), Scan)
+
+
+def test_a_drive_is_the_same_whenever_it_is_tried() -> None:
+    first, second = hall(4.0), hall(4.0)
+    numbers = first.standing.order.tolist()[:10]
+    assert [first.look(k) for k in numbers] == [second.look(k) for k in reversed(numbers)][::-1]
+
+
+def test_a_deadline_ends_a_drive() -> None:
+    analysis = hall(30.0)
+    number = next(one.number for one in looks(hall(0.0)) if not one.usable)
+    found = analysis.look(number, Deadline(0.0))
+    assert found is not None
+    assert found.resolved_after is None
+
+
+def test_a_box_in_a_corner_tells_the_halves_of_a_room_apart() -> None:
+    room = rectangle_room().segments
+    plain = analyzed(room, 0.7)
+    found = looks(plain.with_segments(Segments.from_array(BOX)))
+    assert [replace(one, with_landmark=None) for one in found] == looks(plain)
+    assert {one.with_landmark for one in looks(plain)} == {None}
+    seen = [one for one in found if one.with_landmark is not None]
+    assert len(seen) > 20
+    assert not any(one.usable for one in seen)
+    assert sum(one.with_landmark.usable for one in seen if one.with_landmark) > 0.8 * len(seen)
+    for one in found:
+        inside = -2.5 < one.pose.x < -1.0 and -1.5 < one.pose.y < 0.0
+        assert not (inside and one.with_landmark), "a robot does not stand in the box"
+
+
+def test_what_is_added_far_away_changes_nothing() -> None:
+    far: Floats = BOX + 500.0
+    for one in looks(analyzed(rectangle_room().segments, 2.0).with_segments(Segments.from_array(far)))[:5]:
+        assert one.with_landmark is not None
+        assert (one.with_landmark.status, one.with_landmark.usable) == (Status.AMBIGUOUS, False)

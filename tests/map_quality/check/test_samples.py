@@ -1,0 +1,169 @@
+"""What sample scans say of their map: what was done to it, and nothing where nothing was."""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import cache
+
+import numpy as np
+import pytest
+
+from association import AssociationOptions, CancelledError, Deadline, associate
+from map_quality.check import Sample, SampleReport, judge_samples, try_sample
+from registration import RigidTransform
+from registration.layout import Floats
+
+from ...association.scenes import maze
+from .drawn import THICK, centre_lines, faces, index_of, reversed_ends, sampled, two_faces
+
+MIRROR = np.array([1.0, -1.0, 1.0, -1.0])
+MOVE = RigidTransform(-1.0, 2.0, 0.3)
+
+
+def told(walls: Floats, *, oriented: bool = True, moved: RigidTransform | None = None) -> SampleReport:
+    """Judge the samples in a map; `moved` is what was done to the poses that they are said to be taken from."""
+    index = index_of(walls)
+    samples = [
+        try_sample(
+            index,
+            scan,
+            Deadline(),
+            oriented=oriented,
+            said=None if moved is None else moved.compose(truth),
+        )
+        for truth, scan in sampled()
+    ]
+    return judge_samples(samples, sigma=None, oriented=oriented)
+
+
+@cache
+def in_centre_lines() -> SampleReport:
+    return told(centre_lines())
+
+
+def codes(report: SampleReport) -> list[str]:
+    return [one.code for one in report.findings]
+
+
+def test_nothing_is_told_of_a_map_that_is_right() -> None:
+    report = told(faces(), moved=RigidTransform(0.0, 0.0, 0.0))
+    assert codes(report) == []
+    assert report.advice.oriented is True
+    assert report.advice.sigma is not None
+    assert report.advice.sigma < 0.02
+    assert report.usable_as_advised >= report.usable
+
+
+def test_lines_along_the_middle_of_walls() -> None:
+    """Nearly none was usable without a recipe; the advice is one, and half of a wall's thickness is in it."""
+    report = in_centre_lines()
+    assert codes(report) == ["undirected"]
+    assert report.advice.oriented is False
+    assert report.advice.sigma == pytest.approx(0.5 * THICK, rel=0.35)
+    assert report.usable_as_advised > report.usable + 1
+
+
+def test_the_advice_is_worth_taking() -> None:
+    advice = in_centre_lines().advice
+    assert advice.oriented is False
+    usable = {True: 0, False: 0}
+    for taken in (True, False):
+        index = index_of(centre_lines(), advice.sigma if taken else None)
+        for truth, scan in sampled(12):
+            result = associate(index, scan, None, AssociationOptions(oriented=not taken))
+            usable[taken] += result.usable
+            if taken and result.usable and result.pose is not None:
+                assert math.hypot(result.pose.x - truth.x, result.pose.y - truth.y) < 0.3
+    assert usable[True] >= 3 * usable[False] + 3
+
+
+def test_a_map_that_says_so_is_not_told_again() -> None:
+    assert codes(told(centre_lines(), oriented=False)) == []
+
+
+def test_a_map_with_y_pointing_down() -> None:
+    assert codes(told(reversed_ends(faces() * MIRROR))) == ["mirrored"]
+
+
+def test_a_map_the_wrong_way_round() -> None:
+    report = told(reversed_ends(faces()))
+    assert codes(report) == ["reversed"]
+    assert report.advice.sigma is None
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.01, 1.03, 1.0 / 0.3048, 0.5, 0.62, 2.0, 2.5])
+def test_a_map_that_is_not_to_scale(factor: float) -> None:
+    report = told(faces() * factor)
+    assert codes(report) == ["scale"]
+    said = float(report.findings[0].message.partition("divide the map by ")[2].partition(",")[0])
+    assert said == pytest.approx(factor, rel=0.004)
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (25.4, "millimetres taken for inches"),
+        (1.0 / 25.4, "inches taken for millimetres"),
+        (100.0, "centimetres taken for metres"),
+        (1.0 / 0.0254, "inches taken for metres"),
+        (1e-3, "metres taken for millimetres"),
+    ],
+)
+def test_a_map_of_another_unit(factor: float, said: str) -> None:
+    report = told(faces() * factor)
+    assert codes(report) == ["scale"]
+    assert f"divide the map by {factor:.4g}," in report.findings[0].message
+    assert said in report.findings[0].message
+
+
+@pytest.mark.parametrize("drawn", [0.04, 0.1, 0.35])
+def test_walls_too_thick_or_too_thin_are_no_scale(drawn: float) -> None:
+    """A room between them is too large or too small by as much, whatever its size."""
+    assert "scale" not in codes(told(two_faces(drawn)))
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.02])
+def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None:
+    """What is off by 2 % is put to scale in both; the check still says that it is off."""
+    index = index_of(factor * faces())
+    asked = [associate(index, scan).usable for _, scan in sampled()]
+    samples = [try_sample(index, scan, Deadline(), oriented=True) for _, scan in sampled()]
+    assert [one.result.usable for one in samples] == asked
+    assert [one.trials[True, None].usable for one in samples] == asked
+    assert sum(asked) > len(asked) / 2
+    assert codes(judge_samples(samples, sigma=None, oriented=True)) == ([] if factor == 1.0 else ["scale"])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_scans_of_another_building_say_nothing_of_this_one(seed: int) -> None:
+    """They fit a little better mirrored, without directions, or shrunk to one room: all by chance."""
+    report = told(maze(seed))
+    assert codes(report) == []
+    assert report.usable == 0
+
+
+def test_poses_in_another_frame() -> None:
+    report = told(faces(), moved=MOVE.inverse())
+    assert codes(report) == ["moved"]
+    assert "17.2 degrees" in report.findings[0].message
+    said = report.findings[0].message.partition("moved by (")[2].partition(")")[0]
+    assert [float(number) for number in said.split(", ")] == pytest.approx([-1.0, 2.0], abs=0.011)
+
+
+def test_nothing_to_judge_by() -> None:
+    empty = judge_samples([], sigma=None, oriented=True)
+    assert (empty.findings, empty.usable, empty.advice.oriented) == ((), 0, None)
+
+
+def test_a_deadline_leaves_out_what_it_has_no_time_for() -> None:
+    index, (_, scan) = index_of(faces()), sampled()[0]
+    late = try_sample(index, scan, Deadline(time.monotonic()), oriented=True)
+    assert isinstance(late, Sample)
+    assert list(late.trials) == [(True, None)]
+    assert late.mirrored is None
+    assert judge_samples([late], sigma=None, oriented=True).findings == ()
+    gone = Deadline()
+    gone.cancel()
+    with pytest.raises(CancelledError):
+        try_sample(index, scan, gone, oriented=True)
