@@ -243,17 +243,17 @@ async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and say how far it is."""
     logger.info("compiling the kernels, which takes about a minute; later starts load them from the cache")
     services.readiness.compiled = compiled_fraction
-    telling = asyncio.create_task(_tell_progress())
+    logging_progress = asyncio.create_task(_log_progress())
     try:
         with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
             await services.parse_threads.run(partial(services.parser.call, compile_kernels))
     finally:
-        telling.cancel()
+        logging_progress.cancel()
     services.parser.close()
     services.readiness.compiled = None
 
 
-async def _tell_progress() -> None:
+async def _log_progress() -> None:
     while True:
         await asyncio.sleep(PROGRESS_SECONDS)
         logger.info("compiling", extra={"share": round(compiled_fraction(), 2)})
