@@ -8,8 +8,8 @@ from registration import Segments
 from registration.layout import Records
 
 from ..layout import POINT, as_records
-from ..tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 from .kernels.extents import extent_along
+from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 
 _ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # in which extents are looked for

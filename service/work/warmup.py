@@ -23,7 +23,6 @@ from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
 from association.explain import explain_at
-from association.search.candidates import Begun, Effort
 from association.verdict.null import symmetry_of
 from association.verdict.verdict import judge
 from map_quality.analyze import Analysis, Robot, standing_places
@@ -77,7 +76,6 @@ def warm_up() -> None:
     warm_up_registering()
     warm_up_vectorizing()
     warm_up_searching()
-    warm_up_searching_long()
     warm_up_analyzing()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
@@ -97,7 +95,6 @@ def warm_up_second_half() -> None:
     warm_up_indexing()
     warm_up_vectorizing()
     warm_up_explaining()
-    warm_up_searching_long()
     warm_up_simulating()
 
 
@@ -174,14 +171,6 @@ def warm_up_searching() -> None:
     # Nothing is said of this map, which is not to scale.
     too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
     associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
-
-
-def warm_up_searching_long() -> None:
-    """Go on with a search that has just begun: what a whole one takes is compiled by who is searching meanwhile."""
-    index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
-    context = SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), Deadline())
-    begun = Begun.of(context, Effort.of(context), chunk=1)
-    begun.go_on(context, *begun.plan(context))
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:
