@@ -15,7 +15,6 @@ from registration import Segments
 from ..deadline import Deadline
 from ..errors import IndexingEndedError, InvalidMapError
 from ..layout import ENDS, Integers, as_records
-from ..scan.extents import diagonal
 from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from ..tuning import WHOLE_GAP
 from .grids import crossing_chains, directions_near, near_walls, swept_chains
@@ -209,7 +208,8 @@ class MapIndex:
     @cached_property
     def diagonal(self) -> float:
         """Of the box around the map, metres."""
-        return diagonal(self.segments)
+        corners = self.segments.endpoints.reshape(-1, 2)
+        return float(np.hypot(*np.ptp(corners, axis=0)))
 
     @cached_property
     def tables(self) -> MapTables:

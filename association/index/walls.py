@@ -54,7 +54,7 @@ def merge(local: Segments, gap: float, beside: float, deadline: Deadline | None 
         When the deadline passes first.
     """
     ends, directions = as_records(ENDS, local.endpoints), as_records(POINT, local.directions)
-    labels = collinear_groups(ends, directions, _gates(gap, beside), deadline)
+    labels = collinear_groups(ends, directions, join_gates(gap, beside), deadline)
     wall, lines = _lines(local, labels)
     lateral = np.maximum(
         np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, :2]) - lines.offsets[wall]),
@@ -86,7 +86,8 @@ def collinear_groups(ends: Records, directions: Records, gates: JoinGates, deadl
     return labels
 
 
-def _gates(gap: float, lateral: float) -> JoinGates:
+def join_gates(gap: float, lateral: float) -> JoinGates:
+    """Return when pieces up to `gap` apart, and `lateral` next to one another, metres, are joined."""
     # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
     cell = max(BEGIN_CELL, 1.01 * math.hypot(gap, lateral))
     return JoinGates(cell, float(gap), float(lateral), math.cos(MERGE_ANGLE))
@@ -170,7 +171,7 @@ class _Linked:
         ends = ends_of(walls)
         directions = np.column_stack([walls.rows["dx"], walls.rows["dy"]])
         records = as_records(ENDS, ends), as_records(POINT, directions)
-        self.of_wall = collinear_groups(*records, _gates(LINK_GAP, APART_STEP), deadline)
+        self.of_wall = collinear_groups(*records, join_gates(LINK_GAP, APART_STEP), deadline)
         # Along what the walls of a group have in common, for their own directions differ.
         common = np.zeros((len(ends), 2))
         np.add.at(common, self.of_wall, directions * walls.longest[:, None])

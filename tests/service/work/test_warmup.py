@@ -100,23 +100,7 @@ def compiled_by_requests() -> list[str]:
             for body in bodies:
                 answer = client.post(path, json=body)
                 assert answer.status_code == 200, answer.text
-    search_long()
     return [name for name, count in signatures().items() if count != before.get(name, 0)]
-
-
-def search_long() -> None:
-    """Search as where it takes long: looking at the clock all the time, and beyond the deadline."""
-    from unittest.mock import patch
-
-    from association import AssociationOptions, Deadline, MapIndex, Scan, associate
-    from association.search import candidates
-    from registration import MeasuredSegments, Segments
-
-    walls = Segments.from_array(WALLS)
-    index, scan = MapIndex.build(walls), Scan(MeasuredSegments.from_segments(walls))
-    with patch.object(candidates, "CHUNK", 1):
-        for at in (None, 0.0):
-            associate(index, scan, None, AssociationOptions(exhaustive=True), Deadline(at))
 
 
 def signatures() -> dict[str, int]:
