@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from association.deadline import CancelledError, Deadline
 from association.index.map_index import MapIndex
-from association.options import CancelledError, Deadline
 
 from .likeness import find_look_alikes, likeness_findings
 from .pieces import drawing_findings, drawn_sigma, find_near_walls

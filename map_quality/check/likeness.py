@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from association.associating import associate
+from association.deadline import Deadline
 from association.errors import IndexingEndedError
 from association.index.map_index import MapIndex
-from association.options import AssociationOptions, Deadline
+from association.options import AssociationOptions
 from association.result import AssociationResult
 from association.scan.scan import Scan
 from registration import MeasuredSegments, RigidTransform, Segments, wrap_angle

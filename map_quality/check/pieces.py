@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from association.deadline import Deadline
 from association.index.map_index import MapIndex
-from association.options import Deadline
 from association.tables import Grid
 from registration.layout import Floats, Records
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from association.causes import Cause, Mistake, find_causes
 from association.consensus.scaling import scale_near_one
 from association.context import SearchContext
+from association.deadline import Deadline
 from association.errors import IndexingEndedError
 from association.explain import search_and_explain
 from association.index.map_index import MapIndex
-from association.options import AssociationOptions, Deadline
+from association.options import AssociationOptions
 from association.report import report
 from association.result import AssociationResult
 from association.scan.scan import Scan, mirrored, scaled

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from association.deadline import Deadline
 from association.index.map_index import MapIndex
 from association.layout import Flags
-from association.options import Deadline
 from registration.layout import Floats
 
 from .looking import Looker, segments_of

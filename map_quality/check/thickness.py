@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from association.context import SearchContext
+from association.deadline import Deadline
 from association.errors import IndexingEndedError
 from association.explain import search_and_explain
 from association.index.map_index import MapIndex
-from association.options import AssociationOptions, Deadline
+from association.options import AssociationOptions
 from association.scan.scan import Scan, mirrored
 from registration import Segments
 
