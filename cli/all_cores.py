@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Deadline, MapIndex
-from map_quality.analyze import Analysis, PlaceVerdict, Robot, Standing
+from map_quality import Analysis, PlaceVerdict, Robot, Standing
 from registration import Segments
 
 from .contract import Progress

@@ -19,12 +19,12 @@ from rich.progress import Progress as Bar
 
 from registration import InputError, Segments
 
+from .asking import server_at
 from .compiling import compile_first
 from .contract import Json, Progress
 from .errors import RefusedError, WrongUseError
 from .grouping import grouped
 from .inputs import needing_formats, read_map_file, read_map_or_id
-from .keeping import server_at
 from .options import AsJson, MapArgument, Server
 from .printing import print_json, print_rows
 
@@ -116,8 +116,8 @@ class Asked:
 def _analyzed(target: Json, asked: Asked) -> Json:
     """Return the answer of ``POST /v1/analyze``, worked out here on all cores, however long it takes."""
     import linefix
-    from map_quality.analyze import Analysis, Robot
-    from service.work.analyzing import analysis_json
+    from linefix.map_answers import analysis_json
+    from map_quality import Analysis, Robot
 
     from .all_cores import look_on_all_cores
     from .stored import map_here, require_size, settings_here

@@ -17,8 +17,8 @@ from rich.progress import Task as Bar
 from rich.text import Text
 
 from registration import InputError
-from service.work.compiling import compile_kernels
 
+from .compiling import compile_kernels
 from .errors import RefusedError, WrongUseError
 from .options import AsJson
 from .printing import noted, print_json, print_rows

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .answering import answering
+from .asking import ask
 from .contract import Json
 from .inputs import read_map_or_id, read_scan
 from .options import AsJson, MapArgument, ScanArgument, Server
@@ -40,8 +40,7 @@ def locate(
         body["options"]["include"] = ["correspondences", "alternatives", "segments", "missing_map", "causes"]
     if deadline_ms is not None:
         body["options"]["deadline_ms"] = deadline_ms
-    with answering(server) as service:
-        answer = service.ask("associate", body)
+    answer = ask("associate", body, server)
     if as_json:
         print_json(answer)
     else:

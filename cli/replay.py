@@ -20,10 +20,11 @@ from rich.progress import track
 from linefix.mounted import SPEED, TURN
 from registration import RigidTransform
 
+from .asking import whole_map
 from .contract import Json
 from .errors import CommandError, NoSuchMapError, RefusedError
 from .frames import Frames, odometry_of
-from .inputs import line_map_of, needing_formats, read_map_or_id, whole_map
+from .inputs import line_map_of, needing_formats, read_map_or_id
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
 from .options import AsJson, Server

@@ -12,9 +12,7 @@ from typing import Any
 from linefix_client import Client, LinefixError, ProblemError, schema
 from pydantic import TypeAdapter, ValidationError
 
-from service.importing.fields import Fields
-
-from .contract import KEY, Json, Question, id_of
+from .contract import KEY, Fields, Json, Question, id_of
 from .errors import NOTHING, Asked, CommandError, NoServerError, WrongUseError, error_of
 
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default

@@ -9,7 +9,7 @@ from typing import Annotated
 import orjson
 import typer
 
-from .answering import answering
+from .asking import ask
 from .contract import Json
 from .inputs import read_scan
 from .options import AsJson, ScanArgument, Server
@@ -33,8 +33,7 @@ def vectorize(
     sigma = told.get("sigma") if sigma is None else sigma
     if sigma is not None:
         asked["options"] = {"sigma": sigma}
-    with answering(server) as service:
-        answer = service.ask("vectorize", asked)
+    answer = ask("vectorize", asked, server)
     if out is not None:
         out.write_bytes(orjson.dumps(_scan_of(told, answer)) + b"\n")
     if as_json:

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..inputs import document_at, line_map_of, needing_formats
+from ..asking import document_at
+from ..inputs import line_map_of, needing_formats
 from ..options import MapArgument, Server
 from .files import write_document
 

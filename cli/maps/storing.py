@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from ..asking import keeping
 from ..errors import WrongUseError
 from ..inputs import MAP_ID, read_map_file
-from ..keeping import keeping
 from ..options import AsJson, Server
 from ..printing import print_json, print_rows, print_table
 from .files import write_document

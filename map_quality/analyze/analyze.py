@@ -23,8 +23,7 @@ from simulation import scan
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 from .drive import STEP, seen_on_the_way, ways_from
-from .errors import AnalysisError
-from .robot import Robot
+from .robot import AnalysisError, Robot
 from .standing import Standing, is_free, standing_places
 
 MOST_DRIVE = 30.0  # m

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from registration import InputError
 from simulation import Scanner
-
-from .errors import AnalysisError
 
 MOST_BEAMS = 20_000
 LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # m; what a search takes for the sigma of ranges
 ALL_ROUND = math.tau - 0.01  # rad; a full turn, and what people write for one
 HEADINGS = 4  # that a scanner looks in which does not see all round
+
+
+class AnalysisError(InputError):
+    """A property of the robot or of its places is out of range."""
 
 
 @dataclass(frozen=True, slots=True)

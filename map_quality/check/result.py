@@ -127,9 +127,12 @@ class SampleReport:
         Of the scans, as the map is.
     usable_as_advised : int
         With the advice taken.
+    wall_thickness : float or None
+        By how much walls are thicker than drawn, metres; None where nothing speaks for it.
     """
 
     findings: tuple[Finding, ...]
     advice: Advice
     usable: int
     usable_as_advised: int
+    wall_thickness: float | None = None

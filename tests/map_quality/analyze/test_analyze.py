@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex, Status
-from map_quality.analyze import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
+from map_quality import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
 from map_quality.analyze.robot import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
 from map_quality.analyze.standing import is_free
 from registration import Segments

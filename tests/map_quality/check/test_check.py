@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline
-from map_quality.check import MapCheck, check_map
+from map_quality import MapCheck, check_map
 from map_quality.check.likeness import look_about
 from map_quality.check.looking import Looker
 from registration import RigidTransform
