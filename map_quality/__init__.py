@@ -5,13 +5,13 @@ and searches each of its scans in the map. Both call the search as a program wou
 """
 
 from .analyze.analyze import Analysis, PlaceVerdict
-from .analyze.robot import AnalysisError, Robot
 from .analyze.standing import Standing, standing_places
 from .check.check import check_map
 from .check.judging import judge_samples
 from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
 from .check.samples import Sample, try_sample
 from .check.thickness import conclude, find_thickness, fit_better_mirrored, thickness_finding
+from .views import AnalysisError, Robot
 
 __all__ = [
     "Advice",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .robot import AnalysisError
+from ..views import AnalysisError
 
 CELL = 0.1  # m; fine enough for doors
 MOST_CELLS = 4_000_000

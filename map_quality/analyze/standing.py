@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
+from ..views import AnalysisError, Robot
 from .reach import Reach
-from .robot import AnalysisError, Robot
 
 PLACES = 400  # over the map's box, where no spacing is asked for
 SPACINGS = (0.3, 100.0)  # m

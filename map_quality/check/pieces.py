@@ -9,12 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from association.index.map_index import MapIndex
-from association.options import Deadline
+from association import Deadline, MapIndex
 from association.tables import Grid
 from registration.layout import Floats, Records
 
-from .looking import segments_of
 from .result import Finding
 from .tuning import (
     DOUBLE,
@@ -260,3 +258,11 @@ def drawn_sigma(index: MapIndex) -> float | None:
     step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
     # A caller copies what is advised: to a tenth of a millimetre.
     return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None
+
+
+def segments_of(index: MapIndex, walls: NDArray[np.bool_] | NDArray[np.intp]) -> tuple[int, ...]:
+    """Return the segments, as sent, that some walls consist of; `walls` are flags or indices."""
+    chosen = np.zeros(len(index.walls.rows), dtype=bool)
+    chosen[walls] = True
+    pieces = np.flatnonzero(chosen[index.wall_of_piece]) % index.directed
+    return tuple(np.unique(pieces).tolist())

@@ -7,16 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from association import AssociationOptions, AssociationResult, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
 from association.causes import Cause, Mistake, find_causes
 from association.consensus.scaling import scale_near_one
 from association.context import SearchContext
-from association.errors import IndexingEndedError
 from association.explain import search_and_explain
-from association.index.map_index import MapIndex
-from association.options import AssociationOptions, Deadline
 from association.report import report
-from association.result import AssociationResult
-from association.scan.scan import Scan, mirrored, scaled
+from association.scan.scan import scaled
 from association.to_scale import Explained, put_to_scale
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform

@@ -7,12 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
 from association.context import SearchContext
-from association.errors import IndexingEndedError
 from association.explain import search_and_explain
-from association.index.map_index import MapIndex
-from association.options import AssociationOptions, Deadline
-from association.scan.scan import Scan, mirrored
 from registration import Segments
 
 from .judging import judge_samples
