@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from .parsing.errors import NotJsonError
 from .parsing.reading import parse, validate
-from .printable import escaped
 from .schemas.encoding import encode
 from .schemas.errors import Fault, InvalidRequestError, TooManyError
 from .schemas.limits import Limits
@@ -34,7 +33,6 @@ __all__ = [
     "VectorizeRequest",
     "association_options_of",
     "encode",
-    "escaped",
     "fault_of",
     "included_of",
     "is_oriented",

@@ -23,7 +23,6 @@ from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
 from association.explain import explain_at
-from association.search.candidates import Begun, Effort
 from association.verdict.null import symmetry_of
 from association.verdict.verdict import judge
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
@@ -76,7 +75,6 @@ def warm_up() -> None:
     warm_up_registering()
     warm_up_vectorizing()
     warm_up_searching()
-    warm_up_searching_long()
     warm_up_analyzing()
     room = Segments.from_array(ROOM)
     index = MapIndex.build(room, 0.0)
@@ -85,8 +83,7 @@ def warm_up() -> None:
 
 
 def warm_up_first_half() -> None:
-    """Compile about half of the kernels: those of the search, of registration and of the analysis of maps."""
-    warm_up_registering()
+    """Compile about half of the kernels: those of the search and of the analysis of maps."""
     warm_up_searching()
     warm_up_analyzing()
 
@@ -94,9 +91,9 @@ def warm_up_first_half() -> None:
 def warm_up_second_half() -> None:
     """Compile the other kernels, in an order in which the two halves seldom meet at the same kernel."""
     warm_up_indexing()
+    warm_up_registering()
     warm_up_vectorizing()
     warm_up_explaining()
-    warm_up_searching_long()
     warm_up_simulating()
 
 
@@ -173,14 +170,15 @@ def warm_up_searching() -> None:
     # Nothing is said of this map, which is not to scale.
     too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
     associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
+    # A search that takes some milliseconds has kernels of its own, and so has one that is left no time.
+    many = Segments.from_array(np.concatenate([ROOM + np.tile(at, 2) for at in _room_centres()]))
+    for at in (None, 0.0):
+        associate(MapIndex.build(many, 0.0), _asked()[0][0], None, AssociationOptions(exhaustive=True), Deadline(at))
 
 
-def warm_up_searching_long() -> None:
-    """Go on with a search that has just begun: what a whole one takes is compiled by who is searching meanwhile."""
-    index, scan = MapIndex.build(Segments.from_array(ROOM), 0.0), _asked()[0][0]
-    context = SearchContext.of(index, scan, None, AssociationOptions(exhaustive=True), Deadline())
-    begun = Begun.of(context, Effort.of(context), chunk=1)
-    begun.go_on(context, *begun.plan(context))
+def _room_centres() -> list[tuple[float, float]]:
+    """Return the centres of 64 rooms next to one another, metres."""
+    return [(9.0 * column, 7.0 * row) for row in range(8) for column in range(8)]
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:

@@ -105,18 +105,16 @@ def compiled_by_requests() -> list[str]:
 
 
 def search_long() -> None:
-    """Search as where it takes long: looking at the clock all the time, and beyond the deadline."""
-    from unittest.mock import patch
-
+    """Search many rooms for each pair of walls, to the end and with no time left."""
     from association import AssociationOptions, Deadline, MapIndex, Scan, associate
-    from association.search import candidates
     from registration import MeasuredSegments, Segments
 
-    walls = Segments.from_array(WALLS)
-    index, scan = MapIndex.build(walls), Scan(MeasuredSegments.from_segments(walls))
-    with patch.object(candidates, "CHUNK", 1):
-        for at in (None, 0.0):
-            associate(index, scan, None, AssociationOptions(exhaustive=True), Deadline(at))
+    shifts = [(9.0 * column, 7.0 * row) * 2 for row in range(9) for column in range(9)]
+    rooms = [[value + by for value, by in zip(wall, shift, strict=True)] for shift in shifts for wall in WALLS]
+    index = MapIndex.build(Segments.from_array(rooms))
+    scan = Scan(MeasuredSegments.from_segments(Segments.from_array(WALLS)))
+    for at in (None, 0.0):
+        associate(index, scan, None, AssociationOptions(exhaustive=True), Deadline(at))
 
 
 def signatures() -> dict[str, int]:
