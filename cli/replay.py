@@ -27,7 +27,7 @@ from .frames import Frames, odometry_of
 from .inputs import line_map_of, needing_formats, read_map_or_id
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
-from .options import AsJson, Server
+from .options import AsJson, Server, grouped
 from .printing import plain, print_json, print_rows, print_table
 from .tracking import Tracker
 
@@ -83,28 +83,43 @@ class Tally:
             self.others.append(found.pose)
 
 
-def replay(
-    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
-    on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
-    topic: Topic = None,
-    tf_namespace: TfNamespace = None,
+@dataclass(frozen=True, slots=True)
+class LogChoice:
+    """What to read of a log, as options."""
+
+    topic: Topic = None
+    tf_namespace: TfNamespace = None
+    mount: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y THETA", help="Pose of the laser on the robot, metres and radians."),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class ScanChoice:
+    """Which scans to localize, and how, as options."""
+
     mode: Annotated[
         Mode,
         typer.Option(
             help="track: use odometry from the last usable pose as a prior; global: search each scan on the whole map."
         ),
-    ] = Mode.TRACK,
-    every: Annotated[int, typer.Option(metavar="N", min=1, help="Use each Nth scan.")] = 1,
+    ] = Mode.TRACK
+    every: Annotated[int, typer.Option(metavar="N", min=1, help="Use each Nth scan.")] = 1
+
+
+@grouped
+def replay(
+    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
+    on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
+    source: LogChoice,
+    scans: ScanChoice,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the usable poses to this file in the TUM format.")
     ] = None,
     picture: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses red, others grey."),
-    ] = None,
-    mount: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(metavar="X Y THETA", help="Pose of the laser on the robot, metres and radians."),
     ] = None,
     server: Server = None,
     as_json: AsJson = False,
@@ -114,14 +129,14 @@ def replay(
     Poses are those of the robot if --mount or the log has the mount of the laser. Otherwise they are those of the
     laser.
     """
-    options = options_of(topic, tf_namespace, mount)
-    told, source = read_map_or_id(on), opened(log, options)
+    options = options_of(source.topic, source.tf_namespace, source.mount)
+    told, opened_log = read_map_or_id(on), opened(log, options)
     tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
     with locating(told, server) as locator:
-        scans = _shown(islice(scans_of(source), 0, None, every), source, every)
+        taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
-            for one, found in located(locator, scans, frames, mode):
+            for one, found in located(locator, taken, frames, scans.mode):
                 tally.take(one.stamp_ns, found)
                 if as_json:
                     print_json(_line(one, found, frames))
@@ -135,7 +150,7 @@ def replay(
         write_tum(tally.usable, out)
     if picture is not None:
         _draw(whole_map(told, server), tally, picture)
-    _tell_log(source, frames, sys.stderr if as_json else sys.stdout)
+    _tell_log(opened_log, frames, sys.stderr if as_json else sys.stdout)
     if not as_json:
         _tell(tally)
     if broken is not None:

@@ -14,12 +14,11 @@ from .. import here
 from ..asking import server_at
 from ..contract import Fields, Json
 from ..errors import Asked, WrongUseError
-from ..grouping import grouped
 from ..inputs import line_map_of, needing_formats, refusing
-from ..options import AsJson, Picture, Server
+from ..options import AsJson, Picture, Server, grouped
 from ..printing import noted, print_json, print_rows
 from .checking import check_rows, samples_of
-from .files import write_document
+from .drawing import write_document
 
 if TYPE_CHECKING:
     from formats import ImportOptions
