@@ -9,10 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 
 import linefix
+from formats.maps import DRAWINGS
 
 from .errors import UnreadableMapsError
 
-SUFFIXES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv")
+SUFFIXES = (".yaml", ".yml", *DRAWINGS)
 KEPT = 16  # indices that a worker holds; one of 20,000 segments takes some 10 MB
 
 
