@@ -288,6 +288,11 @@ def answered(count: int, seed: int = 1) -> Iterator[Answered]:
         yield Answered(kind, number, pair, (pair[0].ask(), pair[1].ask()))
 
 
+def _in_words(answer: AssociationResult) -> str:
+    probability = "without a probability" if answer.probability is None else f"{answer.probability:.3f}"
+    return f"{answer.status} {probability}"
+
+
 def rows_of(found: list[Answered]) -> list[Row]:
     """Judge pairs, all together and by kind."""
 
@@ -324,8 +329,7 @@ def main() -> None:
     print_rows(f"Smoothness, {args.pairs} pairs, seed {args.seed}", rows_of(found))
     for one in found if args.list else ():
         if one.difference > MOST:
-            a, b = one.answers
-            print(f"- {one.kind} {one.number}: {a.status} {a.probability:.3f}, {b.status} {b.probability:.3f}")
+            print(f"- {one.kind} {one.number}: {', '.join(map(_in_words, one.answers))}")
 
 
 if __name__ == "__main__":
