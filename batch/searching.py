@@ -21,7 +21,7 @@ from .tables import POSES
 
 @dataclass(frozen=True, slots=True)
 class FleetOptions:
-    """How to search many scans.
+    """Options of a run.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def _prepared(prepare: Callable[[], None] | None) -> None:
 
 
 def lost_row(block: Block) -> pa.Table:
-    """Return the row of a block of one scan whose search ends whoever does it."""
+    """Return the row of a block of one scan whose search ends every worker."""
     row = {"log": block.log, "index": block.start, "usable": False}
     return pa.Table.from_pylist([row | {"error": "worker_lost: its search ended each worker early"}], schema=POSES)
 

@@ -27,7 +27,7 @@ _deadline = Deadline()
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What another process needs to take part; an index does not travel, it is built anew.
+    """Input of another process; it builds the index again, because an index is not sent.
 
     Attributes
     ----------

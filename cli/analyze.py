@@ -46,7 +46,7 @@ class ScannerOptions:
 
 @dataclass(frozen=True, slots=True)
 class FurtherOptions:
-    """What else is to be found out of each place, as options."""
+    """Further questions about each place, as options."""
 
     drive: Annotated[
         float, typer.Option(metavar="METRES", help="Maximum distance to drive until the pose is usable, at most 30.")

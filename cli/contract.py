@@ -1,4 +1,4 @@
-"""What commands ask for, and in which form: that of the HTTP routes."""
+"""The form of requests and answers: that of the HTTP routes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class MapKeeper(Protocol):
         ...
 
     def maps(self) -> Iterator[Json]:
-        """Give what is told of each stored map, by id."""
+        """Yield the summary of each stored map, by id."""
         ...
 
     def remove(self, map_id: str) -> None:

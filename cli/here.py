@@ -148,7 +148,9 @@ def import_map(file: Path, options: ImportOptions) -> Json:
 def require_time(deadline: linefix.Deadline) -> None:
     """Raise `NoServerError` where the deadline has passed before the search."""
     if deadline.passed:
-        raise NoServerError("the deadline passed before the search started; extend --deadline-ms")
+        raise NoServerError(
+            "the deadline passed before the search started; extend deadline_ms, or send the request again later"
+        )
 
 
 def _sealed(answer: Json, watch: Stopwatch) -> Json:

@@ -142,7 +142,7 @@ def line_map_of(document: Json) -> LineMap:
 
 @contextmanager
 def needing_formats(what: str) -> Iterator[None]:
-    """Say in one line where the extra ``[formats]`` is missing, or refuses a file.
+    """Raise `RefusedError` if the extra ``[formats]`` is missing, or refuses a file.
 
     Raises
     ------

@@ -65,7 +65,7 @@ class Locator(Protocol):
 
 @contextmanager
 def locating(on: Json, server: str | None) -> Iterator[Locator]:
-    """Give who locates scans in a map: this process, or the server at a URL.
+    """Give a locator for a map: this process, or the server at a URL.
 
     Raises
     ------

@@ -49,7 +49,7 @@ class Mode(StrEnum):
 
 @dataclass(slots=True)
 class Tally:
-    """What came of the scans so far."""
+    """Counts and poses of the scans so far."""
 
     verdicts: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
@@ -162,7 +162,7 @@ def replay(
 def located(
     locator: Locator, scans: Iterator[LoggedScan], frames: Frames, mode: Mode
 ) -> Iterator[tuple[LoggedScan, Found | RefusedError]]:
-    """Give each scan with where it was taken, or why it is refused.
+    """Yield each scan with its pose, or the reason why it is refused.
 
     In mode track the prior comes from the answers before and odometry.
     """
@@ -191,12 +191,12 @@ def located(
 
 
 def _hopeless(refusals: list[str] | None) -> bool:
-    """Tell whether all scans so far, and some of them, were refused in the same words: it may be for the map."""
+    """Return whether many scans, and all so far, were refused with the same message: the map may be the reason."""
     return refusals is not None and len(refusals) == HOPELESS and len(set(refusals)) == 1
 
 
 def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
-    """Give the scans on, and show how far it is, on a terminal."""
+    """Yield the scans; show the progress on a terminal."""
     total = None if log.count is None else -(-log.count // every)
     where = Console(stderr=True)
     yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
@@ -227,7 +227,7 @@ def _draw(document: Json, tally: Tally, picture: Path) -> None:
 
 
 def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
-    """Say what was taken of the log and what was not, and whose poses are told."""
+    """Print what was read of the log, and whose poses are printed."""
     print_notes(log, where)
     codes = {note.code for note in log.report.assumed}
     if "no_odometry" in codes:

@@ -89,7 +89,7 @@ class Server:
         return self._answer(schema.MapDocument, Asked(map_id), self._client.get_map, map_id)
 
     def maps(self) -> Iterator[Json]:
-        """Give what is told of each stored map, page by page."""
+        """Yield the summary of each stored map, page by page."""
         cursor: str | None = None
         for _ in range(MAX_PAGES):
             page = self._answer(schema.MapList, NOTHING, self._client.list_maps, cursor=cursor)

@@ -1,4 +1,4 @@
-"""Maps that are stored where a service with the settings of this environment would store them."""
+"""The store of maps that a service with the settings of this environment uses."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class StoredMaps:
             return FoundMap(orjson.loads(stored.document), reference)
 
     def maps(self) -> Iterator[Json]:
-        """Give what is told of each stored map, by id."""
+        """Yield the summary of each stored map, by id."""
         after: str | None = ""
         while after is not None:
             with _reaching():

@@ -48,7 +48,7 @@ def ambiguity_json(ambiguity: Ambiguity | None) -> Json | None:
 
 
 def diagnostics_json(diagnostics: RegistrationDiagnostics) -> Json:
-    """Return the numbers beside a pose."""
+    """Return the diagnostics of a pose."""
     return {
         "ambiguity": ambiguity_json(diagnostics.ambiguity),
         "ambiguity_before": ambiguity_json(diagnostics.ambiguity_before),
@@ -94,7 +94,7 @@ def registration_json(
 
 @dataclass(frozen=True, slots=True)
 class _Names:
-    """What segments of a scan are called: by their index, and of several views by the view and the index in it."""
+    """Names of the segments of a scan: the index, or of several views the view and the index in it."""
 
     starts: Indices | None
 

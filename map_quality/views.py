@@ -1,4 +1,4 @@
-"""What a virtual robot sees at a pose of a map, and whether its scan fits another pose of the map as well."""
+"""Simulated scans at poses of a map, and whether such a scan fits another pose of the map as well."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class AnalysisError(InputError):
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """What a robot sees by. The default sees all round, 720 beams, 20 m far, with 2 cm noise.
+    """The scanner of a robot. Default: a full turn, 720 beams, 20 m, 2 cm noise.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Robot:
 
     @property
     def headings(self) -> tuple[float, ...]:
-        """Where it looks from each place, radians: once is enough for one that sees all round."""
+        """Headings at each place, radians: a single one for a scanner that sees a full turn."""
         count = 1 if self.fov >= ALL_ROUND else HEADINGS
         return tuple(math.remainder(k * math.tau / count, math.tau) for k in range(count))
 

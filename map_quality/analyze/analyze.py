@@ -1,4 +1,4 @@
-"""What a robot would know at a place: a scan taken there, searched in the map that it was taken in."""
+"""Localization at a place: a scan is simulated there and searched in the map."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_DRIVE = 30.0  # m
 
 @dataclass(frozen=True, slots=True)
 class PlaceVerdict:
-    """What a robot would know at a place.
+    """Result of localization at a place.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Analysis:
     def _knows_after(
         self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None
     ) -> Generator[None, None, float | None]:
-        """Return how far it drives until all that it has seen is told to be where it is by then; metres."""
+        """Return how far it drives until the scans so far give a usable answer that is right; metres."""
         ways = ways_from(self.segments, pose, self.drive, self.robot.range_max)
         seen_so_far = [[(pose, seen)] for _ in ways]
         for step in zip_longest(*ways):

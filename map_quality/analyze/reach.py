@@ -1,4 +1,4 @@
-"""What can be reached from a point without crossing a wall."""
+"""The cells that can be reached from a point without crossing a wall."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Reach:
         return cls(low, cell, labels == label)
 
     def includes(self, places: Floats) -> NDArray[np.bool_]:
-        """Tell which of ``(n, 2)`` places on the map can be reached."""
+        """Return which of ``(n, 2)`` places on the map can be reached."""
         columns, rows = _cells(places, self.low, self.cell).T
         found: NDArray[np.bool_] = self.inside[columns, rows]
         return found

@@ -1,4 +1,4 @@
-"""What of a map looks alike: simulated scans at some places, searched in the map itself."""
+"""Similar places of a map: scans are simulated at some places and searched in the map itself."""
 
 from __future__ import annotations
 

@@ -21,12 +21,12 @@ from registration import RigidTransform
 from .tuning import BETTER_SCALED, LADDER, LADDER_SECONDS, LEAST_SHARE, SIGMAS
 
 Way = tuple[bool, float | None]
-"""How a map is taken: whether directions mean something, and the sigma of its lines, metres."""
+"""Assumptions about a map: whether directions mean something, and the sigma of its lines, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """How a scan fits a map that is taken in one way.
+    """Fit of a scan under one set of assumptions about the map.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What came of one scan.
+    """Results for one scan.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ def _any_factor(context: SearchContext, known: float) -> float | None:
             return None
         if best is None or found.score > best.score:
             best, factor = found, rung * near
-    # Shrunk, a hall fits the next best room: what is told has to stand up as an answer.
+    # Shrunk, a hall fits the next best room: a factor is reported only if its answer is usable.
     if best is None or best.score <= BETTER_SCALED * known:
         return None
     if not judge(best.context, best.explanations, off_scale=best.off_scale).usable:

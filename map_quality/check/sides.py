@@ -58,20 +58,20 @@ class Looker:
         return float(reach), int(wall)
 
     def is_within(self, x: float, y: float) -> bool:
-        """Tell whether a place lies in the box around the walls, as far as cells list them."""
+        """Return whether a place lies in the box around the walls, as far as cells list them."""
         shape = self.index.tables.place.grid.shape[0]
         right, top = shape["columns"] * shape["cell"], shape["rows"] * shape["cell"]
         return bool(0.0 <= x - shape["x0"] <= right and 0.0 <= y - shape["y0"] <= top)
 
     def is_front(self, wall: int, angle: float) -> bool:
-        """Tell whether a ray along an angle meets a wall on its left, where free space is."""
+        """Return whether a ray along an angle meets a wall on its left, where free space is."""
         row = self.index.walls.rows[wall]
         return bool(row["dx"] * math.sin(angle) < row["dy"] * math.cos(angle))
 
 
 @dataclass(frozen=True, slots=True)
 class Sides:
-    """What rays from walls meet.
+    """Hits of the rays from walls.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Sides:
 
     @property
     def contradiction(self) -> float:
-        """The share of rays that meet what they should not, by length and the mean of both sides, 0 to 1."""
+        """The fraction of rays that meet what they should not, by length and the mean of both sides, 0 to 1."""
         shares = []
         for counts, against in ((self.left, 1), (self.right, 0)):
             met = float((counts.sum(axis=1) * self.lengths).sum())

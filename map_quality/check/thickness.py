@@ -1,4 +1,4 @@
-"""How thick walls are, by scans: by how much nearer to free space their faces should stand than they are drawn."""
+"""Thickness of walls, estimated from scans, and the conclusion from all sample scans."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, orien
 
 
 def fit_better_mirrored(index: MapIndex, scans: Sequence[Scan], deadline: Deadline) -> bool:
-    """Tell whether scans fit a map with directions better mirrored, however thick its walls are made for either."""
+    """Return whether scans fit a directed map better mirrored, each with the thickness of walls that fits best."""
     either = [_scores(index, some, deadline, oriented=True) for some in (scans, [mirrored(scan) for scan in scans])]
     as_they_are, other = (max(one.values(), default=0.0) for one in either)
     return other > as_they_are
