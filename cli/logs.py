@@ -73,7 +73,7 @@ def options_of(
 
 
 def scans_of(log: Log) -> Iterator[LoggedScan]:
-    """Give the scans of a log one by one; raises `RefusedError` where it is broken."""
+    """Yield the scans of a log; raises `RefusedError` where it is broken."""
     with needing_formats(f"reading {log.name}"):
         yield from log
 

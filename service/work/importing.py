@@ -7,13 +7,13 @@ from typing import Any
 import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
-from map_quality.check import check_map
+from linefix.map_answers import check_json
+from map_quality import check_map
 
 from ..admission.errors import DeadlinePassedError
 from ..importing.bounded import ReadMap
-from ..maps.lookup import MapLookup, is_oriented, outline_of
-from ..schemas.parts import InlineMap
-from .checking import check_json
+from ..maps.lookup import MapLookup, outline_of
+from ..schemas.parts import InlineMap, is_oriented
 from .job import Done, Job
 
 
