@@ -116,7 +116,7 @@ def test_overlaps_are_those_at_the_pose_that_is_answered(walls: Floats, at: Rigi
 
 
 @pytest.mark.parametrize("asked", [(), ("correspondences",), ("missing_map",), ("alternatives", "missing_map")])
-def test_parts_that_are_not_asked_for_are_empty_and_change_nothing_else(asked: tuple[Any, ...]) -> None:
+def test_parts_that_are_not_deciding_place_are_empty_and_change_nothing_else(asked: tuple[Any, ...]) -> None:
     """Of an answer that is usable, with another pose, and a wall through which it sees."""
     index = index_of(np.vstack([equal_rooms(2)[:-2], [[4.0, 3.3, 5.0, 3.4]]]))
     sent = scan_of(seen(ROOM, INSIDE, noise=0.01, seed=1)[0], viewpoint=(0.0, 0.0))

@@ -10,15 +10,24 @@ import pytest
 from hypothesis import given, settings
 
 from association.index.grids import listed
-from association.layout import CROSSING, FOUND, PROGRESS, record
-from association.search.kernels import planning, sliding
-from association.search.planning_tables import Planning
+from association.layout import CROSSING
+from association.search.kernels import bases as planning
+from association.search.kernels import sliding
+from association.search.tables import Sampling
+from association.search.tuning import (
+    BASE_SEGMENTS,
+    COST_BASE,
+    COST_ENTRY,
+    GAIN_POWER,
+    PARALLEL_SINE,
+    REUSE,
+    UNTELLING,
+)
 from association.tables import Crossings
-from association.tuning import BASE_SEGMENTS, COST_BASE, COST_ENTRY, GAIN_POWER, PARALLEL_SINE, REUSE, UNTELLING
 from registration.layout import Records
 
 from ...kernels.drawn import ASKED, INDEX, SEEDS, TABLES, Drawn, drawn, oblique
-from ...kernels.plans import NOT_LISTED, RULE, bases_of, entries_of, plan_of, sampled
+from ...kernels.plans import NOT_LISTED, RULE, bases_of, entries_of, plan_of, sampled, state_of
 from ...reference import crossings as twin_of_crossings
 from ...reference import planning as twin
 from ...scenes import context_of, index_of, scan_of
@@ -36,8 +45,10 @@ def uncertain(d: Drawn) -> Records:
 def test_slack_tables(seed: int) -> None:
     d = drawn(seed)
     d.scan["length"] *= 1.5
-    runs = oblique(d.rng).runs
-    for got, expected in zip(planning.slack_tables(d.scan, 9, runs), twin.slack_tables(d.scan, 9, runs), strict=True):
+    chains = oblique(d.rng).chains
+    for got, expected in zip(
+        planning.slack_tables(d.scan, 9, chains), twin.slack_tables(d.scan, 9, chains), strict=True
+    ):
         np.testing.assert_allclose(got, expected, atol=1e-9)
 
 
@@ -55,8 +66,8 @@ def test_is_telling(seed: int) -> None:
 def test_beyond_the_longest_segments_only_what_tells_makes_a_base(seed: int) -> None:
     scan = np.concatenate([uncertain(drawn(seed + k)) for k in range(6)])[: BASE_SEGMENTS + 8]
     assert len(scan) == BASE_SEGMENTS + 8
-    bases = bases_of(scan, len(scan), INDEX.runs, 400.0)
-    expected = twin.plan_bases(scan, len(scan), INDEX.runs, 400.0)
+    bases = bases_of(scan, len(scan), INDEX.chains, 400.0)
+    expected = twin.plan_bases(scan, len(scan), INDEX.chains, 400.0)
     assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
     assert any(max(base[:2]) >= BASE_SEGMENTS for base in expected)
 
@@ -74,13 +85,13 @@ def test_a_base_tells_as_long_as_it_lays_the_others_off_by_a_quarter_of_a_metre(
 @settings(max_examples=20, deadline=None)
 def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
     d = drawn(seed)
-    scan, runs, area = uncertain(d), oblique(d.rng).runs, 10.0 ** d.rng.uniform(1.0, 4.0)
+    scan, chains, area = uncertain(d), oblique(d.rng).chains, 10.0 ** d.rng.uniform(1.0, 4.0)
     count = int(d.rng.integers(2, len(scan) + 1))
-    bases, expected = bases_of(scan, count, runs, area), twin.plan_bases(scan, count, runs, area)
+    bases, expected = bases_of(scan, count, chains, area), twin.plan_bases(scan, count, chains, area)
     assert bases[["sliding", "crossing"]].tolist() == [base[:2] for base in expected]
     np.testing.assert_allclose(bases["merit"], [base[2] for base in expected], rtol=1e-9)
     for fade in (math.log(REUSE), 0.0):
-        plan = plan_of(scan, count, runs, area)._replace(fade=fade)
+        plan = plan_of(scan, count, chains, area)._replace(fade=fade)
         at_most = plan.bases["merit"].tolist()
         taken = [planning.next_base(ASKED._replace(scan=scan), plan) for _ in range(len(expected) + 1)]
         assert taken == [*twin.order_of(expected, fade, at_most), -1]
@@ -91,8 +102,8 @@ def test_plan_bases_and_the_order_in_which_they_are_taken(seed: int) -> None:
 @settings(max_examples=20, deadline=None)
 def test_what_a_base_is_worth_before_it_is_weighed_it_is_worth_at_most(seed: int) -> None:
     d = drawn(seed)
-    scan, runs, area = uncertain(d), oblique(d.rng).runs, 10.0 ** d.rng.uniform(1.0, 4.0)
-    bases, weighed = planning.pair_up(scan, len(scan)), bases_of(scan, len(scan), runs, area)
+    scan, chains, area = uncertain(d), oblique(d.rng).chains, 10.0 ** d.rng.uniform(1.0, 4.0)
+    bases, weighed = planning.pair_up(scan, len(scan)), bases_of(scan, len(scan), chains, area)
     assert not bases["weighed"].any()
     assert weighed["weighed"].all()
     assert (bases["merit"] > weighed["merit"]).all()
@@ -104,8 +115,8 @@ def test_a_base_of_which_the_crossings_are_listed_costs_what_there_are(seed: int
     """Its second segment is to the left of the first one then; beyond the lists it is swept as any other."""
     d = drawn(seed)
     scan, near = uncertain(d), listed_up_to(4.0)
-    swept = bases_of(scan, len(scan), INDEX.runs, INDEX.area)
-    bases = bases_of(scan, len(scan), INDEX.runs, INDEX.area, near)
+    swept = bases_of(scan, len(scan), INDEX.chains, INDEX.area)
+    bases = bases_of(scan, len(scan), INDEX.chains, INDEX.area, near)
     assert (swept["listed"] == -1).all()
     for base, other in zip(bases, swept, strict=True):
         a, b = base["sliding"], base["crossing"]
@@ -122,14 +133,14 @@ def test_a_base_of_which_the_crossings_are_listed_costs_what_there_are(seed: int
 
 
 def listed_up_to(reach: float) -> Crossings:
-    runs = INDEX.sweep.runs
-    found = np.array([(*pair, 0) for pair in sorted(twin_of_crossings.crossings_of(runs, reach))], CROSSING)
-    return listed(runs, found, reach)
+    chains = INDEX.sweep.chains
+    found = np.array([(*pair, 0) for pair in sorted(twin_of_crossings.crossings_of(chains, reach))], CROSSING)
+    return listed(chains, found, reach)
 
 
 def test_few_bases_are_weighed() -> None:
     d = drawn(3)
-    plan = plan_of(d.scan, len(d.scan), INDEX.runs, INDEX.area, crossings=INDEX.crossings)
+    plan = plan_of(d.scan, len(d.scan), INDEX.chains, INDEX.area, crossings=INDEX.crossings)
     for _ in range(4):
         planning.next_base(ASKED._replace(scan=d.scan), plan)
     assert 4 <= plan.bases["weighed"].sum() < 0.5 * len(plan.bases)
@@ -137,30 +148,27 @@ def test_few_bases_are_weighed() -> None:
 
 @given(SEEDS)
 @settings(max_examples=20, deadline=None)
-def test_begin(seed: int) -> None:
-    """A scan of more segments than bases are made of, and of fewer; the best value that is known stays."""
+def test_plan_search(seed: int) -> None:
+    """A scan of more segments than bases are made of, and of fewer."""
     d = drawn(seed)
     question, n = context_of(INDEX, scan_of(d.endpoints)).question(RULE), int(d.rng.integers(1, len(d.scan) + 1))
-    samples, progress = sampled(n, 16, d.rng), record(PROGRESS, best_value=3.0, current=7, bound=9.0)
+    samples, statistics = sampled(n, 16, d.rng), state_of().statistics
     noise = d.rng.gumbel(size=n * n if seed % 2 == 0 else 0)
     crossings = INDEX.crossings if seed % 3 else NOT_LISTED
-    by = Planning(INDEX.runs, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
-    plan = planning.begin(question, TABLES._replace(crossings=crossings), by, progress)
-    assert progress[0]["current"] == -1
-    assert progress[0]["bound"] == pytest.approx(d.scan["gain"].sum())
-    assert progress[0]["missed"] == 1.0
-    assert progress[0]["best_value"] == 3.0
-    anew = plan_of(question.scan, n, INDEX.runs, INDEX.area, crossings=crossings)
-    weighed = bases_of(question.scan, n, INDEX.runs, INDEX.area, crossings)
+    by = Sampling(INDEX.chains, INDEX.area, samples.orders, samples.ranks, math.log(REUSE), noise)
+    plan = planning.plan_search(question, TABLES._replace(crossings=crossings), by, statistics[0])
+    assert statistics[0]["bound"] == pytest.approx(d.scan["gain"].sum())
+    again = plan_of(question.scan, n, INDEX.chains, INDEX.area, crossings=crossings)
+    weighed = bases_of(question.scan, n, INDEX.chains, INDEX.area, crossings)
     weighed["merit"] += noise[: len(weighed)] if len(noise) else 0.0
     given = ["sliding", "crossing", "merit", "weighed", *(["listed"] if plan.random else [])]
-    np.testing.assert_array_equal(plan.bases[given], (weighed if plan.random else anew.bases)[given])
+    np.testing.assert_array_equal(plan.bases[given], (weighed if plan.random else again.bases)[given])
     swept = plan.random and bool((plan.bases["listed"] < 0).any())
     assert plan.costs.known[0] == swept
-    for costs in (plan.costs, anew.costs):
+    for costs in (plan.costs, again.costs):
         planning.know_sweeps(question.scan, costs)
     for name in ("lines", "slides", "smooth", "scale"):
-        np.testing.assert_equal(getattr(plan.costs, name), getattr(anew.costs, name))
+        np.testing.assert_equal(getattr(plan.costs, name), getattr(again.costs, name))
     np.testing.assert_array_equal(plan.uses, np.zeros(n))
     np.testing.assert_array_equal(plan.residual, d.scan["gain"])
     np.testing.assert_array_equal(plan.best_gains, sorted(d.scan["gain"][:n], reverse=True))
@@ -212,10 +220,8 @@ def test_a_slide_needs_enough_without_what_makes_a_base_with_it() -> None:
         parallel = scan["gain"][np.abs(scan["dx"] * scan["dy"][longest] - scan["dy"] * scan["dx"][longest]) < 0.1].sum()
         rules = RULE.copy()
         rules["kept_share"] = 1.0
-        found, progress = np.zeros(9, FOUND), record(PROGRESS, best_value=parallel + more)
-        question = context.question(rules)
-        done = sliding.search_slides(question, index.tables, longest, found, progress, context.workspace, 2.0, 10**9)
-        assert done
-        kept.append(int(progress["verified"][0]))
+        state, question = state_of(9, parallel + more), context.question(rules)
+        assert sliding.search_slides(question, index.tables, longest, state, context.workspace, 2.0)
+        kept.append(int(state.statistics["verified"][0]))
     assert kept[0] > 0
     assert kept[1] == 0

@@ -1,4 +1,4 @@
-"""Compiled choice of bases: the cheap and telling ones first."""
+"""Compiled choice of bases, the minimal samples: those first that cost little and fix the pose well."""
 
 import math
 
@@ -8,9 +8,11 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...consensus.kernels.ordering import ascending
-from ...layout import BASE, FIGURE, LINE_COST, LISTED
+from ...layout import FIGURE, Integers
 from ...tables import Crossings, MapTables, Question, Walls
-from ...tuning import (
+from ..layout import BASE, LINE_COST, LISTED
+from ..tables import Costs, Plan, Samples, Sampling
+from ..tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
     COST_BASE,
@@ -27,20 +29,19 @@ from ...tuning import (
     TIMES_BETTER,
     UNTELLING,
 )
-from ..planning_tables import Costs, Plan, Planning, Samples
-from .looking_up import look_up
+from .lookup import look_up
 from .sweeping import least_length, measure
 
 
 @kernel
-def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats]:
-    """Sum over the runs of each direction bin how far scan segment i could slide on them.
+def slack_tables(scan: Records, count: int, chains: Walls) -> tuple[Floats, Floats]:
+    """Sum over the chains of each direction bin how far scan segment i could slide on them.
 
-    Returns slides (count, bins) in metres and the number of runs long enough for each segment (count,).
+    Returns slides (count, bins) in metres and the number of chains long enough for each segment (count,).
     """
-    bin_starts = runs.bin_starts
-    longest = runs.longest
-    summed = runs.summed
+    bin_starts = chains.bin_starts
+    longest = chains.longest
+    summed = chains.summed
     bins = len(bin_starts) - 1
     slides = np.zeros((count, bins), np.float64)
     fitting = np.zeros(count, np.float64)
@@ -85,10 +86,10 @@ def middle_of(scan: Records) -> tuple[float, float, float]:
 
 @kernel
 def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool:
-    """Tell whether the pose that a base gives is good enough to find the rest of its consensus set.
+    """Return whether the pose that a base gives is precise enough to find the rest of its consensus set.
 
-    Short segments know little of their angle; a base of two of them lays the others beyond what the gates reach.
-    `middle` is that of the scan.
+    The angle of a short segment is imprecise; a base of two of them lays the others beyond the gates. `middle` is that
+    of the scan.
     """
     variance = a.angle_variance * b.angle_variance / (a.angle_variance + b.angle_variance)
     x, y, square = middle
@@ -97,17 +98,17 @@ def is_telling(a: Record, b: Record, middle: tuple[float, float, float]) -> bool
 
 
 @kernel
-def costs_of(count: int, runs: Walls, area: float, crossings: Crossings) -> Costs:
-    """Return what bases of the first `count` scan segments cost: nothing of what is swept is known yet.
+def costs_of(count: int, chains: Walls, area: float, crossings: Crossings) -> Costs:
+    """Return the costs of bases of the first `count` scan segments, those of sweeps not yet known.
 
-    `area` is that of the map, m^2; its crossings say what bases cost that are looked up.
+    `area` is that of the map, m^2; its crossings give the costs of bases that are looked up.
     """
-    bins = len(runs.bin_starts) - 1
+    bins = len(chains.bin_starts) - 1
     return Costs(
         crossings,
         np.empty(1, FIGURE),
         np.empty(0, LISTED),
-        runs,
+        chains,
         np.zeros(1, np.uint8),
         np.empty(count, LINE_COST),
         np.empty((count, bins), np.float64),
@@ -119,13 +120,13 @@ def costs_of(count: int, runs: Walls, area: float, crossings: Crossings) -> Cost
 
 @kernel
 def know_sweeps(scan: Records, costs: Costs) -> None:
-    """Write what it costs to sweep bases, as far as that is of one segment each, once the first of them is."""
+    """Write the parts of the costs of sweeps that depend on one segment each, when the first base is swept."""
     costs.known[0] = 1
     lines = costs.lines
     smooth = costs.smooth
     taken = costs.taken
     count, bins = costs.slides.shape
-    slides, fitting = slack_tables(scan, count, costs.runs)
+    slides, fitting = slack_tables(scan, count, costs.chains)
     for i in range(count):
         line = lines[i]
         total = 0.0
@@ -148,7 +149,7 @@ def know_sweeps(scan: Records, costs: Costs) -> None:
 def pair_up(scan: Records, count: int) -> Records:
     """List the non-parallel pairs of the first `count` scan segments, (k,) of `BASE`, the second left of the first.
 
-    Beyond the first `BASE_SEGMENTS` only those that tell enough. None is weighed.
+    Beyond the first `BASE_SEGMENTS` only those that fix the pose well. None is weighed.
     """
     middle = middle_of(scan)
     tells = np.empty(count, np.float64)
@@ -173,7 +174,7 @@ def pair_up(scan: Records, count: int) -> Records:
 
 @kernel
 def weigh(base: Record, scan: Records, gates: Record, costs: Costs) -> None:
-    """Take what it costs to go through a base off its merit, once, and tell how: by lists or by a sweep."""
+    """Subtract the cost of a base from its merit, once, and choose how it is searched: by lists or by a sweep."""
     figure = costs.figure[0]
     measure(scan[base.sliding], scan[base.crossing], gates, figure)
     _, base.listed = look_up(figure, costs.crossings, costs.no_lists)
@@ -194,7 +195,7 @@ def weigh(base: Record, scan: Records, gates: Record, costs: Costs) -> None:
 
 @kernel
 def swept_cost(i: int, j: int, costs: Costs) -> float:
-    """Return what it costs to sweep a base of the scan segments i and j > i."""
+    """Return the cost of sweeping a base of the scan segments i and j > i."""
     one = costs.lines[i]
     other = costs.lines[j]
     slides = costs.slides[i]
@@ -213,7 +214,7 @@ def swept_cost(i: int, j: int, costs: Costs) -> float:
 
 @kernel
 def weigh_all(question: Question, bases: Records, costs: Costs, noise: Floats) -> None:
-    """Weigh bases that are to be drawn by their merits, to which noise is added, (k,) or more."""
+    """Weigh bases that are drawn at random by their merits, and add noise to these, (k,) or more."""
     for k in range(len(bases)):
         weigh(bases[k], question.scan, question.terms[0].gates, costs)
         bases[k].merit += noise[k]
@@ -221,10 +222,10 @@ def weigh_all(question: Question, bases: Records, costs: Costs, noise: Floats) -
 
 @kernel
 def next_base(question: Question, plan: Plan) -> int:
-    """Take the best base that is left, worth less the more its segments were used; -1 when none is left.
+    """Return the base of the greatest merit that is left, less for each use of its segments; -1 when none is left.
 
-    What a base is worth before it is weighed it is worth at most, so that few of them need be: one is left unweighed
-    that is not worth `TIMES_BETTER` what another is. Ties go to the pair that comes first, of the longest segments.
+    The merit of a base that is not weighed is an upper limit, so that few need be: a base is weighed only where its
+    merit may be `TIMES_BETTER` times that of another. Ties go to the pair that comes first, of the longest segments.
     """
     bases = plan.bases
     uses = plan.uses
@@ -248,18 +249,11 @@ def next_base(question: Question, plan: Plan) -> int:
 
 
 @kernel
-def begin(question: Question, tables: MapTables, planning: Planning, progress: Records) -> Plan:
-    """Plan a search, and put `progress` (1,) at its beginning, at the best value that is known."""
+def plan_search(question: Question, tables: MapTables, sampling: Sampling, statistics: Record) -> Plan:
+    """Pair up the bases of a scan and prepare the stopping rule; `statistics` get the bound of nothing searched yet."""
     scan = question.scan
-    count, n = planning.orders.shape
-    random = len(planning.noise) > 0
-    state = progress[0]
-    state.current = -1
-    state.sliding = -1
-    state.left = 0
-    state.done = 0
-    state.bound = 0.0
-    state.missed = 1.0
+    n = sampling.orders.shape[1]
+    random = len(sampling.noise) > 0
     residual = np.empty(len(scan), np.float64)
     freedoms = np.empty(len(scan), np.float64)
     losses = np.empty(n, np.float64)
@@ -268,21 +262,11 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
     for i in range(len(scan)):
         residual[i] = scan[i].gain
         freedoms[i] = -scan[i].freedom
-        state.bound += scan[i].gain
-    # All of these have sets that may have missed all bases.
-    found = np.empty(count, np.uint8)
-    undecided = np.empty(count + 1, np.int32)
-    for s in range(count):
-        found[s] = n
-        undecided[s] = s
-    undecided[count] = count
-    samples = Samples(
-        planning.orders, planning.ranks, found, np.zeros(count, np.uint8), np.zeros(count, np.float64), undecided
-    )
-    costs = costs_of(n, planning.runs, planning.area, tables.crossings)
+        statistics.bound += scan[i].gain
+    costs = costs_of(n, sampling.chains, sampling.area, tables.crossings)
     bases = pair_up(scan, n)
     if random:
-        weigh_all(question, bases, costs, planning.noise)
+        weigh_all(question, bases, costs, sampling.noise)
     return Plan(
         bases,
         costs,
@@ -290,7 +274,20 @@ def begin(question: Question, tables: MapTables, planning: Planning, progress: R
         residual,
         residual[ascending(losses)],
         ascending(freedoms),
-        samples,
-        planning.fade,
+        all_undecided(sampling.orders, sampling.ranks),
+        sampling.fade,
         random,
     )
+
+
+@kernel
+def all_undecided(orders: Integers, ranks: Integers) -> Samples:
+    """Return sampled consensus sets none of which holds a base that was searched."""
+    count, n = orders.shape
+    found = np.empty(count, np.uint8)
+    undecided = np.empty(count + 1, np.int32)
+    for s in range(count):
+        found[s] = n
+        undecided[s] = s
+    undecided[count] = count
+    return Samples(orders, ranks, found, np.zeros(count, np.uint8), np.zeros(count, np.float64), undecided)

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from association import Scan, mirrored
 from association.layout import POINT, VARIANCES, Integers, as_records, record
-from association.scan.kernels import scans
+from association.scan.kernels import describing, joining
+from association.scan.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
 from association.tables import Measured
-from association.tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERAL
 from registration import MeasuredSegments, Segments
 from registration.layout import LEAST_POINTS, Floats, Records
 
@@ -57,7 +57,7 @@ def given_to(measured: MeasuredSegments) -> Measured:
 
 
 def given_of(measured: MeasuredSegments) -> Records:
-    return scans.as_lines(given_to(measured))
+    return joining.as_lines(given_to(measured))
 
 
 def as_measured(lines: Records, *, counted: bool) -> MeasuredSegments:
@@ -73,19 +73,19 @@ def labelled(
     measured: MeasuredSegments, lateral: float = LINE_LATERAL, cosine: float = LINE_COSINE, *, directed: bool = True
 ) -> list[int]:
     order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
-    return [int(label) for label in scans.collinear_lines(given_of(measured), order, lateral, cosine, directed)]
+    return [int(label) for label in joining.collinear_lines(given_of(measured), order, lateral, cosine, directed)]
 
 
 def joined(measured: MeasuredSegments, labels: list[int] | None = None) -> Records:
     """Join the segments of each label; by default those that continue one another."""
     order = np.array(twin.longest_first(measured.segments.lengths), np.intp)
     of_line: Integers = np.array(labelled(measured) if labels is None else labels, np.intp)
-    return scans.join_labelled(given_of(measured), order, of_line, measured.counted)
+    return joining.join_labelled(given_of(measured), order, of_line, measured.counted)
 
 
 def test_union_length() -> None:
     lows, highs = np.array([3.0, 0.0, 0.5, 3.0, 9.0]), np.array([4.0, 2.0, 1.0, 5.0, 9.5])
-    assert [scans.union_length(lows, highs, count) for count in range(6)] == [0.0, 1.0, 3.0, 3.0, 4.0, 4.5]
+    assert [joining.union_length(lows, highs, count) for count in range(6)] == [0.0, 1.0, 3.0, 3.0, 4.0, 4.5]
 
 
 @given(SEEDS)
@@ -95,7 +95,7 @@ def test_union_length_of_many(seed: int) -> None:
     lows = rng.integers(0, 40, 12).astype(float)
     highs = lows + rng.integers(0, 9, 12).astype(float)
     cells = {x for low, high in zip(lows, highs, strict=True) for x in range(int(low), int(high))}
-    assert scans.union_length(lows, highs, 12) == len(cells)
+    assert joining.union_length(lows, highs, 12) == len(cells)
 
 
 @given(SEEDS)
@@ -208,7 +208,7 @@ def test_describe_lines(seed: int) -> None:
     variances = record(VARIANCES, **dict(zip(names, rng.choice([0.0, 1e-10, 1e-3, 1.0], 4), strict=True)))
     model = model_of(float(rng.choice([1e-4, 1e-2])), 0.3, 0.1)
     order, expected = twin.describe_lines(lines, variances[0], model[0])
-    got = scans.describe_lines(lines, np.array(order), variances, model)
+    got = describing.describe_lines(lines, np.array(order), variances, model)
     assert_records(got, expected, rtol=1e-8, atol=1e-12)
 
 
@@ -237,7 +237,7 @@ def test_describe_view(seed: int) -> None:
         once, cut = measured, list(range(len(measured)))
     apart = twin.collinear_segments(once, LINE_LATERAL, LINE_COSINE)
     order, expected = twin.describe_lines(twin.join_segments(once, apart), variances[0], model[0])
-    row_of, rows, seen = scans.describe_view(given_to(measured), measured.counted, True, variances, model)
+    row_of, rows, seen = describing.describe_view(given_to(measured), measured.counted, True, variances, model)
     assert row_of.tolist() == [order.index(apart[line]) for line in cut]
     assert_rows(rows, expected, 1e-7)
     assert seen["row"].tolist() == list(range(len(rows)))
@@ -251,13 +251,13 @@ def test_describe_view(seed: int) -> None:
 def test_mirror_lines(seed: int) -> None:
     """Those of the mirrored scan, to rounding: its segments lie in the same order, and go together in the same way."""
     measured, variances, model = view_of(seed)
-    row_of, rows, _ = scans.describe_view(given_to(measured), measured.counted, True, variances, model)
+    row_of, rows, _ = describing.describe_view(given_to(measured), measured.counted, True, variances, model)
     other = mirrored(Scan(measured)).measured
-    expected_row_of, expected, _ = scans.describe_view(given_to(other), other.counted, True, variances, model)
+    expected_row_of, expected, _ = describing.describe_view(given_to(other), other.counted, True, variances, model)
     assert row_of.tolist() == expected_row_of.tolist()
-    got, got_seen = scans.mirror_lines(rows)
+    got, got_seen = describing.mirror_lines(rows)
     assert_rows(got, expected, 1e-9)
-    np.testing.assert_array_equal(got_seen, scans.seen_at_once(got))
+    np.testing.assert_array_equal(got_seen, describing.seen_at_once(got))
 
 
 def test_a_scan_of_nothing_has_no_lines() -> None:

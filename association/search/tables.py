@@ -1,4 +1,4 @@
-"""What the kernels are handed to choose bases, and to tell when enough of them have been gone through: as `tables`."""
+"""The arrays that the kernels of the search exchange; `association.tables` has those that stages share."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class Samples(NamedTuple):
     ----------
     orders : (s, n) the segments of each
     ranks : (n, s) the places of each segment in them
-    found : (s,) up to which place each has a base that was gone through, n where it has none
-    sizes : (s,) how many are in each set
-    gains : (s,) what they come to, nats
-    undecided : (s + 1,) those of which none is known to hold a base; at last, how many these are
+    found : (s,) up to which place each holds a base that was searched, n where it holds none
+    sizes : (s,) how many segments are in each set
+    gains : (s,) the sum of their gains, nats
+    undecided : (s + 1,) the sets of which none is known to hold a searched base; at last, how many these are
     """
 
     orders: Integers
@@ -32,7 +32,7 @@ class Samples(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """What the bases of n scan segments cost.
+    """The costs of searching the bases of n scan segments.
 
     Attributes
     ----------
@@ -42,14 +42,13 @@ class Costs(NamedTuple):
         To write to.
     no_lists : (0,) of `LISTED`
         For crossings are only counted.
-    runs : Walls
+    chains : Walls
         Of the map.
-    known : (1,) whether what follows, of bases that are swept, was written: in a small map none is
+    known : (1,) whether what follows, of bases that are swept, was written: in a small map no base is swept
     lines : (n,) of `LINE_COST`
-    slides : (n, bins) how far each could slide on the runs of each direction bin, metres
-    smooth : (n, 2 bins) the same with the neighbouring bins, twice around: a bin that is turned needs no division to be
-        found
-    taken : (n, bins) the bins where it can, as many as there are
+    slides : (n, bins) how far each could slide on the chains of each direction bin, metres
+    smooth : (n, 2 bins) the same with the neighbouring bins, twice around: a rotated bin needs no division to be found
+    taken : (n, bins) the bins where it can slide, as many as there are
     scale : float
         Hypotheses for a metre's slide of one on one of the other, 1/m^2.
     """
@@ -57,7 +56,7 @@ class Costs(NamedTuple):
     crossings: Crossings
     figure: Records
     no_lists: Records
-    runs: Walls
+    chains: Walls
     known: Integers
     lines: Records
     slides: Floats
@@ -66,23 +65,23 @@ class Costs(NamedTuple):
     scale: float
 
 
-class Planning(NamedTuple):
-    """What the bases of a scan are planned by.
+class Sampling(NamedTuple):
+    """By which a plan is made.
 
     Attributes
     ----------
-    runs : Walls
+    chains : Walls
         Of the map.
     area : float
         Of the map, m^2.
-    orders : (s, n) as in `Samples`, n being how many segments bases are made of
+    orders : (s, n) as in `Samples`, n being the number of segments that bases are made of
     ranks : (n, s) as in `Samples`
     fade : float
         As in `Plan`.
     noise : (k,) what is added to the merits of bases that are drawn at random; empty where they are not
     """
 
-    runs: Walls
+    chains: Walls
     area: float
     orders: Integers
     ranks: Integers
@@ -91,19 +90,19 @@ class Planning(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The bases of a scan, and what tells when enough of them have been gone through.
+    """The bases of a scan, and what the stopping rule knows.
 
     Attributes
     ----------
     bases : (k,) of `BASE`
     costs : Costs
-        By which those are weighed whose turn may have come.
+        By which those bases are weighed that may come next.
     uses : (n,) how often each of the first n scan segments was part of a base so far
     residual : (all scan segments,) what is left of each gain in the bound, nats
     best_gains : (n,) the gains of the first n, the largest first, nats
     freest : (all scan lines,) those that take most freedom by themselves first
     samples : Samples
-        Consensus sets that may have missed all bases so far.
+        Consensus sets that all bases so far may have missed.
     fade : float
         What the logarithm of a base's merit loses for each earlier use of one of its segments.
     random : bool
@@ -119,3 +118,35 @@ class Plan(NamedTuple):
     samples: Samples
     fade: float
     random: bool
+
+
+class SearchState(NamedTuple):
+    """What a search has come to so far.
+
+    Attributes
+    ----------
+    poses : (k,) of `FOUND`, the best poses in no order
+    best : (1,) of `BEST`
+    statistics : (1,) of `STATISTICS`
+    stop : (1,) not 0 once the search has to end; written by another thread, hence read anew for each hypothesis
+    """
+
+    poses: Records
+    best: Records
+    statistics: Records
+    stop: Integers
+
+
+class Sweeps(NamedTuple):
+    """Room for the stages of a sweep, of `AT_ONCE` each.
+
+    Attributes
+    ----------
+    laid : (k,) of `LAID`
+    swept : (k,) of `SWEPT`
+    met : (k,) of `MET`
+    """
+
+    laid: Records
+    swept: Records
+    met: Records
