@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 import pytest
-from linefix.simulation import Scanner, scan
 
 import linefix
 from linefix.map_answers import checked_json
+from simulation import Scanner, scan
 
 ROOM = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
 FIELDS = {"findings", "size", "advice", "places", "viewpoints", "complete", "samples"}
