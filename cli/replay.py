@@ -99,7 +99,7 @@ def replay(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses red, others grey."),
+        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses green, others grey."),
     ] = None,
     mount: Annotated[
         tuple[float, float, float] | None,
