@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page wheel image-check sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page pictures wheel image-check sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -105,6 +105,12 @@ peers: $(VENV)-peers/.peers  ## print Linefix beside other solvers, installed ap
 page: $(VENV)/.ready  ## build the page from web/ into service/page/ (needs node)
 	cd web && npm ci --no-audit --no-fund && npm run build
 	$(BIN)/python -m examples.scenes
+
+pictures: $(VENV)/.ready  ## draw the pictures of README and documents that need no data; the page with chromium
+	$(BIN)/python -m examples.animation
+	$(BIN)/python -m examples.concepts
+	$(BIN)/python -m benchmarks.verdicts
+	$(BIN)/python -m examples.demo && cp out/demo.png docs/demo.png
 
 wheel: $(VENV)/.ready  ## build the wheel of the last commit into dist/, twice: both have to be the same to the byte
 	BIN=$(BIN) .ci/wheel

@@ -27,7 +27,6 @@ from .inputs import needing_formats, read_map_file, read_map_or_id
 from .options import AsJson, MapArgument, Server, grouped
 from .printing import print_json, print_rows
 
-COLOURS = {"ok": (46, 125, 70), "ambiguous": (214, 130, 20), "degenerate": (150, 60, 160), "no_match": (190, 40, 40)}
 SUFFIXES = (".json", ".geojson")
 # Arguments of the library by the options that they come from.
 OPTIONS = {f"laser.{name.replace('-', '_')}": f"--{name}" for name in ("fov", "beams", "range-max", "sigma")}
@@ -180,21 +179,16 @@ def features(answer: Json) -> Json:
 
 def _draw(document: Json, answer: Json, picture: Path) -> None:
     with needing_formats("drawing"):
-        from formats import LineMap, PlaceMark, draw_map
+        from formats import VERDICTS, LineMap, PlaceMark, draw_map, rgb, verdict_of
 
         segments = Segments.from_array(document["segments"], argument="map.segments")
         oriented = document.get("oriented") is not False
         marks = [
-            PlaceMark(one["pose"]["x"], one["pose"]["y"], answer["spacing"], COLOURS[_kind(one)])
+            PlaceMark(one["pose"]["x"], one["pose"]["y"], answer["spacing"], rgb(VERDICTS[kind]))
             for one in answer["places"]
+            for kind in [verdict_of(one["status"], usable=one["usable"])]
         ]
         draw_map(LineMap(segments, oriented=oriented), picture, marks=marks)
-
-
-def _kind(place: Json) -> str:
-    """Return how a place is told: one that is ok, but not usable, is as good as ambiguous."""
-    status: str = place["status"]
-    return "ambiguous" if status == "ok" and not place["usable"] else status
 
 
 def _rows(answer: Json) -> Iterator[tuple[str, str]]:

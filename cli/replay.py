@@ -119,7 +119,7 @@ def replay(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses red, others grey."),
+        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses green, others grey."),
     ] = None,
     server: Server = None,
     as_json: AsJson = False,

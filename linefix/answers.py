@@ -130,6 +130,7 @@ def alternative_json(other: Alternative) -> Json:
         "ambiguity": ambiguity_json(other.ambiguity),
         "reliability": other.reliability,
         "inlier_fraction": other.inlier_fraction,
+        "probability": other.probability,
     }
 
 

@@ -19,7 +19,7 @@ def draw(
     out: Annotated[Path, typer.Option(metavar="FILE", help="File to write: png, svg, dxf, geojson, csv or json.")],
     server: Server = None,
 ) -> None:
-    """Draw a map: walls in black, a green tick on the free side of each."""
+    """Draw a map: walls in grey, a blue tick on the free side of each."""
     document = document_at(on, server)
     if out.suffix.lower() != ".png":
         write_document(document, out)
