@@ -4,7 +4,12 @@
 from dataclasses import dataclass, field
 
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, byte, float32, float64, int8, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import array, float32, float64, int8, int32, sequence, uint8, uint32
+
+try:
+    from cyclonedds.idl.types import byte
+except ImportError:  # Cyclone DDS before 11; both are one byte
+    byte = uint8
 
 
 def _type(package: str, name: str) -> str:

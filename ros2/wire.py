@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
-from cyclonedds.core import DDSException, GuardCondition, ReadCondition, SampleState, ViewState, WaitSet
+from cyclonedds.core import DDSException, GuardCondition, Listener, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.core import InstanceState as Instances
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
@@ -45,6 +45,40 @@ def _ignore(problem: str) -> None:
     pass
 
 
+class _Endpoints(Listener):
+    """Counts the endpoints that are connected, and those whose quality of service does not fit; in threads of DDS.
+
+    Attributes
+    ----------
+    connected : int
+        Now.
+    ever : int
+        Since the beginning.
+    incompatible : int
+        Since the beginning.
+    """
+
+    def __init__(self) -> None:
+        self.connected = self.ever = self.incompatible = 0
+        super().__init__()
+
+    def on_publication_matched(self, _: Any, status: Any) -> None:
+        """Take the state of a writer."""
+        self.connected, self.ever = status.current_count, status.total_count
+
+    def on_subscription_matched(self, _: Any, status: Any) -> None:
+        """Take the state of a reader."""
+        self.connected, self.ever = status.current_count, status.total_count
+
+    def on_offered_incompatible_qos(self, _: Any, status: Any) -> None:
+        """Take the state of a writer."""
+        self.incompatible = status.total_count
+
+    def on_requested_incompatible_qos(self, _: Any, status: Any) -> None:
+        """Take the state of a reader."""
+        self.incompatible = status.total_count
+
+
 class Subscription(Generic[Message]):
     """A subscription.
 
@@ -73,7 +107,11 @@ class Subscription(Generic[Message]):
     ) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name, self.problem = name, problem
-        self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
+        self._endpoints = [_Endpoints() for _ in profiles]
+        self.readers: list[Any] = [
+            DataReader(participant, topic, qos=profile, listener=listener)
+            for profile, listener in zip(profiles, self._endpoints, strict=True)
+        ]
 
     def take(self) -> Sequence[Message]:
         """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
@@ -82,12 +120,12 @@ class Subscription(Generic[Message]):
     @property
     def publishers(self) -> int:
         """How many publishers are connected."""
-        return max(len(reader.get_matched_publications()) for reader in self.readers)
+        return max(one.connected for one in self._endpoints)
 
     @property
     def incompatible(self) -> bool:
         """Whether there are publishers whose quality of service fits none of the readers."""
-        return all(reader.get_requested_incompatible_qos_status().total_count > 0 for reader in self.readers)
+        return all(one.incompatible for one in self._endpoints)
 
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []
@@ -112,8 +150,9 @@ class Publisher(Generic[Message]):
     def __init__(self, participant: DomainParticipant, name: str, kind: type[Message], quality: Qos) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name = name
-        self._writer: Any = DataWriter(participant, topic, qos=quality)
-        self._known: frozenset[int] = frozenset()
+        self._endpoints = _Endpoints()
+        self._writer: Any = DataWriter(participant, topic, qos=quality, listener=self._endpoints)
+        self._known = 0
 
     def publish(self, message: Message) -> None:
         """Publish a message."""
@@ -122,17 +161,17 @@ class Publisher(Generic[Message]):
     @property
     def incompatible(self) -> bool:
         """Whether there are subscribers whose quality of service does not fit."""
-        return bool(self._writer.get_offered_incompatible_qos_status().total_count > 0)
+        return self._endpoints.incompatible > 0
 
     @property
     def subscribed(self) -> bool:
         """Whether somebody is subscribed."""
-        return bool(self._writer.get_matched_subscriptions())
+        return self._endpoints.connected > 0
 
     def joined(self) -> bool:
         """Return whether somebody subscribed since the last call."""
-        known, self._known = self._known, frozenset(self._writer.get_matched_subscriptions())
-        return bool(self._known - known)
+        known, self._known = self._known, self._endpoints.ever
+        return self._known > known
 
 
 class Waiting:
