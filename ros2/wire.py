@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
-from cyclonedds.core import DDSException, GuardCondition, Listener, ReadCondition, SampleState, ViewState, WaitSet
+from cyclonedds.core import DDSException, GuardCondition, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.core import InstanceState as Instances
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
@@ -14,6 +14,8 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
+
+from .discovery import Endpoints
 
 Message = TypeVar("Message", bound=IdlStruct)
 
@@ -45,40 +47,6 @@ def _ignore(problem: str) -> None:
     pass
 
 
-class _Endpoints(Listener):
-    """Counts the endpoints that are connected, and those whose quality of service does not fit; in threads of DDS.
-
-    Attributes
-    ----------
-    connected : int
-        Now.
-    ever : int
-        Since the beginning.
-    incompatible : int
-        Since the beginning.
-    """
-
-    def __init__(self) -> None:
-        self.connected = self.ever = self.incompatible = 0
-        super().__init__()
-
-    def on_publication_matched(self, _: Any, status: Any) -> None:
-        """Take the state of a writer."""
-        self.connected, self.ever = status.current_count, status.total_count
-
-    def on_subscription_matched(self, _: Any, status: Any) -> None:
-        """Take the state of a reader."""
-        self.connected, self.ever = status.current_count, status.total_count
-
-    def on_offered_incompatible_qos(self, _: Any, status: Any) -> None:
-        """Take the state of a writer."""
-        self.incompatible = status.total_count
-
-    def on_requested_incompatible_qos(self, _: Any, status: Any) -> None:
-        """Take the state of a reader."""
-        self.incompatible = status.total_count
-
-
 class Subscription(Generic[Message]):
     """A subscription.
 
@@ -107,11 +75,8 @@ class Subscription(Generic[Message]):
     ) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name, self.problem = name, problem
-        self._endpoints = [_Endpoints() for _ in profiles]
-        self.readers: list[Any] = [
-            DataReader(participant, topic, qos=profile, listener=listener)
-            for profile, listener in zip(profiles, self._endpoints, strict=True)
-        ]
+        self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
+        self._writers = Endpoints(participant, topic_name(name), profiles, writers=True)
 
     def take(self) -> Sequence[Message]:
         """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
@@ -120,12 +85,12 @@ class Subscription(Generic[Message]):
     @property
     def publishers(self) -> int:
         """How many publishers are connected."""
-        return max(one.connected for one in self._endpoints)
+        return len(self._writers.connected)
 
     @property
     def incompatible(self) -> bool:
         """Whether there are publishers whose quality of service fits none of the readers."""
-        return all(one.incompatible for one in self._endpoints)
+        return self._writers.incompatible
 
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []
@@ -150,9 +115,9 @@ class Publisher(Generic[Message]):
     def __init__(self, participant: DomainParticipant, name: str, kind: type[Message], quality: Qos) -> None:
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name = name
-        self._endpoints = _Endpoints()
-        self._writer: Any = DataWriter(participant, topic, qos=quality, listener=self._endpoints)
-        self._known = 0
+        self._writer: Any = DataWriter(participant, topic, qos=quality)
+        self._readers = Endpoints(participant, topic_name(name), [quality], writers=False)
+        self._known: frozenset[Any] = frozenset()
 
     def publish(self, message: Message) -> None:
         """Publish a message."""
@@ -161,17 +126,17 @@ class Publisher(Generic[Message]):
     @property
     def incompatible(self) -> bool:
         """Whether there are subscribers whose quality of service does not fit."""
-        return self._endpoints.incompatible > 0
+        return self._readers.incompatible
 
     @property
     def subscribed(self) -> bool:
         """Whether somebody is subscribed."""
-        return self._endpoints.connected > 0
+        return bool(self._readers.connected)
 
     def joined(self) -> bool:
         """Return whether somebody subscribed since the last call."""
-        known, self._known = self._known, self._endpoints.ever
-        return self._known > known
+        known, self._known = self._known, self._readers.connected
+        return bool(self._known - known)
 
 
 class Waiting:
