@@ -15,10 +15,10 @@ from formats.report import Notes
 from linefix.mounted import motion_warning
 from registration import RigidTransform
 
-from .frames import FrameError, Mount
 from .messages import LaserScan, Time
+from .names import quoted
 from .odometry import OdometryHistory, Speed, nanoseconds
-from .text import quoted
+from .transforms import FrameError, Mount
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
 

@@ -44,7 +44,7 @@ def machines() -> Iterator[tuple[Machine, Machine]]:
         pytest.skip("needs root, util-linux and iproute2")
     with ExitStack() as stack:
         both = []
-        for number in (1, 2):
+        for _ in range(2):
             holder = subprocess.Popen(
                 ["unshare", "--net", "sh", "-c", HOLD],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,

@@ -94,7 +94,8 @@ private:
         TypeSupport type(new Type());
         type.register_type(participant_);
         const std::string whole = "rt" + (name[0] == '/' ? name : space_ + "/" + name);
-        return participant_->create_topic(whole, type.get_type_name(), TOPIC_QOS_DEFAULT);
+        auto* known = dynamic_cast<Topic*>(participant_->lookup_topicdescription(whole));
+        return known ? known : participant_->create_topic(whole, type.get_type_name(), TOPIC_QOS_DEFAULT);
     }
 
     std::string space_;
