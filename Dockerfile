@@ -38,9 +38,10 @@ COPY linefix linefix
 COPY ros2 ros2
 COPY service service
 COPY cli cli
+COPY clients/python clients/python
 # Given the time of a commit, the wheel is that of `make wheel`, to the byte.
 ARG SOURCE_DATE_EPOCH
-RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . \
+RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . ./clients/python \
     && /opt/tools/bin/pip --python /opt/linefix/bin/python install --quiet --no-compile --no-deps /wheels/*.whl \
     && /opt/tools/bin/python .ci/materials.py /opt/linefix/sbom.cdx.json /opt/linefix/bin/python \
     && find /opt/linefix/bin -mindepth 1 ! -name 'python*' ! -name linefix -delete \
@@ -50,7 +51,7 @@ ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE compiled registration vectorization association simulation formats map_quality batch linefix ros2 service cli \
+    && $COMPILE compiled registration vectorization association simulation formats map_quality batch linefix ros2 service cli linefix_client \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}

@@ -127,9 +127,9 @@ class Localization:
         self._initial.published(subscribed=subscribed, now=time.monotonic())
         self._watch.reset()
         x, y, degrees = scan.pose.x, scan.pose.y, math.degrees(scan.pose.theta)
-        nobody = "" if subscribed else ", to which nobody subscribes"
+        note = "" if subscribed else ", which has no subscriber"
         self._health.note(
-            f"published {self._topics.initial.name}{nobody} ({reason}): x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
+            f"published {self._topics.initial.name}{note} ({reason}): x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
         )
 
     def _odometry_at(self, stamp: int) -> linefix.RigidTransform | None:

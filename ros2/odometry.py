@@ -39,7 +39,7 @@ def nanoseconds(stamp: Time) -> int:
 
 
 class OdometryHistory:
-    """Poses and speeds of the robot in its odometry frame, of late.
+    """The newest poses and speeds of the robot in its odometry frame.
 
     Attributes
     ----------

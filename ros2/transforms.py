@@ -22,7 +22,7 @@ NS = 1_000_000_000
 
 
 class FrameError(ValueError):
-    """A transform or a chain of frames cannot be used; the message says which, why, and what to do."""
+    """A transform or a chain of frames cannot be used; the message names it, the reason and the remedy."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,11 +130,11 @@ class Publisher(Generic[Message]):
 
     @property
     def subscribed(self) -> bool:
-        """Whether somebody is subscribed."""
+        """Whether there is a subscriber."""
         return bool(self._readers.connected)
 
     def joined(self) -> bool:
-        """Return whether somebody subscribed since the last call."""
+        """Return whether there is a new subscriber since the last call."""
         known, self._known = self._known, self._readers.connected
         return bool(self._known - known)
 
