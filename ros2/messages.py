@@ -1,4 +1,4 @@
-"""The messages of ROS 2 that the node receives and publishes, as DDS has them: names of types end in ``dds_::Name_``."""
+"""The messages of ROS 2 that the node receives and publishes, as in DDS: names of types end in ``dds_::Name_``."""
 
 # Annotations are read while the program runs, so they are no strings here.
 from dataclasses import dataclass, field
