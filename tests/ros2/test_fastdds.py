@@ -195,36 +195,3 @@ def test_robots_with_namespaces_do_not_hear_each_other(domain: int, room: linefi
         assert float(found[4]) == pytest.approx(1.0, abs=0.03)
         poses = [line for line in other.lines() if line.startswith(("pose", "initialpose"))]
         assert poses == []
-
-
-def test_a_request_with_an_id_is_answered(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    with running(NodeOptions(domain=domain, agree=1), room), peer(program, domain) as robot:
-        robot.mount()
-        way = Way(robot)
-        robot.until("initialpose", way)
-        robot.send("request", "7")
-        assert robot.until("result 7", way)[2:] == ["0", "the", "pose", "is", "agreed"]
-
-
-def test_agreed_poses_and_markers_are_received(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    with running(NodeOptions(domain=domain), room), peer(program, domain) as robot:
-        assert robot.until("marker linefix/map", lambda: None)[2] == str(2 * len(ROOM))
-        robot.mount()
-        way = Way(robot)
-        robot.until("agreed_pose", way)
-        robot.until("marker linefix/robot 0", way)
-
-
-def test_a_mount_that_moves_and_the_pose_of_a_localizer(domain: int, room: linefix.MapIndex, program: Path) -> None:
-    with running(NodeOptions(domain=domain), room), peer(program, domain) as robot:
-        way = Way(robot)
-
-        def play() -> None:
-            stamp = int(way.second + 0.5), int(1e9 * ((way.second + 0.5) % 1.0))
-            robot.send("moving_mount", *stamp, BASE_FROM_LASER.x, BASE_FROM_LASER.y, BASE_FROM_LASER.theta)
-            robot.send("amcl_pose", *stamp, 3.0, 0.5, 2.0)
-            time.sleep(0.02)
-            way()
-
-        robot.until("initialpose", play)
-        robot.until("status 2 the pose of the localizer differs", play)

@@ -94,8 +94,7 @@ private:
         TypeSupport type(new Type());
         type.register_type(participant_);
         const std::string whole = "rt" + (name[0] == '/' ? name : space_ + "/" + name);
-        auto* known = dynamic_cast<Topic*>(participant_->lookup_topicdescription(whole));
-        return known ? known : participant_->create_topic(whole, type.get_type_name(), TOPIC_QOS_DEFAULT);
+        return participant_->create_topic(whole, type.get_type_name(), TOPIC_QOS_DEFAULT);
     }
 
     std::string space_;
@@ -136,13 +135,8 @@ int main(int argc, char** argv) {
     auto* mounts = robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>("tf_static", LATCHED);
     auto* maps = robot.writer<nav_msgs::msg::dds_::OccupancyGrid_PubSubType>("map", LATCHED);
     auto* requests = robot.writer<std_msgs::msg::dds_::Empty_PubSubType>("linefix/locate", RELIABLE);
-    auto* named = robot.writer<std_msgs::msg::dds_::String_PubSubType>("linefix/locate_request", RELIABLE);
-    auto* moving = robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>("tf", RELIABLE);
-    auto* localizer = robot.writer<g::PoseWithCovarianceStamped_PubSubType>("amcl_pose", LATCHED);
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>("initialpose", RELIABLE, printing_pose("initialpose"));
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>("linefix/pose", RELIABLE, printing_pose("pose"));
-    robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>(
-        "linefix/agreed_pose", RELIABLE, printing_pose("agreed_pose"));
     robot.reader<tf2_msgs::msg::dds_::TFMessage_PubSubType, tf2_msgs::msg::dds_::TFMessage_>(
         space.empty() ? "/tf" : "tf", RELIABLE, [](const tf2_msgs::msg::dds_::TFMessage_& message) {
             for (const auto& one : message.transforms()) {
@@ -153,19 +147,6 @@ int main(int argc, char** argv) {
     robot.reader<diagnostic_msgs::msg::dds_::DiagnosticStatus_PubSubType, Status>(
         "linefix/status", LATCHED,
         [](const Status& message) { print("status " + std::to_string(message.level()) + ' ' + message.message()); });
-    robot.reader<diagnostic_msgs::msg::dds_::DiagnosticStatus_PubSubType, Status>(
-        "linefix/locate_result", LATCHED, [](const Status& message) {
-            print("result " + message.name() + ' ' + std::to_string(message.level()) + ' ' + message.message());
-        });
-    using Markers = visualization_msgs::msg::dds_::MarkerArray_;
-    for (const char* name : {"linefix/map_markers", "linefix/markers"}) {
-        robot.reader<visualization_msgs::msg::dds_::MarkerArray_PubSubType, Markers>(
-            name, LATCHED, [](const Markers& message) {
-                for (const auto& one : message.markers()) {
-                    print("marker " + one.ns() + ' ' + std::to_string(one.points().size()));
-                }
-            });
-    }
     using Diagnostics = diagnostic_msgs::msg::dds_::DiagnosticArray_;
     robot.reader<diagnostic_msgs::msg::dds_::DiagnosticArray_PubSubType, Diagnostics>(
         "/diagnostics", RELIABLE, [](const Diagnostics& message) {
@@ -178,11 +159,10 @@ int main(int argc, char** argv) {
         std::istringstream words(text);
         std::string command;
         words >> command;
-        if (command == "mount" || command == "moving_mount") {
+        if (command == "mount") {
             double x, y, theta;
-            g::TransformStamped_ one;
-            if (command == "moving_mount") one.header().stamp(time_of(words));
             words >> x >> y >> theta;
+            g::TransformStamped_ one;
             one.header().frame_id("base_link");
             one.child_frame_id("laser");
             one.transform().translation().x(x);
@@ -191,7 +171,7 @@ int main(int argc, char** argv) {
             one.transform().rotation().w(std::cos(0.5 * theta));
             tf2_msgs::msg::dds_::TFMessage_ message;
             message.transforms().push_back(one);
-            (command == "mount" ? mounts : moving)->write(&message);
+            mounts->write(&message);
         } else if (command == "odom") {
             nav_msgs::msg::dds_::Odometry_ message;
             message.header().stamp(time_of(words));
@@ -232,23 +212,6 @@ int main(int argc, char** argv) {
             message.info().origin().orientation().w(1.0);
             while (words >> cell) message.data().push_back(static_cast<uint8_t>(cell));
             maps->write(&message);
-        } else if (command == "amcl_pose") {
-            Posed message;
-            message.header().stamp(time_of(words));
-            message.header().frame_id("map");
-            double x, y, theta;
-            words >> x >> y >> theta;
-            message.pose().pose().position().x(x);
-            message.pose().pose().position().y(y);
-            message.pose().pose().orientation().z(std::sin(0.5 * theta));
-            message.pose().pose().orientation().w(std::cos(0.5 * theta));
-            localizer->write(&message);
-        } else if (command == "request") {
-            std_msgs::msg::dds_::String_ message;
-            std::string id;
-            words >> id;
-            message.data(id);
-            named->write(&message);
         } else if (command == "locate") {
             std_msgs::msg::dds_::Empty_ message;
             requests->write(&message);
