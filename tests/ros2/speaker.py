@@ -14,7 +14,12 @@ from ros2.wire import RELIABLE, Publisher, Subscription
 def main(name: str) -> None:
     net = connect(domain_of({}))
     ended = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), ended.set())).start()
+
+    def read() -> None:
+        sys.stdin.read()
+        ended.set()
+
+    threading.Thread(target=read).start()
     publisher, subscription = Publisher(net, "names", String, RELIABLE), Subscription(net, "names", String, RELIABLE)
     print("ready", flush=True)
     while not ended.wait(0.05):
