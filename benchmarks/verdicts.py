@@ -173,8 +173,8 @@ def _scale(axes: Axes) -> None:
 
 def _legend(figure: Figure) -> None:
     """Name the colours of lines that are drawn, below the plots."""
-    lines = [line for axes in figure.axes for line in axes.collections]
-    drawn = {to_hex(colour) for line in lines for colour in line.get_edgecolor()}
+    edges = [np.asarray(line.get_edgecolor(), dtype=float) for axes in figure.axes for line in axes.collections]
+    drawn = {to_hex((red, green, blue)) for red, green, blue, _ in np.vstack(edges).tolist()}
     entries = [("map", MAP), ("matched scan segment, as sent", INK), ("unmatched", UNMATCHED), ("alternative", OTHER)]
     entries += [("critical wall", CRITICAL), *((f"pose: {name}", colour) for name, colour in VERDICTS.items())]
     handles = [Line2D([], [], color=c, linewidth=3.0, label=text) for text, c in entries if c in drawn]
