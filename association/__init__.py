@@ -3,13 +3,12 @@
 from registration import Beams
 
 from .associating import associate
+from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .index.map_index import MapIndex
 from .options import (
     PARTS,
     AssociationOptions,
-    CancelledError,
-    Deadline,
     HardPrior,
     Prior,
     SoftPrior,

@@ -6,10 +6,11 @@ import time
 
 from .causes import find_causes
 from .context import SearchContext
+from .deadline import Deadline
 from .explain import explain
 from .index.map_index import MapIndex
 from .last_view import search_last_view
-from .options import AssociationOptions, Deadline, Prior
+from .options import AssociationOptions, Prior
 from .report import report, with_causes
 from .result import AssociationResult
 from .scan.scan import Scan

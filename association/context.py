@@ -12,6 +12,7 @@ from registration.layout import Records
 from registration.observability import most_parallel_up_to
 from registration.values import value
 
+from .deadline import Deadline
 from .index.map_index import MapIndex
 from .layout import (
     ENDS,
@@ -28,7 +29,7 @@ from .layout import (
     as_records,
     record,
 )
-from .options import AssociationOptions, Deadline, HardPrior, Prior, SoftPrior
+from .options import AssociationOptions, HardPrior, Prior, SoftPrior
 from .scan.alignment import aligned
 from .scan.scan import Scan
 from .scan.scan_lines import ScanLines, gates

@@ -21,24 +21,25 @@ Flags: TypeAlias = NDArray[np.bool_]
 _F, _I = np.float64, np.int64
 
 
-def _fields(*groups: tuple[type, str]) -> np.dtype[Any]:
+def fields(*groups: tuple[type, str]) -> np.dtype[Any]:
+    """Return a record type of groups of fields, each a type and names with spaces between them."""
     return np.dtype([(name, kind) for kind, names in groups for name in names.split()])
 
 
 # A point or a direction, and both ends of a segment.
-POINT = _fields((_F, "x y"))
-ENDS = _fields((_F, "x1 y1 x2 y2"))
+POINT = fields((_F, "x y"))
+ENDS = fields((_F, "x1 y1 x2 y2"))
 
 # A line of the map, or several joined: unit direction; offset along the left normal; abscissae of begin and end along
-# the direction; angle of the direction; the walls before and after it on its run, or -1. One cache line.
-WALL = _fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
+# the direction; angle of the direction; the walls before and after it that are linked to it, or -1. One cache line.
+WALL = fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
 
 # A line of the scan, one segment or several that continue or repeat one another, the most telling first: unit
 # direction; midpoint; length; angle of the direction; mean of the points and their second moment along the line (m^2);
 # variances of offset (m^2) and angle (rad^2) with the model's slack, for the gates; weight in the sums (1/m^2), without
 # what is common to a wall; what it is worth on a wall; the sum of that over all later lines; variance of the offset by
 # the sigmas alone (m^2); the freedom that it takes from a pose by itself, nats.
-SCAN_LINE = _fields(
+SCAN_LINE = fields(
     (
         _F,
         "dx dy x y length angle centroid_x centroid_y spread offset_variance angle_variance weight gain later_gain "
@@ -50,54 +51,54 @@ SCAN_LINE = _fields(
 # to end, and of what they cover; mean of the points and their second moment along the line (m^2); how many
 # they are, and the standard deviation of one of them (m); variance of its offset (m^2); what is not known of where they
 # were seen from, as variances of the offset (m^2) and the angle (rad^2).
-LINE_PARTS = _fields(
+LINE_PARTS = fields(
     (_F, "dx dy x y length covered centroid_x centroid_y spread points sigma variance common_offset common_angle")
 )
 
 # What one view shows of a line of the scan: which view's sensor that is; the row of that line; unit direction;
 # midpoint; length; mean of the points and their second moment along the line (m^2); variance of its offset (m^2).
-SIGHTING = _fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid_y spread variance"))
+SIGHTING = fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid_y spread variance"))
 
 # Where a scan line lies: the wall or -1; offset from the line under it, which tied walls make up together; sine of the
 # angle to the wall; share of the length on walls; by how much that line is beside the wall's own (m), and the mean
 # square by which the walls under it are off it (m^2); what the match gains, and what it is worth with its cost, nats.
-MATCH = _fields((_I, "wall"), (_F, "offset sine overlap shift uneven gain worth"))
+MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift uneven gain worth"))
 
 # A pose with its covariance, of additive x, y, theta.
 ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 
 # What a consensus set is worth, nats: the gains of its pairs; its joint cost, walls' own errors out; the logarithm of
 # the freedom that it takes from the pose. The score is gain - cost / 2 - freedom.
-VALUE = _fields((_F, "gain cost freedom"))
+VALUE = fields((_F, "gain cost freedom"))
 
 # What an estimate is worth: its score; the joint cost in it; what the same sums cost at the paper's estimate; length of
 # the matched segments; its share of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
 # sigmas alone expect; what lines of sight speak against it, nats; the shares of the beams that read the wall they
 # should, and that passed through one, 0 without beams; how many rows are matched.
-MERIT = _fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed count"))
+MERIT = fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed count"))
 
 # What one wall has in the sums: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of
 # its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs. What is known of the wall's error but
 # by these pairs: weight (1/m^2), and weight times the error (1/m) at a pose. Whether it is listed.
-WALL_SHARE = _fields((_F, "c s x y one weight count other_weight other_sum"), (_I, "listed"))
+WALL_SHARE = fields((_F, "c s x y one weight count other_weight other_sum"), (_I, "listed"))
 
 # A pose among the best: score and prior together; the score alone.
 FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
 
 # Geometry of a grid: its corner; the size of a cell; how many there are.
-GRID_SHAPE = _fields((_F, "x0 y0 cell"), (_I, "columns rows"))
+GRID_SHAPE = fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 
 # What a match has to pass: gates in standard deviations, and the least and greatest offset and angle that they may
 # come to; the least share of the length on walls.
-GATES = _fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
+GATES = fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
 
 # What a consensus set is judged by: variance of a wall's own error, m^2; how far a pose is free before it is fixed, as
 # standard deviations of position (m) and heading (rad).
-MODEL = _fields((_F, "wall_variance free_distance free_angle"))
+MODEL = fields((_F, "wall_variance free_distance free_angle"))
 
 # Which poses are kept: share of the best value that is needed; distance and angle of distinct poses; share of the best
 # value that makes a rival, up to which the search goes on; the value that ends it.
-RULES = _fields((_F, "kept_share distinct_distance distinct_angle rival_share enough"))
+RULES = fields((_F, "kept_share distinct_distance distinct_angle rival_share enough"))
 
 # What is known before: kind; the pose; radius and angle of a window; information of a Gaussian.
 PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYMMETRIC3.descr])
@@ -106,129 +107,78 @@ NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 # What a pose is judged by.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
-# Two runs whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
-# `kernels.crossings.code_of`. On a list there are dozens for each run, so that four bytes have to do.
-CROSSING = _fields((np.int32, "first second"), (np.uint32, "code"))
+# Two wall chains whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
+# `kernels.crossings.code_of`. There are dozens of them for each chain, so that four bytes have to do.
+CROSSING = fields((np.int32, "first second"), (np.uint32, "code"))
 
-# Some of the boxes around runs that are near one another in y: where they begin and end, and between which y they are.
-BAND = _fields((_I, "begin end"), (_F, "low high"))
+# Some of the boxes around chains that are near one another in y: where they begin and end, and their range of y.
+BAND = fields((_I, "begin end"), (_F, "low high"))
 
 # Where crossings are listed: up to how far from the point where the lines cross, and how many cells there are that way.
-CROSSING_SHAPE = _fields((_F, "reach"), (_I, "columns"))
-
-# A list of crossings on which a base may lie: where it begins and ends; the column and row of its cell; what is asked
-# for in it, from the midpoint of each segment, m; what its codes may be at most.
-LISTED = _fields((_I, "begin end column row"), (_F, "from_first from_second"), (_I, "code"))
-
-# Two scan segments that fix a pose; the first has the second one to its left, or slides where the base is swept. Once
-# it is weighed: how many crossings are listed of it, -1 where it is swept. Merit: the logarithm of what it can tell
-# (the lesser gain) over what it costs; until it is weighed, over what any base costs.
-BASE = _fields((_I, "sliding crossing listed weighed"), (_F, "merit"))
-
-# What a scan segment adds to the cost of its bases: in how many direction bins it can slide; its angle; what its length
-# says of the hypotheses on a wall that crosses; what it costs to slide it everywhere.
-LINE_COST = _fields((_I, "bins"), (_F, "angle short sweep"))
+CROSSING_SHAPE = fields((_F, "reach"), (_I, "columns"))
 
 # What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, also
 # along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
 # rotation; by how much the two angles may disagree, by how much the rotation may be off until the final one is known,
-# and by how many metres b then is; half of what has to lie within its run of a and of b.
-FIGURE = _fields((_F, "x y ahead beside turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
+# and by how many metres b then is; half of what has to lie within its chain of a and of b.
+FIGURE = fields((_F, "x y ahead beside turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
 
-# Segment a of a base laid on a run, and b while a slides: which run; the column, row and number of the cell where b is,
-# and how these go on; which sectors the direction of b may lie in, as bits; directions of the run and of b; midpoint of
-# b with a at abscissa 0 of the run; the slide where b enters the cell, and the last of all; those at which it comes to
-# the next column and row, and what lies between two of them.
-LAID = _fields(
-    (_I, "run column row step step_x step_y sectors"),
-    (_F, "dx dy b_dx b_dy x y at high next_x next_y pace_x pace_y"),
-)
-
-# A cell that b sweeps, and that lists runs of its direction: which of those that a is laid on; the number of the cell
-# on the way, and in the grid; the slides between which b is in it.
-SWEPT = _fields((_I, "laid step here"), (_F, "at until"))
-
-# A run of the direction of b on the list of such a cell, or a crossing on a list: which run, or entry of all lists;
-# which of the cells swept; the entry of its list; in the first of an array, which of all of them b lies on.
-MET = _fields((_I, "run cell entry hit"))
-
-# A pose to be tried: the pose; cosine and sine of its heading; from the sensor to where it is held, in the scan frame,
-# rotated, and the variance of its turning about that; what the prior says of it, and what its score has to come to;
-# where the search goes on behind it; whether it may score that.
-POSED = np.dtype(
+# A pose proposed from a base: the pose; cosine and sine of its heading; from the sensor to the point about which it may
+# turn, in the scan frame, rotated, and the variance of that rotation; what the prior adds to its score, and what its
+# score has to come to; whether it may score that.
+HYPOTHESIS = np.dtype(
     [
         *POSE.descr,
-        *_fields((_F, "cosine sine lever_x lever_y angle_variance bonus floor")).descr,
-        *_fields((_I, "anchor step entry possible")).descr,
+        *fields((_F, "cosine sine lever_x lever_y angle_variance bonus floor"), (_I, "possible")).descr,
     ]
 )
-
-# How far a search is. Best value and the least value on a full list of best poses, with how many there are; bases gone
-# through, poses proposed, poses scored to the end; where to go on: at which base or -1, the anchor, the step along it,
-# and the entry of the list there; bound on the gain of a pose that contains no base so far; chance of having missed a
-# better consensus set; the freedom that any set takes at least whose score would be kept. Once bases have been left:
-# how many poses are of these; how many segments have been laid along walls, -1 before, and what they have to come to
-# together; whether bases have been left, and nothing is left to do.
-PROGRESS = _fields(
-    (_F, "best_value least_kept"),
-    (_I, "count bases hypotheses verified current anchor step entry"),
-    (_F, "bound missed least_freedom"),
-    (_I, "of_bases sliding"),
-    (_F, "floor"),
-    (_I, "left done"),
-)
-
-# How far a search goes: the greatest chance of having missed a better consensus set, -1 for all bases; metres between
-# slides, and what is laid so has to come to, as a share of the best value; how many poses of bases are kept; tests of
-# walls between two looks at the clock.
-HOW = _fields((_F, "allowed spacing share"), (_I, "kept budget"))
 
 # A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
 # m^2; if walls were off by centimetres, the position's deviation along its weakest direction, m, and that unit
 # direction; whether all walls are parallel within three standard deviations of their angles.
-SETTLED = np.dtype([("pose", ESTIMATE), *_fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
+SETTLED = np.dtype([("pose", ESTIMATE), *fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
 
 # A pose among walls of which each is off by itself, with that standard deviation, m.
-POSE_AMONG_WALLS = _fields((_F, "theta x y wall_sigma"))
+POSE_AMONG_WALLS = fields((_F, "theta x y wall_sigma"))
 
 # What a pose would be without one wall, and what is tied to it: the wall; by how much it would move, m; the position's
 # deviation along its weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed;
 # how far the wall counts as one of its own, beside those that it is tied to, 0 to 1.
-HINGE = np.dtype([("wall", _I), *_fields((_F, "moves deviation dx dy own")).descr])
+HINGE = np.dtype([("wall", _I), *fields((_F, "moves deviation dx dy own")).descr])
 
 # What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
 # together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
-VARIANCES = _fields((_F, "map common least_offset least_angle"))
+VARIANCES = fields((_F, "map common least_offset least_angle"))
 
 # A ray from a place in the index frame: unit direction; how far it is followed.
-RAY = _fields((_F, "x y dx dy limit"))
+RAY = fields((_F, "x y dx dy limit"))
 
 # A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return.
-BEAM = _fields((_F, "x y dx dy range"))
+BEAM = fields((_F, "x y dx dy range"))
 
 # How many rays pass through a wall on their way to a segment of the consensus set, and to another one. While they are
 # counted: the scan line that the last one goes to, from 1 up; the view it comes from; how many go from there to that
 # line, and how many at most from any view.
-BLOCKER = _fields((_I, "to_matched to_clutter row sensor here most"))
+BLOCKER = fields((_I, "to_matched to_clutter row sensor here most"))
 
 # What single beams say of a pose: the shares that read the wall they should, and that passed through one.
-BEAM_EVIDENCE = _fields((_F, "read passed"))
+BEAM_EVIDENCE = fields((_F, "read passed"))
 
 
 # What an explanation is worth beside others: its value, nats; the joint cost in it; how many rows are matched. And of
 # one that is not the best: by how much it is worth more, nats, with the walls as far off as they may be; how far it
 # counts, 0 to 1: fully where the search cannot have missed one as good.
-RIVAL = _fields((_F, "value cost count"))
-WEIGHED = _fields((_F, "gap counted"))
+RIVAL = fields((_F, "value cost count"))
+WEIGHED = fields((_F, "gap counted"))
 
 # What is known of an answer besides its merits: the position's deviation along its weakest direction, and by how much
 # it would move without one wall and its deviation then, m; how many walls hold a match; share of directions in which
 # the scan shows what the map does; shares of the beams that read farther, and nearer, than the map shows; probability
 # that chance scores as high; length of the longest segment that is not matched, and of all of these, m.
-FACTS = _fields((_F, "weakest moves hinge_deviation walls agreement farther nearer significance longest unmatched"))
+FACTS = fields((_F, "weakest moves hinge_deviation walls agreement farther nearer significance longest unmatched"))
 
 # The numbers of an answer that the verdict goes by: see `association.verdict.features.Features`.
-FEATURES = _fields(
+FEATURES = fields(
     (
         _F,
         "constant lead solitude share root_count root_length deviation misfit inverse_count longest_unmatched "
@@ -239,16 +189,16 @@ FEATURES = _fields(
 
 # A scan segment of a consensus set in the map's own pieces: the piece that it lies on most, -1 where it is none of the
 # set, and how many others are named; the share of its length that lies on any.
-PAIR = _fields((_I, "piece rivals"), (_F, "overlap"))
+PAIR = fields((_I, "piece rivals"), (_F, "overlap"))
 
 # What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
 # it below the first of them. From `start` on the slope is more by `more`.
-CURVE = _fields((_I, "feature begin end"), (_F, "slope"))
-BEND = _fields((_F, "start more"))
+CURVE = fields((_I, "feature begin end"), (_F, "slope"))
+BEND = fields((_F, "start more"))
 
 # What it adds for two features together: which; 1 where the lesser share counts, 0 for the greater; nats; for each the
 # value from which it speaks for the answer, and that at which it does in full.
-TWO_FEATURES = _fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
+TWO_FEATURES = fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
 # What kernels write to while they look at one pose: the pose; the information of its consensus set; its sums, without
 # the walls' errors and with them; a line; what is known of the error of walls that are tied; what the set is worth; the

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -146,42 +145,3 @@ class AssociationOptions:
         for name, value, low, high in ranges:
             if value is not None and not low <= value <= high:
                 raise InvalidSearchError(f"expected a number from {low:g} to {high:g}", argument=f"options.{name}")
-
-
-class CancelledError(Exception):
-    """The search was told to stop by `Deadline.cancel`; there is no answer."""
-
-
-@dataclass(slots=True)
-class Deadline:
-    """A cooperative end of the search: a time, a flag that another thread sets, or both.
-
-    Attributes
-    ----------
-    at : float or None
-        `time.monotonic()` seconds.
-    """
-
-    at: float | None = None
-    _cancelled: bool = field(default=False, init=False)
-    _outer: Deadline | None = field(default=None, init=False)
-
-    def within(self, at: float) -> Deadline:
-        """Return an end that comes no later than a time, and is cancelled with this one."""
-        inner = Deadline(at if self.at is None else min(at, self.at))
-        inner._outer = self
-        return inner
-
-    def cancel(self) -> None:
-        """Make the search give up soon; safe from any thread."""
-        self._cancelled = True
-
-    @property
-    def cancelled(self) -> bool:
-        """Whether `cancel` was called."""
-        return self._cancelled or (self._outer is not None and self._outer.cancelled)
-
-    @property
-    def passed(self) -> bool:
-        """Whether the search has to end: it was cancelled, or its time is over."""
-        return self.cancelled or (self.at is not None and time.monotonic() >= self.at)

@@ -12,12 +12,12 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import MATCH, POSED, SCRATCH, WALL_SHARE, Indices, Integers, record
+from .layout import HYPOTHESIS, MATCH, SCRATCH, WALL_SHARE, Indices, Integers, record
 from .tuning import AT_ONCE
 
 
 class Walls(NamedTuple):
-    """Walls or runs, by direction bin and the longest of a bin first.
+    """Walls or wall chains, by direction bin and the longest of a bin first.
 
     Attributes
     ----------
@@ -31,6 +31,27 @@ class Walls(NamedTuple):
     bin_starts: Integers
     longest: Floats
     summed: Floats
+
+
+class JoinGates(NamedTuple):
+    """When two pieces of walls are joined.
+
+    Attributes
+    ----------
+    cell : float
+        Size of the cells in which begins of pieces are listed, metres.
+    gap : float
+        The largest gap between two pieces along their line, metres.
+    lateral : float
+        The largest offset from the line of the other, metres.
+    least_cosine : float
+        Of the angle between them.
+    """
+
+    cell: float
+    gap: float
+    lateral: float
+    least_cosine: float
 
 
 class Grid(NamedTuple):
@@ -53,7 +74,7 @@ class Raster(NamedTuple):
     Attributes
     ----------
     shape : (1,) of `GRID_SHAPE`
-    bits : (columns * rows,) bit s of a cell is set where a wall or a run of direction sector s is within `REACH`, bit
+    bits : (columns * rows,) bit s of a cell is set where a wall or a chain of direction sector s is within `REACH`, bit
         ``SECTORS + s`` where it is within `NARROW_REACH`
     """
 
@@ -70,7 +91,7 @@ class Place(NamedTuple):
     bin_starts : (bins + 1,) where each bin begins
     grid : Grid
         Walls within `REACH` of each cell, in ascending order.
-    ties : (m,) where on its chain each wall is, in minus the log of a correlation: the errors of two walls are
+    ties : (m,) where in its group of linked walls each is, in minus the log of a correlation: the errors of two are
         correlated by ``exp(-|difference|)``; -1 of one that is tied to none
     """
 
@@ -81,32 +102,32 @@ class Place(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """The runs, and where they are: where a base may lie.
+    """The wall chains, and where they are: where a base may lie.
 
     Attributes
     ----------
-    runs : (m,) of `WALL`, those that lie near one another together
-    lengths : (m,) of the runs, metres
+    chains : (m,) of `WALL`, those that lie near one another together
+    lengths : (m,) of the chains, metres
     sectors : Grid
-        Runs on each cell, ``run * SECTORS + sector``.
-    present : (columns * rows,) bit s of a cell is set where it lists a run of direction sector s
+        Chains on each cell, ``chain * SECTORS + sector``.
+    present : (columns * rows,) bit s of a cell is set where it lists a chain of direction sector s
     """
 
-    runs: Records
+    chains: Records
     lengths: Floats
     sectors: Grid
     present: Integers
 
 
 class Crossings(NamedTuple):
-    """The pairs of runs whose lines cross near both, by how a scan segment would lie on each.
+    """The pairs of wall chains whose lines cross near both, by how a scan segment would lie on each.
 
     Attributes
     ----------
     shape : (1,) of `CROSSING_SHAPE`
-    bins : (angles,) which of the grids is that of each bin of angles between two runs, -1 where there is none
+    bins : (angles,) which of the grids is that of each bin of angles between two chains, -1 where there is none
     starts, entries : cell ``c = (grid * columns + column) * columns + row`` lists
-        ``entries[starts[c]:starts[c + 1]]``, of `CROSSING`: those whose first run is somewhere `column` cells, and
+        ``entries[starts[c]:starts[c + 1]]``, of `CROSSING`: those whose first chain is somewhere `column` cells, and
         whose second one `row` cells, from where they cross
     """
 
@@ -123,7 +144,7 @@ class Pieces(NamedTuple):
     ----------
     items, starts : wall w consists of segments ``items[starts[w]:starts[w + 1]]``
     ends : (n,) of `ENDS`
-    firsts : (m,) of the chain of each wall, the wall that begins first
+    firsts : (m,) of the group of linked walls that each is in, the one that begins first
     """
 
     items: Integers
@@ -133,7 +154,7 @@ class Pieces(NamedTuple):
 
 
 class PiecesAlong(NamedTuple):
-    """The pieces of a wall, or of a run, along its line.
+    """The pieces of a wall, or of linked walls, along a line.
 
     Attributes
     ----------
@@ -330,7 +351,7 @@ class Workspace(NamedTuple):
     shifts : (n,) where in the raster's cells the bits for the offset gate begin; below 0 where none is looked up
     later : (n,) what the scan lines after each can add, of those that are looked up, nats
     possible : (n,) what each scan line can add at a pose, nats, -1 where it can lie on no wall
-    posed : (k,) of `POSED`, poses to be tried
+    hypotheses : (k,) of `HYPOTHESIS`, those that are scored together
     near : (n, k) whether each scan line may lie on a wall at each of them
     held : (n,) which wall of each scan line is in the sums, or -1
     shifts_held : (n,) by how much the line that is in the sums is beside that wall, m
@@ -345,7 +366,7 @@ class Workspace(NamedTuple):
     shifts: Integers
     later: Floats
     possible: Floats
-    posed: Records
+    hypotheses: Records
     near: Integers
     held: Integers
     shifts_held: Floats
@@ -361,7 +382,7 @@ class Workspace(NamedTuple):
         shifts, held, listed = np.zeros((3, count), np.int64)
         shifts_held, weights_held = np.zeros((2, count))
         held.fill(-1)
-        posed, near = np.empty(AT_ONCE, POSED), np.empty((count, AT_ONCE), np.uint8)
+        hypotheses, near = np.empty(AT_ONCE, HYPOTHESIS), np.empty((count, AT_ONCE), np.uint8)
         matches, shares, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SHARE), record(SCRATCH)
         return cls(
             matches,
@@ -369,7 +390,7 @@ class Workspace(NamedTuple):
             shifts,
             later,
             possible,
-            posed,
+            hypotheses,
             near,
             held,
             shifts_held,

@@ -1,4 +1,4 @@
-"""Every threshold of the search and the verdict, by stage, with its unit and where it comes from.
+"""Thresholds that several stages share, with unit and origin; the others stand in ``tuning.py`` of their stage.
 
 Origins: *geometry* follows from what the number means; *tables* was chosen by the tables of `docs/dev/search.md` on
 floor plans and logs, and little changes near it; *measured* is a fit or a timing of what it stands for; *rounding*
@@ -9,96 +9,32 @@ import math
 
 # --- Walls: from a map's segments to lines, and where they are listed -------------------------------------------------
 
-MAX_EXTENT = 1e5  # m; the contract
-MAX_MAP_SIGMA = 10.0  # m; the contract
-# Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
-ONE_LINE = 1e-4  # m, rounding
-LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is said to be exact
-ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
 # Walls that continue one another are tied: a scan segment may lie on both, and they share their error, the less the
 # farther apart they are: not at all from these distances on.
 WHOLE_GAP = 0.15  # m, geometry: the joint between two pieces of one wall is not wider, and as good as none
 APART_GAP = 0.6  # m, geometry: a doorway is wider
 APART_STEP = 0.08  # m, tables; the gate within which a segment lies on a wall
-# What a step says of how walls were drawn: those with smaller ones are put on a line that they have in common, the less
-# the larger it is, and not at all from here on.
-BLENDED_STEP = 0.045  # m, tables; where nobody says how far the map is off
-BLENDED_SIGMAS = 4.0  # geometry; otherwise, up to the same
-BLENDED_WALLS = 16  # on either side, measured
-LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over what is open between them
-TIE_FREE = 30.0  # minus the log of a correlation that is none
-TIES_BEFORE = 6  # walls before it that one is tied to at most, measured
-# What bases are laid on: lines through what nearly continues one another, and through what does so across doorways.
-MERGE_GAP = 0.3  # m, geometry: a doorway is wider, the joint between two pieces of one wall is not
-RUN_GAP = 1.5  # m, geometry: a base segment may bridge a doorway
-MERGE_LATERAL = 0.03  # m, tables
-MERGE_ANGLE = math.radians(2.0)  # tables
-BEGIN_CELL = 1.0  # m, by which begins of pieces are found, at least; measured: little changes near it
-MOST_STEPS = 100  # places along one piece around which others are looked for; geometry: 190 m of wall
-MOST_LOOKS = 600  # begins that one piece is compared with; measured: no fewer walls are found on 443 maps of buildings
-PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadline: 0.2 s where each takes the most
 DIRECTION_BINS = 90  # tables
 SECTOR_BITS = 4
 SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degrees is the middle of one; tables
 REACH = 0.4  # m, tables; a wall is listed in the cells this near to it, so gates end here
-CELL = 1.0  # m, tables
-SWEEP_CELL = 2.0  # m, tables
-SWEEP_REACH = 0.02  # m, rounding
-RASTER_CELL = 0.5  # m, tables
 NARROW_REACH = 0.15  # m, tables; a wall is in the raster of narrow gates where it is this near
-NEIGHBOURHOOD = 64.0  # m, squares of which the runs are numbered together; measured: 8 to 128 are as good
-MAX_CELLS = 4_000_000  # memory: some 50 MB
-MAX_SWEEP_CELLS = 1_000_000  # memory
-MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about
-CELL_GROWTH = 1.25  # by which cells grow until their lists fit
 
 # --- Scan: what a segment is worth and how far it is to be trusted ----------------------------------------------------
 
-# Segments of a scan that continue or repeat one another are one line, and one witness; first those that were one
-# segment and cut, or that come twice, so that nothing else depends on it.
-CUT_LATERAL = 1e-4  # m, rounding
-CUT_COSINE = 1.0 - 1e-7  # rounding: some 0.03 degrees
-LINE_LATERAL = 0.04  # m, tables; how far the middle of one may lie beside the line of another,
-LINE_ANGLE = math.radians(2.5)  # tables; the angle between them,
-LINE_COSINE = math.cos(LINE_ANGLE)
-LINE_GAP = 0.3  # m, geometry: as for walls; and along it
 # What no sigma that is sent accounts for: maps drawn or built with some slack, walls that are not quite straight.
 MODEL_OFFSET = 0.02  # m, tables; of a wall as a whole,
 ROUGHNESS = 0.01  # m, tables; of which that much differs along it
 MODEL_ANGLE = math.radians(0.6)  # tables
-# Roughness of a wall and bias of the ranges shift neighbouring points together: no number of points averages it out. It
-# decides the angle of short segments, which come with raw ranges.
-COMMON_ERROR = 0.008  # m, tables
-# Of several views whose poses are not exact: by how many standard deviations more lines of two may lie apart that are
-# one, and up to how far.
-VIEW_SIGMAS = 1.5  # tables
-MOST_LATERAL = 0.12  # m, tables
-MOST_TURN = math.radians(6.0)  # tables
-# Views laid on one another before the search.
-ALIGNING_ROUNDS = 3  # tables
-ALIGNED_LINES = 40  # tables; of a view, the longest
-ALIGNED_VIEWS = 8  # tables; that many views before it a view is laid on
-LEAST_ALIGNED = 0.4  # m, tables; that two lines which are one have in common, or half of the shorter
-MOST_APART = 0.6  # m, tables; by which they lie apart at most,
-MOST_TURNED = 0.3  # sine, tables; and by which they are turned
-SAME_LINE = 0.08  # m, tables; two lines of one view that are farther apart cannot both be the line of another
-ALIGNING_SHARE = 0.5  # tables; of its information that a seam counts with: seams of one wall have errors in common
-VIEWS_APART = 0.1  # m, tables; standard deviation: views from places nearer to each other see about the same
 VIEW_ROUNDS = 6  # tables; of solving for a pose and the errors of its views
 # What finding a segment on a wall is worth against its being clutter: a share of its own, and one by length.
 GAIN = 6.0  # nats, tables
 GAIN_PER_METRE = 2.0  # nats, tables
 GAIN_LENGTH = 4.0  # m, tables; beyond it a segment tells no more
-LEAST_SPREAD = 1e-6  # m^2, rounding
-LEAST_VARIANCE = 1e-8  # m^2, rounding
 
 # --- Matching: when a scan segment lies on a wall ---------------------------------------------------------------------
 
-GATE_SIGMAS = 3.0  # geometry: 99.7 % of a Gaussian
-LEAST_OFFSET_GATE = 0.08  # m, tables
-LEAST_ANGLE_GATE = math.radians(4.0)  # tables
 GREATEST_ANGLE_GATE = 0.35  # rad, tables
-LEAST_OVERLAP = 1e-3  # rounding, and as much less than all of a segment: its end may lie on a wall's
 # Between these lengths a segment comes to bridge a gap between walls: a short one may well be clutter there.
 SHORT_BRIDGE, LONG_BRIDGE = 2.5, 3.5  # m, tables
 FLAT_STEP = 0.03  # m, tables; between two walls on which a segment lies, up to where both count fully
@@ -107,7 +43,6 @@ OVERLAP_TAPER = 0.05  # beyond the least overlap, tables; up to there a match ga
 LEAST_COUNT = 1e-9  # rounding; of matches, to divide by
 WHOLE_WORTH = 2.0  # nats, tables; a match that is worth less is a match in part
 MOST_BRIDGED = 2000  # neighbours on their chains that the walls under one scan segment have, measured
-WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
 
 # --- Consensus: growing and shrinking a set of matches at a pose ------------------------------------------------------
 
@@ -124,75 +59,16 @@ START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
 
 # --- Proposing: bases, sweeps and slides ------------------------------------------------------------------------------
 
-BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the longest segments; and, in scans of more,
-# those that tell enough among as many of these as there are: else what all others could add keeps a search going.
-TELLING_SEGMENTS = (48, 56, 64, 72, 80, 88, 96)  # tables
 BASE_SLACK = 0.2  # m, tables; how far a scan segment of a base may stick out at an end of its wall
 BASE_SLACK_SHARE = 0.1  # of its length, tables
 MIN_CROSSING = 0.1  # sine of the least angle between the walls of a base, tables
-MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base, tables
-WINDOW_MARGIN = 0.5  # m, tables, and
-WINDOW_TURN = 0.1  # rad, tables; what lies farther outside a hard prior's window is not refined into it
-SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
-SLIDE_SPACING = 2.0  # m, tables; what is found stands for the family along the walls
-SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; there beams tell where along them
-SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are told apart
-PARALLEL_SINE = 0.1  # tables
-KEPT_SLIDES = 64  # tables
 
-# Pairs of runs that cross are listed up to as far from there as one of these, as three numbers allow: pairs, their
-# entries in all lists, and pairs of runs that are near enough to be looked at.
-CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m; each has about half the entries of the last
-CROSSING_CELL = 2.0  # m, tables
-CROSSING_BAND = 16.0  # m; runs are gone through band by band to find those that cross,
-MOST_BANDS = 200  # of which there are so many at most, about
 # Bins of half a turn; an odd number, so that the middle one is about a right angle. Measured: with 23 it takes up to a
 # tenth longer, with 91 as long.
 CROSSING_ANGLES = 45
-# Tables: half of the first two take a seventh longer at 20,000 segments; twice as many take a twelfth less, for 2.3
-# times the memory. The third is some 10 us of indexing a run.
-CROSSINGS_A_RUN = (80, 500, 4_000)
-# Memory, of 12 bytes each: 54 MB of entries, and 24 MB of pairs while indexing, with room for a fifth more; and 1 to
-# 1.5 s of indexing. They are compared with estimates: twice as many pairs and looks are let pass.
-MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
-FEW_RUNS = 500  # at least so many runs count; tables: in a room all pairs are listed
-CROSSING_SAMPLE = 128  # runs by which these numbers are estimated; measured: to a fifth, by 32 to a third;
-CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most: some 30 ms
-CROSSING_MARGIN = 1e-3  # m, rounding
-# Lists for one base; it is swept where there are more. Measured: at most one base in a thousand.
-MOST_LISTS = 256
 
 # --- Planning: the order of bases, and when enough have been gone through ---------------------------------------------
 
-TELLING = 0.25  # m, tables; how far a base may lay the other segments off, root mean square
-UNTELLING = 0.1  # tables; what a base is worth less that lays them farther off
-TIMES_BETTER = 2.0  # tables; what a base has to be worth at most, in times what another is, to be weighed
-REUSE = 0.3  # tables; what a base is worth less for each earlier use of one of its segments
-# What a base, an entry of its lists with what comes of it, a wall that it may slide on, a metre of slide, a hypothesis
-# cost; nanoseconds, measured.
-COST_BASE = 2000.0
-COST_ENTRY = 50.0
-COST_ANCHOR = 60.0
-COST_SLIDE = 3.0
-COST_HYPOTHESIS = 480.0
-# Observed over expected number of hypotheses: short walls stand beside long ones, at corners and doors, so that a base
-# with a short segment fits more often than lengths alone say, and one across at a small angle less often. Measured.
-HYPOTHESIS_SCALE = 2.0
-SHORT_POWER = -0.7  # of the length of the shorter segment, metres
-SHORT_LENGTH = 0.1  # m
-SINE_POWER = 0.3
-GAIN_POWER = 3.0  # of the lesser gain, tables: long segments are clutter less often
-SAMPLES = 10_240  # consensus sets, a resolution of 1e-4
-SAMPLE_SEED = 20190901
-# Work between two looks at the clock, in tests of a wall: a few milliseconds. Measured.
-CHUNK = 300_000
-USUAL_CROWD = 8.0  # walls on the list that a place on a wall has
-USUAL_LINES = 200.0  # of a scan; with more, poses take longer in proportion
-TESTS_BASE = 100
-TESTS_ANCHOR = 5
-TESTS_REJECTED = 10
-TESTS_HYPOTHESIS = 50
-TESTS_REFINED = 800
 AT_ONCE = 256  # runs, cells and poses that go through a stage together; measured: with 64 it takes a tenth longer
 
 # Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
@@ -206,11 +82,6 @@ PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at
 
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 
-KEPT = 64  # poses, tables
-KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no rivals
-# Where raw beams are to decide, the segments propose more. Tables.
-KEPT_FOR_BEAMS = 192
-KEPT_SHARE_FOR_BEAMS = 0.5
 RIVAL_SHARE = 0.75  # of the best value, tables; a pose above it must not have been missed, for the verdict weighs it
 DISTINCT_DISTANCE = 0.3  # m, tables
 DISTINCT_ANGLE = 0.1  # rad, tables
@@ -339,8 +210,6 @@ FACING = 0.05  # m, geometry; a wall seen along itself may pass the sensor on ei
 # centimetres, it is 18 % at most.
 LEAST_STUCK = 10
 STUCK_SHARE = 0.5  # measured
-EXTENT_ANGLES = 18  # directions in which a scan's extent is looked for, geometry
-OUTERMOST_SHARE = 0.05  # of a scan's length, measured; at either end it may lie outside of the map
 EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs in their own maps come to 1.0
 MAX_RIVALS = 8  # map segments named beside the one that a scan segment lies on most
 MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85

@@ -14,7 +14,8 @@ from unittest.mock import patch
 import numpy as np
 
 from association.scan import scan_lines
-from association.scan.kernels.scans import as_lines, describe_labelled, join_labelled, longest_first, seen_at_once
+from association.scan.kernels.describing import describe_labelled, seen_at_once
+from association.scan.kernels.joining import as_lines, join_labelled, longest_first
 from association.tables import Measured
 from registration.layout import Records
 

@@ -14,10 +14,10 @@ from registration.layout import Records
 from registration.values import value
 
 from ..context import SearchContext
+from ..deadline import CancelledError
 from ..layout import BEAM, BEAM_EVIDENCE, ESTIMATE, MATCH, MERIT, Integers
-from ..options import CancelledError, Estimator
+from ..options import Estimator
 from ..search.candidates import Candidates
-from ..search.kernels.best_poses import prior_values
 from ..tables import Rays
 from ..tuning import (
     BEAM_FINALISTS,
@@ -39,6 +39,7 @@ from ..tuning import (
 )
 from .kernels import ranking as kernels
 from .kernels.beams import weigh_beams
+from .kernels.priors import prior_values
 
 Floats = NDArray[np.float64]
 NOTHING = np.zeros(0)

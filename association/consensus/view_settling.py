@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from registration import RigidTransform, wrap_angle
 from registration.layout import POSE, Floats, Records
 
+from ..deadline import Deadline
 from ..layout import POINT, as_records, record
-from ..options import Deadline
 from ..scan.scan import Views
 from ..tables import SeenByViews
 from ..tuning import (

@@ -11,8 +11,10 @@ from registration.layout import Records
 
 from ..layout import BAND, CROSSING, CROSSING_SHAPE, ENDS, GRID_SHAPE, as_records, record
 from ..tables import Crossings, Grid, Raster, Sweep, Walls
-from ..tuning import (
-    APART_STEP,
+from ..tuning import APART_STEP, NARROW_REACH, REACH, SECTORS
+from .kernels.crossings import find_crossings, list_crossings, sample_crossings
+from .kernels.walls import direction_raster, grid_cells
+from .tuning import (
     CELL,
     CELL_GROWTH,
     CROSSING_BAND,
@@ -20,23 +22,18 @@ from ..tuning import (
     CROSSING_REACHES,
     CROSSING_SAMPLE,
     CROSSING_SAMPLE_LOOKS,
-    CROSSINGS_A_RUN,
-    FEW_RUNS,
+    CROSSINGS_A_CHAIN,
+    FEW_CHAINS,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MOST_BANDS,
     MOST_CROSSINGS,
-    NARROW_REACH,
     NEIGHBOURHOOD,
     RASTER_CELL,
-    REACH,
-    SECTORS,
     SWEEP_CELL,
     SWEEP_REACH,
 )
-from .kernels.crossings import find_crossings, list_crossings, sample_crossings
-from .kernels.walls import direction_raster, grid_cells
 from .walls import ends_of, ends_of_rows
 
 Floats = NDArray[np.float64]
@@ -47,12 +44,12 @@ def near_walls(walls: Walls) -> Grid:
     return _grid(ends_of(walls), CELL, REACH, MAX_CELLS)
 
 
-def swept_runs(runs: Walls) -> Sweep:
-    """Return the runs, those that are near one another together, and which of them lie on each cell."""
-    ends = ends_of(runs)
+def swept_chains(chains: Walls) -> Sweep:
+    """Return the chains, those that are near one another together, and which of them lie on each cell."""
+    ends = ends_of(chains)
     squares = np.round(0.5 * (ends[:, :2] + ends[:, 2:]) / NEIGHBOURHOOD)
     order = np.lexsort((squares[:, 0], squares[:, 1]))
-    rows, swept = runs.rows[order], _grid(ends[order], SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
+    rows, swept = chains.rows[order], _grid(ends[order], SWEEP_CELL, SWEEP_REACH, MAX_SWEEP_CELLS)
     sectors = _sectors(rows)[swept.items]
     present = np.zeros(len(swept.starts) - 1, np.uint16)
     np.bitwise_or.at(
@@ -62,31 +59,31 @@ def swept_runs(runs: Walls) -> Sweep:
     return Sweep(rows, rows["end"] - rows["begin"], swept, present)
 
 
-def crossing_runs(runs: Records) -> Crossings:
-    """List the pairs of runs (m,) that cross, up to as far from there as their number allows, or none."""
-    ends, counted = ends_of_rows(runs), max(len(runs), FEW_RUNS)
-    most = [min(a_run * counted, at_most) for a_run, at_most in zip(CROSSINGS_A_RUN, MOST_CROSSINGS, strict=True)]
+def crossing_chains(chains: Records) -> Crossings:
+    """List the pairs of chains (m,) that cross, up to as far from there as their number allows, or none."""
+    ends, counted = ends_of_rows(chains), max(len(chains), FEW_CHAINS)
+    most = [min(a_run * counted, at_most) for a_run, at_most in zip(CROSSINGS_A_CHAIN, MOST_CROSSINGS, strict=True)]
     boxed = boxes_in_bands(ends)
     # No farther than from one end of the map to the other: the fewer lists there are the sooner one is found.
     across = float(np.hypot(*np.ptp(ends.reshape(-1, 2), axis=0)))
     reaches = np.array([reach for reach in CROSSING_REACHES if reach <= across] or CROSSING_REACHES[-1:])
-    every = max(1, len(runs) // CROSSING_SAMPLE)
-    counts = sample_crossings(runs, *boxed, reaches, every, CROSSING_SAMPLE_LOOKS)
+    every = max(1, len(chains) // CROSSING_SAMPLE)
+    counts = sample_crossings(chains, *boxed, reaches, every, CROSSING_SAMPLE_LOOKS)
     allowed = (counts <= most).all(axis=1)
     for reach, count in zip(reaches[allowed].tolist(), counts[allowed, 0].tolist(), strict=True):
-        found = np.empty(int(1.2 * count) + FEW_RUNS, CROSSING)
-        number, looks = find_crossings(runs, *boxed, reach, 2 * most[2], found)
+        found = np.empty(int(1.2 * count) + FEW_CHAINS, CROSSING)
+        number, looks = find_crossings(chains, *boxed, reach, 2 * most[2], found)
         if number > 2 * most[0] or looks > 2 * most[2]:
             continue  # the sample was not like the rest
         if number > len(found):
             found = np.empty(number, CROSSING)
-            find_crossings(runs, *boxed, reach, 2 * most[2], found)
-        return listed(runs, found[:number], reach)
-    return listed(runs, np.zeros(0, CROSSING), -1.0)
+            find_crossings(chains, *boxed, reach, 2 * most[2], found)
+        return listed(chains, found[:number], reach)
+    return listed(chains, np.zeros(0, CROSSING), -1.0)
 
 
 def boxes_in_bands(ends: Floats, height: float = CROSSING_BAND) -> tuple[Records, NDArray[np.int32], Records]:
-    """Return the boxes around runs (m, 4), by bands of y and there by their left sides, their order, and the bands.
+    """Return the boxes around chains (m, 4), by bands of y and there by their left sides, their order, and the bands.
 
     (m,) of `ENDS`, (m,) and (b,) of `BAND`, each some `height` metres or more.
     """
@@ -104,18 +101,18 @@ def boxes_in_bands(ends: Floats, height: float = CROSSING_BAND) -> tuple[Records
     return as_records(ENDS, boxes), order.astype(np.int32), bands
 
 
-def listed(runs: Records, found: Records, reach: float) -> Crossings:
-    """List crossings (k,) of `CROSSING`, all those of the runs that there are up to `reach` metres."""
+def listed(chains: Records, found: Records, reach: float) -> Crossings:
+    """List crossings (k,) of `CROSSING`, all those of the chains that there are up to `reach` metres."""
     shape = record(CROSSING_SHAPE, reach=reach, columns=max(0, math.ceil(2.0 * reach / CROSSING_CELL)))
-    return Crossings(shape, *list_crossings(runs, found, shape))
+    return Crossings(shape, *list_crossings(chains, found, shape))
 
 
-def directions_near(walls: Walls, runs: Walls) -> Raster:
-    """Set in each cell the sectors of the walls and runs near it: runs also have directions over their doorways."""
-    # The line of a run may pass its walls by as much as they were joined with.
-    both = np.vstack([ends_of(walls), ends_of(runs)])
+def directions_near(walls: Walls, chains: Walls) -> Raster:
+    """Set in each cell the sectors of the walls and chains near it: chains also have directions over their doorways."""
+    # The line of a chain may pass its walls by as much as they were joined with.
+    both = np.vstack([ends_of(walls), ends_of(chains)])
     shape = _shape(both, RASTER_CELL, REACH + APART_STEP, MAX_CELLS)
-    sectors, ends = np.concatenate([_sectors(walls.rows), _sectors(runs.rows)]), as_records(ENDS, both)
+    sectors, ends = np.concatenate([_sectors(walls.rows), _sectors(chains.rows)]), as_records(ENDS, both)
     bits = np.zeros(int(shape["columns"][0] * shape["rows"][0]), dtype=np.uint32)
     direction_raster(ends, REACH + APART_STEP, shape, sectors, bits)
     direction_raster(ends, NARROW_REACH + APART_STEP, shape, sectors + SECTORS, bits)

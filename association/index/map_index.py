@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
+from ..deadline import Deadline
 from ..errors import IndexingEndedError, InvalidMapError
 from ..layout import ENDS, Integers, as_records
-from ..options import Deadline
-from ..scan.extents import diagonal
 from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
-from ..tuning import (
+from ..tuning import WHOLE_GAP
+from .grids import crossing_chains, directions_near, near_walls, swept_chains
+from .tuning import (
     BLENDED_SIGMAS,
     BLENDED_STEP,
     LEAST_ONE_LINE,
@@ -25,10 +26,8 @@ from ..tuning import (
     MAX_MAP_SIGMA,
     ONE_LINE,
     ONE_LINE_SHARE,
-    WHOLE_GAP,
 )
-from .grids import crossing_runs, directions_near, near_walls, swept_runs
-from .walls import blended, both_ways, merge, runs_of, tie
+from .walls import blended, both_ways, chains_of, merge, tie
 
 Floats = NDArray[np.float64]
 
@@ -54,15 +53,15 @@ class MapIndex:
         Which segments each wall consists of.
     walls : Walls
     ties : (m,) how walls that continue one another are tied: see `tables.Place`
-    runs : Walls
+    chains : Walls
         Lines through what nearly continues one another, also across doorways: where a segment of a base may lie.
     grid : Grid
         Walls within `REACH` of each cell, whatever their direction: what lies at a point?
     sweep : Sweep
-        Which runs of a direction does a sweep meet? Told from the list alone, since a look at a run costs more than all
-        else.
+        Which chains of a direction does a sweep meet? The list alone answers this, since reading a chain takes longer
+        than all else.
     crossings : Crossings
-        On which pairs of runs may two segments of a scan lie? As far as they are listed no sweep is needed.
+        On which pairs of chains may two segments of a scan lie? As far as they are listed no sweep is needed.
     raster : Raster
         The quickest way to see that a segment cannot lie at a place.
     """
@@ -75,7 +74,7 @@ class MapIndex:
     pieces: Pieces
     walls: Walls
     ties: Floats
-    runs: Walls
+    chains: Walls
     grid: Grid
     sweep: Sweep
     crossings: Crossings
@@ -135,18 +134,18 @@ class MapIndex:
         blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
         if blends > one_line:
             walls, wall_of_piece = blended(local, walls, wall_of_piece.astype(np.intp), blends, deadline)
-        runs = runs_of(walls, deadline)
+        chains = chains_of(walls, deadline)
         ties, firsts = tie(walls, deadline)
         order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
         starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
         pieces = Pieces(order, starts, as_records(ENDS, local.endpoints), firsts)
         _require_time(deadline)
-        sweep = swept_runs(runs)
+        sweep = swept_chains(chains)
         _require_time(deadline)
-        crossings = crossing_runs(sweep.runs)
+        crossings = crossing_chains(sweep.chains)
         _require_time(deadline)
-        grids = near_walls(walls), sweep, crossings, directions_near(walls, runs)
-        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, ties, runs, *grids)
+        grids = near_walls(walls), sweep, crossings, directions_near(walls, chains)
+        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, ties, chains, *grids)
         for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
             getattr(index, name)  # kept from here on, so that the first search does not wait for them
         return index
@@ -209,7 +208,8 @@ class MapIndex:
     @cached_property
     def diagonal(self) -> float:
         """Of the box around the map, metres."""
-        return diagonal(self.segments)
+        corners = self.segments.endpoints.reshape(-1, 2)
+        return float(np.hypot(*np.ptp(corners, axis=0)))
 
     @cached_property
     def tables(self) -> MapTables:
@@ -230,13 +230,13 @@ class MapIndex:
         tables: list[Any] = [
             self.pieces,
             self.walls,
-            self.runs,
+            self.chains,
             self.grid,
             self.sweep.sectors,
             self.crossings,
             self.raster,
         ]
-        tables.append((self.sweep.runs, self.sweep.lengths, self.sweep.present))
+        tables.append((self.sweep.chains, self.sweep.lengths, self.sweep.present))
         lines = [getattr(self.segments, field.name) for field in fields(Segments)]
         return sum(
             array.nbytes for array in [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]

@@ -14,24 +14,21 @@ from numpy.typing import NDArray
 from registration import Segments
 from registration.layout import LINE, Records
 
+from ..deadline import Deadline
 from ..errors import IndexingEndedError
 from ..layout import ENDS, POINT, WALL, Integers, as_records
-from ..options import Deadline
-from ..tables import Walls
-from ..tuning import (
-    APART_STEP,
-    BASE_SLACK,
-    BASE_SLACK_SHARE,
+from ..tables import JoinGates, Walls
+from ..tuning import APART_STEP, BASE_SLACK, BASE_SLACK_SHARE, DIRECTION_BINS
+from .kernels.walls import blend_walls, join_collinear, label_groups, list_begins, tie_walls
+from .tuning import (
     BEGIN_CELL,
-    DIRECTION_BINS,
+    CHAIN_GAP,
     LINK_GAP,
     MERGE_ANGLE,
     MERGE_GAP,
     MERGE_LATERAL,
     PIECES_A_LOOK,
-    RUN_GAP,
 )
-from .kernels.walls import blend_walls, join_collinear, label_groups, list_begins, tie_walls
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +54,7 @@ def merge(local: Segments, gap: float, beside: float, deadline: Deadline | None 
         When the deadline passes first.
     """
     ends, directions = as_records(ENDS, local.endpoints), as_records(POINT, local.directions)
-    labels = collinear_groups(ends, directions, gap, beside, math.cos(MERGE_ANGLE), deadline)
+    labels = collinear_groups(ends, directions, join_gates(gap, beside), deadline)
     wall, lines = _lines(local, labels)
     lateral = np.maximum(
         np.abs(np.einsum("ij,ij->i", lines.normals[wall], local.endpoints[:, :2]) - lines.offsets[wall]),
@@ -70,14 +67,7 @@ def merge(local: Segments, gap: float, beside: float, deadline: Deadline | None 
     return _sorted(local, wall, lines)
 
 
-def collinear_groups(
-    ends: Records,
-    directions: Records,
-    max_gap: float,
-    max_lateral: float,
-    min_cos: float,
-    deadline: Deadline | None = None,
-) -> Integers:
+def collinear_groups(ends: Records, directions: Records, gates: JoinGates, deadline: Deadline | None) -> Integers:
     """Label pieces that continue or repeat one another, see `join_collinear`: (n,) the lowest index of each group.
 
     Raises
@@ -86,10 +76,7 @@ def collinear_groups(
         When the deadline passes first.
     """
     labels = np.arange(len(ends))
-    # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
-    cell = max(BEGIN_CELL, 1.01 * math.hypot(max_gap, max_lateral))
-    heads, following = list_begins(ends, cell)
-    gates = (cell, float(max_gap), float(max_lateral), float(min_cos))
+    heads, following = list_begins(ends, gates.cell)
     for first in range(0, len(ends), PIECES_A_LOOK):
         if deadline is not None and deadline.passed:
             raise IndexingEndedError
@@ -97,6 +84,13 @@ def collinear_groups(
         join_collinear(ends, directions, heads, following, gates, labels, first, last)
     label_groups(labels)
     return labels
+
+
+def join_gates(gap: float, lateral: float) -> JoinGates:
+    """Return when pieces up to `gap` apart, and `lateral` next to one another, metres, are joined."""
+    # Small, so that in a dense map there are few to compare; a begin is at most one cell away from where it is sought.
+    cell = max(BEGIN_CELL, 1.01 * math.hypot(gap, lateral))
+    return JoinGates(cell, float(gap), float(lateral), math.cos(MERGE_ANGLE))
 
 
 class _Lines:
@@ -149,36 +143,36 @@ def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Wal
     return Walls(rows, starts, longest, np.concatenate([[0.0], np.cumsum(longest)])), place[wall]
 
 
-def runs_of(walls: Walls, deadline: Deadline | None = None) -> Walls:
+def chains_of(walls: Walls, deadline: Deadline | None = None) -> Walls:
     """Return the lines that a segment of a base may lie on, though it lies on several walls.
 
     Those through walls that nearly continue one another, across doorways, too; and beside these those through what does
     so with larger steps, for a wall with a step is then still found.
     """
     nearly, _ = merge(Segments.derived(ends_of(walls)), MERGE_GAP, MERGE_LATERAL, deadline)
-    runs, _ = merge(Segments.derived(ends_of(nearly)), RUN_GAP, MERGE_LATERAL, deadline)
-    stepped, line = merge(Segments.derived(ends_of(runs)), RUN_GAP, APART_STEP, deadline)
+    chains, _ = merge(Segments.derived(ends_of(nearly)), CHAIN_GAP, MERGE_LATERAL, deadline)
+    stepped, line = merge(Segments.derived(ends_of(chains)), CHAIN_GAP, APART_STEP, deadline)
     longest = np.zeros(len(stepped.rows))
-    np.maximum.at(longest, line, runs.longest)
+    np.maximum.at(longest, line, chains.longest)
     # As much as a segment may stick out it may lie on one of them.
     joined = stepped.rows[longest < (1.0 - BASE_SLACK_SHARE) * stepped.longest - BASE_SLACK]
     if not len(joined):
-        return runs
-    both = np.vstack([ends_of(runs), ends_of_rows(joined)])
+        return chains
+    both = np.vstack([ends_of(chains), ends_of_rows(joined)])
     local, each = Segments.derived(both), np.arange(len(both))
     every, _ = _sorted(local, each, _Lines(local, each, len(both)))
     return every
 
 
-class _Chains:
-    """Walls that continue one another: the chain of each, (m,), and their order chain by chain, by begin and by end."""
+class _Linked:
+    """Walls that continue one another: the group of each, (m,), and their order group by group, by begin and by end."""
 
     def __init__(self, walls: Walls, deadline: Deadline | None) -> None:
         ends = ends_of(walls)
         directions = np.column_stack([walls.rows["dx"], walls.rows["dy"]])
         records = as_records(ENDS, ends), as_records(POINT, directions)
-        self.of_wall = collinear_groups(*records, LINK_GAP, APART_STEP, math.cos(MERGE_ANGLE), deadline)
-        # Along what the walls of a chain have in common, for their own directions differ.
+        self.of_wall = collinear_groups(*records, join_gates(LINK_GAP, APART_STEP), deadline)
+        # Along what the walls of a group have in common, for their own directions differ.
         common = np.zeros((len(ends), 2))
         np.add.at(common, self.of_wall, directions * walls.longest[:, None])
         common = common[self.of_wall]
@@ -187,23 +181,23 @@ class _Chains:
 
 
 def tie(walls: Walls, deadline: Deadline | None = None) -> tuple[Floats, Integers]:
-    """Name in each wall the next ones of its chain.
+    """Name in each wall the next ones of its group.
 
     The wall before another is that which ends next before it, the one after it that which begins next.
 
     Returns
     -------
     (m,) how the walls are tied: see `Place.ties`
-    (m,) of the chain of each, the wall that begins first
+    (m,) of the group of each, the wall that begins first
     """
-    chains = _Chains(walls, deadline)
-    for name, order in (("after", chains.by_begin), ("before", chains.by_end[::-1])):
+    linked = _Linked(walls, deadline)
+    for name, order in (("after", linked.by_begin), ("before", linked.by_end[::-1])):
         one, other = order[:-1], order[1:]
-        same = chains.of_wall[one] == chains.of_wall[other]
+        same = linked.of_wall[one] == linked.of_wall[other]
         walls.rows[name][one[same]] = other[same]
-    begins = chains.of_wall[chains.by_begin]
-    firsts = chains.by_begin[np.searchsorted(begins, chains.of_wall)]
-    return np.asarray(tie_walls(walls.rows, chains.by_begin, chains.of_wall, APART_STEP)), firsts
+    begins = linked.of_wall[linked.by_begin]
+    firsts = linked.by_begin[np.searchsorted(begins, linked.of_wall)]
+    return np.asarray(tie_walls(walls.rows, linked.by_begin, linked.of_wall, APART_STEP)), firsts
 
 
 def blended(
@@ -218,10 +212,10 @@ def blended(
     Walls
     (n,) the wall that each piece is part of
     """
-    chains = _Chains(walls, deadline)
-    ties = tie_walls(walls.rows, chains.by_begin, chains.of_wall, apart)
+    linked = _Linked(walls, deadline)
+    ties = tie_walls(walls.rows, linked.by_begin, linked.of_wall, apart)
     on = np.zeros(len(walls.rows), LINE)
-    blend_walls(walls.rows, walls.longest, chains.by_begin, chains.of_wall, ties, on)
+    blend_walls(walls.rows, walls.longest, linked.by_begin, linked.of_wall, ties, on)
     lines = _Lines(local, wall_of_piece, len(on))
     lines.take_over(on)
     return _sorted(local, wall_of_piece, lines)
@@ -238,7 +232,7 @@ def ends_of(walls: Walls) -> Floats:
 
 
 def ends_of_rows(rows: Records) -> Floats:
-    """Return the same of walls or runs, (m,) of `WALL`."""
+    """Return the same of walls or chains, (m,) of `WALL`."""
     dx, dy, offset, begin, end = (rows[name] for name in ("dx", "dy", "offset", "begin", "end"))
     a = np.column_stack([dx * begin - dy * offset, dy * begin + dx * offset])
     b = np.column_stack([dx * end - dy * offset, dy * end + dx * offset])

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from registration.layout import Floats, Records
 
+from ..deadline import Deadline
 from ..layout import POINT, as_records
-from ..options import Deadline
-from ..tuning import ALIGNED_LINES, ALIGNING_ROUNDS, ALIGNING_SHARE, LEAST_SPREAD, MODEL_ANGLE, ROUGHNESS
+from ..tuning import MODEL_ANGLE, ROUGHNESS
 from .kernels.alignment import pair_lines
 from .scan import Scan, Views
 from .scan_lines import parts_of
+from .tuning import ALIGNED_LINES, ALIGNING_ROUNDS, ALIGNING_SHARE, LEAST_SPREAD
 from .views import corrected
 
 Indices = NDArray[np.intp]

@@ -8,20 +8,12 @@ from registration import Segments
 from registration.layout import Records
 
 from ..layout import POINT, as_records
-from ..tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 from .kernels.extents import extent_along
+from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 
 _ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
 DIRECTIONS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # in which extents are looked for
 _DIRECTIONS = as_records(POINT, DIRECTIONS)
-
-
-def diagonal(segments: Segments) -> float:
-    """Return the diagonal of the box around segments, metres; 0 without any."""
-    if not len(segments):
-        return 0.0
-    low, high = segments.endpoints.min(axis=0).tolist(), segments.endpoints.max(axis=0).tolist()
-    return float(np.hypot(max(high[0::2]) - min(low[0::2]), max(high[1::2]) - min(low[1::2])))
 
 
 def extent(ends: Records) -> float:
@@ -32,14 +24,14 @@ def extent(ends: Records) -> float:
 def inner_extent(segments: Segments) -> float:
     """Return the extent without what is outermost, metres.
 
-    Of their length a share of `OUTERMOST_SHARE` at either end does not count: some beams leave through a window.
+    Of their length a fraction of `OUTERMOST_SHARE` at either end does not count: some beams leave through a window.
     """
     if not len(segments):
         return 0.0
     along = DIRECTIONS @ segments.endpoints.reshape(-1, 2).T
     order = np.argsort(along, axis=1)
-    shares = np.cumsum(np.repeat(segments.lengths, 2)[order], axis=1) / (2.0 * segments.lengths.sum())
-    low = np.argmax(shares >= OUTERMOST_SHARE, axis=1)
-    high = np.argmax(shares >= 1.0 - OUTERMOST_SHARE, axis=1)
+    fractions = np.cumsum(np.repeat(segments.lengths, 2)[order], axis=1) / (2.0 * segments.lengths.sum())
+    low = np.argmax(fractions >= OUTERMOST_SHARE, axis=1)
+    high = np.argmax(fractions >= 1.0 - OUTERMOST_SHARE, axis=1)
     rows = np.arange(EXTENT_ANGLES)
     return float((along[rows, order[rows, high]] - along[rows, order[rows, low]]).max())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from registration import Beams, MeasuredSegments, RigidTransform, Segments
 
 from ..result import AssociationWarning
-from ..tuning import VIEWS_APART
+from .tuning import VIEWS_APART
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -16,12 +16,14 @@ from registration.values import value
 from ..layout import GATES, LINE_PARTS, MODEL, POINT, SIGHTING, VARIANCES, Integers, as_records, record
 from ..options import AssociationOptions
 from ..tables import Measured
-from ..tuning import (
+from ..tuning import FREE_ANGLE, FREE_DISTANCE, GREATEST_ANGLE_GATE, REACH
+from .kernels import describing
+from .kernels.describing import describe_labelled
+from .kernels.joining import join_lines, lines_of_a_view
+from .scan import Scan, Views
+from .tuning import (
     COMMON_ERROR,
-    FREE_ANGLE,
-    FREE_DISTANCE,
     GATE_SIGMAS,
-    GREATEST_ANGLE_GATE,
     LEAST_ANGLE_GATE,
     LEAST_OFFSET_GATE,
     LEAST_OVERLAP,
@@ -29,15 +31,11 @@ from ..tuning import (
     LINE_LATERAL,
     MOST_LATERAL,
     MOST_TURN,
-    REACH,
     VIEW_SIGMAS,
 )
-from .kernels import scans as kernels
-from .kernels.scans import describe_labelled, join_lines, lines_of_a_view
-from .scan import Scan, Views
 
-_describe_view, _mirror_lines = kernels.describe_view, kernels.mirror_lines
-_set_map_sigma = kernels.set_map_sigma
+_describe_view, _mirror_lines = describing.describe_view, describing.mirror_lines
+_set_map_sigma = describing.set_map_sigma
 
 
 @value(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
-from ..schemas.parts import InlineMap, MapDocument
+from ..schemas.parts import InlineMap, MapDocument, is_oriented
 from .cache import CachedMap, IndexCache
 from .errors import BusyStoreError
 from .records import MapOutline, MapRecord
@@ -86,7 +86,7 @@ class MapLookup:
         return FoundMap(record, None)
 
     def takes_long(self, asked: InlineMap | FoundMap) -> bool:
-        """Tell whether it may take long until a map is ready to be searched."""
+        """Return whether it may take long until a map is ready to be searched."""
         if isinstance(asked, InlineMap):
             return len(asked.segments) > LONG_SEGMENTS
         return asked.document is not None and len(asked.document) > LONG_BYTES
@@ -149,11 +149,6 @@ class MapLookup:
         segments = Segments.from_array(asked.segments, argument="map.segments")
         index = MapIndex.build(segments, asked.sigma, oriented=oriented)
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
-
-
-def is_oriented(asked: bool | None, own: bool | None) -> bool:
-    """Tell whether directions mean anything: as the request says, else as the map does, else yes."""
-    return next((said for said in (asked, own) if said is not None), True)
 
 
 def outline_of(document: MapDocument) -> MapOutline:

@@ -43,6 +43,17 @@ class MapOutline:
     sigma: float | None = None
     oriented: bool | None = None
 
+    def as_json(self, map_id: str, revision: int) -> dict[str, Any]:
+        """Return the summary of a stored map as the contract has it."""
+        return {
+            "map_id": map_id,
+            "revision": revision,
+            "segment_count": self.segments,
+            "bounds": self.bounds,
+            "sigma": self.sigma,
+            "oriented": self.oriented,
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class MapSummary:
@@ -105,7 +116,7 @@ def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
 
 
 def is_sealed(row: Row[Any]) -> bool:
-    """Tell whether a row of `maps` is as it was written."""
+    """Return whether a row of `maps` is as it was written."""
     return bool(row.seal == seal(*(getattr(row, name) for name in SEALED)))
 
 

@@ -25,9 +25,8 @@ from association.context import SearchContext
 from association.explain import explain_at
 from association.verdict.null import symmetry_of
 from association.verdict.verdict import judge
-from map_quality.analyze import Analysis, Robot, standing_places
+from map_quality import Analysis, Robot, check_map, standing_places, try_sample
 from map_quality.analyze.standing import is_free
-from map_quality.check import check_map, try_sample
 from registration import (
     Beams,
     Correspondences,
@@ -171,15 +170,6 @@ def warm_up_searching() -> None:
     # Nothing is said of this map, which is not to scale.
     too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
     associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
-    # A search that takes some milliseconds has kernels of its own, and so has one that is left no time.
-    many = Segments.from_array(np.concatenate([ROOM + np.tile(at, 2) for at in _room_centres()]))
-    for at in (None, 0.0):
-        associate(MapIndex.build(many, 0.0), _asked()[0][0], None, AssociationOptions(exhaustive=True), Deadline(at))
-
-
-def _room_centres() -> list[tuple[float, float]]:
-    """Return the centres of 64 rooms next to one another, metres."""
-    return [(9.0 * column, 7.0 * row) for row in range(8) for column in range(8)]
 
 
 def _asked() -> list[tuple[Scan, Prior | None, AssociationOptions]]:

@@ -10,7 +10,8 @@ import pytest
 from association import Deadline, HardPrior, MapIndex, Prior, SoftPrior, mirrored
 from association.layout import GATES, HARD_PRIOR, NO_PRIOR, RULES, SOFT_PRIOR, record
 from association.scan.scan_lines import ScanLines
-from association.tuning import GATE_SIGMAS, GREATEST_ANGLE_GATE, LEAST_ANGLE_GATE, LEAST_OFFSET_GATE, REACH
+from association.scan.tuning import GATE_SIGMAS, LEAST_ANGLE_GATE, LEAST_OFFSET_GATE
+from association.tuning import GREATEST_ANGLE_GATE, REACH
 from registration import RigidTransform
 
 from .answers import ROOM_INDEX, SCAN

@@ -296,7 +296,7 @@ def test_rivals_at_other_scales_are_put_beside_the_answer() -> None:
 
 
 @pytest.mark.parametrize(("error", "asked"), [(0.0, False), (0.05, True)])
-def test_what_fits_to_millimetres_is_not_asked_for_a_factor(
+def test_what_fits_to_millimetres_is_not_deciding_place_a_factor(
     error: float, asked: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[SearchContext] = []

@@ -1,6 +1,6 @@
-"""Compiled lists of the pairs of runs whose lines cross, by how a scan segment would lie on each.
+"""Compiled lists of the pairs of chains whose lines cross, by how a scan segment would lie on each.
 
-Two scan segments fix where each of them lies, counted from the point where their lines cross. So the pairs of runs on
+Two scan segments fix where each of them lies, counted from the point where their lines cross. So the pairs of chains on
 which they may lie are those that cross at the angle between them and have something at both of these places: one list,
 or a few next to one another, holds them all. `looking_up` finds these.
 """
@@ -13,7 +13,8 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...layout import CROSSING, Integers
-from ...tuning import CROSSING_ANGLES, CROSSING_CELL, MIN_CROSSING
+from ...tuning import CROSSING_ANGLES, MIN_CROSSING
+from ..tuning import CROSSING_CELL
 
 PER_HALF_TURN = CROSSING_ANGLES / math.pi
 PER_CELL = 1.0 / CROSSING_CELL
@@ -22,7 +23,7 @@ STEPS = 127  # of a byte of a code
 
 @kernel
 def crossing_of(a: Record, b: Record) -> tuple[float, float, float, float]:
-    """Return where the lines of two runs cross, as abscissae along each, and sine and cosine of the angle between them.
+    """Return where the lines of two chains cross, as abscissae along each, and sine and cosine of their angle.
 
     ``n . c = offset`` holds for both; they may not be parallel.
     """
@@ -33,7 +34,7 @@ def crossing_of(a: Record, b: Record) -> tuple[float, float, float, float]:
 
 @kernel
 def reach_to(a: Record, b: Record) -> float:
-    """Return how far from where two lines cross the nearest point of a run is, the farther of both; inf if parallel."""
+    """Return the distance from where two lines cross to the nearest point of a chain, the larger of both, or inf."""
     if abs(a.dx * b.dy - a.dy * b.dx) < MIN_CROSSING:
         return math.inf
     on_a, on_b, _, _ = crossing_of(a, b)
@@ -48,7 +49,7 @@ def cell_of(abscissa: float, reach: float, columns: int) -> int:
 
 @kernel
 def cells_of(a: Record, b: Record, reach: float, columns: int) -> tuple[int, int, int, int]:
-    """Return the first and last cell of a run, and those of one that crosses it."""
+    """Return the first and last cell of a chain, and those of one that crosses it."""
     on_a, on_b, _, _ = crossing_of(a, b)
     return (
         cell_of(a.begin - on_a, reach, columns),
@@ -66,9 +67,9 @@ def step_of(abscissa: float, per_metre: float) -> int:
 
 @kernel
 def code_of(first_begin: float, first_end: float, second_begin: float, second_end: float, reach: float) -> int:
-    """Return where two runs begin and end as a number of four bytes, each from 0 to 127.
+    """Return where two chains begin and end as a number of four bytes, each from 0 to 127.
 
-    Each is the less the farther a run reaches, so that those that reach far enough have no byte that is more.
+    Each is the less the farther a chain reaches, so that those that reach far enough have no byte that is more.
     """
     per_metre = STEPS / (2.0 * reach)
     low = step_of(first_begin, per_metre) | step_of(second_begin, per_metre) << 16
@@ -99,19 +100,19 @@ def first_from(boxes: Records, begin: int, end: int, at: int) -> int:
 
 @kernel
 def sample_crossings(
-    runs: Records, boxes: Records, order: Integers, bands: Records, reaches: Floats, every: int, most: int
+    chains: Records, boxes: Records, order: Integers, bands: Records, reaches: Floats, every: int, most: int
 ) -> Floats:
-    """Estimate how many crossings are listed up to each of some reaches, by those of every so many-th run.
+    """Estimate how many crossings are listed up to each of some reaches, by those of every so many-th chain.
 
-    `reaches` (k,) in descending order; the others as of `find_crossings`. Stops after `most` looks at a pair of runs.
+    `reaches` (k,) in descending order; the others as of `find_crossings`. Stops after `most` looks at a pair of chains.
     Returns for each reach (k, 3) crossings, their entries in all lists, and looks.
     """
     counts = np.zeros((len(reaches), 3), np.float64)
     sampled = 0
     looks = 0
     at = 0
-    while at < len(runs) and looks < most:
-        one = runs[order[at]]
+    while at < len(chains) and looks < most:
+        one = chains[order[at]]
         for g in range(len(bands)):
             band = bands[g]
             away = away_from(band, boxes[at])
@@ -122,7 +123,7 @@ def sample_crossings(
                 looks += 1
                 gap = boxes[k].x1 - boxes[at].x2
                 above = max(boxes[k].y1 - boxes[at].y2, boxes[at].y1 - boxes[k].y2)
-                other = runs[order[k]]
+                other = chains[order[k]]
                 least = reach_to(one, other) if above <= 2.0 * reaches[0] else math.inf
                 for j in range(len(reaches)):
                     reach = reaches[j]
@@ -136,20 +137,20 @@ def sample_crossings(
                 k += 1
         sampled += 1
         at += every
-    return counts * (len(runs) / max(1, sampled))
+    return counts * (len(chains) / max(1, sampled))
 
 
 @kernel
 def find_crossings(
-    runs: Records, boxes: Records, order: Integers, bands: Records, reach: float, most: int, out: Records
+    chains: Records, boxes: Records, order: Integers, bands: Records, reach: float, most: int, out: Records
 ) -> tuple[int, int]:
-    """Find the pairs of runs that cross within `reach` of both, and write as many to `out` (k,) as there is room for.
+    """Find the pairs of chains that cross within `reach` of both, and write as many to `out` (k,) as there is room for.
 
-    `boxes` (m,) of `ENDS`: corners of the box around each run, those of each of `bands` (b,) of `BAND` in ascending
-    order of x1, which `order` (m,) gives. Pairs come in the order of their runs, so that those are together that are
+    `boxes` (m,) of `ENDS`: corners of the box around each chain, those of each of `bands` (b,) of `BAND` in ascending
+    order of x1, which `order` (m,) gives. Pairs come in the order of their chains, so that those are together that are
     near one another. Stops after `most` looks at a pair. Returns how many there are, and looks.
     """
-    m = len(runs)
+    m = len(chains)
     place = np.empty(m, np.int32)
     for k in range(m):
         place[order[k]] = k
@@ -169,9 +170,9 @@ def find_crossings(
             while k < band.end and boxes[k].x1 <= right:
                 if boxes[k].y1 <= high and boxes[k].y2 >= low:
                     q = order[k]
-                    if reach_to(runs[p], runs[q]) <= reach:
+                    if reach_to(chains[p], chains[q]) <= reach:
                         if found < len(out):
-                            turned = runs[p].dx * runs[q].dy - runs[p].dy * runs[q].dx < 0.0
+                            turned = chains[p].dx * chains[q].dy - chains[p].dy * chains[q].dx < 0.0
                             out[found].first = q if turned else p
                             out[found].second = p if turned else q
                         found += 1
@@ -183,15 +184,15 @@ def find_crossings(
 
 
 @kernel
-def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integers, Integers, Records]:
-    """List crossings (k,) in the cells that their runs reach into; return bins, starts, entries as of `Crossings`."""
+def list_crossings(chains: Records, found: Records, shape: Records) -> tuple[Integers, Integers, Records]:
+    """List crossings (k,) in the cells that their chains reach into; return bins, starts, entries as of `Crossings`."""
     reach = shape[0].reach
     columns = shape[0].columns
     bins = np.full(CROSSING_ANGLES, -1, dtype=np.int32)
     of_angle = np.empty(len(found), np.uint8)
     for k in range(len(found)):
-        a = runs[found[k].first]
-        b = runs[found[k].second]
+        a = chains[found[k].first]
+        b = chains[found[k].second]
         on_a, on_b, sine, cosine = crossing_of(a, b)
         found[k].code = code_of(a.begin - on_a, a.end - on_a, b.begin - on_b, b.end - on_b, reach)
         of_angle[k] = min(CROSSING_ANGLES - 1, int(math.atan2(sine, cosine) * PER_HALF_TURN))
@@ -212,7 +213,7 @@ def list_crossings(runs: Records, found: Records, shape: Records) -> tuple[Integ
                 total += here
             entries = np.empty(total, CROSSING)
         for k in range(len(found)):
-            left, right, bottom, top = cells_of(runs[found[k].first], runs[found[k].second], reach, columns)
+            left, right, bottom, top = cells_of(chains[found[k].first], chains[found[k].second], reach, columns)
             for column in range(left, right + 1):
                 cells = (bins[of_angle[k]] * columns + column) * columns
                 for row in range(bottom, top + 1):

@@ -8,7 +8,9 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...layout import Integers
-from ...tuning import APART_GAP, BLENDED_WALLS, MOST_LOOKS, MOST_STEPS, TIE_FREE, TIES_BEFORE, WHOLE_GAP
+from ...tables import JoinGates
+from ...tuning import APART_GAP, WHOLE_GAP
+from ..tuning import BLENDED_WALLS, MOST_LOOKS, MOST_STEPS, TIE_FREE, TIES_BEFORE
 
 
 @kernel
@@ -20,7 +22,7 @@ def fade(value: float, whole: float, apart: float) -> float:
 
 @kernel
 def tie_between(before: Record, after: Record, apart: float) -> float:
-    """Return minus the log of how much two walls of a chain are one, up to `TIE_FREE`; with a step of `apart`, m, none.
+    """Return minus the log of how much two linked walls are one, up to `TIE_FREE`; with a step of `apart`, m, none.
 
     The second one begins behind the begin of the first one. The step is the farthest that the shorter one is off the
     line of the other, so that walls that bend are not one either.
@@ -44,8 +46,8 @@ def seen_from(wall: Record, other: Record, at: float) -> tuple[float, float]:
 
 
 @kernel
-def tie_walls(walls: Records, order: Integers, chain: Integers, apart: float) -> Floats:
-    """Return where on its chain each wall is, (m,), as `Place.ties` says; in `order` they are chain by chain, by begin.
+def tie_walls(walls: Records, order: Integers, group: Integers, apart: float) -> Floats:
+    """Return where in its group each wall is, (m,), as of `Place.ties`; in `order` they are group by group, by begin.
 
     Each is tied to that of the walls before it to which it is tied best; with a step of `apart`, metres, to none.
     """
@@ -56,7 +58,7 @@ def tie_walls(walls: Records, order: Integers, chain: Integers, apart: float) ->
         place = at + TIE_FREE
         for back in range(1, min(k, TIES_BEFORE) + 1):
             v = order[k - back]
-            if chain[v] != chain[w]:
+            if group[v] != group[w]:
                 break
             here = tie_between(walls[v], walls[w], apart)
             if here < TIE_FREE and ties[v] + here < place:
@@ -64,8 +66,8 @@ def tie_walls(walls: Records, order: Integers, chain: Integers, apart: float) ->
         ties[w] = place
         at = max(at, place)
     for k in range(len(order)):
-        first = k == 0 or chain[order[k - 1]] != chain[order[k]]
-        if first and (k + 1 == len(order) or chain[order[k + 1]] != chain[order[k]]):
+        first = k == 0 or group[order[k - 1]] != group[order[k]]
+        if first and (k + 1 == len(order) or group[order[k + 1]] != group[order[k]]):
             ties[order[k]] = -1.0
     return ties
 
@@ -104,59 +106,68 @@ def join_collinear(
     directions: Records,
     heads: Integers,
     following: Integers,
-    gates: tuple[float, float, float, float],
+    gates: JoinGates,
     parent: Integers,
     first: int,
     last: int,
 ) -> None:
     """Join pieces `first` to `last` with those that they continue or repeat, in `parent` (n,), a union-find forest.
 
-    One begins along the other, or within `max_gap` of its end. What begins along another one has to end beside its
-    line, too. Where more than `MOST_LOOKS` begin about one piece, and beyond `MOST_STEPS` places before its end, as on
-    no map of a building, some are not merged. `ends` (n,) of `ENDS`, `directions` (n,) of `POINT`; `heads` and
-    `following` of `list_begins`; `gates` are ``(cell, max_gap, max_lateral, min_cos)``, metres but for the last.
+    Around each piece the begins of others are looked up. Where more than `MOST_LOOKS` begin about one piece, and beyond
+    `MOST_STEPS` places before its end, as on no map of a building, some are not merged. `ends` (n,) of `ENDS`,
+    `directions` (n,) of `POINT`; `heads` and `following` of `list_begins`.
     """
-    cell, max_gap, max_lateral, min_cos = gates
     buckets = len(heads)
-    spacing = 1.98 * (cell - max_lateral)
+    spacing = 1.98 * (gates.cell - gates.lateral)
     for i in range(first, last):
-        x = ends[i].x2
-        y = ends[i].y2
-        dx = directions[i].x
-        dy = directions[i].y
-        length = math.hypot(x - ends[i].x1, y - ends[i].y1)
+        length = math.hypot(ends[i].x2 - ends[i].x1, ends[i].y2 - ends[i].y1)
         looks = 0
         # At places from the end backwards, evenly spread, the last of them the begin.
         steps = math.ceil(length / spacing)
         for step in range(min(steps, MOST_STEPS) + 1):
             back = step * length / steps if step < MOST_STEPS else length
-            column = math.floor((x - back * dx) / cell)
-            row = math.floor((y - back * dy) / cell)
+            column = math.floor((ends[i].x2 - back * directions[i].x) / gates.cell)
+            row = math.floor((ends[i].y2 - back * directions[i].y) / gates.cell)
             for a in range(-1, 2):
                 for b in range(-1, 2):
                     j = heads[_cell_hash(column + a, row + b, buckets)]
                     while j >= 0 and looks < MOST_LOOKS:
                         looks += 1
-                        gx = ends[j].x1 - x
-                        gy = ends[j].y1 - y
-                        along = gx * dx + gy * dy
-                        if (
-                            j != i
-                            and -length - max_gap <= along <= max_gap
-                            and abs(gy * dx - gx * dy) <= max_lateral
-                            and directions[j].x * dx + directions[j].y * dy >= min_cos
-                            and (
-                                abs(along) <= max_gap
-                                or abs((ends[j].y2 - y) * dx - (ends[j].x2 - x) * dy) <= max_lateral
-                            )
-                        ):
-                            one = _find(parent, i)
-                            other = _find(parent, j)
-                            if one < other:
-                                parent[other] = one
-                            else:
-                                parent[one] = other
+                        if j != i and continues(ends[i], directions[i], length, ends[j], directions[j], gates):
+                            _join(parent, i, j)
                         j = following[j]
+
+
+@kernel
+def continues(
+    piece: Record, direction: Record, length: float, other: Record, other_direction: Record, gates: JoinGates
+) -> bool:
+    """Return whether another piece continues or repeats a piece of some length.
+
+    It begins along the piece, or within the gap of its end. If it begins along it, it has to end near its line, too.
+    """
+    dx = direction.x
+    dy = direction.y
+    gx = other.x1 - piece.x2
+    gy = other.y1 - piece.y2
+    along = gx * dx + gy * dy
+    return (
+        -length - gates.gap <= along <= gates.gap
+        and abs(gy * dx - gx * dy) <= gates.lateral
+        and other_direction.x * dx + other_direction.y * dy >= gates.least_cosine
+        and (abs(along) <= gates.gap or abs((other.y2 - piece.y2) * dx - (other.x2 - piece.x2) * dy) <= gates.lateral)
+    )
+
+
+@kernel
+def _join(parent: Integers, i: int, j: int) -> None:
+    """Join two trees of a union-find forest; the lower index becomes the root."""
+    one = _find(parent, i)
+    other = _find(parent, j)
+    if one < other:
+        parent[other] = one
+    else:
+        parent[one] = other
 
 
 @kernel
@@ -168,7 +179,7 @@ def label_groups(parent: Integers) -> None:
 
 @kernel
 def blend_walls(
-    walls: Records, lengths: Floats, order: Integers, chain: Integers, ties: Floats, lines: Records
+    walls: Records, lengths: Floats, order: Integers, group: Integers, ties: Floats, lines: Records
 ) -> None:
     """Write the line of each wall with those that it is tied to, (m,) of `LINE`: their means, by length and tie.
 
@@ -184,7 +195,7 @@ def blend_walls(
         total = lengths[w]
         for way in (-1, 1):
             j = k + way
-            while 0 <= j < len(order) and abs(j - k) <= BLENDED_WALLS and chain[order[j]] == chain[w]:
+            while 0 <= j < len(order) and abs(j - k) <= BLENDED_WALLS and group[order[j]] == group[w]:
                 v = order[j]
                 part = lengths[v] * math.exp(-abs(ties[v] - ties[w]))
                 dx += part * walls[v].dx

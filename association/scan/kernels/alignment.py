@@ -8,15 +8,14 @@ from compiled import kernel
 from registration.layout import Floats, Record, Records
 
 from ...layout import Integers
-from ...tuning import (
+from ...tuning import MODEL_ANGLE, ROUGHNESS
+from ..tuning import (
     ALIGNED_VIEWS,
     GATE_SIGMAS,
     LEAST_ALIGNED,
     LEAST_SPREAD,
-    MODEL_ANGLE,
     MOST_APART,
     MOST_TURNED,
-    ROUGHNESS,
     SAME_LINE,
 )
 
@@ -92,39 +91,60 @@ def pair_lines(lines: Records, starts: Integers, places: Records, covariance: Fl
     count = 0
     for v in range(1, len(starts) - 1):
         for i in range(starts[v], starts[v + 1]):
-            one = lines[i]
             for u in range(v - 1, max(-1, v - 1 - ALIGNED_VIEWS), -1):
-                best = -1
-                least = math.inf
-                low = math.inf
-                high = -math.inf
-                for j in range(starts[u], starts[u + 1]):
-                    other = lines[j]
-                    sine = other.dx * one.dy - other.dy * one.dx
-                    if abs(sine) > MOST_TURNED or other.dx * one.dx + other.dy * one.dy <= 0.0:
-                        continue
-                    at, common = overlap_middle(one, other)
-                    if common < min(LEAST_ALIGNED, 0.5 * min(one.length, other.length)):
-                        continue
-                    x = other.x + at * other.dx
-                    y = other.y + at * other.dy
-                    offset = offset_at(one, other, x, y)
-                    if abs(offset) > MOST_APART:
-                        continue
-                    noise = variance_at(one, x, y) + variance_at(other, x, y)
-                    steps, turns = step_variance(covariance, v, u, other, x, y, places)
-                    if abs(offset) > GATE_SIGMAS * math.sqrt(noise + steps):
-                        continue
-                    if abs(sine) > GATE_SIGMAS * math.sqrt(angle_variance(one) + angle_variance(other) + turns):
-                        continue
-                    low = min(low, offset)
-                    high = max(high, offset)
-                    if abs(offset) / math.sqrt(noise) < least:
-                        least = abs(offset) / math.sqrt(noise)
-                        best = j
-                if best >= 0 and high - low <= SAME_LINE:
+                nearest, apart = nearest_line(lines[i], v, lines[starts[u] : starts[u + 1]], u, places, covariance)
+                if nearest >= 0 and apart <= SAME_LINE:
                     pairs[count, 0] = i
-                    pairs[count, 1] = best
+                    pairs[count, 1] = starts[u] + nearest
                     count += 1
                     break
     return pairs[:count]
+
+
+@kernel
+def nearest_line(
+    one: Record, v: int, others: Records, u: int, places: Records, covariance: Floats
+) -> tuple[int, float]:
+    """Return which line of view u is the nearest of those that a line of view v can be, by its deviation; -1 for none.
+
+    And between which offsets from it all of these lie, metres.
+    """
+    nearest = -1
+    least = math.inf
+    low = math.inf
+    high = -math.inf
+    for j in range(len(others)):
+        offset, noise = offset_if_one(one, v, others[j], u, places, covariance)
+        if offset < math.inf:
+            low = min(low, offset)
+            high = max(high, offset)
+            if abs(offset) / math.sqrt(noise) < least:
+                least = abs(offset) / math.sqrt(noise)
+                nearest = j
+    return nearest, high - low
+
+
+@kernel
+def offset_if_one(
+    one: Record, v: int, other: Record, u: int, places: Records, covariance: Floats
+) -> tuple[float, float]:
+    """Return how far a line of view v lies from one of view u if both can be one, metres, else inf; and its variance.
+
+    The variance, m^2, is that of the lines alone.
+    """
+    sine = other.dx * one.dy - other.dy * one.dx
+    if abs(sine) > MOST_TURNED or other.dx * one.dx + other.dy * one.dy <= 0.0:
+        return math.inf, 0.0
+    at, common = overlap_middle(one, other)
+    if common < min(LEAST_ALIGNED, 0.5 * min(one.length, other.length)):
+        return math.inf, 0.0
+    x = other.x + at * other.dx
+    y = other.y + at * other.dy
+    offset = offset_at(one, other, x, y)
+    noise = variance_at(one, x, y) + variance_at(other, x, y)
+    steps, turns = step_variance(covariance, v, u, other, x, y, places)
+    if abs(offset) > min(MOST_APART, GATE_SIGMAS * math.sqrt(noise + steps)):
+        return math.inf, 0.0
+    if abs(sine) > GATE_SIGMAS * math.sqrt(angle_variance(one) + angle_variance(other) + turns):
+        return math.inf, 0.0
+    return offset, noise

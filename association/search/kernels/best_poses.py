@@ -1,49 +1,23 @@
-"""Compiled list of the best poses so far, and what a prior says of a pose."""
+"""Compiled list of the best poses so far."""
 
 import numpy as np
 
 from compiled import kernel
-from registration.layout import Floats, Record, Records
+from registration.kernels import keep_alive
+from registration.layout import Record, Records
 
 from ...consensus.kernels.matching import wrap
-from ...layout import HARD_PRIOR, NO_PRIOR
-from ...tuning import INSIDE, SOFT_FLOOR
+from ...consensus.kernels.ordering import ascending
+from ...consensus.kernels.priors import prior_value
+from ...layout import FOUND, HARD_PRIOR
+from ...tuning import INSIDE
+from ..tables import SearchState
 
 
 @kernel
-def prior_value(prior: Record, pose: Record) -> float:
-    """Return what the prior says of a pose, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
-    if prior.kind == NO_PRIOR:
-        return 0.0
-    dx = pose.x - prior.x
-    dy = pose.y - prior.y
-    turn = wrap(pose.theta - prior.theta)
-    if prior.kind == HARD_PRIOR:
-        return INSIDE if dx * dx + dy * dy <= prior.radius * prior.radius and abs(turn) <= prior.angle else 0.0
-    square = (
-        prior.xx * dx * dx
-        + 2.0 * prior.xy * dx * dy
-        + 2.0 * prior.xt * dx * turn
-        + prior.yy * dy * dy
-        + 2.0 * prior.yt * dy * turn
-        + prior.tt * turn * turn
-    )
-    return max(SOFT_FLOOR, -0.5 * square)
-
-
-@kernel
-def prior_values(prior: Records, poses: Records) -> Floats:
-    """Return what the prior (1,) says of each of the poses (k,), nats."""
-    values = np.empty(len(poses), np.float64)
-    for k in range(len(poses)):
-        values[k] = prior_value(prior[0], poses[k])
-    return values
-
-
-@kernel
-def keep(found: Records, progress: Record, rules: Record, pose: Record, score: float, value: float) -> None:
+def store(found: Records, best: Record, rules: Record, pose: Record, score: float, value: float) -> None:
     """Put a pose among the best, at most one within the distance and angle of `rules`; ties keep the earlier."""
-    n = progress.count
+    n = best.count
     near = -1
     worst = 0
     for k in range(n):
@@ -62,7 +36,7 @@ def keep(found: Records, progress: Record, rules: Record, pose: Record, score: f
             return
     elif n < len(found):
         place = n
-        progress.count = n + 1
+        best.count = n + 1
     else:
         place = worst
         if value <= found[worst].value:
@@ -72,28 +46,49 @@ def keep(found: Records, progress: Record, rules: Record, pose: Record, score: f
     found[place].x = pose.x
     found[place].y = pose.y
     found[place].score = score
-    if progress.count == len(found):
+    if best.count == len(found):
         least = found[0].value
         for k in range(1, len(found)):
             least = min(least, found[k].value)
-        progress.least_kept = least
+        best.least_value = least
 
 
 @kernel
-def floor_of(rules: Record, progress: Record, bonus: float) -> float:
-    """Return the score that a pose must reach to be kept, given what the prior says of it."""
-    return max(rules.kept_share * progress.best_value, progress.least_kept) - bonus
+def floor_of(rules: Record, best: Record, bonus: float) -> float:
+    """Return the score that a pose must reach to be stored, given what the prior adds to it."""
+    return max(rules.kept_share * best.best_value, best.least_value) - bonus
 
 
 @kernel
-def offer(found: Records, progress: Record, rules: Record, prior: Record, pose: Record, score: float) -> None:
-    """Keep a refined pose if it is worth it."""
+def offer(found: Records, best: Record, rules: Record, prior: Record, pose: Record, score: float) -> None:
+    """Store a refined pose if its score reaches the floor and it lies in the window of a hard prior."""
     bonus = prior_value(prior, pose)
     if prior.kind == HARD_PRIOR:
         if bonus < INSIDE:
             return
         bonus = 0.0
-    if score <= 0.0 or score < floor_of(rules, progress, bonus):
+    if score <= 0.0 or score < floor_of(rules, best, bonus):
         return
-    keep(found, progress, rules, pose, score, score + bonus)
-    progress.best_value = max(progress.best_value, score + bonus)
+    store(found, best, rules, pose, score, score + bonus)
+    best.best_value = max(best.best_value, score + bonus)
+
+
+@kernel
+def best_first(of_bases: SearchState, of_slides: SearchState) -> Records:
+    """Return the poses of bases and of slides, (k,) of `FOUND`, the best value first, ties as they were found."""
+    first = of_bases.best[0].count
+    n = first + of_slides.best[0].count
+    losses = np.empty(n, np.float64)
+    together = np.empty(n, FOUND)
+    ordered = np.empty(n, FOUND)
+    for k in range(n):
+        if k < first:
+            together[k] = of_bases.poses[k]
+        else:
+            together[k] = of_slides.poses[k - first]
+        losses[k] = -together[k].value
+    order = ascending(losses)
+    for k in range(n):
+        ordered[k] = together[order[k]]
+    keep_alive(together)
+    return ordered

@@ -1,125 +1,113 @@
-"""Compiled search from its plan to what it found, in one call where the budget lets it."""
+"""Compiled search: the loop over bases, then parallel segments. It reads as `ransac_impl.h` of PoseLib does."""
 
 import numpy as np
 
 from compiled import kernel
-from registration.kernels import keep_alive
 from registration.layout import Records
 
-from ...consensus.kernels.ordering import ascending
-from ...layout import FOUND
+from ...layout import FOUND, Integers
 from ...tables import MapTables, Question, Workspace
-from ...tuning import BASE_SEGMENTS, SLIDE_SEGMENTS
-from ..planning_tables import Plan, Planning
-from .advancing import BUDGET, EXHAUSTED, advance
-from .planning import begin
+from ..layout import BEST, EXHAUSTED, GOES_ON, INTERRUPTED
+from ..tables import Plan, Sampling, SearchState
+from ..tuning import BASE_SEGMENTS, KEPT_SLIDES, SLIDE_SEGMENTS
+from .bases import next_base, plan_search
+from .best_poses import best_first
+from .hypotheses import search_base
 from .sliding import search_slides, sliding_segments
-from .stopping import missed_share
+from .stopping import missed_fraction, why_stop
 
 
 @kernel
 def search(
     question: Question,
     tables: MapTables,
-    planning: Planning,
-    found: Records,
-    progress: Records,
+    sampling: Sampling,
+    limits: Records,
+    statistics: Records,
     work: Workspace,
-    how: Records,
-) -> tuple[int, Plan | None]:
-    """Plan a search, go through its bases as `advance` does, and then `finish` it; `how` (1,) of `HOW`.
+    stop: Integers,
+) -> Records:
+    """Search a map for the poses that explain a scan best, (k,) of `FOUND`, the best value first.
 
-    ``rules`` of the question (2,) are those of bases and of slides. Returns why the bases were left, and the plan where
-    the budget ended them or the slides, to `go_on` with; else None: a plan is thirty arrays, which take long to hand to
-    Python and back.
+    1. Plan: pair up the bases, and prepare the stopping rule.
+    2. Search bases until the stopping rule ends it.
+    3. Slide parallel segments along the walls: those of a corridor make no base.
+
+    Parameters
+    ----------
+    question : Question
+        ``rules`` (2,) are those of bases and of slides.
+    tables : MapTables
+        Of the map.
+    sampling : Sampling
+        By which bases are drawn.
+    limits : (1,) of `LIMITS`
+    statistics : (1,) of `STATISTICS`
+        Written.
+    work : Workspace
+    stop : (1,) uint8
+        Not 0 once the search has to end; another thread may write it.
     """
-    plan = begin(question, tables, planning, progress)
-    why = EXHAUSTED
-    if len(plan.bases) == 0:
-        progress[0].missed = 0.0  # walls of which no two cross are slid
-    else:
-        of_bases = found[: how[0].kept]
-        why = advance(question, tables, plan, of_bases, progress, work, how)
-        if why == BUDGET:
-            return why, plan
-        if why == EXHAUSTED and not plan.random:
-            progress[0].missed = missed_share(question, plan, progress)
-    progress[0].left = 1
-    finish(question, tables, found, progress, work, how)
-    if progress[0].done == 0:
-        return why, plan
-    return why, None
+    plan = plan_search(question, tables, sampling, statistics[0])
+    state = SearchState(np.zeros(limits[0].stored, FOUND), np.zeros(1, BEST), statistics, stop)
+    start_at(limits[0].known, 0.0, 0.0, state)
+    statistics[0].why = search_bases(question, tables, plan, state, work, limits[0].allowed)
+    slides = SearchState(np.zeros(KEPT_SLIDES, FOUND), np.zeros(1, BEST), statistics, stop)
+    if statistics[0].why != INTERRUPTED:
+        search_parallel(question, tables, state, slides, work, limits)
+    return best_first(state, slides)
 
 
 @kernel
-def go_on(
-    question: Question,
-    tables: MapTables,
-    plan: Plan,
-    found: Records,
-    progress: Records,
-    work: Workspace,
-    how: Records,
+def search_bases(
+    question: Question, tables: MapTables, plan: Plan, state: SearchState, work: Workspace, allowed: float
 ) -> int:
-    """Go on with a search where `progress` stands, with its bases or, once these are ``left``, to `finish` it.
+    """Search bases, the best first, until the stopping rule ends it; return why it ended.
 
-    Returns as `advance` does. Both in one kernel, for each that goes through bases takes seconds to compile.
+    1. Draw a base, the minimal sample.
+    2. Form its hypotheses; score, refine and store each.
+    3. Ask the stopping rule.
     """
-    if progress[0].left == 0:
-        return advance(question, tables, plan, found[: how[0].kept], progress, work, how)
-    finish(question, tables, found, progress, work, how)
-    return BUDGET if progress[0].done == 0 else EXHAUSTED
+    statistics = state.statistics[0]
+    statistics.missed = 1.0 if len(plan.bases) > 0 else 0.0
+    why = GOES_ON
+    while why == GOES_ON:
+        k = next_base(question, plan)
+        if k < 0:
+            why = EXHAUSTED
+        elif not search_base(question, tables, plan.bases[k], state, work):
+            why = INTERRUPTED
+        else:
+            statistics.bases += 1
+            why = why_stop(question, plan, plan.bases[k], state, allowed)
+    if why in (INTERRUPTED, EXHAUSTED) and len(plan.bases) > 0 and not plan.random:
+        statistics.missed = missed_fraction(question, plan, state.best[0].best_value)
+    return why
 
 
 @kernel
-def finish(
-    question: Question, tables: MapTables, found: Records, progress: Records, work: Workspace, how: Records
+def search_parallel(
+    question: Question, tables: MapTables, of_bases: SearchState, slides: SearchState, work: Workspace, limits: Records
 ) -> None:
-    """Lay the longest of parallel segments on every run, once the bases are left, and put what was found in order.
+    """Lay the longest of parallel segments on every wall chain, where these may gain more than the best pose does.
 
-    Parallel walls alone, as in a corridor, fix the pose across them: no base shows it, yet it may explain more. Goes on
-    where `progress` stands, and stops when ``budget`` tests are used up for one of the segments: it is not ``done``
-    then.
+    ``why`` of the statistics is then `INTERRUPTED` if the search has to end before the last slide.
     """
-    state = progress[0]
-    limits = how[0]
-    if state.sliding < 0:
-        state.sliding = 0
-        state.floor = limits.share * state.best_value
-        state.of_bases = state.count
-        state.count = 0
-        state.anchor = 0
-        state.step = 0
     scan = question.scan
-    slides = Question(scan, question.terms, question.rules[1:])
-    most = SLIDE_SEGMENTS
-    segments = sliding_segments(scan, min(len(scan), BASE_SEGMENTS), state.floor, most)
-    while state.sliding < len(segments):
-        a = segments[state.sliding]
-        if not search_slides(slides, tables, a, found[limits.kept :], progress, work, limits.spacing, limits.budget):
+    best = of_bases.best[0]
+    start_at(best.best_value, best.least_value, best.least_freedom, slides)
+    floor = limits[0].slides_fraction * best.best_value
+    of_slides = Question(scan, question.terms, question.rules[1:])
+    for a in sliding_segments(scan, min(len(scan), BASE_SEGMENTS), floor, SLIDE_SEGMENTS):
+        if not search_slides(of_slides, tables, a, slides, work, limits[0].spacing):
+            slides.statistics[0].why = INTERRUPTED
             return
-        state.sliding += 1
-        state.anchor = 0
-        state.step = 0
-    put_in_order(found, progress, how)
 
 
 @kernel
-def put_in_order(found: Records, progress: Records, how: Records) -> None:
-    """Put the poses of bases and of slides together, the best first, ties as they were found; ``count`` of them."""
-    state = progress[0]
-    if state.sliding < 0:
-        state.of_bases = state.count
-        state.count = 0
-    n = state.of_bases + state.count
-    losses = np.empty(n, np.float64)
-    together = np.empty(n, FOUND)
-    for k in range(n):
-        together[k] = found[k if k < state.of_bases else how[0].kept + k - state.of_bases]
-        losses[k] = -together[k].value
-    order = ascending(losses)
-    for k in range(n):
-        found[k] = together[order[k]]
-    keep_alive(together)
-    state.count = n
-    state.done = 1
+def start_at(best_value: float, least_value: float, least_freedom: float, state: SearchState) -> None:
+    """Start a list of best poses, which is empty, at the values that another one has come to."""
+    best = state.best[0]
+    best.best_value = best_value
+    best.least_value = least_value
+    best.least_freedom = least_freedom

@@ -1,19 +1,20 @@
-"""Compiled proposals of scans without a base: parallel segments laid on every run; what is found is free along them."""
+"""Compiled hypotheses of parallel segments, which make no base: laid on every wall chain, and free along it."""
 
 import math
 
 import numpy as np
 
 from compiled import kernel
-from registration.layout import Floats, Records
+from registration.layout import Floats, Record, Records
 
 from ...consensus.kernels.matching import gates_about, wrap
 from ...layout import HARD_PRIOR, Integers
 from ...tables import MapTables, Question, Workspace
-from ...tuning import BASE_SEGMENTS, MIN_CROSSING_BASE, PARALLEL_SINE, WINDOW_TURN
-from .planning import is_telling, middle_of
+from ..tables import SearchState
+from ..tuning import BASE_SEGMENTS, MIN_CROSSING_BASE, PARALLEL_SINE, WINDOW_TURN
+from .bases import is_telling, middle_of
+from .scoring import score_hypotheses
 from .sweeping import anchors, end_slack
-from .trying import try_poses
 
 
 @kernel
@@ -62,77 +63,76 @@ def leave_out_bases(scan: Records, sliding: int, shifts: Integers, later: Floats
 
 @kernel
 def search_slides(
-    question: Question,
-    tables: MapTables,
-    sliding: int,
-    found: Records,
-    progress: Records,
-    work: Workspace,
-    spacing: float,
-    budget: int,
+    question: Question, tables: MapTables, sliding: int, state: SearchState, work: Workspace, spacing: float
 ) -> bool:
-    """Lay scan segment `sliding` on every run that is long enough, at slides `spacing` metres apart; keep the best.
+    """Lay scan segment `sliding` on every chain that is long enough, at slides `spacing` metres apart; score each.
 
-    For scans without a base: what is found is a family of poses, fixed across the walls and free along them. What makes
-    a base with the segment has been looked for so, and what does not has to be enough by itself. Goes on from the
-    anchor and the step of `progress` (1,), and returns False when `budget` tests are used up before the end.
+    What is found is a family of poses, fixed across the walls and free along them. Segments that make a base with this
+    one do not count: the others have to be enough by themselves. Returns False if the search has to end before the last
+    slide.
     """
-    state = progress[0]
-    runs = tables.sweep.runs
+    chains = tables.sweep.chains
     prior = question.terms[0].prior
-    posed = work.posed
     a = question.scan[sliding]
-    variance = a.angle_variance
     figure = work.scratch[0].figure
-    figure.angle_variance = variance
+    figure.angle_variance = a.angle_variance
     figure.pin_x = a.x
     figure.pin_y = a.y
     figure.slip = 0.0
     gates_about(question.scan, figure, question.terms[0].gates, work.spreads, work.shifts, work.later)
     leave_out_bases(question.scan, sliding, work.shifts, work.later)
-    anchor_list = np.empty(len(runs), np.int32)
+    anchor_list = np.empty(len(chains), np.int32)
     n_anchors = anchors(a.length, tables.sweep.lengths, anchor_list)
-    left = budget
     n = 0
-    for anchor in range(state.anchor, n_anchors):
-        w = anchor_list[anchor]
-        wall = runs[w]
-        first = state.step
-        state.step = 0
-        half = 0.5 * a.length - end_slack(a.length)
-        low = wall.begin + half
-        high = wall.end - half
-        theta = wall.angle - a.angle
+    for k in range(n_anchors):
+        chain = chains[anchor_list[k]]
+        low, high, count = slides_on(chain, a, prior, spacing)
+        for j in range(count):
+            pose_slide(chain, a, low + (j + 0.5) / count * (high - low), work.hypotheses[n])
+            n += 1
+            if n == len(work.hypotheses):
+                if not score_hypotheses(question, tables, n, state, work):
+                    return False
+                n = 0
+    return score_hypotheses(question, tables, n, state, work)
+
+
+@kernel
+def slides_on(chain: Record, a: Record, prior: Record, spacing: float) -> tuple[float, float, int]:
+    """Return between which abscissae the midpoint of a segment slides on a chain, and the number of slides there.
+
+    That is 0 outside the window of a hard prior.
+    """
+    half = 0.5 * a.length - end_slack(a.length)
+    low = chain.begin + half
+    high = chain.end - half
+    if prior.kind == HARD_PRIOR:
+        theta = chain.angle - a.angle
         c = math.cos(theta)
         s = math.sin(theta)
         gx = c * a.x - s * a.y
         gy = s * a.x + c * a.y
-        if prior.kind == HARD_PRIOR:
-            middle = wall.dx * (prior.x + gx) + wall.dy * (prior.y + gy)
-            low = max(low, middle - prior.radius)
-            high = min(high, middle + prior.radius)
-            if low > high or abs(wrap(theta - prior.theta)) > prior.angle + WINDOW_TURN:
-                continue
-        steps = max(1, math.ceil((high - low) / spacing))
-        for j in range(first, steps):
-            slide = low + (j + 0.5) / steps * (high - low)
-            one = posed[n]
-            one.theta = theta
-            one.cosine = c
-            one.sine = s
-            one.x = wall.dx * slide - wall.dy * wall.offset - gx
-            one.y = wall.dy * slide + wall.dx * wall.offset - gy
-            one.lever_x = gx
-            one.lever_y = gy
-            one.angle_variance = variance
-            one.anchor = anchor
-            one.step = j + 1
-            one.entry = 0
-            n += 1
-            if n == len(posed):
-                cost, stopped = try_poses(question, tables, n, found, state, work, left)
-                if stopped:
-                    return False
-                left -= cost
-                n = 0
-    return not try_poses(question, tables, n, found, state, work, left)[1]
+        middle = chain.dx * (prior.x + gx) + chain.dy * (prior.y + gy)
+        low = max(low, middle - prior.radius)
+        high = min(high, middle + prior.radius)
+        if low > high or abs(wrap(theta - prior.theta)) > prior.angle + WINDOW_TURN:
+            return low, high, 0
+    return low, high, max(1, math.ceil((high - low) / spacing))
+
+
+@kernel
+def pose_slide(chain: Record, a: Record, slide: float, one: Record) -> None:
+    """Write the hypothesis that puts the midpoint of a segment at an abscissa of a chain."""
+    theta = chain.angle - a.angle
+    c = math.cos(theta)
+    s = math.sin(theta)
+    gx = c * a.x - s * a.y
+    gy = s * a.x + c * a.y
+    one.theta = theta
+    one.cosine = c
+    one.sine = s
+    one.x = chain.dx * slide - chain.dy * chain.offset - gx
+    one.y = chain.dy * slide + chain.dx * chain.offset - gy
+    one.lever_x = gx
+    one.lever_y = gy
+    one.angle_variance = a.angle_variance

@@ -1,11 +1,60 @@
-"""Compiled stop of the search: when enough bases have been gone through, by a bound and by sampled consensus sets."""
+"""Compiled stopping rule: whether a better consensus set may have been missed, by a bound and by sampled sets."""
+
+import math
 
 from compiled import kernel
-from registration.layout import Floats, Records
+from registration.layout import Floats, Record, Records
 
 from ...layout import Integers
 from ...tables import Question
-from ..planning_tables import Plan, Samples
+from ..layout import CONFIDENT, GOES_ON, PROVEN
+from ..tables import Plan, Samples, SearchState
+from .bases import is_telling, middle_of
+
+
+@kernel
+def why_stop(question: Question, plan: Plan, base: Record, state: SearchState, allowed: float) -> int:
+    """Return why a search ends after a base, `GOES_ON` where it does not.
+
+    It ends where the best value is enough, where the bound on what a pose gains without any of the bases so far is
+    below what an alternative needs, or where the probability of having missed such a set is at most `allowed`. That of
+    a search in order is the fraction of sampled sets that hold none of the bases; of a random one it follows from the
+    number of draws. With `allowed` below 0 all bases are searched.
+    """
+    scan = question.scan
+    rules = question.rules[0]
+    best = state.best[0]
+    statistics = state.statistics[0]
+    best.least_freedom = least_freedom(scan, plan.freest, rules.kept_share * best.best_value)
+    needed = needed_of(question, plan, best.best_value)
+    if is_telling(scan[base.sliding], scan[base.crossing], middle_of(scan)):
+        count_base(question, plan, base, needed, allowed, statistics)
+    if best.best_value >= rules.enough:
+        return CONFIDENT
+    if allowed >= 0.0 and statistics.bound < needed:
+        return PROVEN
+    if allowed >= 0.0 and statistics.missed <= allowed:
+        return CONFIDENT
+    return GOES_ON
+
+
+@kernel
+def count_base(question: Question, plan: Plan, base: Record, needed: float, allowed: float, statistics: Record) -> None:
+    """Lower the bound, and the probability of having missed a set that gains `needed`, by a base that was searched."""
+    scan = question.scan
+    a = base.sliding
+    b = base.crossing
+    beyond = gain_beyond(scan, plan)
+    statistics.bound -= cover(plan.residual, a, b)
+    fewest = fewest_segments(plan.best_gains, beyond, needed)
+    if plan.random:
+        statistics.missed *= 1.0 - drawn_probability(fewest, len(plan.best_gains))
+        return
+    strike(plan.samples, a, b)
+    count = len(plan.samples.found)
+    # It need not be known by how much the probability is too large.
+    most = math.floor(allowed * count) if allowed >= 0.0 else -1
+    statistics.missed = missed_sets(scan, plan.samples, fewest, needed - beyond, most) / count
 
 
 @kernel
@@ -23,7 +72,7 @@ def cover(residual: Floats, a: int, b: int) -> float:
 
 @kernel
 def restrict(drawn: Integers, orders: Integers, ranks: Integers) -> None:
-    """Leave of orders of more segments those of the first n; of all orders as likely they are all as likely.
+    """Reduce equally likely orders of more segments to equally likely orders of the first n.
 
     Parameters
     ----------
@@ -47,7 +96,7 @@ def restrict(drawn: Integers, orders: Integers, ranks: Integers) -> None:
 
 @kernel
 def strike(samples: Samples, a: int, b: int) -> None:
-    """Note in the sampled consensus sets that a base was gone through."""
+    """Note in the sampled consensus sets that a base was searched."""
     found = samples.found
     first = samples.ranks[a]
     second = samples.ranks[b]
@@ -60,40 +109,43 @@ def strike(samples: Samples, a: int, b: int) -> None:
 def missed_sets(scan: Records, samples: Samples, fewest: int, needed: float, most: int) -> int:
     """Count the sampled consensus sets that hold none of the bases so far, up to one more than `most`.
 
-    Each is an order of the segments of bases, and has as many of the first as come to gains of `needed`, `fewest` at
-    least, which may be more than before, never less. An order whose gains do not come to it has no set. Where a set
-    was found to hold a base it is not looked at any more.
+    `fewest` and `needed` as in `is_decided`. A set that was found to hold a base is not looked at again.
     """
-    orders = samples.orders
-    found = samples.found
-    sizes = samples.sizes
-    gains = samples.gains
     undecided = samples.undecided
-    n = orders.shape[1]
-    left = 0
+    count = len(samples.found)
+    end = undecided[count]
     at = 0
-    end = undecided[len(found)]
-    while at < end and left <= most:
-        s = undecided[at]
-        held = found[s] < fewest
-        if not held:
-            size = sizes[s]
-            gain = gains[s]
-            # One that is larger than the place where it has a base holds that, however large it has to be.
-            while size <= found[s] and size < n and (gain < needed or size < fewest):
-                gain += scan[orders[s, size]].gain
-                size += 1
-            sizes[s] = size
-            gains[s] = gain
-            held = found[s] < size or gain < needed
-        if held:
+    while at < end and at <= most:
+        if is_decided(scan, samples, undecided[at], fewest, needed):
             end -= 1
             undecided[at] = undecided[end]
         else:
-            left += 1
             at += 1
-    undecided[len(found)] = end
-    return left
+    undecided[count] = end
+    return at
+
+
+@kernel
+def is_decided(scan: Records, samples: Samples, s: int, fewest: int, needed: float) -> bool:
+    """Return whether a sampled set holds a base that was searched, or is none because all its gains are too little.
+
+    A sample is an order of the segments of bases. Its set consists of the first of them, as many as gain `needed`, and
+    `fewest` at least. Both may be more than before, never less: the set grows from what it was.
+    """
+    orders = samples.orders
+    n = orders.shape[1]
+    place = samples.found[s]
+    if place < fewest:
+        return True
+    size = samples.sizes[s]
+    gain = samples.gains[s]
+    # A set that is larger than the place where the order has a base holds it, however large it has to be.
+    while size <= place and size < n and (gain < needed or size < fewest):
+        gain += scan[orders[s, size]].gain
+        size += 1
+    samples.sizes[s] = size
+    samples.gains[s] = gain
+    return place < size or gain < needed
 
 
 @kernel
@@ -111,16 +163,16 @@ def fewest_segments(best_gains: Floats, beyond: float, needed: float) -> int:
 
 
 @kernel
-def drawn_chance(fewest: int, count: int) -> float:
-    """Return the chance that both segments of a base drawn among `count` are among `fewest` inliers."""
+def drawn_probability(fewest: int, count: int) -> float:
+    """Return the probability that both segments of a base drawn among `count` are among `fewest` inliers."""
     return min(1.0, fewest * (fewest - 1) / max(1, count * (count - 1)))
 
 
 @kernel
 def least_freedom(scan: Records, freest: Integers, needed: float) -> float:
-    """Return what freedom a consensus set takes at least whose gains come to `needed`, nats.
+    """Return the least freedom that a consensus set takes whose gains reach `needed`, nats.
 
-    It has one of the lines at least without which the others do not come to that; `freest` (n,) are the lines, those
+    The set has at least one of the lines without which the others do not reach it; `freest` (n,) are the lines, those
     that take most by themselves first.
     """
     rest = 0.0
@@ -135,14 +187,14 @@ def least_freedom(scan: Records, freest: Integers, needed: float) -> float:
 
 @kernel
 def needed_of(question: Question, plan: Plan, best_value: float) -> float:
-    """Return what the gains of a set come to at least that scores as high as a rival of the best."""
+    """Return the least gain of a consensus set that scores as high as an alternative of the best, nats."""
     needed = question.rules[0].rival_share * best_value
     return needed + least_freedom(question.scan, plan.freest, needed)
 
 
 @kernel
 def gain_beyond(scan: Records, plan: Plan) -> float:
-    """Return what the segments of a scan could add of which no bases are made, nats."""
+    """Return the gain of the segments of a scan of which no bases are made, nats."""
     beyond = 0.0
     for i in range(len(plan.best_gains), len(scan)):
         beyond += scan[i].gain
@@ -150,10 +202,10 @@ def gain_beyond(scan: Records, plan: Plan) -> float:
 
 
 @kernel
-def missed_share(question: Question, plan: Plan, progress: Records) -> float:
-    """Return the share of the sampled consensus sets that hold none of the bases so far."""
+def missed_fraction(question: Question, plan: Plan, best_value: float) -> float:
+    """Return the fraction of the sampled consensus sets that hold none of the bases so far."""
     scan = question.scan
-    needed = needed_of(question, plan, progress[0].best_value)
+    needed = needed_of(question, plan, best_value)
     beyond = gain_beyond(scan, plan)
     count = len(plan.samples.found)
     fewest = fewest_segments(plan.best_gains, beyond, needed)

@@ -1,6 +1,6 @@
-"""Compiled sweeps: where the second segment of a base comes to lie while the first one slides along a run.
+"""Compiled sweeps: where the second segment of a base comes to lie while the first one slides along a wall chain.
 
-In stages, each for many runs at once: a processor waits where what it does next hangs on what it did last.
+In stages, each for many chains at once, so that the processor need not wait for one result before the next.
 """
 
 import math
@@ -11,7 +11,8 @@ from registration.layout import Floats, Record, Records
 from ...consensus.kernels.matching import PER_RADIAN, sectors_about, wrap
 from ...layout import HARD_PRIOR, Integers
 from ...tables import Grid
-from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS, WINDOW_MARGIN, WINDOW_TURN
+from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS
+from ..tuning import WINDOW_MARGIN, WINDOW_TURN
 
 
 @kernel
@@ -28,14 +29,14 @@ def least_length(length: float) -> float:
 
 @kernel
 def angle_tolerance(a: Record, b: Record, gates: Record) -> float:
-    """Return by how much the angle between two scan segments may differ from that between their runs."""
+    """Return by how much the angle between two scan segments may differ from that between their chains."""
     variance = a.angle_variance + b.angle_variance
     return min(gates.greatest_angle, max(gates.least_angle, gates.sigmas * math.sqrt(variance)))
 
 
 @kernel
 def anchors(length: float, lengths: Floats, out: Integers) -> int:
-    """List the runs, of `lengths` (m,), that are long enough for a scan segment of `length` metres; return how many."""
+    """List the chains, of `lengths` (m,), that are long enough for a scan segment of `length` metres; count them."""
     n = 0
     need = least_length(length)
     for w in range(len(lengths)):
@@ -46,7 +47,7 @@ def anchors(length: float, lengths: Floats, out: Integers) -> int:
 
 @kernel
 def measure(a: Record, b: Record, gates: Record, figure: Record) -> None:
-    """Write what the search of a base goes by, of the scan segments a, which slides, and b.
+    """Write the figure of a base of the scan segments a, which slides, and b.
 
     The final angle splits the misfit of both, so that b turns about a by up to `swing` metres.
     """
@@ -69,74 +70,81 @@ def measure(a: Record, b: Record, gates: Record, figure: Record) -> None:
 
 @kernel
 def lay(
-    figure: Record, a: Record, b: Record, prior: Record, runs: Records, shape: Record, anchors: Integers, laid: Records
-) -> None:
-    """Lay a on runs, `anchors` (k,), and write to `laid` (k,) where b is when a is at their begins, in the grid."""
-    per_cell = 1.0 / shape.cell
-    cell = shape.cell
-    spread = figure.tolerance * PER_RADIAN
-    # A hard prior says about where the midpoint of a is.
+    figure: Record, a: Record, b: Record, prior: Record, chains: Records, shape: Record, anchors: Integers,
+    laid: Records,
+) -> None:  # fmt: skip
+    """Lay a on the begins of chains, `anchors` (k,), and write to `laid` (k,) where b is then in the grid."""
     windowed = prior.kind == HARD_PRIOR
     widest = prior.angle + WINDOW_TURN + figure.tolerance
     near_x = math.cos(prior.theta) * a.x - math.sin(prior.theta) * a.y + prior.x
     near_y = math.sin(prior.theta) * a.x + math.cos(prior.theta) * a.y + prior.y
     lever = 2.0 * math.hypot(a.x, a.y) * math.sin(0.5 * min(widest, math.pi))
     window = prior.radius + WINDOW_MARGIN + lever + figure.swing
+    spread = figure.tolerance * PER_RADIAN
     for j in range(len(anchors)):
-        run = runs[anchors[j]]
+        chain = chains[anchors[j]]
         one = laid[j]
-        dx = run.dx
-        dy = run.dy
-        # Rotation that lays a on the run, and the direction that b then has.
-        c = dx * a.dx + dy * a.dy
-        s = dy * a.dx - dx * a.dy
-        one.run = anchors[j]
-        one.dx = dx
-        one.dy = dy
-        one.b_dx = c * b.dx - s * b.dy
-        one.b_dy = s * b.dx + c * b.dy
-        # Midpoint of b with a's midpoint at abscissa 0 of the run; the slide is that abscissa.
-        x = c * figure.x - s * figure.y - dy * run.offset
-        y = s * figure.x + c * figure.y + dx * run.offset
-        one.x = x
-        one.y = y
-        at = run.begin + figure.half_a
-        high = run.end - figure.half_a
+        one.chain = anchors[j]
+        lay_on(figure, a, b, chain, one)
+        one.sectors = sectors_about((chain.angle + figure.turn + math.pi) * PER_RADIAN + 0.5, spread)
         if windowed:
-            away = dx * near_y - dy * near_x - run.offset
-            along = dx * near_x + dy * near_y
-            at = max(at, along - window)
-            high = min(high, along + window)
-            if abs(away) > window or abs(wrap(run.angle - a.angle - prior.theta)) > widest:
-                high = -math.inf
-        one.at = at
-        one.high = high
-        one.step = 0
-        fx = (x + at * dx - shape.x0) * per_cell
-        fy = (y + at * dy - shape.y0) * per_cell
-        column = math.floor(fx)
-        row = math.floor(fy)
-        one.column = column
-        one.row = row
-        right = dx > 0.0
-        up = dy > 0.0
-        one.step_x = 2 * right - 1
-        one.step_y = 2 * up - 1
-        one.pace_x = cell / max(abs(dx), 1e-12)
-        one.pace_y = cell / max(abs(dy), 1e-12)
-        one.next_x = at + (right + (1 - 2 * right) * (fx - column)) * one.pace_x
-        one.next_y = at + (up + (1 - 2 * up) * (fy - row)) * one.pace_y
-        one.sectors = sectors_about((run.angle + figure.turn + math.pi) * PER_RADIAN + 0.5, spread)
+            # A hard prior says about where the midpoint of a is.
+            away = chain.dx * near_y - chain.dy * near_x - chain.offset
+            along = chain.dx * near_x + chain.dy * near_y
+            one.at = max(one.at, along - window)
+            one.high = min(one.high, along + window)
+            if abs(away) > window or abs(wrap(chain.angle - a.angle - prior.theta)) > widest:
+                one.high = -math.inf
+        enter_grid(one, shape)
 
 
 @kernel
-def sweep(
-    laid: Records, first: int, count: int, present: Integers, shape: Record, begin: int, swept: Records
-) -> tuple[int, int]:
-    """Write the cells that b sweeps and that list runs of its direction, from the `first` of `count` laid runs on.
+def lay_on(figure: Record, a: Record, b: Record, chain: Record, one: Record) -> None:
+    """Write where b lies, and how far a can slide, with a on a chain."""
+    dx = chain.dx
+    dy = chain.dy
+    # Rotation that lays a on the chain, and the direction that b then has.
+    c = dx * a.dx + dy * a.dy
+    s = dy * a.dx - dx * a.dy
+    one.dx = dx
+    one.dy = dy
+    one.b_dx = c * b.dx - s * b.dy
+    one.b_dy = s * b.dx + c * b.dy
+    # Midpoint of b with the midpoint of a at abscissa 0 of the chain; the slide is that abscissa.
+    one.x = c * figure.x - s * figure.y - dy * chain.offset
+    one.y = s * figure.x + c * figure.y + dx * chain.offset
+    one.at = chain.begin + figure.half_a
+    one.high = chain.end - figure.half_a
 
-    Of the run 0 from its cell `begin` on. Returns on which run it left off because `swept` (k,) was full, or `count`,
-    and how many cells these are.
+
+@kernel
+def enter_grid(one: Record, shape: Record) -> None:
+    """Write in which cell b begins its way through a grid, and where it comes to the next column and row."""
+    per_cell = 1.0 / shape.cell
+    cell = shape.cell
+    at = one.at
+    fx = (one.x + at * one.dx - shape.x0) * per_cell
+    fy = (one.y + at * one.dy - shape.y0) * per_cell
+    column = math.floor(fx)
+    row = math.floor(fy)
+    one.column = column
+    one.row = row
+    right = one.dx > 0.0
+    up = one.dy > 0.0
+    one.step_x = 2 * right - 1
+    one.step_y = 2 * up - 1
+    one.pace_x = cell / max(abs(one.dx), 1e-12)
+    one.pace_y = cell / max(abs(one.dy), 1e-12)
+    one.next_x = at + (right + (1 - 2 * right) * (fx - column)) * one.pace_x
+    one.next_y = at + (up + (1 - 2 * up) * (fy - row)) * one.pace_y
+
+
+@kernel
+def sweep(laid: Records, first: int, count: int, present: Integers, shape: Record, swept: Records) -> tuple[int, int]:
+    """Write the cells that b sweeps and that list chains of its direction, from the `first` of `count` laid ones on.
+
+    Returns with which of these it stopped because `swept` (k,) was full, or `count`, and the number of cells. What is
+    `laid` keeps how far it is.
     """
     columns = shape.columns
     rows = shape.rows
@@ -149,19 +157,15 @@ def sweep(
         row = one.row
         next_x = one.next_x
         next_y = one.next_y
-        step = one.step
-        skipped = begin if j == 0 else 0
         while at <= high and n < len(swept):
             until = min(next_x, next_y)
             inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
             here = row * columns + column if inside else 0
             swept[n].laid = j
-            swept[n].step = step
             swept[n].here = here
             swept[n].at = at
             swept[n].until = until
-            listed = inside & (step >= skipped) & ((present[here] & one.sectors) != 0)
-            n += 1 if listed else 0
+            n += 1 if inside & ((present[here] & one.sectors) != 0) else 0
             at = until
             # Without a branch, which would be as often one way as the other.
             sideways = 1 if next_x < next_y else 0
@@ -169,14 +173,12 @@ def sweep(
             row += (1 - sideways) * one.step_y
             next_x += sideways * one.pace_x
             next_y += (1 - sideways) * one.pace_y
-            step += 1
         if at <= high:
             one.at = at
             one.column = column
             one.row = row
             one.next_x = next_x
             one.next_y = next_y
-            one.step = step
             return j, n
     return count, n
 
@@ -185,10 +187,10 @@ def sweep(
 def meet(
     laid: Records, swept: Records, first: int, begin: int, count: int, sectors: Grid, met: Records
 ) -> tuple[int, int, int]:
-    """Write the runs that have the direction of b, of the cells swept from the `first` of `count` on.
+    """Write the chains that have the direction of b, of the cells swept from the `first` of `count` on.
 
-    Of that one from the entry `begin` of its list on. Returns in which cell, and at which entry, it left off
-    because `met` (k,) was full, or `count` and 0, and how many runs these are.
+    Of that one from the entry `begin` of its list on. Returns in which cell, and at which entry, it stopped because
+    `met` (k,) was full, or `count` and 0, and the number of chains.
     """
     starts = sectors.starts
     items = sectors.items
@@ -200,20 +202,19 @@ def meet(
         for k in range(start + begin, starts[one.here + 1]):
             if n == len(met):
                 return cell, k - start, n
-            met[n].run = items[k] >> SECTOR_BITS
+            met[n].number = items[k] >> SECTOR_BITS
             met[n].cell = cell
-            met[n].entry = k - start
             n += (wanted >> (items[k] & (SECTORS - 1))) & 1
         begin = 0
     return count, 0, n
 
 
 @kernel
-def where_crossed(figure: Record, laid: Records, swept: Records, met: Records, count: int, runs: Records) -> int:
-    """Pick of the first `count` runs that were met those that b lies on where it crosses them; return how many.
+def where_crossed(figure: Record, laid: Records, swept: Records, met: Records, count: int, chains: Records) -> int:
+    """Pick of the first `count` chains that were met those that b lies on where it crosses them; return how many.
 
-    A run is listed in several cells: it counts where the crossing is. The ends are tested loosely, for the final angle
-    is not known. ``hit`` of the first of `met` has their places.
+    A chain is listed in several cells: it counts where the crossing is. The ends are tested loosely, for the final
+    angle is not known. ``hit`` of the first of `met` has their places.
     """
     n = 0
     least_cos = 1.0 - 0.5 * figure.tolerance * figure.tolerance
@@ -221,13 +222,13 @@ def where_crossed(figure: Record, laid: Records, swept: Records, met: Records, c
     for k in range(count):
         cell = swept[met[k].cell]
         one = laid[cell.laid]
-        run = runs[met[k].run]
+        chain = chains[met[k].number]
         met[n].hit = k
-        across = run.dx * one.dy - run.dy * one.dx
-        if run.dx * one.b_dx + run.dy * one.b_dy < least_cos or abs(across) < MIN_CROSSING:
+        across = chain.dx * one.dy - chain.dy * one.dx
+        if chain.dx * one.b_dx + chain.dy * one.b_dy < least_cos or abs(across) < MIN_CROSSING:
             continue
-        slide = (run.offset - run.dx * one.y + run.dy * one.x) / across
-        along = run.dx * (one.x + slide * one.dx) + run.dy * (one.y + slide * one.dy)
+        slide = (chain.offset - chain.dx * one.y + chain.dy * one.x) / across
+        along = chain.dx * (one.x + slide * one.dx) + chain.dy * (one.y + slide * one.dy)
         here = (slide >= cell.at) & (slide < cell.until) & (slide <= one.high)
-        n += 1 if here & (along - half >= run.begin) & (along + half <= run.end) else 0
+        n += 1 if here & (along - half >= chain.begin) & (along + half <= chain.end) else 0
     return n

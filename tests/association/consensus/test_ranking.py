@@ -113,7 +113,7 @@ def test_lines_of_sight_count_where_there_are_no_beams() -> None:
 
 
 @pytest.mark.parametrize(("wanted", "count"), [(5, LEAST_DISTINCT), (LEAST_DISTINCT + 2, LEAST_DISTINCT + 3), (50, 30)])
-def test_so_many_are_told_apart_as_may_be_asked_for(wanted: int, count: int) -> None:
+def test_so_many_are_told_apart_as_may_be_deciding_place(wanted: int, count: int) -> None:
     """One more than the alternatives, and enough for the verdict."""
     context = context_of(index_of(equal_rooms(30)), ROOM_SCAN, max_alternatives=wanted)
     assert len(ranked_at(context, *map(room, range(30)))) == count

@@ -12,19 +12,18 @@ import numpy as np
 import pytest
 
 from association import InvalidMapError, MapIndex
-from association.index.walls import ends_of
-from association.tables import Walls
-from association.tuning import (
+from association.index.tuning import (
     CELL,
     MAX_CELLS,
     MAX_ENTRIES,
     MAX_SWEEP_CELLS,
     MERGE_LATERAL,
     NEIGHBOURHOOD,
-    REACH,
-    SECTORS,
     SWEEP_CELL,
 )
+from association.index.walls import ends_of
+from association.tables import Walls
+from association.tuning import REACH, SECTORS
 from registration import Segments
 from registration.layout import Floats
 
@@ -102,10 +101,10 @@ def test_grid_lists_every_wall_within_reach() -> None:
 
 
 def test_raster_has_the_directions_of_what_is_near() -> None:
-    """Of walls and of runs, so that a doorway has the direction of its wall."""
+    """Of walls and of chains, so that a doorway has the direction of its wall."""
     index = index_of([*maze(2)[:12], [40.0, 0.0, 43.0, 0.0], [44.4, 0.0, 48.0, 0.0]])
-    ends = np.vstack([ends_of(index.walls), ends_of(index.runs)])
-    angles = np.concatenate([index.walls.rows["angle"], index.runs.rows["angle"]])
+    ends = np.vstack([ends_of(index.walls), ends_of(index.chains)])
+    angles = np.concatenate([index.walls.rows["angle"], index.chains.rows["angle"]])
     sectors = np.round((angles + math.pi) * SECTORS / math.tau).astype(int) % SECTORS
     for at in np.random.default_rng(0).uniform(-25.0, 25.0, (300, 2)):
         cell = cell_of(index.raster.shape, at)
@@ -119,7 +118,7 @@ def test_raster_has_the_directions_of_what_is_near() -> None:
 
 
 def test_directions_are_sorted_longest_first() -> None:
-    for walls in (index_of(maze(5)).walls, MAZE_INDEX.runs):
+    for walls in (index_of(maze(5)).walls, MAZE_INDEX.chains):
         count = len(walls.bin_starts) - 1
         bins = np.minimum(np.floor((walls.rows["angle"] + math.pi) / math.tau * count), count - 1)  # pi is in the last
         for b in range(count):
@@ -148,19 +147,23 @@ def test_built_without_directions_it_is_its_own_undirected() -> None:
 
 
 def test_the_sweep_lists_the_sector_of_every_run() -> None:
-    runs, sectors = np.divmod(MAZE_INDEX.sweep.sectors.items, SECTORS)
-    off = (MAZE_INDEX.sweep.runs["angle"][runs] + math.pi - sectors * math.tau / SECTORS) % math.tau
-    assert set(runs) == set(range(len(MAZE_INDEX.runs.rows)))
+    chains, sectors = np.divmod(MAZE_INDEX.sweep.sectors.items, SECTORS)
+    off = (MAZE_INDEX.sweep.chains["angle"][chains] + math.pi - sectors * math.tau / SECTORS) % math.tau
+    assert set(chains) == set(range(len(MAZE_INDEX.chains.rows)))
     assert np.minimum(off, math.tau - off).max() <= math.pi / SECTORS + 1e-9
 
 
 def test_the_sweep_lists_runs_where_they_are() -> None:
     sweep = MAZE_INDEX.sweep
-    starts, shape, ends = sweep.sectors.starts, sweep.sectors.shape, ends_of(MAZE_INDEX.runs._replace(rows=sweep.runs))
-    runs = sweep.sectors.items // SECTORS
+    starts, shape, ends = (
+        sweep.sectors.starts,
+        sweep.sectors.shape,
+        ends_of(MAZE_INDEX.chains._replace(rows=sweep.chains)),
+    )
+    chains = sweep.sectors.items // SECTORS
     cells = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-    for cell, run in zip(cells[::3].tolist(), runs[::3].tolist(), strict=True):
-        assert distance_to_cell(ends[run], cell, shape) < 0.1
+    for cell, chain in zip(cells[::3].tolist(), chains[::3].tolist(), strict=True):
+        assert distance_to_cell(ends[chain], cell, shape) < 0.1
     for cell, present in enumerate(sweep.present.tolist()):
         there = set((sweep.sectors.items[starts[cell] : starts[cell + 1]] % SECTORS).tolist())
         assert {s for s in range(SECTORS) if present >> s & 1} == there
@@ -170,9 +173,9 @@ def test_runs_that_are_near_one_another_are_numbered_together() -> None:
     """What is swept one after the other is then read from one place."""
     corners = np.random.default_rng(0).uniform(0.0, 300.0, (400, 2))
     index = index_of(np.hstack([corners, corners + np.array([3.0, 0.0])]))
-    assert sorted(index.sweep.runs.tolist()) == sorted(index.runs.rows.tolist())
-    np.testing.assert_array_equal(index.sweep.lengths, index.sweep.runs["end"] - index.sweep.runs["begin"])
-    middles = ends_of(index.runs._replace(rows=index.sweep.runs)).reshape(-1, 2, 2).mean(axis=1)
+    assert sorted(index.sweep.chains.tolist()) == sorted(index.chains.rows.tolist())
+    np.testing.assert_array_equal(index.sweep.lengths, index.sweep.chains["end"] - index.sweep.chains["begin"])
+    middles = ends_of(index.chains._replace(rows=index.sweep.chains)).reshape(-1, 2, 2).mean(axis=1)
     squares = [tuple(square) for square in np.round(middles / NEIGHBOURHOOD).tolist()]
     assert len([*itertools.groupby(squares)]) == len(set(squares)) > 20
 

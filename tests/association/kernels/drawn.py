@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from hypothesis import strategies as st
 
-from association import AssociationOptions, MapIndex
+from association import AssociationOptions, HardPrior, MapIndex, Prior, SoftPrior
 from association.layout import Indices
 from association.scan.scan_lines import gates
 from association.tables import Workspace
@@ -95,3 +95,16 @@ def oblique(rng: np.random.Generator) -> MapIndex:
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
     x, y = np.moveaxis(ends - middles, -1, 0)
     return index_of((middles + np.stack([c * x - s * y, s * x + c * y], axis=-1)).reshape(-1, 4))
+
+
+def prior_record(prior: Prior | None) -> Records:
+    """Return a prior of the index frame as a record; the index lies about its own origin."""
+    if prior is None:
+        return context_of(INDEX, scan_of(np.zeros((0, 4)))).prior_record
+    x, y = INDEX.origin
+    there = RigidTransform(prior.pose.x + x, prior.pose.y + y, prior.pose.theta)
+    if isinstance(prior, HardPrior):
+        given: Prior = HardPrior(there, prior.radius, prior.angle)
+    else:
+        given = SoftPrior(there, prior.covariance)
+    return context_of(INDEX, scan_of(np.zeros((0, 4))), given).prior_record

@@ -7,20 +7,32 @@ import math
 import numpy as np
 
 from association.index.grids import listed
-from association.layout import CROSSING, FIGURE, LISTED, RULES, record
-from association.search.kernels import planning
-from association.search.kernels.looking_up import look_up
+from association.layout import CROSSING, FIGURE, FOUND, RULES, record
+from association.search.kernels import bases as planning
+from association.search.kernels.lookup import look_up
 from association.search.kernels.sweeping import measure
-from association.search.planning_tables import Costs, Plan, Samples
+from association.search.layout import BEST, LISTED, STATISTICS
+from association.search.tables import Costs, Plan, Samples, SearchState
+from association.search.tuning import MOST_LISTS, REUSE
 from association.tables import Crossings, Walls
-from association.tuning import MOST_LISTS, REUSE
 from registration.layout import Records
 
 from .drawn import ASKED, GATES, INDEX
 
-NOT_LISTED = listed(INDEX.sweep.runs, np.zeros(0, CROSSING), -1.0)  # so that every base is swept
+NOT_LISTED = listed(INDEX.sweep.chains, np.zeros(0, CROSSING), -1.0)  # so that every base is swept
 
 RULE = record(RULES, kept_share=0.65, distinct_distance=0.3, distinct_angle=0.1, rival_share=0.95, enough=np.inf)
+
+
+def state_of(stored: int = 20_000, best_value: float = 0.0) -> SearchState:
+    """Return the state of a search that has just begun, with room for so many poses."""
+    statistics = record(STATISTICS, missed=1.0)
+    return SearchState(np.zeros(stored, FOUND), record(BEST, best_value=best_value), statistics, np.zeros(1, np.uint8))
+
+
+def stored_in(state: SearchState) -> Records:
+    """Return the best poses of a search so far."""
+    return state.poses[: int(state.best["count"][0])]
 
 
 def sampled(n: int, count: int, rng: np.random.Generator) -> Samples:
@@ -31,12 +43,12 @@ def sampled(n: int, count: int, rng: np.random.Generator) -> Samples:
 
 
 def plan_of(
-    scan: Records, n: int, runs: Walls, area: float, *, crossings: Crossings = NOT_LISTED, by_chance: bool = False
+    scan: Records, n: int, chains: Walls, area: float, *, crossings: Crossings = NOT_LISTED, by_chance: bool = False
 ) -> Plan:
     """Return the plan of a search with bases of the first n segments, none of them weighed yet."""
     return Plan(
         bases=planning.pair_up(scan, n),
-        costs=costs_of(n, runs, area, crossings),
+        costs=costs_of(n, chains, area, crossings),
         uses=np.zeros(n),
         residual=scan["gain"].copy(),
         best_gains=-np.sort(-scan["gain"][:n]),
@@ -47,15 +59,15 @@ def plan_of(
     )
 
 
-def costs_of(count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Costs:
+def costs_of(count: int, chains: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Costs:
     """Return what the bases of the first `count` segments of a scan cost."""
-    return planning.costs_of(count, runs, area, crossings)
+    return planning.costs_of(count, chains, area, crossings)
 
 
-def bases_of(scan: Records, count: int, runs: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Records:
+def bases_of(scan: Records, count: int, chains: Walls, area: float, crossings: Crossings = NOT_LISTED) -> Records:
     """Return the bases of the first `count` segments of a scan, all of them weighed."""
     bases, question = planning.pair_up(scan, count), ASKED._replace(scan=scan)
-    planning.weigh_all(question, bases, costs_of(count, runs, area, crossings), np.zeros(len(bases)))
+    planning.weigh_all(question, bases, costs_of(count, chains, area, crossings), np.zeros(len(bases)))
     return bases
 
 

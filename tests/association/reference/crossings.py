@@ -1,4 +1,4 @@
-"""Twins of the kernels that list where runs cross."""
+"""Twins of the kernels that list where chains cross."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import math
 
 import numpy as np
 
-from association.tuning import CROSSING_ANGLES, CROSSING_CELL, MIN_CROSSING
+from association.index.tuning import CROSSING_CELL
+from association.tuning import CROSSING_ANGLES, MIN_CROSSING
 from registration.layout import Floats, Record, Records
 
 from .geometry import direction, normal
 
-Rectangle = tuple[float, float, float, float]  # begin and end of a run, begin and end of another
+Rectangle = tuple[float, float, float, float]  # begin and end of a chain, begin and end of another
 
 
 def extents(a: Record, b: Record) -> Rectangle:
-    """Return where two runs begin and end, counted along each from where their lines cross."""
+    """Return where two chains begin and end, counted along each from where their lines cross."""
     point = np.linalg.solve(np.array((normal(a), normal(b))), [a["offset"], b["offset"]])
     on_a, on_b = direction(a) @ point, direction(b) @ point
     return a["begin"] - on_a, a["end"] - on_a, b["begin"] - on_b, b["end"] - on_b
@@ -30,17 +31,17 @@ def reach_to(a: Record, b: Record) -> float:
     return float(max(first, -last, bottom, -top))
 
 
-def crossings_of(runs: Records, reach: float) -> set[tuple[int, int]]:
+def crossings_of(chains: Records, reach: float) -> set[tuple[int, int]]:
     """Return all pairs that cross within reach, the second to the left of the first."""
     return {
         (p, q)
-        for p, q in itertools.permutations(range(len(runs)), 2)
-        if normal(runs[p]) @ direction(runs[q]) > 0.0 and reach_to(runs[p], runs[q]) <= reach
+        for p, q in itertools.permutations(range(len(chains)), 2)
+        if normal(chains[p]) @ direction(chains[q]) > 0.0 and reach_to(chains[p], chains[q]) <= reach
     }
 
 
 def angle_bin(a: Record, b: Record) -> int:
-    """Return the bin of the angle from one run to another on its left."""
+    """Return the bin of the angle from one chain to another on its left."""
     return int(math.acos(direction(a) @ direction(b)) / math.pi * CROSSING_ANGLES)
 
 
@@ -51,10 +52,10 @@ def cells_of(rectangle: Rectangle, reach: float) -> list[tuple[int, int]]:
     return list(itertools.product(range(first, last + 1), range(bottom, top + 1)))
 
 
-def counts_of(runs: Records, reach: float) -> Floats:
+def counts_of(chains: Records, reach: float) -> Floats:
     """Return how many crossings there are, and entries in all lists."""
-    found = crossings_of(runs, reach)
-    return np.array([len(found), sum(len(cells_of(extents(runs[p], runs[q]), reach)) for p, q in found)])
+    found = crossings_of(chains, reach)
+    return np.array([len(found), sum(len(cells_of(extents(chains[p], chains[q]), reach)) for p, q in found)])
 
 
 def extents_of_segments(a: Record, b: Record) -> tuple[float, float]:

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from association.tables import Walls
-from association.tuning import (
+from association.search.tuning import (
     BASE_SEGMENTS,
     COST_ANCHOR,
     COST_BASE,
@@ -24,6 +23,7 @@ from association.tuning import (
     TIMES_BETTER,
     UNTELLING,
 )
+from association.tables import Walls
 from registration.layout import Floats, Record, Records
 
 from .geometry import point
@@ -32,14 +32,14 @@ from .proposing import end_slack
 Base = tuple[int, int, float]  # sliding, crossing, merit
 
 
-def slack_tables(scan: Records, count: int, runs: Walls) -> tuple[Floats, Floats]:
-    """Look at every run of every bin."""
-    bins = len(runs.bin_starts) - 1
+def slack_tables(scan: Records, count: int, chains: Walls) -> tuple[Floats, Floats]:
+    """Look at every chain of every bin."""
+    bins = len(chains.bin_starts) - 1
     slides, fitting = np.zeros((count, bins)), np.zeros(count)
     for i in range(count):
         need = scan[i]["length"] - 2.0 * end_slack(scan[i]["length"])
         for b in range(bins):
-            lengths = runs.longest[runs.bin_starts[b] : runs.bin_starts[b + 1]]
+            lengths = chains.longest[chains.bin_starts[b] : chains.bin_starts[b + 1]]
             enough = lengths[lengths >= need]
             slides[i, b] = (enough - max(0.0, need)).sum()
             fitting[i] += len(enough)
@@ -54,9 +54,9 @@ def is_telling(scan: Records, a: int, b: int) -> bool:
     return bool(math.sqrt(np.average(squares, weights=scan["gain"])) <= TELLING)
 
 
-def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> list[Base]:
+def plan_bases(scan: Records, count: int, chains: Walls, area: float) -> list[Base]:
     """Weigh every pair by what it tells and what it will cost."""
-    slides, fitting = slack_tables(scan, count, runs)
+    slides, fitting = slack_tables(scan, count, chains)
     bins = slides.shape[1]
     sweeps = COST_ANCHOR * fitting + COST_SLIDE * slides.sum(axis=1)
     bases = []
@@ -67,7 +67,7 @@ def plan_bases(scan: Records, count: int, runs: Walls, area: float) -> list[Base
             if sine < MIN_CROSSING_BASE or (j >= BASE_SEGMENTS and not is_telling(scan, i, j)):
                 continue
             shift = round(turn * bins / math.tau)
-            # The runs under j have the turned direction, up to a neighbouring bin.
+            # The chains under j have the turned direction, up to a neighbouring bin.
             expected = sum(slides[i] @ np.roll(slides[j], -shift - k) for k in (-1, 0, 1)) / area
             shorter = min(scan[i]["length"], scan[j]["length"]) + SHORT_LENGTH
             expected *= HYPOTHESIS_SCALE * sine**SINE_POWER * shorter**SHORT_POWER

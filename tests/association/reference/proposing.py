@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from association import HardPrior
-from association.tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, WINDOW_MARGIN, WINDOW_TURN
+from association.search.tuning import WINDOW_MARGIN, WINDOW_TURN
+from association.tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 
@@ -58,15 +59,15 @@ def lies_within(segment: Record, middle: Floats, wall: Record) -> bool:
     return bool(wall["begin"] <= along - half and along + half <= wall["end"])
 
 
-def placements(scan: Records, a: int, b: int, runs: Records, gates: Records) -> list[Proposal]:
-    """Lay segments a and b of the scan on all pairs of runs."""
+def placements(scan: Records, a: int, b: int, chains: Records, gates: Records) -> list[Proposal]:
+    """Lay segments a and b of the scan on all pairs of chains."""
     gate, found = gates[0], []
     va, vb = float(scan[a]["angle_variance"]), float(scan[b]["angle_variance"])
     tolerance = float(np.clip(gate["sigmas"] * math.sqrt(va + vb), gate["least_angle"], gate["greatest_angle"]))
     pin = 0.5 * (point(scan[a]) + point(scan[b]))
-    for wa in runs:
+    for wa in chains:
         lever = rotation(float(wa["angle"] - scan[a]["angle"])) @ pin
-        for wb in runs:
+        for wb in chains:
             gap = float(wb["angle"] - wa["angle"] - scan[b]["angle"] + scan[a]["angle"])
             crossing = abs(normal(wa) @ direction(wb))
             if math.cos(gap) >= 1.0 - 0.5 * tolerance**2 and crossing >= MIN_CROSSING:
@@ -76,18 +77,18 @@ def placements(scan: Records, a: int, b: int, runs: Records, gates: Records) -> 
     return found
 
 
-def slides(segment: Record, runs: Records, spacing: float, window: HardPrior | None = None) -> list[Proposal]:
-    """Lay a segment on every run that is long enough, at evenly spread places at most `spacing` apart.
+def slides(segment: Record, chains: Records, spacing: float, window: HardPrior | None = None) -> list[Proposal]:
+    """Lay a segment on every chain that is long enough, at evenly spread places at most `spacing` apart.
 
-    With a window those within its radius of where its middle lies along the run.
+    With a window those within its radius of where its middle lies along the chain.
     """
     found = []
-    for run in runs:
-        low, high = run["begin"] + half_length(segment), run["end"] - half_length(segment)
-        theta = float(run["angle"] - segment["angle"])
+    for chain in chains:
+        low, high = chain["begin"] + half_length(segment), chain["end"] - half_length(segment)
+        theta = float(chain["angle"] - segment["angle"])
         lever = rotation(theta) @ point(segment)
         if window is not None:
-            middle = direction(run) @ (translation(window.pose) + lever)
+            middle = direction(chain) @ (translation(window.pose) + lever)
             low, high = max(low, middle - window.radius), min(high, middle + window.radius)
             if abs(wrap(theta - window.pose.theta)) > window.angle + WINDOW_TURN:
                 continue
@@ -95,7 +96,7 @@ def slides(segment: Record, runs: Records, spacing: float, window: HardPrior | N
             continue
         steps = max(1, math.ceil((high - low) / spacing))
         for along in low + (np.arange(steps) + 0.5) / steps * (high - low):
-            x, y = along * direction(run) + run["offset"] * normal(run) - lever
+            x, y = along * direction(chain) + chain["offset"] * normal(chain) - lever
             covariance = turning(float(segment["angle_variance"]), lever)
             found.append(Proposal(RigidTransform(float(x), float(y), theta), covariance))
     return found

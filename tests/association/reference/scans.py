@@ -8,17 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from association.layout import LINE_PARTS, SCAN_LINE
-from association.tuning import (
-    GAIN,
-    GAIN_LENGTH,
-    GAIN_PER_METRE,
-    LEAST_SPREAD,
-    LEAST_VARIANCE,
-    LINE_GAP,
-    MODEL_ANGLE,
-    MODEL_OFFSET,
-    ROUGHNESS,
-)
+from association.scan.tuning import LEAST_SPREAD, LEAST_VARIANCE, LINE_GAP
+from association.tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import LEAST_POINTS, Floats, Record, Records
 

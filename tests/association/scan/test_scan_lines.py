@@ -10,14 +10,13 @@ import pytest
 
 from association import MapIndex, Scan, View, assemble
 from association.scan.scan_lines import ScanLines, parts_of
+from association.scan.tuning import COMMON_ERROR, GATE_SIGMAS
 from association.tuning import (
-    COMMON_ERROR,
     FREE_ANGLE,
     FREE_DISTANCE,
     GAIN,
     GAIN_LENGTH,
     GAIN_PER_METRE,
-    GATE_SIGMAS,
     MODEL_ANGLE,
     MODEL_OFFSET,
     ROUGHNESS,

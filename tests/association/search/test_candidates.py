@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,17 +13,10 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, SearchReport
-from association.search.candidates import Begun, Candidates, Effort, find_candidates
-from association.search.kernels.planning import pair_up
-from association.tuning import (
-    BASE_SEGMENTS,
-    KEPT_SHARE,
-    KEPT_SHARE_FOR_BEAMS,
-    REUSE,
-    RIVAL_SHARE,
-    ROUNDS,
-    TELLING_SEGMENTS,
-)
+from association.search.candidates import Candidates, find_candidates
+from association.search.kernels.bases import pair_up
+from association.search.tuning import BASE_SEGMENTS, KEPT_SHARE, KEPT_SHARE_FOR_BEAMS, REUSE, TELLING_SEGMENTS
+from association.tuning import RIVAL_SHARE, ROUNDS
 from registration import RigidTransform
 from registration.layout import Records
 
@@ -49,19 +43,6 @@ ROOM_SCAN = scan_of(seen(ROOM, INSIDE)[0])
 MAZE_INDEX = index_of(maze(1))
 MAZE_SCAN = scan_of(seen(maze(1), pose(15.0, 14.0, 0.5), noise=0.02, cut=0.4, clutter=4, radius=8.0)[0])
 CAMPUS = index_of(np.vstack([equal_rooms(10) + np.tile([0.0, 12.0 * k], 2) for k in range(10)]))
-
-
-class EndsAfter(Deadline):
-    """A deadline that passes when it has been looked at a number of times."""
-
-    def __init__(self, looks: int) -> None:
-        super().__init__()
-        self.looks, self.looked = looks, 0
-
-    @property
-    def passed(self) -> bool:
-        self.looked += 1
-        return self.looked > self.looks
 
 
 @dataclass(frozen=True)
@@ -172,11 +153,11 @@ BASE = ["sliding", "crossing", "merit"]
 
 def bases_in(index: MapIndex, scan: Scan) -> list[planning.Base]:
     rows = context_of(index, scan).lines.rows
-    bases: list[planning.Base] = bases_of(rows, len(rows), index.runs, index.area, index.crossings)[BASE].tolist()
+    bases: list[planning.Base] = bases_of(rows, len(rows), index.chains, index.area, index.crossings)[BASE].tolist()
     return bases
 
 
-def test_an_exhaustive_search_goes_through_all_bases() -> None:
+def test_an_exhaustive_search_searches_all_bases() -> None:
     scan = scan_of(seen(maze(1), pose(15.0, 14.0, 0.5), noise=0.02, cut=0.2, clutter=4, radius=10.0)[0])
     count = len(bases_in(MAZE_INDEX, scan))
     whole = found(MAZE_INDEX, scan, exhaustive=True).report
@@ -304,35 +285,29 @@ def test_a_search_of_a_window_is_as_sure_as_the_less_sure_one() -> None:
     assert (exhaustive.exhaustive, exhaustive.confidence) == (True, 1.0)
 
 
-def interrupted(after: int, prior: HardPrior | None = None) -> tuple[SearchReport, int]:
-    """Search a campus through and through, up to some looks at the clock; return also how many there were."""
-    clock = EndsAfter(after)
-    return found(CAMPUS, ROOM_SCAN, prior=prior, deadline=clock, exhaustive=True).report, clock.looked
+def deadlines() -> Iterator[Deadline]:
+    """Yield deadlines that are ever later, until the search is complete in one."""
+    milliseconds = itertools.accumulate(itertools.count(0))
+    return (Deadline(time.monotonic() + 1e-3 * ms) for ms in milliseconds)
 
 
-def test_a_stopped_search_says_so() -> None:
-    _, whole = interrupted(10**6)
-    assert whole > 3
-    reports = [interrupted(after)[0] for after in range(whole + 1)]
-    assert [report.complete for report in reports] == [False] * whole + [True]
+@pytest.mark.parametrize("prior", [None, HardPrior(pose(3.2, 2.5, 0.7), 0.5, 0.3)])
+def test_a_stopped_search_says_so(prior: HardPrior | None) -> None:
+    """Wherever the deadline ends it: a search of a window comes first, and is complete when both are."""
+    whole, reports = found(CAMPUS, ROOM_SCAN, prior=prior, exhaustive=True), []
+    for deadline in deadlines():
+        candidates = found(CAMPUS, ROOM_SCAN, prior=prior, exhaustive=True, deadline=deadline)
+        reports.append(candidates.report)
+        if candidates.report.complete:
+            break
+        assert not candidates.report.exhaustive
+        assert candidates.report.complete_above == 1.0
+        assert candidates.report.hypotheses <= whole.report.hypotheses
+        assert (np.diff(candidates.poses["value"]) <= 0.0).all() or prior is not None
     assert (reports[0].bases, reports[0].hypotheses, reports[0].confidence) == (0, 0, 0.0)
-    for one, other in itertools.pairwise(reports):
-        assert one.hypotheses <= other.hypotheses
-    assert [report.exhaustive for report in reports] == [False] * whole + [True]
-    assert sum(report.bases == reports[-1].bases for report in reports) > 1, (
-        "parallel walls are looked at after all bases"
-    )
-    assert [report.complete_above for report in reports] == [1.0] * whole + [RIVAL_SHARE]
-
-
-def test_a_search_of_a_window_is_complete_when_both_are() -> None:
-    """The search of the window comes first: it may be done when the deadline passes, and the whole map is not."""
-    window = HardPrior(pose(3.2, 2.5, 0.7), 0.5, 0.3)
-    (_, whole), (_, anywhere) = interrupted(10**6, window), interrupted(10**6)
-    for after in (0, whole - anywhere, whole - 1):
-        assert not interrupted(after, window)[0].complete, after
-    assert interrupted(whole - anywhere, window)[0].bases > 0, "that of the window was done"
-    assert interrupted(whole, window)[0].complete
+    assert reports[-1] == whole.report
+    assert (reports[-1].exhaustive, reports[-1].complete_above) == (True, RIVAL_SHARE)
+    np.testing.assert_array_equal(candidates.poses, whole.poses)
 
 
 def test_a_cancelled_search_raises() -> None:
@@ -353,14 +328,3 @@ def test_a_deadline_holds_where_walls_are_kilometres_long(seen_walls: list[list[
     report = found(index, scan_of(seen_walls), deadline=Deadline(at=time.monotonic() + 0.1)).report
     assert time.thread_time() - begun < 1.0
     assert not report.complete
-
-
-def test_the_clock_is_looked_at_after_fewer_poses_of_a_scan_of_many_segments() -> None:
-    """Each takes as many times longer as there are more lines than usual."""
-    budgets = []
-    for count in (20, 200, 2_000):
-        y = 3.0 * np.arange(count)
-        context = context_of(CAMPUS, scan_of(np.stack([0.0 * y, y, 2.0 + 0.0 * y, y + 1.0], axis=1)))
-        assert len(context.lines.rows) == count
-        budgets.append(int(Begun.of(context, Effort.of(context)).how["budget"][0]))
-    assert budgets[0] == budgets[1] == pytest.approx(10 * budgets[2], rel=1e-3)

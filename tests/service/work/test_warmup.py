@@ -100,21 +100,7 @@ def compiled_by_requests() -> list[str]:
             for body in bodies:
                 answer = client.post(path, json=body)
                 assert answer.status_code == 200, answer.text
-    search_long()
     return [name for name, count in signatures().items() if count != before.get(name, 0)]
-
-
-def search_long() -> None:
-    """Search many rooms for each pair of walls, to the end and with no time left."""
-    from association import AssociationOptions, Deadline, MapIndex, Scan, associate
-    from registration import MeasuredSegments, Segments
-
-    shifts = [(9.0 * column, 7.0 * row) * 2 for row in range(9) for column in range(9)]
-    rooms = [[value + by for value, by in zip(wall, shift, strict=True)] for shift in shifts for wall in WALLS]
-    index = MapIndex.build(Segments.from_array(rooms))
-    scan = Scan(MeasuredSegments.from_segments(Segments.from_array(WALLS)))
-    for at in (None, 0.0):
-        associate(index, scan, None, AssociationOptions(exhaustive=True), Deadline(at))
 
 
 def signatures() -> dict[str, int]:

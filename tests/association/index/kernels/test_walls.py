@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 
 from association.index.kernels import walls
-from association.index.walls import collinear_groups
+from association.index.tuning import CHAIN_GAP, MOST_LOOKS
+from association.index.walls import collinear_groups, join_gates
 from association.layout import ENDS, GRID_SHAPE, POINT, as_records, record
-from association.tuning import MOST_LOOKS, RUN_GAP
 from registration import Segments
 from registration.layout import Floats, Records
 
@@ -25,7 +25,8 @@ SHAPE = record(GRID_SHAPE, x0=-7.3, y0=-9.1, cell=1.7, columns=27, rows=29)  # h
 
 def labels_of(ends: Floats, gap: float, lateral: float, angle: float) -> list[int]:
     directions = as_records(POINT, Segments.from_array(ends).directions)
-    return collinear_groups(as_records(ENDS, ends), directions, gap, lateral, math.cos(angle)).tolist()
+    gates = join_gates(gap, lateral)._replace(least_cosine=math.cos(angle))
+    return collinear_groups(as_records(ENDS, ends), directions, gates, None).tolist()
 
 
 def continued(rng: np.random.Generator) -> Floats:
@@ -80,7 +81,7 @@ def test_a_wall_is_merged_however_many_others_are_about() -> None:
     begins, angles = rng.uniform(0.0, 6.0, (900, 2)), rng.uniform(0.5, 2.5, 900)
     others = np.hstack([begins, begins + np.stack([np.cos(angles), np.sin(angles)], axis=1)])
     for ends in (np.vstack([chain, others]), np.vstack([others, chain])):
-        labels = np.array(labels_of(ends, RUN_GAP, 0.03, 0.035))
+        labels = np.array(labels_of(ends, CHAIN_GAP, 0.03, 0.035))
         assert len(set(labels[(ends[:, 1] == 3.0) & (ends[:, 3] == 3.0)])) == 1
 
 
@@ -104,7 +105,7 @@ def test_one_piece_is_compared_with_so_many() -> None:
 
 
 def test_no_pieces() -> None:
-    assert collinear_groups(np.zeros(0, ENDS), np.zeros(0, POINT), 0.3, 0.03, 0.9).tolist() == []
+    assert collinear_groups(np.zeros(0, ENDS), np.zeros(0, POINT), join_gates(0.3, 0.03), None).tolist() == []
 
 
 def turned_maze(seed: int) -> Floats:

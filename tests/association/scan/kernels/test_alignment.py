@@ -9,16 +9,8 @@ from hypothesis import given, settings
 
 from association.layout import LINE_PARTS, POINT, as_records
 from association.scan.kernels.alignment import pair_lines
-from association.tuning import (
-    ALIGNED_VIEWS,
-    GATE_SIGMAS,
-    LEAST_ALIGNED,
-    MODEL_ANGLE,
-    MOST_APART,
-    MOST_TURNED,
-    ROUGHNESS,
-    SAME_LINE,
-)
+from association.scan.tuning import ALIGNED_VIEWS, GATE_SIGMAS, LEAST_ALIGNED, MOST_APART, MOST_TURNED, SAME_LINE
+from association.tuning import MODEL_ANGLE, ROUGHNESS
 from registration.layout import Floats, Record, Records
 
 from ...kernels.drawn import SEEDS

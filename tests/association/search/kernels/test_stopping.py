@@ -76,10 +76,10 @@ def test_fewest_segments(seed: int) -> None:
     assert stopping.fewest_segments(gains, beyond, needed) == twin.fewest_segments(gains.tolist(), beyond, needed)
 
 
-def test_drawn_chance() -> None:
+def test_drawn_probability() -> None:
     for count in range(8):
         for fewest in range(2, max(3, count + 1)):
-            assert stopping.drawn_chance(fewest, count) == pytest.approx(twin.drawn_chance(fewest, count))
+            assert stopping.drawn_probability(fewest, count) == pytest.approx(twin.drawn_chance(fewest, count))
 
 
 @given(SEEDS)

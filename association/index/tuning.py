@@ -1,0 +1,68 @@
+"""Thresholds of the map index, with unit and origin.
+
+Origins: *geometry* follows from what the number means; *tables* was chosen by the tables of `docs/dev/search.md` on
+floor plans and logs, and little changes near it; *measured* is a fit or a timing; *rounding* keeps arithmetic sound.
+"""
+
+import math
+
+# --- Walls ------------------------------------------------------------------------------------------------------------
+
+MAX_EXTENT = 1e5  # m; the contract
+MAX_MAP_SIGMA = 10.0  # m; the contract
+# Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
+ONE_LINE = 1e-4  # m, rounding
+LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is said to be exact
+ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
+# Walls that continue one another with a small step are put on a common line: the larger the step, the less, and from
+# here on not at all.
+BLENDED_STEP = 0.045  # m, tables; of a map without a declared deviation
+BLENDED_SIGMAS = 4.0  # geometry; otherwise, up to the same
+BLENDED_WALLS = 16  # on either side, measured
+LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over what is open between them
+TIE_FREE = 30.0  # minus the log of a correlation that is none
+TIES_BEFORE = 6  # walls before it that one is tied to at most, measured
+
+# --- Wall chains: lines through walls that nearly continue one another, also across doorways --------------------------
+
+MERGE_GAP = 0.3  # m, geometry: a doorway is wider, the joint between two pieces of one wall is not
+CHAIN_GAP = 1.5  # m, geometry: a base segment may bridge a doorway
+MERGE_LATERAL = 0.03  # m, tables
+MERGE_ANGLE = math.radians(2.0)  # tables
+
+# --- Search for pieces that continue one another ----------------------------------------------------------------------
+
+BEGIN_CELL = 1.0  # m, by which begins of pieces are found, at least; measured: little changes near it
+MOST_STEPS = 100  # places along one piece around which others are looked for; geometry: 190 m of wall
+MOST_LOOKS = 600  # begins that one piece is compared with; measured: no fewer walls are found on 443 maps of buildings
+PIECES_A_LOOK = 4_000  # pieces that are compared between two looks at a deadline: 0.2 s where each takes the most
+
+# --- Grids ------------------------------------------------------------------------------------------------------------
+
+CELL = 1.0  # m, tables
+SWEEP_CELL = 2.0  # m, tables
+SWEEP_REACH = 0.02  # m, rounding
+RASTER_CELL = 0.5  # m, tables
+NEIGHBOURHOOD = 64.0  # m, squares of which the chains are numbered together; measured: 8 to 128 are as good
+MAX_CELLS = 4_000_000  # memory: some 50 MB
+MAX_SWEEP_CELLS = 1_000_000  # memory
+MAX_ENTRIES = 10_000_000  # memory; of all lists of a grid together, about
+CELL_GROWTH = 1.25  # by which cells grow until their lists fit
+
+# --- Crossings --------------------------------------------------------------------------------------------------------
+
+# Pairs of chains that cross are listed up to as far from there as one of these, as three numbers allow: pairs, their
+# entries in all lists, and pairs of chains that are near enough to be compared.
+CROSSING_REACHES = (64.0, 48.0, 32.0, 24.0, 16.0, 12.0, 8.0, 6.0, 4.0)  # m; each has about half the entries of the last
+CROSSING_CELL = 2.0  # m, tables
+CROSSING_BAND = 16.0  # m; height of the bands of chains among which crossings are searched
+MOST_BANDS = 200  # about
+# Tables: half of the first two take a seventh longer at 20,000 segments; twice as many take a twelfth less, for 2.3
+# times the memory. The third is some 10 us of indexing a chain.
+CROSSINGS_A_CHAIN = (80, 500, 4_000)
+# Memory, of 12 bytes each: 54 MB of entries, and 24 MB of pairs while indexing, with room for a fifth more; and 1 to
+# 1.5 s of indexing. They are compared with estimates: twice as many pairs and looks are let pass.
+MOST_CROSSINGS = (2_000_000, 4_500_000, 500_000_000)
+FEW_CHAINS = 500  # at least so many chains count; tables: in a room all pairs are listed
+CROSSING_SAMPLE = 128  # chains by which these numbers are estimated; measured: to a fifth, by 32 to a third;
+CROSSING_SAMPLE_LOOKS = 4_000_000  # with so many looks at most: some 30 ms
