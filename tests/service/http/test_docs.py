@@ -106,7 +106,7 @@ def test_every_code_is_described() -> None:
 
 
 def test_every_finding_of_a_check_is_described() -> None:
-    source = "".join(path.read_text() for path in (ROOT / "association" / "checking").glob("*.py"))
+    source = "".join(path.read_text() for path in (ROOT / "map_quality" / "check").glob("*.py"))
     codes = set(re.findall(r'Finding\(\s*"(\w+)"', source))
     assert len(codes) >= 13
     assert {code for code in codes if f"| `{code}` |" not in HTTP["check"]} == set()
