@@ -11,7 +11,7 @@ from .explain import explain
 from .index.map_index import MapIndex
 from .last_view import search_last_view
 from .options import AssociationOptions, Prior
-from .report import report
+from .report import report, with_causes
 from .result import AssociationResult
 from .scan.scan import Scan
 from .search.candidates import find_candidates
@@ -67,5 +67,5 @@ def associate(
     if last.result is not None:
         return last.result
     verdict = verdict if last.complete else verdict.cut_short()
-    causes = find_causes(context, found.explanations, verdict, began)
-    return report(found.context, found.explanations, verdict, causes, found.factor)
+    result = report(found.context, found.explanations, verdict, found.factor)
+    return with_causes(result, find_causes(context, found.explanations, verdict, began))

@@ -31,22 +31,26 @@ from .result import (
 from .to_scale import Factor
 from .tuning import HINGES
 from .verdict.verdict import Verdict
-from .warnings import warnings_of
+from .warnings import warnings_of, warnings_of_causes
 
 
 def report(
-    context: SearchContext,
-    explanations: Explanations,
-    verdict: Verdict,
-    causes: Sequence[Cause] = (),
-    factor: Factor | None = None,
+    context: SearchContext, explanations: Explanations, verdict: Verdict, factor: Factor | None = None
 ) -> AssociationResult:
-    """Put an answer together; `factor` is what the scan was put to scale by."""
+    """Put an answer together; `factor` is what the scan was put to scale by.
+
+    Where the deadline passes before it is put together, the answer is not complete, and so not usable.
+    """
+    answer = None if verdict.status is Status.NO_MATCH else explanations.answer
+    others = explanations.ranked if answer is None else explanations.others
+    alternatives = _alternatives(context, explanations, others, usable=verdict.usable)
+    missing = () if answer is None else _missing_map(context, answer)
+    if context.deadline.passed:
+        verdict = verdict.cut_short()
     if not verdict.complete:
         explanations = replace(explanations, search=explanations.search.cut_short())
-    answer = explanations.answer
-    if answer is None or verdict.status is Status.NO_MATCH:
-        return _no_match(context, explanations, verdict, causes)
+    if answer is None:
+        return _no_match(context, explanations, verdict, alternatives)
     degenerate, parts = verdict.status is Status.DEGENERATE, context.options.parts
     matched, on_map = set(answer.accepted.scan_indices), set(answer.accepted.map_indices(context.index))
     return AssociationResult(
@@ -58,13 +62,18 @@ def report(
         unobservable=answer.settled.direction if degenerate else None,
         correspondences=_correspondences(context, answer, verdict) if "correspondences" in parts else (),
         unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
-        missing_map=tuple(i for i in _missing_map(context, answer) if i not in on_map),
+        missing_map=tuple(i for i in missing if i not in on_map),
         diagnostics=_diagnostics(context, answer, verdict),
         reasons=verdict.reasons,
-        alternatives=_alternatives(context, explanations, explanations.others, usable=verdict.usable),
+        alternatives=alternatives,
         search=explanations.search,
-        warnings=warnings_of(context, explanations.search, verdict, causes, factor),
+        warnings=warnings_of(context, explanations.search, verdict, factor),
     )
+
+
+def with_causes(result: AssociationResult, causes: Sequence[Cause]) -> AssociationResult:
+    """Add a warning for each mistake of the caller that was found."""
+    return replace(result, warnings=(*result.warnings, *warnings_of_causes(causes))) if causes else result
 
 
 def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -> tuple[Correspondence, ...]:
@@ -76,7 +85,7 @@ def _correspondences(context: SearchContext, answer: Answer, verdict: Verdict) -
 
 
 def _no_match(
-    context: SearchContext, explanations: Explanations, verdict: Verdict, causes: Sequence[Cause]
+    context: SearchContext, explanations: Explanations, verdict: Verdict, alternatives: tuple[Alternative, ...]
 ) -> AssociationResult:
     return AssociationResult(
         status=Status.NO_MATCH,
@@ -90,9 +99,9 @@ def _no_match(
         missing_map=(),
         diagnostics=None,
         reasons=verdict.reasons,
-        alternatives=_alternatives(context, explanations, explanations.ranked, usable=False),
+        alternatives=alternatives,
         search=explanations.search,
-        warnings=warnings_of(context, explanations.search, verdict, causes),
+        warnings=warnings_of(context, explanations.search, verdict),
     )
 
 

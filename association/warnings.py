@@ -43,13 +43,9 @@ NOT_IN_ORDER = (
 
 
 def warnings_of(
-    context: SearchContext,
-    search: SearchReport,
-    verdict: Verdict,
-    causes: Sequence[Cause] = (),
-    factor: Factor | None = None,
+    context: SearchContext, search: SearchReport, verdict: Verdict, factor: Factor | None = None
 ) -> tuple[AssociationWarning, ...]:
-    """List the warnings about scan, search and map, then those about a sender's mistakes."""
+    """List the warnings about scan, search and map."""
     found = _of_scan(context) | {
         "prior_contradicted": "A clearly better pose lies where the prior excludes it. Check the prior, or search "
         "without it."
@@ -58,7 +54,12 @@ def warnings_of(
         "search_incomplete": None if search.complete else _incomplete(context),
         "map_scale": None if factor is None else _off_scale(factor),
     }
-    return _listed(found | {cause.mistake.code: _mistaken(cause) for cause in causes})
+    return _listed(found)
+
+
+def warnings_of_causes(causes: Sequence[Cause]) -> tuple[AssociationWarning, ...]:
+    """List the warnings about a sender's mistakes."""
+    return tuple(AssociationWarning(cause.mistake.code, _mistaken(cause)) for cause in causes)
 
 
 def warnings_of_scan(context: SearchContext) -> tuple[AssociationWarning, ...]:

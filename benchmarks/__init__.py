@@ -1,4 +1,4 @@
-"""Speed and quality: what the house can do, in figures, each beside its goal."""
+"""Speed and quality: the measured figures of Linefix, each with its goal."""
 
 import os
 

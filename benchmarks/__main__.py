@@ -1,9 +1,10 @@
-"""All figures beside their goals, quality and speed: ``python -m benchmarks [table ...]``."""
+"""All figures with their goals, quality and speed: ``python -m benchmarks [table ...]``."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 
 from . import vectorization
 from .adversarial import adversarial
@@ -11,6 +12,7 @@ from .analysis import analysis
 from .batch import batch
 from .drawn import SCANNER
 from .estimators import estimators
+from .figures import record
 from .growth import PAIRS, SIZES, growth
 from .imports import imports
 from .localization import localization
@@ -72,7 +74,7 @@ def _ranges(quick: int) -> list[Row]:
 
 def _analyze(quick: int) -> list[Row]:
     rows = analysis(quick)
-    print_rows("Analysis of maps beside the logs", rows)
+    print_rows("Analysis of maps next to the logs", rows)
     return rows
 
 
@@ -131,6 +133,9 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("tables", nargs="*", help=f"of {', '.join(TABLES)}, or all; by default {', '.join(DEFAULT)}")
+    parser.add_argument(
+        "--results", type=Path, metavar="FILE", help="write the rows into this file, such as benchmarks/results.json"
+    )
     parser.add_argument("--quick", type=int, default=1, metavar="N", help="take about one in N of everything")
     args = parser.parse_args()
     names = list(TABLES) if args.tables == ["all"] else args.tables or list(DEFAULT)
@@ -138,7 +143,13 @@ def main() -> None:
     if unknown or args.quick < 1:
         parser.error(f"no such table: {', '.join(unknown)}" if unknown else "--quick takes a number from 1 up")
     print(f"{machine()}; one thread; data: {DATA.name if data_found() else 'absent, drawn offices instead'}")
-    rows = [row for name in names for row in TABLES[name](args.quick)]
+    rows: list[Row] = []
+    for name in names:
+        found = TABLES[name](args.quick)
+        rows += found
+        if args.results is not None:
+            quick = "" if args.quick == 1 else f" --quick {args.quick}"
+            record(args.results, name, f"python -m benchmarks {name}{quick}", found)
     short = [row for row in rows if row.met is False]
     missed = [row for row in rows if row.aimed is False]
     print(f"\n{sum(row.met is True for row in rows)} goals met, {len(short)} short; {len(missed)} aims missed.")

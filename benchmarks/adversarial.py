@@ -82,7 +82,7 @@ MAPS: Mapping[str, Callable[[], Ends]] = {
 def adversarial(rounds: int) -> list[Row]:
     """Search each for many segments, without and with beams, under a deadline of a second; the best of some rounds.
 
-    What passes is measured: other work on the machine adds to it.
+    The elapsed time is measured: other work on the machine adds to it.
     """
     room = (ROOM.reshape(-1, 2) - INSIDE).reshape(-1, 4)
     associate(MapIndex.build(Segments.from_array(ROOM)), scan_of(room, with_beams=True))  # compiled

@@ -1,9 +1,9 @@
-"""Analyses of maps held against reality: usable where they say so, and not where not.
+"""Analyses of maps compared with real logs.
 
 ``python -m benchmarks analyze``
 
 At the pose of each real scan the virtual scanner takes one of its own in the map of the log. Reality has people,
-furniture that moved and walls that are on no map; the analysis knows of none of it.
+furniture that moved and walls that are on no map; the analysis includes none of it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SPACING = 1.0  # m; stands for nothing here
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What an analysis says of the place of a scan, None where it takes it for no free place, and what came of it."""
+    """The prediction of an analysis for the place of a scan (None: not a free place), and the real result."""
 
     log: str
     expected: bool | None
@@ -73,7 +73,7 @@ def analysis(stride: int) -> list[Row]:
     title = f"all logs: agreement, of all {len(found)} good scans"
     rows.append(at_least(title, mean(one.expected == one.usable for one in found), GOAL))
     always = mean(one.usable for one in found)
-    rows.append(at_least("  for comparison: whoever says usable of every place", always))
+    rows.append(at_least("  for comparison: an analysis that reports usable of every place", always))
     failed = [one for one in found if not one.usable]
     foretold = mean(one.expected is False for one in failed)
     rows.append(at_least(f"  of the {len(failed)} scans that were not usable: share of which it was said", foretold))

@@ -164,7 +164,7 @@ def difference(one: Any, other: Any) -> float:
 
 
 def answers() -> dict[str, Any]:
-    """Answer all requests; what they are called beside what was said."""
+    """Answer all requests; their names with their answers."""
     found: dict[str, Any] = {}
     for k, asked in enumerate(requests()):
         result = associate(asked.index, asked.scan, asked.prior, asked.options)

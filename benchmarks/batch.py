@@ -1,7 +1,8 @@
-"""Many logged scans at a time beside `associate` in a bare loop: ``python -m benchmarks batch``.
+"""Many logged scans at a time next to `associate` in a bare loop: ``python -m benchmarks batch``.
 
 Times are of one run, in which loop and workers take turns; what starting the workers takes is left out by the
-difference of a long and a short run. Processor time is told beside: other work on the machine does not count in it.
+difference of a long and a short run. Processor time is
+reported, too: other work on the machine does not count in it.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The chance that the best explanation is right is a logistic function of `associa
 explanations that are about as good. Scans of floor plans (three levels of clutter), of logs and of drawn worlds, as
 segments and with their raw ranges, and scans that were searched in the map of another building or of another part of
 it, where nothing is right: these count next to nothing for the one probability, which is about scans of this map, and
-fully for the cautious one, which an answer has to pass too before a robot goes by it. What is reported of an answer
+fully for the cautious one, which an answer has to pass too before a robot goes by it. The report of an answer
 comes from a fit without its building, its log or its world; the coefficients come from all of these. The drawn worlds
 that ``python -m benchmarks worlds`` reports on are never fitted on.
 
@@ -37,7 +37,7 @@ AWAY = (
     "unmapped", "other_type", "sister", "mirrored", "rough_unmapped", "rough_sister", "rough_mirrored",
 )  # fmt: skip
 KEPT = ("clean", "clutter_33", "clutter_66", "changed", "scaled_1", "walls_5cm", "rough")
-"""Conditions of drawn worlds that are shown by themselves: of strangers, and of scans in the map."""
+"""Conditions of drawn worlds that are shown by themselves: of out-of-map scans, and of scans in the map."""
 
 
 BEAMS = ("read", "passed", "root_farther", "root_nearer")
@@ -57,7 +57,7 @@ CAREFUL_WITH_BEAMS = (
     "root_farther", "root_nearer",
 )  # fmt: skip
 # Chosen likewise, each of the 45 pairs that promised most tried in both kinds, until none takes off 0.0003 more.
-# Without deviations and hinges: whether the scan is of this map is asked whatever direction is free.
+# Without deviations and critical walls: the map of the scan does not depend on free directions.
 PAIRS = (
     ("least", "+misfit", "+root_count"), ("most", "-longest_unmatched", "+misfit_of_many"),
     ("least", "-blocked", "-misfit_of_many"), ("most", "-null", "-root_length"), ("most", "+lead", "+root_length"),
@@ -98,7 +98,7 @@ def told_loss(probabilities: np.ndarray, examples: Sequence[Example], task: Task
 def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: Sequence[Example]) -> None:
     """Print for several thresholds of the cautious model the usable share by group and how many of those are wrong.
 
-    Of drawn strangers, the share that is usable although the scan shows that it is wrong.
+    Of drawn out-of-map scans, the share that is usable although the scan shows that it is wrong.
     """
     cells, kept = [], []
     for threshold in THRESHOLDS:
@@ -138,7 +138,7 @@ def print_changes(old: np.ndarray, new: np.ndarray, examples: Sequence[Example])
             ]
             row.append(f"{len(changed)} ({changed.count(False)} wrong)")
         cells.append(row)
-    print_table(f"Answers over {USABLE_CAUTIOUS:g}, beside the present model", ("", *GROUPS, DRAWN_STRANGERS), cells)
+    print_table(f"Answers over {USABLE_CAUTIOUS:g}, next to the present model", ("", *GROUPS, DRAWN_STRANGERS), cells)
 
 
 def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dict[str, Model]:
@@ -148,7 +148,7 @@ def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dic
     for temperature in TEMPERATURES:
         losses = [told_loss(cross_validated(examples, t, temperature), examples, t) for t in tasks]
         cells.append((f"{temperature:g}", *(f"{v:.4f}" for v in losses)))
-    print_table("Temperature of the twins, cross-validated log-loss", ("nats", *(t.name for t in tasks)), cells)
+    print_table("Temperature of similar places, cross-validated log-loss", ("nats", *(t.name for t in tasks)), cells)
     own = np.array([not e.stranger for e in examples])
     right = np.array([e.right for e in examples])
     tried = [cross_validated(examples, t, TWIN_TEMPERATURE) for t in tasks]

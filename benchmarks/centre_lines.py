@@ -41,7 +41,7 @@ class DrawnPlan:
     scans: tuple[PosedScan, ...]
 
     def imports(self) -> dict[str, LineMap]:
-        """Return the maps that come of its drawing, by what is said of it."""
+        """Return the maps from its drawing, by the options of the import."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "plan.dxf"
             write_map(LineMap(Segments.from_array(self.lines), oriented=False), path)

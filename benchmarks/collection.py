@@ -10,7 +10,7 @@ from association import MapIndex, Scan
 from registration import MeasuredSegments, RigidTransform, Segments
 
 LEVELS = ("scan", "scan_30", "scan_50")
-SIGMA = 0.02  # m, the noise of the drawn scans and what a caller who knows nothing sends
+SIGMA = 0.02  # m, the noise of the drawn scans and the default of a caller
 
 FLOOR_PLANS = ("apartments", "public_buildings", "campus_buildings")
 FOLDS = 5  # of the floor plans
@@ -35,7 +35,7 @@ class Query:
     segments : Segments
         In the sensor's frame.
     lead : float or None
-        By how much the truth leads every other pose in explained length; None where nobody worked it out.
+        By how much the truth leads every other pose in explained length; None if not computed.
     """
 
     family: str

@@ -6,7 +6,7 @@ these never go the wrong way either.
 More of what speaks for an answer must not make the verdict less sure of it. Free curves do so where few examples hold
 them, and what they win on the buildings that they were fitted on they lose on others.
 
-Left out of a fit are strangers that nobody could tell: where the scan reads what the map shows although it was taken
+Out-of-map scans that cannot be recognized are left out of a fit: the scan agrees with the map, although it was taken
 elsewhere. All that these would teach is to mistrust a scan that fits without fault.
 """
 
@@ -26,7 +26,7 @@ IN_FULL = (0.05, 0.95)  # quantiles of a feature between which it counts in a pa
 RIDGE = 3.0  # on slopes of standardised features, in units of one answer; cross-validated
 LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
-# A scan of a real plan or log is worth that many of drawn buildings, of which there are as many as one cares to draw.
+# A scan of a real plan or log counts as that many of drawn buildings, of which there are as many as one cares to draw.
 REAL = 3.0
 FOR = ("lead", "solitude", "share", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
 AGAINST = (
@@ -34,7 +34,7 @@ AGAINST = (
     "root_unmatched",
 )  # fmt: skip
 # These say as much of how far the walls are off as of the place: a rough map is no sign of being elsewhere. And
-# what is matched in all goes, beside the share that is, with what is not.
+# what is matched in all goes, next to the share that is, with what is not.
 EITHER = ("deviation", "misfit", "misfit_of_many", "hinge_moves", "hinge_deviation", "root_farther", "root_length")
 
 
@@ -68,7 +68,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model with the temperature of the twins, nats."""
+    """A model with the temperature of similar places, nats."""
 
     model: Model
     temperature: float
@@ -90,7 +90,7 @@ def _weights(examples: Sequence[Example], strangers: float) -> np.ndarray:
 
 
 def tellable(examples: Sequence[Example]) -> list[Example]:
-    """Return the answers but those of strangers that nobody could tell."""
+    """Return the answers without those of out-of-map scans that cannot be recognized."""
     return [e for e in examples if e.told or not e.stranger]
 
 

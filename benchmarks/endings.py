@@ -1,7 +1,7 @@
-"""How soon things end that have to: ``python -m benchmarks.endings``.
+"""The time until things end that have to: ``python -m benchmarks.endings``.
 
 A client that hangs up, one that is slow in the head, in the body, in both, or in reading; a worker that is killed; and
-the service when it is told to end while it searches.
+the service when it is reported to end while it searches.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def _trickle(port: int, pieces: list[bytes]) -> float:
 
 
 def killed_workers() -> list[Row]:
-    """Kill one of two workers, and count until there are two that answer again; meanwhile nobody may be refused."""
+    """Kill one of two workers, and time until two respond again; no request may be rejected meanwhile."""
     seconds: list[float] = []
     failed = asked = 0
     with running_service(workers=2, searches=2) as (url, pid):

@@ -1,4 +1,4 @@
-"""Who does the work of a benchmark that has much of it: processes of this machine, or Ray."""
+"""Execution of long benchmarks: by processes of this machine, or on Ray."""
 
 from __future__ import annotations
 

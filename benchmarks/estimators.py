@@ -1,4 +1,4 @@
-"""The estimators with known correspondences: against the Cramer-Rao bound, and against their slow twins.
+"""The estimators with known correspondences: against the Cramer-Rao bound, and against their slow references.
 
 Segments are fitted by least squares to points that are spread evenly over straight walls and lie off them by
 independent normal noise. The bound is that of the raw points on known map lines.
@@ -125,7 +125,7 @@ def efficiency_rows(trials: int) -> list[Row]:
 
 
 def twin_rows() -> list[Row]:
-    """Compare both estimators with their twins, metres and radians."""
+    """Compare both estimators with their references, metres and radians."""
     rng = np.random.default_rng(SEED)
     worst = {"joint": 0.0, "one_step, Wahba": 0.0, "one_step, Mitsuta": 0.0}
     for _ in range(TWINS):
@@ -133,7 +133,9 @@ def twin_rows() -> list[Row]:
         scan = measure(scene.walls, rng)
         for name in worst:
             worst[name] = max(worst[name], _twin_difference(name, scene.map, scan))
-    return [at_most(f"{name}, greatest difference from its twin", v, 1e-9, form=".1e") for name, v in worst.items()]
+    return [
+        at_most(f"{name}, greatest difference from its reference", v, 1e-9, form=".1e") for name, v in worst.items()
+    ]
 
 
 def _twin_difference(name: str, map: Segments, scan: MeasuredSegments) -> float:

@@ -29,7 +29,7 @@ from .worlds.outcomes import share_read
 from .worlds.tables import TOLD
 
 SEGMENTS, RANGES = "segments", "ranges"
-STRANGERS, DRAWN, DRAWN_STRANGERS = "strangers", "drawn", "drawn strangers"
+STRANGERS, DRAWN, DRAWN_STRANGERS = "out-of-map scans", "drawn", "drawn out-of-map scans"
 # Of each drawn world and condition, of those worlds that are fitted on.
 HERE, AWAY = 32, 128
 DRAWN_DISTANCE, DRAWN_ANGLE = 0.3, 3.0  # m, degrees
@@ -45,17 +45,17 @@ class Example:
     form : str
         `SEGMENTS` or `RANGES`: how the scan was sent.
     group : str
-        What kind of scan it is; `STRANGERS` for one that was searched in the map of another building.
+        The kind of the scan; `STRANGERS` for one that was searched in the map of another building.
     condition : str
         Of a drawn world; the log or level of another.
     fold : str
         It is reported on by a fit without that one.
     features : Features
-    gaps : (n,) how much less than the best the rivals are worth, nats, 0 or less
+    gaps : (n,) how much less than the best the alternatives score, nats, 0 or less
     counted : (n,) how far each of them counts, 0 to 1
     right, degenerate : bool
     told : bool
-        Whether the scan shows that the answer is not where it was taken, where the answer is wrong.
+        True if the scan shows that the answer is not where it was taken, where the answer is wrong.
     """
 
     form: str
@@ -71,7 +71,7 @@ class Example:
 
     @property
     def stranger(self) -> bool:
-        """Whether no answer is right."""
+        """Return whether no answer is right."""
         return self.group in (STRANGERS, DRAWN_STRANGERS)
 
 
@@ -90,7 +90,7 @@ class Case:
     group, condition, fold : str
         As of `Example`.
     told : callable or None
-        Whether a pose is one that the scan speaks against; by default any wrong one is.
+        True if a pose is one that the scan speaks against; by default any wrong one is.
     """
 
     scan: Scan

@@ -1,7 +1,7 @@
-"""What is kept over what is let in, as the bar of the cautious probability moves: a picture of the choice.
+"""Accepted right answers over accepted out-of-map scans, for thresholds of the cautious probability: a picture.
 
 Scans of the drawn worlds that nothing was fitted on, as ranges and as segments, with the models as they are. Of an
-answer goes in what the models weigh; the second look at its twins and a search that was cut short are left out.
+answer goes in what the models weigh; the second look at its alternatives and a search that was cut short are left out.
 
 ``python -m benchmarks.frontier [--stride 1] [--keep FOLDER]``
 """
@@ -32,16 +32,16 @@ STRANGE = ("unmapped", "sister")  # the conditions whose scans are hardest to te
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """What comes of a bar, percent of the scans.
+    """The result of a threshold, percent of the scans.
 
     Attributes
     ----------
     bar : float
-        What the cautious probability has to reach.
+        The threshold of the cautious probability.
     kept : dict
         Usable and right, by group of conditions.
     let_in : float
-        Usable of the strangers, where the scan shows that they are.
+        Usable of the out-of-map scans, where the scan shows that they are.
     wrong : float
         Usable but wrong of the usable, of scans in their map.
     """

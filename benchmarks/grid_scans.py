@@ -63,7 +63,7 @@ def simulated(name: str, count: int, *, middle: bool) -> list[PosedScan]:
     name : str
     count : int
     middle : bool
-        Whether beams end in the middle of a cell, as the returns did that made it occupied.
+        True if beams end in the middle of a cell, as the returns did that made it occupied.
     """
     grid, cells = load_cells(name)
     walls, unknown = (_borders(cells, kind) for kind in (OCCUPIED, UNKNOWN))

@@ -1,4 +1,4 @@
-"""How times grow: constant-time sums with the pairs, the search with the map, the scan and the share of clutter.
+"""Growth of times: constant-time sums with the pairs, the search with the map, the scan and the share of clutter.
 
 ``python -m benchmarks.growth [--queries 30] [--sizes 200,2000,20000,200000]``
 """
@@ -52,7 +52,7 @@ def best_time(action: Callable[[], object], repeats: int) -> float:
 
 
 def sums_times(counts: tuple[int, ...]) -> list[tuple[float, float, float]]:
-    """Time adding a pair to sums over many, solving, and summing anew; microseconds."""
+    """Time adding a pair to sums over many, solving, and summing again; microseconds."""
     rng = np.random.default_rng(SEED)
     return [_sums_times(count, rng) for count in counts]
 
@@ -75,7 +75,7 @@ def campus(size: int) -> Segments:
     """Lay floor plans, or drawn offices, side by side until there are `size` segments; cut off what is beyond.
 
     Each plan comes once as it is. When all have been laid they come mirrored and stretched by up to a tenth, so that no
-    place has an exact twin.
+    place has an exact copy.
     """
     rng = np.random.default_rng(SEED)
     if not data_found():
@@ -212,7 +212,7 @@ def growth_rows(found: list[Growth]) -> list[Row]:
 def growth(queries: int, sizes: tuple[int, ...], pairs: tuple[int, ...] = PAIRS) -> list[Row]:
     """Run all, print their tables, draw the picture and return the rows that were judged."""
     times = sums_times(pairs)
-    head = ("pairs in the sums", "add one, us", "solve, us", "sum anew, us")
+    head = ("pairs in the sums", "add one, us", "solve, us", "sum again, us")
     cells = [(f"{k:,}", *(f"{t:,.1f}" for t in row)) for k, row in zip(pairs, times, strict=True)]
     print_table("Constant-time sums of the joint estimator", head, cells)
     warm_up()  # as a service does: what a first scan of its kind needs is compiled, and loaded

@@ -40,7 +40,7 @@ SAME = 1e-6  # m and rad; poses of the same verdict
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What came of one scan: how far off, metres and degrees; inf where there is no pose."""
+    """The result of one scan: how far off, metres and degrees; inf where there is no pose."""
 
     usable: bool
     distance: float
@@ -49,7 +49,7 @@ class Found:
 
     @property
     def right(self) -> bool:
-        """Whether the answer is near enough."""
+        """Return whether the answer is near enough."""
         return self.distance < self.limits[0] and self.angle < self.limits[1]
 
 

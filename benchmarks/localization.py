@@ -1,7 +1,7 @@
-"""How often scans are found in their maps, how sure that is said to be, and how long it takes.
+"""Localization of scans in their maps: correctness, stated probability, and time.
 
 Every query counts, those without a single segment too. Times are the processor's for the searching thread, so that
-other work on the machine does not count; beside them the time that passed.
+other work on the machine does not count; next to them the time that passed.
 
 ``python -m benchmarks.localization [--only floor-plans,intel] [--stride 10] [--wrong] [--engine [--ray]]``
 """
@@ -26,7 +26,7 @@ from .table import Row, at_least, at_most, mean, print_rows, print_table, quanti
 IDENTIFIABLE = 0.02  # of lead
 LARGE = 400  # segments
 
-# What must be reached and what is aimed at, by level or log.
+# Goals and aims, by level or log.
 RIGHT_FIRST = {"scan": (0.93, 0.95), "scan_30": (0.87, 0.92), "scan_50": (0.72, 0.80)}
 AMONG = {"scan": (0.98, 0.99), "scan_30": (0.95, 0.98), "scan_50": (0.85, 0.92)}
 USABLE = {"scan": (0.75, 0.80), "scan_30": (0.60, 0.70), "scan_50": (0.40, 0.50)}

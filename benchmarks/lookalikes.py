@@ -1,4 +1,4 @@
-"""Drawn worlds in which several poses explain a scan about as well: an honest answer says so, and lists the truth.
+"""Drawn worlds in which several poses explain a scan about as well: a correct answer is ambiguous, and lists the truth.
 
 Scans are simulated with 2 cm noise from random poses and vectorized. A scene passes where every answer is `ambiguous`
 or `degenerate` and the truth is the pose or one of the alternatives; where a direction is not fixed, up to a shift
@@ -38,14 +38,14 @@ Corners = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A world with twins.
+    """A world with similar places.
 
     Attributes
     ----------
     name : str
     segments : Segments
     places : (low corner, high corner)
-        Where poses are drawn; those too near a wall or outside are drawn again.
+        If poses are drawn; those too near a wall or outside are drawn again.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""How often a caller's mistake is named, and how often one is that nobody made: ``causes`` on the floor plans."""
+"""Fractions of named mistakes of a caller, and of mistakes named without cause: ``causes`` on the floor plans."""
 
 from __future__ import annotations
 

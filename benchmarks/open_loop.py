@@ -1,4 +1,4 @@
-"""Requests at a given rate whether or not they are answered, and probes beside them; each in a process of its own.
+"""Requests at a given rate whether or not they are answered, and probes next to them; each in a process of its own.
 
 A client that waits for an answer before it asks again slows down with the service, and hides what it should show. This
 one keeps to its schedule: a request is late from the moment it was due.
@@ -138,7 +138,7 @@ class _Connection(asyncio.Protocol):
         return connection
 
     def ask(self, request: bytes, done: Callable[[int], None]) -> None:
-        """Send a request; `done` is told the status of the answer, 0 when there is none."""
+        """Send a request; `done` receives the status of the answer, 0 when there is none."""
         self._done = done
         assert self._transport is not None
         self._transport.write(request)

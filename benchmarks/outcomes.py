@@ -29,13 +29,13 @@ PIECE = 60  # queries that a worker of an engine does at a time
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a query.
+    """The result of a query.
 
     Attributes
     ----------
     query : Query
     map : MapKey
-        Where it was searched; of another building for a stranger.
+        The map of the search; that of another building for an out-of-map scan.
     result : AssociationResult
     right : bool
         The pose lies within the collection's tolerance of the truth; never in the map of another building.
@@ -57,7 +57,7 @@ class Outcome:
 
     @property
     def usable(self) -> bool:
-        """Whether the robot would go by it."""
+        """Return whether the robot would go by it."""
         return self.result.usable
 
 

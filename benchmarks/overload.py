@@ -1,4 +1,4 @@
-"""What the service does when ten times too much is asked of it: ``python -m benchmarks.overload``.
+"""The service under ten times too much load: ``python -m benchmarks.overload``.
 
 Goodput at ten times the capacity over goodput at capacity, in alternating pairs; the slowest of the accepted; how a
 flood with one key leaves another its share; how probes are answered meanwhile, and while maps of 16 MB are stored,
@@ -69,7 +69,7 @@ class Service:
         return status
 
     def requests(self, key: str = "robot") -> list[bytes]:
-        """Return what is asked, by turns."""
+        """Return the requests, in turn."""
         return [request_of("/v1/associate", body, key) for body in self._bodies]
 
     def memory_mb(self) -> float:
@@ -156,7 +156,7 @@ def full_queue_ms(times: Sequence[float], rate: float, cores: int) -> float:
 
 
 def share(service: Service, seconds: float) -> list[Row]:
-    """Flood the service with one key while another asks for more than its share."""
+    """Flood the service with one key while another requests more than its part."""
     connections = service.cores + QUEUE // 2
     capacity = goodput(without_pause(service.port, service.requests(), connections, seconds), seconds)
     flood = (service.port, service.requests("flood"), FACTOR * capacity, seconds)
@@ -166,7 +166,7 @@ def share(service: Service, seconds: float) -> list[Row]:
     refused = sum(a.status == 429 for a in flooded)
     return [
         at_least(
-            "a key's goodput beside a flood, over half the capacity", goodput(asked, seconds) / (0.5 * capacity), SHARE
+            "a key's goodput next to a flood, over half the capacity", goodput(asked, seconds) / (0.5 * capacity), SHARE
         ),
         at_most("refusals of that key", sum(a.status != 200 for a in asked), 0, form=".0f"),
         Row(

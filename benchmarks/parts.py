@@ -1,4 +1,4 @@
-"""What each part of the score is good for: the same scans without it, in one run.
+"""The effect of each part of the score: the same scans without it, in one run.
 
 The models of the verdict stay those of the whole score, so that `usable` without a part is no more than a hint.
 """
@@ -52,7 +52,7 @@ def without_freedom(terms: Terms) -> None:
 
 
 def without_common_error(terms: Terms) -> None:
-    """Let every line have its wall's error anew, as independent."""
+    """Let every line have its wall's error again, as independent."""
     terms[0]["map"] += terms[1]["wall_variance"]
     terms[1]["wall_variance"] = TINY**2
 

@@ -29,7 +29,7 @@ def panels(rows: int, columns: int, size: tuple[float, float], title: str) -> tu
 
 
 def save(figure: Figure, name: str) -> None:
-    """Write a figure and tell where."""
+    """Write a figure and print its path."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     path = FOLDER / f"{name}.png"
     figure.savefig(path, dpi=110)
@@ -74,7 +74,7 @@ def draw_growth(
     sums: Sequence[tuple[int, tuple[float, float, float]]],
 ) -> None:
     """Draw the search's times, the index's seconds and megabytes by map size, and the sums' microseconds by pairs."""
-    figure, [top, below] = panels(2, 3, (4.2, 3.4), "How times grow")
+    figure, [top, below] = panels(2, 3, (4.2, 3.4), "Growth of times")
     for ax, curve in zip(top, curves, strict=True):
         for k, name in enumerate(("median", "p95")):
             ax.plot(curve.values, [t[k] for t in curve.times], "o-", color=COLOURS[k], label=name)
@@ -88,7 +88,7 @@ def draw_growth(
     for ax, k, unit in zip(below[:2], (1, 2), ("index, s", "index, MB"), strict=True):
         ax.plot([entry[0] for entry in indexes], [entry[k] for entry in indexes], "o-", color=COLOURS[3])
         ax.set(xscale="log", yscale="log", xlabel="map segments", ylabel=unit)
-    for k, name in enumerate(("add one pair", "solve", "sum anew")):
+    for k, name in enumerate(("add one pair", "solve", "sum again")):
         below[2].plot([count for count, _ in sums], [times[k] for _, times in sums], "o-", color=COLOURS[k], label=name)
     below[2].set(xscale="log", yscale="log", xlabel="pairs in the sums", ylabel="us")
     below[2].legend(fontsize=8)

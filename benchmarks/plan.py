@@ -1,4 +1,4 @@
-"""What a fleet needs, from what one request takes: ``python -m benchmarks plan``.
+"""The needs of a fleet, from the cost of one request: ``python -m benchmarks plan``.
 
 Everything is processor time, of the threads and processes that do it, so that what else the machine does counts little.
 """
@@ -20,7 +20,7 @@ from association import HardPrior, MapIndex, Scan, associate
 from batch.blocks import SIGMA
 from examples.running import running_service
 from registration import MeasuredSegments, RigidTransform, Segments
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapStore
 from service.maps.preconditions import Preconditions
 from service.maps.records import MapOutline
@@ -51,7 +51,7 @@ class Question:
 
     @property
     def prior(self) -> HardPrior:
-        """What a robot knows that was there a moment ago."""
+        """The prior of a robot from a moment ago."""
         return HardPrior(RigidTransform(self.pose.x + AWAY, self.pose.y - AWAY, self.pose.theta), RADIUS, ANGLE)
 
 
@@ -125,7 +125,7 @@ def _ask(url: str, method: str, path: str, body: bytes) -> bytes:
 
 
 def _lookups(count: int) -> tuple[float, float]:
-    """Return the processor microseconds of a look-up: of who asks, and of the server."""
+    """Return the processor microseconds of a look-up: of the client, and of the server."""
     with postgresql_schema() as database:
         store = MapStore(database_url(f"{database}&application_name={LOOKING_UP}"))
         store.open()

@@ -1,6 +1,6 @@
 """Floor plans and logs from the data folder, or drawn offices where it is absent.
 
-The folder is the one that ``LINEFIX_BENCH_DATA`` names, by default ``../shared/data`` beside the repository.
+The folder is the one that ``LINEFIX_BENCH_DATA`` names, by default ``../shared/data`` next to the repository.
 """
 
 from __future__ import annotations

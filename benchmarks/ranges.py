@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ PRIOR_DISTANCE, PRIOR_ANGLE = 1.0, math.radians(20.0)  # standard deviations
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What came of one scan: without a prior, and with the previous scan's pose as a soft one."""
+    """The result of one scan: without a prior, and with the previous scan's pose as a soft one."""
 
     log: str
     right: bool
@@ -115,24 +115,29 @@ def ranges(stride: int) -> list[Row]:
     for log, goal in GOALS.items():
         of_log = [a for a in found if a.log == log]
         rows.append(at_least(f"{log}: right first, of all {len(of_log)} scans", mean(a.right for a in of_log), goal))
+    easy = [a.right for a in found if a.log in EASY]
+    rows.append(Row("first four: right first", f"{mean(easy):.3f} ({sum(easy)} of {len(easy)})"))
     for names, usable, wrong in ((EASY, 0.60, 0.5), (("acapulco", "edmonton"), 0.40, 2.0)):
         group = [a for a in found if a.log in names]
         taken = [a for a in group if a.usable]
         title = ", ".join(names)
         rows.append(at_least(f"{title}: usable", mean(a.usable for a in group), usable))
-        share = 100.0 * mean(not a.right for a in taken)
-        bad = sum(not a.right for a in taken)
-        rows.append(at_most(f"  usable but wrong, % of usable ({bad} of {len(taken)})", share, wrong, form=".2f"))
+        rows.append(_wrong(f"{title}: usable but wrong, % of usable", [not a.right for a in taken], wrong))
     led = [a for a in found if a.log in EASY]
     rows.append(
         at_least("first four, soft prior from the scan before: right", mean(a.right_with_prior for a in led), 0.98)
     )
-    taken = [a for a in led if a.usable_with_prior]
-    bad = sum(not a.right_with_prior for a in taken)
-    rows.append(at_most(f"  usable but wrong with it, % ({bad} of {len(taken)})", 100.0 * bad / max(1, len(taken))))
+    with_prior = [not a.right_with_prior for a in led if a.usable_with_prior]
+    rows.append(_wrong("first four, soft prior: usable but wrong, % of usable", with_prior, None))
     vectorized, searched = [a.vectorize_ms for a in found], [a.search_ms for a in found]
     rows.append(at_most("vectorize, median ms", quantile(vectorized, 0.5), form=".2f"))
     rows.append(at_most("vectorize, p95 ms", quantile(vectorized, 0.95), form=".2f"))
     rows.append(at_most("associate, median ms", quantile(searched, 0.5), None, 2.0, ".2f"))
     rows.append(at_most("associate, p95 ms", quantile(searched, 0.95), None, 15.0, ".2f"))
     return rows
+
+
+def _wrong(what: str, wrong: list[bool], goal: float | None) -> Row:
+    """Return the row of the fraction of usable answers that are wrong, with the counts."""
+    per_cent = 100.0 * sum(wrong) / max(1, len(wrong))
+    return replace(at_most(what, per_cent, goal), measured=f"{per_cent:.2f} % ({sum(wrong)} of {len(wrong)})")

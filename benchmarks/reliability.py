@@ -1,4 +1,4 @@
-"""How well the probability that an answer states agrees with how often such answers are right."""
+"""Agreement: the probability that an answer states agrees with how often such answers are right."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Way:
 
     @property
     def name(self) -> str:
-        """What it is called in the proxy's settings."""
+        """Its name in the proxy's settings."""
         return f"ways{self.replicas}{'h' if self.hashed else ''}"
 
 
@@ -117,7 +117,7 @@ def _measured(way: Way, urls: Sequence[str], maps: int, asked: list[bytes], seco
     times = [1e3 * one.seconds for one in found if one.status == 200]
     failed = len(found) - len(times)
     told = f"{len(times) / seconds:.0f}/s, p99 {quantile(times, 0.99):.0f} ms, "
-    told += f"{misses / max(1, len(found)):.1%} indexed anew" + (f", {failed} FAILED" if failed else "")
+    told += f"{misses / max(1, len(found)):.1%} indexed again" + (f", {failed} FAILED" if failed else "")
     return Row(f"{maps} maps, {way.replicas} replicas{', hashed' if way.hashed else ''}", told)
 
 
@@ -143,7 +143,7 @@ def _put_maps(url: str, segments: Segments) -> None:
 
 
 def _misses(url: str) -> float:
-    time.sleep(0.25)  # they are counted anew five times a second
+    time.sleep(0.25)  # they are counted again five times a second
     with urllib.request.urlopen(f"{url}/metrics", timeout=30) as answer:
         lines = answer.read().decode().splitlines()
     return float(next((line.split()[1] for line in lines if line.startswith("linefix_map_cache_misses_total ")), 0.0))

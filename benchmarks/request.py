@@ -1,6 +1,6 @@
-"""What a request costs beside its search: ``python -m benchmarks request``.
+"""The cost of a request without its search: ``python -m benchmarks request``.
 
-Processor time by part, what a client sees that asks one request after the other, and requests per second, all beside a
+Processor time by part, what a client sees that asks one request after the other, and requests per second, all next to a
 bare route of the same server that answers a constant. The turns of what is compared alternate.
 """
 
@@ -24,7 +24,7 @@ import orjson
 
 from association import Deadline
 from examples.running import free_port, running_service
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.lookup import MapLookup
 from service.parsing.parser_process import ParserProcess
@@ -59,7 +59,7 @@ server.serve(target_loader=load, wrap_loader=False)
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A process that serves, and a request that it is asked again and again."""
+    """A service process, and a request that is sent to it repeatedly."""
 
     port: int
     pid: int
@@ -131,22 +131,22 @@ def request(quick: int) -> list[Row]:
 
 
 def _by_part(cost: dict[str, tuple[float, float]], each: dict[str, float]) -> list[Row]:
-    """Print what a request for a stored map costs beside its search, by part."""
+    """Print what a request for a stored map costs without its search, by part."""
     whole, seen = cost["a stored map, no walls seen"]
     layers, _ = cost["a probe (/livez)"]
-    # What stands for a search where there is nothing to search for is no part; 25 walls are read and written besides.
+    # The time of an empty search is not a part; the other request reads and writes 25 walls in addition.
     more = each["parsing and checking"] + each["encoding"] - each.pop("an empty search")
     shown = {"server, framework, admission, log (a probe)": layers} | each
     beside = whole + more
     shown["hand-over between threads, and what is left"] = beside - sum(shown.values())
     print_table(
-        "By part, beside the search",
+        "By part, next to the search",
         ("part", "processor ms", "share"),
         [(name, f"{ms:.3f}", f"{100 * ms / beside:.0f} %") for name, ms in {**shown, "together": beside}.items()],
     )
     rows = [
-        at_most("beside its search, processor ms", beside, BESIDE_MS),
-        at_most("beside its search, times a bare route", beside / cost["a bare route"][0]),
+        at_most("without its search, processor ms", beside, BESIDE_MS),
+        at_most("without its search, times a bare route", beside / cost["a bare route"][0]),
         at_most("as a client sees it, its search left out, ms", seen + more, CLIENT_MS),
     ]
     print_rows("A request for a stored map", rows)

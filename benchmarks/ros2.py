@@ -51,7 +51,7 @@ STEPS_TIMED = ("way", "search", "vectorize")
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """What became of a scan, over DDS and in this process.
+    """The result of a scan, over DDS and in this process.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Exchange:
 
 
 class Player:
-    """A robot that plays a log, and hears what the bridge says to it."""
+    """A robot that plays a log and subscribes to the topics of the bridge."""
 
     def __init__(self, domain: int) -> None:
         net = DomainParticipant(domain)

@@ -1,6 +1,6 @@
-"""What one hostile client takes from an honest one: ``python -m benchmarks.siege``.
+"""The effect of one hostile client on an honest one: ``python -m benchmarks.siege``.
 
-Each attack runs by itself, beside a client with another key and beside probes. Printed are how soon `/livez` answers,
+Each attack runs alone, next to a client with another key and next to probes. Printed are how soon `/livez` answers,
 what the honest client gets over half of what the service can do, how much memory all processes hold at most, and what
 was answered as nothing should be. With two cores or more the service has the first half to itself.
 """
@@ -137,7 +137,7 @@ def attacks() -> dict[str, tuple[int, Script]]:
         "unknown fields": (4, sent(request(unknown))),
         "parallel walls": (8, sent(request(parallel_walls()))),
         "one cell": (8, sent(request(one_cell()))),
-        "maps anew": (4, maps_anew()),
+        "maps again": (4, maps_anew()),
         "gzip": (12, sent(request(packed, b"Content-Encoding: gzip\r\n"))),
         "bodies withheld": (20, sent(half, 10.0)),
         "a large map stored": (2, sent(put)),
@@ -176,7 +176,7 @@ def attack(port: int, name: str, seconds: float) -> int:
 
 
 def besieged(service: Service, name: str, seconds: float, capacity: float) -> list[Row]:
-    """Run an attack beside an honest client and probes."""
+    """Run an attack next to an honest client and probes."""
     probes = (service.port, [request_of("/livez")], PROBES, seconds)
     with (
         beside(attack, service.port, name, seconds) as connected,

@@ -1,4 +1,4 @@
-"""How much an answer changes where its input changes by 1 mm, or not at all in what it means.
+"""The change of an answer where its input changes by 1 mm, or not at all in what it means.
 
 Pairs of requests are drawn: a scan in a drawn room, and the same with a step, a gap, a cut, a reversed or a repeated
 piece in the map or in the scan. Steps and gaps differ by 1 mm between the two requests of a pair; the other changes
@@ -39,7 +39,7 @@ LEAST_PIECE = 0.6  # m; a shorter segment is left as it is
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked: the map's segments (m, 4) with its sigma, the scan's (n, 4) with sigma and points (n,).
+    """The request: the map's segments (m, 4) with its sigma, the scan's (n, 4) with sigma and points (n,).
 
     `seen` are the walls that the scan sees most of, (k,).
     """
@@ -186,7 +186,7 @@ def map_reversed(rng: np.random.Generator, request: Request) -> Pair:
 
 
 def map_repeated(rng: np.random.Generator, request: Request) -> Pair:
-    """Add walls, or parts of them, once more."""
+    """Add walls, or parts of them, again."""
     return request, _with_map(request, np.vstack([request.walls, _parts(rng, request.walls)]))
 
 
@@ -235,7 +235,7 @@ def scan_reversed(rng: np.random.Generator, request: Request) -> Pair:
 
 
 def scan_repeated(rng: np.random.Generator, request: Request) -> Pair:
-    """Add scan segments once more."""
+    """Add scan segments again."""
     rows = rng.random(len(request.scan)) < 0.5
     both = np.vstack([request.scan, request.scan[rows]])
     return request, replace(request, scan=both, points=np.append(request.points, request.points[rows]))
@@ -269,7 +269,7 @@ class Answered:
 
     @property
     def flips(self) -> bool:
-        """Whether one answer is usable and the other is not."""
+        """Return whether one answer is usable and the other is not."""
         one, other = self.answers
         return one.usable is not other.usable
 
@@ -286,6 +286,11 @@ def answered(count: int, seed: int = 1) -> Iterator[Answered]:
     for number in range(count):
         kind, pair = draw_pair(number, seed)
         yield Answered(kind, number, pair, (pair[0].ask(), pair[1].ask()))
+
+
+def _in_words(answer: AssociationResult) -> str:
+    probability = "without a probability" if answer.probability is None else f"{answer.probability:.3f}"
+    return f"{answer.status} {probability}"
 
 
 def rows_of(found: list[Answered]) -> list[Row]:
@@ -324,8 +329,7 @@ def main() -> None:
     print_rows(f"Smoothness, {args.pairs} pairs, seed {args.seed}", rows_of(found))
     for one in found if args.list else ():
         if one.difference > MOST:
-            a, b = one.answers
-            print(f"- {one.kind} {one.number}: {a.status} {a.probability:.3f}, {b.status} {b.probability:.3f}")
+            print(f"- {one.kind} {one.number}: {', '.join(map(_in_words, one.answers))}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Starts of robots: from each scan of a drive on, when a pose counts as agreed, and whether it is right.
 
 Drives are those of the public logs, and others that are drawn in 40 buildings whose furniture has been moved since the
-map was made. Each scan is searched once, by itself; a start at each scan of a drive goes on from there. Odometry has
+map was made. Each scan is searched once, alone; a start at each scan of a drive goes on from there. Odometry has
 errors that are drawn.
 
 ``python -m benchmarks starts``
@@ -76,7 +76,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """What became of a start: whether a pose was agreed, was right, and after how many seconds and metres."""
+    """The result of a start: whether a pose was agreed, was right, and after how many seconds and metres."""
 
     agreed: bool
     right: bool
@@ -85,7 +85,7 @@ class Start:
 
 
 def observe(index: linefix.MapIndex, laser: linefix.LaserScan, stamp: int) -> Observation:
-    """Search a scan by itself."""
+    """Search a scan alone."""
     try:
         answer = linefix.locate(index, laser, options=OPTIONS)
     except InputError:

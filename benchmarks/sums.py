@@ -1,4 +1,4 @@
-"""What a million additions and removals leave behind in the sums: ``python -m benchmarks sums``."""
+"""The error of the sums after a million additions and removals: ``python -m benchmarks sums``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures beside their goals, and the machine that they were measured on."""
+"""Figures with their goals, and the machine that they were measured on."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Row:
     ----------
     what, measured : str
     goal, aim : str
-        What must be reached and what is aimed at beyond that; empty where nothing is asked.
+        The goal that must be reached, and a further aim; empty for none.
     met, aimed : bool or None
-        Whether they were; None where nothing is asked or nothing was measured.
+        True if they were; None without a goal or a measurement.
     """
 
     what: str

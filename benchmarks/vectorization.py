@@ -1,7 +1,7 @@
 """The vectorizer's and the virtual scanner's rows: speed, accuracy over the bound, walls found, segments that are none.
 
 ``python -m benchmarks.vectorization [--poses 300]``. The floor plans and logs are read from the folder that
-``LINEFIX_BENCH_DATA`` names, by default ``../shared/data`` beside the repository; without it drawn worlds stand in for
+``LINEFIX_BENCH_DATA`` names, by default ``../shared/data`` next to the repository; without it drawn worlds stand in for
 the plans, and the logs are left out.
 """
 
@@ -127,7 +127,7 @@ def judge(seen: SimulatedScan, map: Segments, found: Vectorization) -> dict[str,
         wall = int(good[np.argmax([np.sum(seen.hits[held] == k) for k in good])])
         off_line = true_points @ local.normals[wall] - local.offsets[wall]
         own = held[np.isfinite(seen.ranges[held]) & (np.abs(off_line[held]) < STRAIGHT)]
-        # Where plans bend or step by less than the gates no line is the true one; points of other walls are mistakes.
+        # If plans bend or step by less than the gates no line is the true one; points of other walls are mistakes.
         beside = np.isin(seen.hits[held], good) & (np.abs(off_line[held]) >= STRAIGHT)
         whole = beside.sum() <= 0.02 * len(held)
         tally["whole"].append(float(whole))

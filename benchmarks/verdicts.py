@@ -47,7 +47,7 @@ class Scene:
     Attributes
     ----------
     title : str
-        What is odd about it, in words.
+        The special feature of the scene, in words.
     walls : (n, 4) metres
     seen : (m, 4) metres, in the map frame as if nothing were odd; what of it was not there is the caller's to know
     at : RigidTransform

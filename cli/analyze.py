@@ -40,9 +40,9 @@ class ScannerOptions:
     """The scanner that the robot has, as options."""
 
     fov: Annotated[float, typer.Option(metavar="RADIANS", help="Field of view of the scanner.")] = 6.283185307179586
-    beams: Annotated[int, typer.Option(metavar="N", help="Over the field of view.")] = 720
-    range_max: Annotated[float, typer.Option(metavar="METRES", help="How far it sees.")] = 20.0
-    sigma: Annotated[float, typer.Option(metavar="METRES", help="Standard deviation of its ranges.")] = 0.02
+    beams: Annotated[int, typer.Option(metavar="N", help="Number of beams in the field of view.")] = 720
+    range_max: Annotated[float, typer.Option(metavar="METRES", help="Maximum range of the scanner.")] = 20.0
+    sigma: Annotated[float, typer.Option(metavar="METRES", help="Standard deviation of the ranges.")] = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +50,11 @@ class FurtherOptions:
     """What else is to be found out of each place, as options."""
 
     drive: Annotated[
-        float, typer.Option(metavar="METRES", help="How far it may drive until it knows where it is, 30 at most.")
+        float, typer.Option(metavar="METRES", help="Maximum distance to drive until the pose is usable, at most 30.")
     ] = 0.0
     landmark: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Walls of a landmark: each place is also tried with it."),
+        typer.Option(metavar="FILE", help="Map file with the walls of a landmark: repeat the analysis with it."),
     ] = None
 
 
@@ -64,23 +64,27 @@ def analyze(
     scanner: ScannerOptions,
     further: FurtherOptions,
     spacing: Annotated[
-        float | None, typer.Option(metavar="METRES", help="From place to place; without it some 400 places.")
+        float | None,
+        typer.Option(metavar="METRES", help="Distance between places. Default: about 400 places on the map."),
     ] = None,
     point: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="X Y", help="Only places that are reached from this one.")
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="Analyze only places that are connected with this one."),
     ] = None,
-    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time for all of it.")] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write it all as .json or .geojson.")] = None,
-    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it over the map, as .png.")] = None,
+    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time limit of the analysis.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the result as .json or .geojson.")] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result on the map as .png.")] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Stand a robot all over a map; say where it would know where it is, and where not."""
+    """Simulate scans on a grid of poses and report where localization succeeds."""
     if out is not None and out.suffix.lower() not in SUFFIXES:
-        raise WrongUseError(f"--out: expected a name that ends in {' or '.join(SUFFIXES)}")
+        raise WrongUseError(f"--out: found {out.name}, expected a name that ends in {' or '.join(SUFFIXES)}")
     target = read_map_or_id(on)
     if picture is not None and "map_id" in target:
-        raise WrongUseError("--picture: it is drawn over the map of a file; name one instead of an id")
+        raise WrongUseError(
+            "--picture: found the id of a stored map, expected a map file; write one with linefix map get ID --out FILE"
+        )
     landmark = [] if further.landmark is None else read_map_file(further.landmark).get("segments", [])
     if server is None:
         answer = _analyzed(target, Asked(scanner, further.drive, landmark, spacing, point, deadline_ms))
@@ -191,14 +195,14 @@ def _rows(answer: Json) -> Iterator[tuple[str, str]]:
     counts = answer["summary"]
     share = 100.0 * counts["usable"] / counts["places"] if counts["places"] else 0.0
     yield "places", f"{counts['places']} poses, {answer['spacing']:g} m apart, {counts['not_free']} more are not free"
-    yield "usable", f"{counts['usable']} ({share:.0f} %)"
+    yield "usable", f"{counts['usable']} ({share:.0f} %), simulated without people and furniture that the map lacks"
     if counts.get("resolved_within") is not None:
-        yield "driven", f"{counts['resolved_within']} know where they are at once or on the way"
+        yield "driven", f"{counts['resolved_within']} are usable at once or on the way"
     if counts.get("usable_with_landmark") is not None:
         yield "landmark", f"{counts['usable_with_landmark']} usable with the landmark"
     for status in ("ambiguous", "degenerate", "no_match"):
         if counts[status]:
-            twins = f", {counts['similar_pose']} of them look like another" if status == "ambiguous" else ""
+            twins = f", {counts['similar_pose']} of them with a similar place" if status == "ambiguous" else ""
             yield status, f"{counts[status]}{twins}"
     if not answer["complete"]:
-        yield "left out", f"{counts['left_out']}, for which there was no time"
+        yield "left out", f"{counts['left_out']}, the time limit ended the analysis"

@@ -28,18 +28,22 @@ if TYPE_CHECKING:
 
 
 def batch(
-    logs: Annotated[list[str], typer.Argument(metavar="LOGS", help="Parquet files, bags, mcap or CARMEN logs.")],
-    maps: Annotated[Path, typer.Option(metavar="MAPS", help="A map file, or a folder of them.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The Parquet file to write, one row a scan.")],
-    workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one a core by default.")] = None,
+    logs: Annotated[list[str], typer.Argument(metavar="LOGS", help="Parquet files, bags, MCAP files or CARMEN logs.")],
+    maps: Annotated[Path, typer.Option(metavar="MAPS", help="A map file, or a folder of map files.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The Parquet file to write, one row per scan.")],
+    workers: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Number of processes. Default: the number of cores.")
+    ] = None,
     ray: Annotated[
-        bool, typer.Option("--ray", help="Work on a Ray cluster: that of RAY_ADDRESS, or a new one.")
+        bool, typer.Option("--ray", help="Run on a Ray cluster: that of RAY_ADDRESS, or a new one.")
     ] = False,
     block: Annotated[
-        int, typer.Option(min=1, max=65_536, metavar="N", help="Scans that a worker does at a time.")
+        int, typer.Option(min=1, max=65_536, metavar="N", help="Number of scans in the block of a worker.")
     ] = 512,
-    undirected: Annotated[bool, typer.Option("--undirected", help="Directions of segments mean nothing.")] = False,
-    deadline_ms: Annotated[float, typer.Option(min=1.0, metavar="MS", help="Time for each search.")] = 10_000.0,
+    undirected: Annotated[
+        bool, typer.Option("--undirected", help="The directions of segments have no meaning.")
+    ] = False,
+    deadline_ms: Annotated[float, typer.Option(min=1.0, metavar="MS", help="Time limit of each search.")] = 10_000.0,
     as_json: AsJson = False,
 ) -> None:
     """Find where the scans of many logs were taken; a run that was killed goes on where it was.
@@ -47,7 +51,7 @@ def batch(
     A scan lies on the map that its column map_id names, else on that named as its log, else on the only one.
     """
     if out.is_dir():
-        raise WrongUseError(f"{out}: is a folder")
+        raise WrongUseError(f"--out: found the folder {out}, expected a file")
     begun = time.monotonic()
     try:
         from batch import associate_many
@@ -57,7 +61,9 @@ def batch(
             summary = associate_many(logs, maps, out, options, _engine(workers, ray=ray), watch)
     except ModuleNotFoundError as error:
         extra = "ray" if ray else "batch"
-        raise RefusedError(f'a batch needs {error.name}: pip install "linefix[{extra}]"') from None
+        raise RefusedError(
+            f'linefix batch needs the package {error.name}: in a checkout, pip install ".[{extra}]"'
+        ) from None
     except InputError as error:
         raise RefusedError(str(error)) from None
     if as_json:
@@ -88,7 +94,7 @@ def _engine(workers: int | None, *, ray: bool) -> Engine | None:
 
     if ray:
         if workers is not None:
-            raise WrongUseError("--workers: on Ray as many work as the cluster has cores")
+            raise WrongUseError("--workers: not possible with --ray, which uses all cores of the cluster; leave it out")
         return OnRay()
     return None if workers is None else Processes(workers)
 

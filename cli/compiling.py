@@ -25,7 +25,10 @@ def compile_first() -> None:
     if is_complete():
         return
     parser = ParserProcess()
-    print("linefix: compiling the kernels for about a minute; later runs load them from the cache", file=sys.stderr)
+    print(
+        "linefix: compiling the kernels, which takes one to two minutes; later runs load them from the cache",
+        file=sys.stderr,
+    )
     columns = TextColumn("kernels"), BarColumn(), TaskProgressColumn()
     bar = Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True)
     with ThreadPoolExecutor(1) as threads, bar:

@@ -42,7 +42,7 @@ def run(arguments: list[str]) -> int:
         named = f"{error.filename}: " if error.filename else ""
         return _ended(2, f"{named}{error.strerror or error}")
     except Exception as error:
-        return _ended(1, f"a defect of linefix, please report it: {type(error).__name__}: {error}")
+        return _ended(1, f"a defect of linefix; please report it: {type(error).__name__}: {error}")
 
 
 def _ended(code: int, message: str) -> int:

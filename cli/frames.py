@@ -54,19 +54,22 @@ class Frames:
         if self.of_laser:
             return replace(one, mount=None)
         if one.mount is None:
-            raise RefusedError(f"the log does not say where {one.frame_id} was on the robot then")
+            raise RefusedError(
+                f"the log has no mount of {one.frame_id} at this time, expected one as for the other scans; set --mount"
+            )
         return one
 
     def _decide(self, one: LoggedScan) -> None:
         mount = one.mount
         if mount is None:
             self.name, self.of_laser = one.frame_id or "laser", True
-            self.told = f"of {self.name}, the laser; --mount X Y THETA would give those of the robot"
+            self.told = f"of {self.name}, the laser; set --mount X Y THETA for those of the robot"
             return
         self.name = one.base_frame
-        by = "as --mount says" if self.given is not None else "as the log says"
+        by = "from --mount" if self.given is not None else "from the log"
+        way = "upside down " if one.flipped else ""
         where = f"({mount.x:.3f}, {mount.y:.3f}) m, {math.degrees(mount.theta):.1f} degrees"
-        self.told = f"of {self.name}, the robot, with {one.frame_id} mounted at {where}, {by}"
+        self.told = f"of {self.name}, the robot, with {one.frame_id} mounted {way}at {where}, {by}"
 
 
 def odometry_of(one: LoggedScan) -> RigidTransform | None:

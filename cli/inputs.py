@@ -33,7 +33,30 @@ MAP_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
 FILES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv", ".bag", ".mcap", ".db3")  # never meant as ids
 RECORDINGS = ("rosbag1", "rosbag2", "mcap")
 CHOICE = ("grids", "topic", "costmap", "orientation")  # codes of notes of the grid that was read
-_FORMS = ("laser", "points", "segments", "views")
+
+
+def bytes_of(name: str) -> bytes:
+    """Return the content of a text file; ``-`` reads stdin. A byte-order mark is left out.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file, or it cannot be read.
+    RefusedError
+        When it is text in UTF-16.
+    """
+    try:
+        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
+    except OSError as error:
+        raise WrongUseError(f"{name}: {error.strerror}") from None
+    if data.startswith(WIDE):
+        raise RefusedError(f"{name}: found text in UTF-16, expected UTF-8; save the file as UTF-8")
+    return data.removeprefix(BYTE_ORDER_MARK)
+
+
+def json_of(data: bytes) -> Any:
+    """Parse JSON; raises `NotJsonError`, and `TooManyError` when there are more values than any request may have."""
+    return parse(data, _ANY)
 
 
 def read_json(name: str) -> Any:
@@ -44,34 +67,13 @@ def read_json(name: str) -> Any:
     WrongUseError
         When there is no such file, or it cannot be read.
     RefusedError
-        When it is not JSON; a byte-order mark in front of it is passed over.
+        When it is not JSON.
     """
+    data = bytes_of(name)
     try:
-        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
-    except OSError as error:
-        raise WrongUseError(f"{name}: {error.strerror}") from None
-    if data.startswith(WIDE):
-        raise RefusedError(f"{name}: is text in UTF-16; save it as UTF-8")
-    try:
-        return parse(data.removeprefix(BYTE_ORDER_MARK), _ANY)
+        return json_of(data)
     except (NotJsonError, TooManyError) as error:
         raise RefusedError(f"{name}: not JSON: {error}") from None
-
-
-def read_scan(name: str) -> Json:
-    """Return a scan; the bare fields of a LaserScan message get their `laser` around them.
-
-    Raises
-    ------
-    WrongUseError, RefusedError
-        As `read_json`, and when it is no object.
-    """
-    told = read_json(name)
-    if not isinstance(told, dict):
-        raise RefusedError(f"{name}: expected an object with one of {', '.join(_FORMS)}")
-    if "ranges" in told and not any(form in told for form in _FORMS):
-        return {"laser": told}
-    return told
 
 
 def read_map_or_id(name: str) -> Json:

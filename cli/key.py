@@ -16,11 +16,14 @@ from .errors import WrongUseError
 
 
 def key(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Whose it is to be; not secret.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the key, for people; not secret.")],
     role: Annotated[
-        list[Role] | None, typer.Option(help="What it is good for; may be repeated; all by default.")
+        list[Role] | None, typer.Option(help="Role of the key; repeat for more roles. Default: all.")
     ] = None,
-    maps: Annotated[str, typer.Option(metavar="PREFIX", help="How the ids of the maps begin that it sees.")] = "",
+    maps: Annotated[
+        str,
+        typer.Option(metavar="PREFIX", help="Prefix of the ids of the maps that the key may use. Default: all maps."),
+    ] = "",
 ) -> None:
     """Make a key: it goes to stderr, once, and the lines for LINEFIX_KEYS_FILE, which hold its digest, to stdout."""
     made = secrets.token_urlsafe(32)
@@ -32,7 +35,10 @@ def key(
     try:
         parse_keys("\n".join(lines))
     except ValueError:
-        raise WrongUseError("a name has 1 to 64 letters; ids begin with letters, digits, dots, dashes") from None
+        raise WrongUseError(
+            "the name or the prefix is not valid: expected 1 to 64 letters for "
+            "NAME, and letters, digits, dots or dashes for --maps"
+        ) from None
     for line in lines:
         print(line)
     typer.echo(made, err=True)

@@ -8,9 +8,10 @@ import typer
 
 from .answering import answering
 from .contract import Json
-from .inputs import read_map_or_id, read_scan
+from .inputs import read_map_or_id
 from .options import AsJson, MapArgument, ScanArgument, Server
 from .printing import print_json, print_rows, verdict_rows
+from .scans import read_scan
 
 
 def locate(
@@ -18,19 +19,24 @@ def locate(
     scan: ScanArgument,
     near: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(metavar="X Y THETA", help="Look only near this pose; metres, radians."),
+        typer.Option(metavar="X Y THETA", help="Search only near this pose; metres and radians."),
     ] = None,
-    radius: Annotated[float, typer.Option(metavar="METRES", help="How far from --near.")] = 1.0,
-    angle: Annotated[float, typer.Option(metavar="RADIANS", help="How far turned from --near.")] = 0.5,
-    undirected: Annotated[bool, typer.Option("--undirected", help="Directions of segments mean nothing.")] = False,
-    causes: Annotated[
-        bool, typer.Option("--causes", help="Where nothing fits, look whether the scan is mirrored, or the like.")
+    radius: Annotated[float, typer.Option(metavar="METRES", help="Maximum distance from --near.")] = 1.0,
+    angle: Annotated[float, typer.Option(metavar="RADIANS", help="Maximum rotation from --near.")] = 0.5,
+    undirected: Annotated[
+        bool, typer.Option("--undirected", help="The directions of segments have no meaning.")
     ] = False,
-    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time for the search.")] = None,
+    causes: Annotated[
+        bool,
+        typer.Option(
+            "--causes", help="If the answer is not usable, test the scan mirrored, reversed and in other units."
+        ),
+    ] = False,
+    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time limit of the search.")] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find where in a map a scan was taken; the answer is that of /v1/associate."""
+    """Find the pose of a scan on a map; the answer is that of /v1/associate."""
     body: Json = {"map": read_map_or_id(on), "scan": read_scan(scan), "options": {}}
     if near is not None:
         body["prior"] = dict(zip(("x", "y", "theta"), near, strict=True), radius=radius, angle=angle)

@@ -24,13 +24,16 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 FARTHEST = 1e4  # m; where a log names no greatest range
 Topic = Annotated[
-    str | None, typer.Option(help="Of the scans; the one with most of them where not given. Of CARMEN FLASER or so.")
+    str | None,
+    typer.Option(
+        help="Topic of the scans; for CARMEN the message, such as FLASER. Default: the topic with most scans."
+    ),
 ]
 TfNamespace = Annotated[
     str | None,
     typer.Option(
         metavar="NAMESPACE",
-        help="Of a bag of several robots: where their transforms are, such as /robot1 (/robot1/tf).",
+        help="Namespace of the transforms in a bag of several robots, such as /robot1 for /robot1/tf.",
     ),
 ]
 
@@ -60,7 +63,9 @@ def options_of(
     from registration import RigidTransform
 
     if mount is not None and not all(map(math.isfinite, mount)):
-        raise WrongUseError("--mount: expected x and y in metres, and theta in radians")
+        raise WrongUseError(
+            "--mount: found a value that is not finite, expected x and y in metres, and theta in radians"
+        )
     with needing_formats("reading a log"):
         from formats import LogOptions
 

@@ -9,9 +9,9 @@ import typer
 
 Server = Annotated[
     str | None,
-    typer.Option("--server", metavar="URL", help="Ask the service there; a key is read from LINEFIX_KEY."),
+    typer.Option("--server", metavar="URL", help="Use the service at this URL; the key is read from LINEFIX_KEY."),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the whole answer as JSON.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the complete answer as JSON.")]
 MapArgument = Annotated[
     str,
     typer.Argument(
@@ -23,7 +23,8 @@ ScanArgument = Annotated[
     str,
     typer.Argument(
         metavar="SCAN",
-        help="A scan as JSON: segments, points or laser, or the fields of a LaserScan message; - reads it from stdin.",
+        help="A scan file: JSON with segments, points, laser or views; a LaserScan "
+        "message as JSON or as YAML; - reads stdin.",
     ),
 ]
-Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it there, as png.")]
+Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result to this PNG file.")]

@@ -12,8 +12,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from service.printable import escaped
-
 from .contract import Json
 
 
@@ -88,3 +86,19 @@ def pose_text(pose: Json | None) -> str:
         return "none"
     x, y, theta = pose["x"], pose["y"], pose["theta"]
     return f"x {x:.3f} m, y {y:.3f} m, theta {theta:.4f} rad ({math.degrees(theta):.1f} degrees)"
+
+
+def escaped(document: str) -> str:
+    """Return a JSON document in one line with every character that is not printable as its escape.
+
+    JSON escapes the control characters below 32 only; terminals obey those from 127 to 159 as well, and others change
+    the direction of what follows.
+    """
+    if document.isascii() and "\x7f" not in document:
+        return document
+    return "".join(letter if letter.isprintable() else _escape(letter) for letter in document)
+
+
+def _escape(letter: str) -> str:
+    units = letter.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{int.from_bytes(units[k : k + 2], 'big'):04x}" for k in range(0, len(units), 2))

@@ -38,12 +38,13 @@ def _tell_version(asked: bool) -> None:
 @app.callback()
 def linefix(
     version: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Tell a robot where it is, from a map and a scan.
+    """Find the pose of a robot on a map of walls from a laser scan.
 
-    Exit codes: 0 done, whatever the verdict; 2 wrong use; 3 refused input; 4 no server.
+    Exit codes: 0 done, whatever the verdict; 1 a defect, or a service that cannot start; 2 wrong use;
+    3 rejected input; 4 no server.
     """
 
 
@@ -53,7 +54,7 @@ def linefix(
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
 )
 def run_service(context: typer.Context) -> None:
-    """Start the service; linefix serve --help lists every setting."""
+    """Start the HTTP service; linefix serve --help lists all settings."""
     raise typer.Exit(serve(context.args))
 
 
@@ -73,5 +74,5 @@ def call(arguments: list[str]) -> int:
         context = getattr(error, "ctx", None)
         path = "linefix" if context is None else context.command_path
         wrong = " ".join(error.format_message().split()).rstrip(".")
-        raise WrongUseError(f"{wrong}; {path} --help says how") from None
+        raise WrongUseError(f"{wrong}; {path} --help lists the options") from None
     return code if isinstance(code, int) else 0

@@ -8,9 +8,10 @@ import typer
 
 from .answering import answering
 from .contract import Json
-from .inputs import read_json, read_map_file, read_scan
+from .inputs import read_json, read_map_file
 from .options import AsJson, ScanArgument, Server
 from .printing import print_json, print_rows, verdict_rows
+from .scans import read_scan
 
 
 def register(
@@ -18,9 +19,13 @@ def register(
     scan: ScanArgument,
     pairs: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="JSON: [[scan index, map index], ...]; without it i belongs to i."),
+        typer.Option(
+            metavar="FILE", help="JSON file: [[scan index, map index], ...]. Default: segment i belongs to segment i."
+        ),
     ] = None,
-    undirected: Annotated[bool, typer.Option("--undirected", help="Directions of segments mean nothing.")] = False,
+    undirected: Annotated[
+        bool, typer.Option("--undirected", help="The directions of segments have no meaning.")
+    ] = False,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:

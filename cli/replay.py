@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 HOPELESS = 20  # scans from the first on
 FEW = 0.5  # of the scans; where fewer are usable the map may be to blame
-HINT = "linefix map check MAP --log LOG tells whether the map is to scale, mirrored, or without directions"
+HINT = "linefix map check MAP --log LOG tests the scale, the handedness and the directions of the map"
 
 
 class Mode(StrEnum):
@@ -83,29 +83,35 @@ class Tally:
 
 
 def replay(
-    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or 2, an mcap, or a log of CARMEN.")],
+    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
     on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
     topic: Topic = None,
     tf_namespace: TfNamespace = None,
     mode: Annotated[
-        Mode, typer.Option(help="track: by odometry from the last usable pose, once there is one; global: each anew.")
+        Mode,
+        typer.Option(
+            help="track: use odometry from the last usable pose as a prior; global: search each scan on the whole map."
+        ),
     ] = Mode.TRACK,
-    every: Annotated[int, typer.Option(metavar="N", min=1, help="Take each Nth scan.")] = 1,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the usable poses there, as TUM.")] = None,
+    every: Annotated[int, typer.Option(metavar="N", min=1, help="Use each Nth scan.")] = 1,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the usable poses to this file in the TUM format.")
+    ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw map and poses there, as png: usable ones red, others grey."),
+        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses red, others grey."),
     ] = None,
     mount: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(metavar="X Y THETA", help="Where the laser sits on the robot, metres and radians."),
+        typer.Option(metavar="X Y THETA", help="Pose of the laser on the robot, metres and radians."),
     ] = None,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Locate the scans of a log one after the other. With --json one line a scan.
+    """Localize the scans of a log one after the other. With --json, print one line per scan.
 
-    Poses are those of the robot where --mount or the log says how the laser is mounted, else those of the laser.
+    Poses are those of the robot if --mount or the log has the mount of the laser. Otherwise they are those of the
+    laser.
     """
     options = options_of(topic, tf_namespace, mount)
     told, source = read_map_or_id(on), opened(log, options)
@@ -189,6 +195,7 @@ def _line(one: LoggedScan, found: Found | CommandError, frames: Frames) -> Json:
         "usable": bool(taken and taken.usable),
         "probability": taken and taken.probability,
         "pose": pose and {"x": pose.x, "y": pose.y, "theta": pose.theta},
+        "covariance": taken and taken.covariance,
         "reasons": taken.reasons if taken else [],
         "timing_ms": taken and taken.timing_ms,
         "child_frame_id": frames.name,
@@ -211,7 +218,7 @@ def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
         print(f"{'prior':10}none without odometry: each scan is searched on the whole map", file=where)
     if "motion" in codes:
         wider = f"{SPEED:.1f} m/s and {TURN:.1f} rad/s"
-        print(f"{'poses':10}covariances allow for a motion of {wider} where it is not known", file=where)
+        print(f"{'poses':10}covariances include an unknown motion of {wider} for scans without odometry", file=where)
     print(f"{'poses':10}{plain(frames.told)}", file=where)
 
 

@@ -50,7 +50,9 @@ class MapSource:
 
     on: Annotated[
         str | None,
-        typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map. Default: a topic."),
+        typer.Option(
+            "--map", metavar="MAP", help="A map file, or the id of a stored map. Default: the topic of --map-topic."
+        ),
     ] = None
     map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of an OccupancyGrid, without --map.")] = "map"
 
@@ -65,15 +67,16 @@ class ScanSources:
     together_s: Annotated[
         float,
         typer.Option(
-            metavar="SECONDS", min=0.0, max=5.0, help="Scans of several topics so near in time are one; 0: none are."
+            metavar="SECONDS",
+            min=0.0,
+            max=5.0,
+            help="Search scans of several topics as one if they are so close in time; 0: never.",
         ),
     ] = 0.1
     odom: Annotated[str, typer.Option(metavar="TOPIC", help="Topic of odometry.")] = "odom"
     motion: Annotated[
         bool,
-        typer.Option(
-            help="Correct scans for motion, by time_increment and the twist of odometry; no: take them as they are."
-        ),
+        typer.Option(help="Correct the motion during a scan by its time_increment and the twist of odometry."),
     ] = True
 
 
@@ -83,7 +86,7 @@ class RobotNames:
 
     base: Annotated[str, typer.Option(metavar="FRAME", help="The base frame of the robot.")] = "base_link"
     odom_frame: Annotated[
-        str, typer.Option(metavar="FRAME", help="The odometry frame, where no odometry message names it.")
+        str, typer.Option(metavar="FRAME", help="The odometry frame, if no odometry message names it.")
     ] = "odom"
     namespace: Annotated[
         str | None,
@@ -100,25 +103,39 @@ class Publishing:
 
     agree: Annotated[
         int,
-        typer.Option(min=1, max=100, help="Scans that have to agree before a pose is published; 1: each by itself."),
+        typer.Option(
+            min=1, max=100, help="Number of scans that have to agree before a pose is published; 1: each scan."
+        ),
     ] = 3
     when: Annotated[
         Literal["start", "lost", "always"],
         typer.Option(
-            help="When to publish initialpose: at the start, on request and for new subscribers; also when the "
-            "localizer disagrees; or for each scan that confirms the pose."
+            help="When to publish initialpose. start: at the start, on request and for "
+            "new subscribers; lost: also when "
+            "the localizer disagrees; always: also for each scan that confirms the pose."
         ),
     ] = "start"
     min_sigma: Annotated[
-        float, typer.Option(metavar="METRES", min=0.0, max=10.0, help="Least standard deviation of initialpose.")
+        float,
+        typer.Option(
+            metavar="METRES", min=0.0, max=10.0, help="Minimum standard deviation of the position in initialpose."
+        ),
     ] = 0.05
     min_sigma_theta: Annotated[
-        float, typer.Option(metavar="RADIANS", min=0.0, max=3.0, help="Least standard deviation of its heading.")
+        float,
+        typer.Option(
+            metavar="RADIANS", min=0.0, max=3.0, help="Minimum standard deviation of the heading in initialpose."
+        ),
     ] = round(math.radians(2.0), 4)
     publish_tf: Annotated[
-        bool, typer.Option(help="Publish the transform from the map to the odometry frame; without AMCL.")
+        bool,
+        typer.Option(
+            help="Publish the transform from the map to the odometry frame. Do not use it together with AMCL."
+        ),
     ] = False
-    hardware_id: Annotated[str, typer.Option(metavar="NAME", help="Of the diagnostics. Default: the namespace.")] = ""
+    hardware_id: Annotated[
+        str, typer.Option(metavar="NAME", help="Hardware id of the diagnostics. Default: the namespace.")
+    ] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,11 +144,9 @@ class RosArguments:
 
     params_file: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", is_eager=True, callback=_read_params, help="A YAML file of parameters, as ROS 2 has it."
-        ),
+        typer.Option(metavar="FILE", is_eager=True, callback=_read_params, help="A parameter file of ROS 2 (YAML)."),
     ] = None
-    ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored: what follows is taken as it is.")] = False
+    ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored; the options after it apply as usual.")] = False
     remap: Annotated[
         list[str] | None, typer.Option("--remap", "-r", metavar="FROM:=TO", help="Remap the name of a topic.")
     ] = None
@@ -139,9 +154,9 @@ class RosArguments:
 
 @grouped
 def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing: Publishing, ros: RosArguments) -> None:
-    """Subscribe to scans of ROS 2, publish initialpose when they agree; ends with an interrupt.
+    """Subscribe to scans of ROS 2, and publish initialpose when they agree, until an interrupt.
 
-    The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI are honoured.
+    The domain is ROS_DOMAIN_ID; ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE and CYCLONEDDS_URI apply as usual.
     """
     try:
         from ros2 import ConnectionRefusedError, Node, NodeOptions, OptionError, domain_of
@@ -196,7 +211,7 @@ def _started(options: NodeOptions, on: str | None) -> str:
     scans = ", ".join(options.topic(name) for name in options.scans)
     source = on if on is not None else f"the topic {options.topic(options.map_topic or 'map')}"
     return (
-        f"listening to {scans} in domain {options.domain}; map from {source}; base frame {options.base_frame}; "
+        f"subscribed to {scans} in domain {options.domain}; map from {source}; base frame {options.base_frame}; "
         f"{options.topic('initialpose')} when {options.agree} scans agree"
     )
 
@@ -220,7 +235,10 @@ def _map_at(name: str) -> tuple[linefix.MapIndex, str]:
         index = linefix.index_map(document)
     frame = document.get("frame_id") or "map"
     if not (isinstance(frame, str) and frame.isprintable() and len(frame) <= MAX_FRAME):
-        raise RefusedError(f"{name}: found a frame_id that is no name, expected one of at most {MAX_FRAME} characters")
+        raise RefusedError(
+            f"{name}: found a frame_id that is not a name, expected at most "
+            f"{MAX_FRAME} printable characters; correct it in the map file"
+        )
     return index, frame
 
 

@@ -46,7 +46,10 @@ class Server:
         if not named or not _HEADER.fullmatch(url):
             raise WrongUseError("--server: expected a URL such as http://127.0.0.1:8000")
         if key is not None and not _HEADER.fullmatch(key):
-            raise WrongUseError(f"{KEY} in the environment holds a space, or a letter that no header can")
+            raise WrongUseError(
+                f"{KEY} in the environment: found a space or a character that a header "
+                "cannot contain, expected a key of printable ASCII"
+            )
         self._url = url.rstrip("/")
         self._client = Client(self._url, key, timeout=SECONDS)
 
@@ -73,7 +76,10 @@ class Server:
         """Return the answer of ``/v1/maps/{map_id}:check``, which is for stored maps."""
         map_id = id_of(on)
         if map_id is None:
-            raise WrongUseError("a server checks stored maps: linefix map put it first, or leave --server out")
+            raise WrongUseError(
+                "found a map file, expected the id of a stored map with --server; "
+                "store it with linefix map put, or leave --server out"
+            )
         return self._answer(schema.CheckAnswer, Asked(map_id), self._client.check_map, map_id, samples)
 
     def put(self, map_id: str, document: Any) -> Json:
@@ -93,7 +99,7 @@ class Server:
             if page["next"] is None:
                 return
             cursor = str(page["next"])
-        raise NoServerError(f"{self._url} lists more than {MAX_PAGES} pages of maps; check the URL")
+        raise NoServerError(f"{self._url}: found more than {MAX_PAGES} pages of maps; check the URL")
 
     def remove(self, map_id: str) -> None:
         """Forget a stored map."""
@@ -118,7 +124,7 @@ class Server:
             wrong = error.errors(include_url=False)[0]
             place = "/" + "/".join(map(str, wrong["loc"]))
             raise NoServerError(
-                f"the answer of {self._url} is not that of this version of Linefix: {place}: {wrong['msg']}; "
+                f"the answer of {self._url} does not match this version of Linefix: {place}: {wrong['msg']}; "
                 "check the URL and the version of the server"
             ) from None
         return answer
@@ -132,15 +138,17 @@ class Server:
             if error.__cause__ is None:  # a server answers, though none of Linefix
                 raise NoServerError(f"{str(error).removesuffix('; check the URL')}; check the URL") from None
             raise NoServerError(
-                f"no server answers at {self._url}: {error.__cause__}; start one with linefix serve, "
+                f"no server responds at {self._url}: {error.__cause__}; start one with linefix serve, "
                 "or leave --server out"
             ) from None
         except ValueError as error:  # such as a number that JSON cannot have
             raise WrongUseError(f"not sent: {error}") from None
 
     def _refusal(self, error: ProblemError, asked: Asked) -> CommandError:
-        if error.status in (401, 403):
-            return NoServerError(f"{self._url} asks for a key: set {KEY} in the environment to one that it knows")
+        if error.status == 401:
+            return NoServerError(f"{self._url} requires a key; set {KEY} in the environment")
+        if error.status == 403:
+            return NoServerError(f"{self._url}: {error.detail}; set {KEY} in the environment to a key with this right")
         faults = [one for one in error.errors if isinstance(one.get("pointer"), str) and "message" in one]
         return error_of(error.status, error.code, f"{self._url}: {error.detail}", faults, asked)
 

@@ -11,18 +11,21 @@ import typer
 
 from .answering import answering
 from .contract import Json
-from .inputs import read_scan
 from .options import AsJson, ScanArgument, Server
 from .printing import print_json, print_rows, print_table
+from .scans import read_scan
 
 TAKEN = ("laser", "points", "viewpoint")  # of a scan; its frame and stamp make no difference to its segments
 
 
 def vectorize(
     scan: ScanArgument,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the segments as a scan for locate.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the segments to this file, as a scan for locate.")
+    ] = None,
     sigma: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Of single ranges; estimated where not given.")
+        float | None,
+        typer.Option(metavar="METRES", help="Standard deviation of single ranges. Default: estimated from the scan."),
     ] = None,
     server: Server = None,
     as_json: AsJson = False,

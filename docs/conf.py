@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "_extensions")]
 
 project = "Linefix"
 copyright = "the authors of Linefix"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "endpoints", "options"]
 html_theme = "furo"
 html_title = "Linefix"
 exclude_patterns = ["dev/experiments/*"]

@@ -1,4 +1,4 @@
-"""What this package refuses, each in one line that names the file.
+"""Errors of this package, each in one line that names the file.
 
 ::
 

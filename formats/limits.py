@@ -1,4 +1,4 @@
-"""How much of a file of somebody else's is read. What goes beyond is refused, never cut."""
+"""Limits of the files that are read. Larger files are rejected, never cut."""
 
 MAX_MAP_BYTES = 32 * 2**20  # of a drawing or a picture
 MAX_YAML_BYTES = 16 * 2**10  # of a map_server description

@@ -20,10 +20,10 @@ class LineMap:
     sigma : float or None
         Standard deviation of the walls normal to themselves, metres; None: not known.
     oriented : bool
-        Whether the directions mean anything.
+        True if the directions mean anything.
     frame_id : str
     meta : dict
-        Where it comes from; for people.
+        The origin of the map, for people.
     """
 
     segments: Segments

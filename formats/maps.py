@@ -33,7 +33,7 @@ DRAWINGS: dict[str, Callable[[Path, ImportOptions, Notes], Drawing]] = {
     ".csv": read_csv,
 }
 MAP_SUFFIXES = (".yaml", ".yml", *DRAWINGS, *BAG_SUFFIXES)
-"""Of files that `read_map` reads; beside a ``.yaml`` lies its picture."""
+"""Of files that `read_map` reads; a ``.yaml`` has its picture in the same folder."""
 
 
 def read_map(
@@ -46,10 +46,10 @@ def read_map(
     Parameters
     ----------
     path : str or path
-        A ``.yaml`` of map_server, its picture beside it; a bag of ROS with an OccupancyGrid; a drawing in ``.dxf``,
-        ``.svg`` or ``.geojson``; segments in ``.csv``; a map file of our own in ``.json``.
+        A ``.yaml`` of map_server with its picture in the same folder; a bag of ROS with an OccupancyGrid; a drawing in
+        ``.dxf``, ``.svg`` or ``.geojson``; segments in ``.csv``; a map file of our own in ``.json``.
     options : ImportOptions
-        What the file does not say.
+        Values that the file lacks.
     pictures : mapping of str to Path, optional
         Paths of the pictures of a ``.yaml``, by the names that it may contain; no other picture is read then. Without
         it the picture lies in the folder of the ``.yaml``.
@@ -109,7 +109,7 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
     message : object
         With the fields of the message, whatever library it comes from.
     name : str
-        What errors and the report call it.
+        Its name in errors and in the report.
 
     Raises
     ------

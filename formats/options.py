@@ -1,4 +1,4 @@
-"""What the owner of a file may say of it."""
+"""Options for the import of a file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """What a file does not say; a grid needs nothing of it.
+    """Values that a file lacks; a grid needs none.
 
     Attributes
     ----------
@@ -37,16 +37,16 @@ class ImportOptions:
     layers : tuple of str
         Patterns such as ``*WALL*``, without regard to case; empty: all layers that are drawn.
     drawn : "faces", "centres" or None
-        Whether the lines of a drawing are the faces of walls, or run in their middle; None: found from how they lie.
+        True if the lines of a drawing are the faces of walls, or run in their middle; None: detected.
     thickness : float or None
         Of walls that are drawn by their centre line, metres, 0 to 10; None: as the drawing says, else 0.2.
     inside : tuple of (x, y)
         Free places, metres in the map frame: directions are found from there.
     directions : "drawn", "none" or None
-        What the directions of lines are worth: free space lies on the left of each, or nothing. None: found from
+        Meaning of the directions of lines: free space lies on the left of each, or none. None: found from
         `inside` where given, else as the file says.
     local_metres : bool
-        Whether the coordinates of a GeoJSON file are metres; else they are degrees, and are refused.
+        True if the coordinates of a GeoJSON file are metres; else they are degrees, and are refused.
     topic : str or None
         Of the grid in a bag; None: the only one.
     unknown : int, "none" or None

@@ -19,7 +19,7 @@ NS = 1_000_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StampedPose:
-    """Where the robot was, and when.
+    """A pose of the robot with its time.
 
     Attributes
     ----------
@@ -66,8 +66,8 @@ def pose_message(one: StampedPose, frame_id: str = "map") -> dict[str, Any]:
     Returns
     -------
     dict
-        Names as in ROS; the covariance in 36 numbers, row by row over x, y, z and the turns about them. What a scan
-        in the plane says nothing of is 0; all of it is 0 where the covariance is not known, as ROS has it.
+        Names as in ROS; the covariance in 36 numbers, row by row over x, y, z and the rotations about them. Entries
+        outside of the plane are 0. All entries are 0 if the covariance is unknown, as in ROS.
     """
     sec, nanosec = divmod(one.stamp_ns, NS)
     full = np.zeros((6, 6))

@@ -1,4 +1,4 @@
-"""What an import did: typed, to be shown or checked by a program."""
+"""The report of an import, for people and programs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Note:
     message : str
         For people: one sentence.
     count : int
-        How many cells, entities, segments or messages it concerns; 0 where nothing is counted.
+        Number of cells, entities, segments or messages; 0 if nothing is counted.
     """
 
     code: str
@@ -29,7 +29,7 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class ImportReport:
-    """What was made of a file.
+    """The report of a file.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class ImportReport:
     files : tuple of str
         Names, without folders.
     read, merged, dropped, assumed : tuple of Note
-        What was taken; what became one; what was left out, and why; what nobody said.
+        Content that was read; merged; dropped, with the reason; and assumptions.
     """
 
     format: str
@@ -71,7 +71,7 @@ class Notes:
         _add(self.dropped, code, message, count)
 
     def add_assumed(self, code: str, message: str, count: int = 0) -> None:
-        """Note what nobody said."""
+        """Note an assumption."""
         _add(self.assumed, code, message, count)
 
     def report(self, format: str, files: tuple[str, ...]) -> ImportReport:

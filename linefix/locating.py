@@ -48,6 +48,8 @@ def locate(
     options : AssociationOptions, optional
         Default: those of the service. Directions count where they do in the map, and `options.oriented` is true.
     deadline : Deadline, optional
+        Of the search. A map is indexed first, whatever the deadline; an index whose directions count is indexed once
+        more by the first search for which they do not.
 
     Returns
     -------

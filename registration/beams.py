@@ -23,7 +23,7 @@ class Beams:
     range_max : float
         Metres; how far a beam without return is known to be free; inf where the scanner does not say.
     origins : (m, 2) or None
-        Where each beam begins in the scan frame, metres; None: at the scan's viewpoint.
+        Origin of each beam in the scan frame, metres; None: at the scan's viewpoint.
     """
 
     angles: Floats

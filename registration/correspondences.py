@@ -26,7 +26,7 @@ class Correspondences:
     Attributes
     ----------
     rows : (n,) PAIR
-        What the properties show.
+        The values of the properties.
     """
 
     rows: Records

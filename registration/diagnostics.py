@@ -1,4 +1,4 @@
-"""From a fit to a result: the pose, its covariance, and the numbers beside it."""
+"""From a fit to a result: the pose, its covariance, and its diagnostics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What registration refuses, and the root of what all packages refuse.
+"""Errors of registration, and the base of the input errors of all packages.
 
 ::
 
@@ -19,7 +19,7 @@ class InputError(ValueError):
     index : int or None
         The row that is at fault, where there is one.
     message : str
-        What was expected, or what is wrong with it.
+        The expected value, or the fault.
     """
 
     def __init__(self, message: str, *, argument: str, index: int | None = None) -> None:

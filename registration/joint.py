@@ -89,7 +89,7 @@ class JointSums:
         theta : float
             Radians in (-pi, pi].
         translation : (2,) metres
-            Where all lines are parallel, the shortest.
+            If all lines are parallel, the shortest.
         observable : bool
             False where all lines are parallel to rounding.
         """

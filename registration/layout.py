@@ -1,6 +1,6 @@
-"""What the kernels' records hold.
+"""The records of the kernels.
 
-Arrays of these go in and out of kernels; ``rows[i].dx`` is field `dx` of element i there. What a kernel changes is the
+Arrays of these go in and out of kernels; ``rows[i].dx`` is field `dx` of element i there. A kernel changes the
 element of an array: ``sums[0]`` of an array of length 1. Inside kernels an element is a bare pointer, which costs
 nothing to hand on and does not keep its array alive: see `kernels.keep_alive`. Between Python and kernels whole arrays
 go to and fro: handing over one element costs three microseconds.
@@ -17,7 +17,7 @@ Floats: TypeAlias = NDArray[np.float64]
 Records: TypeAlias = NDArray[np.void]  # an array of one of the types below
 Record: TypeAlias = Any  # an element of one; type checkers cannot see its fields
 
-LEAST_POINTS = 2.0  # behind all that is seen of one wall, where nobody counted them
+LEAST_POINTS = 2.0  # behind all that is seen of one wall, if they were not counted
 
 X, Y = 0, 1  # columns of an (n, 2) array of points or directions
 
@@ -32,7 +32,7 @@ LINE = np.dtype(
     ]
 )  # fmt: skip
 
-# What was measured of a scan segment, in the scan frame.
+# The measurement of a scan segment, in the scan frame.
 SEEN = np.dtype(
     [
         ("dx", "f8"), ("dy", "f8"),  # unit direction
@@ -104,10 +104,10 @@ POSE = np.dtype(
     ]
 )  # fmt: skip
 
-# How pairs are fitted, with 1 for yes: by the paper's estimator, else by the joint one; whether the transform is given
+# Options of a fit, with 1 for yes: by the paper's estimator, else by the joint one; whether the transform is given
 # instead; whether directions mean anything; by Wahba's rotation, else by Mitsuta's; whether the weights used are what
 # is taken for 1 / variance; whether a covariance is wanted, and the ambiguity somewhere else. Up to what chi-square of
-# their angles lines are parallel. The transform that is given, and where else the ambiguity is asked, map_from_scan.
+# their angles lines are parallel. The given transform, and the additional pose for the ambiguity, map_from_scan.
 FITTING = np.dtype(
     [
         *((name, "i8") for name in ("one_step", "given", "oriented", "wahba", "informed", "covariance", "elsewhere")),
@@ -117,7 +117,7 @@ FITTING = np.dtype(
     ]
 )
 
-# What an estimator answers: the transform, map_from_scan, and its translation between the middles of both sets; its
+# The result of an estimator: the transform, map_from_scan, and its translation between the middles of both sets; its
 # covariance, where it is wanted and there is one; what is free, see `kernels.observability`, along which unit vector,
 # that points right or straight up, and how far, m; whether only one way to turn the segments round fits, and whether
 # any scan segment runs against its map segment; how many pairs count, their chi-square, and the root mean squares of

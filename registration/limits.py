@@ -1,7 +1,7 @@
-"""How large the numbers are that the packages take."""
+"""Limits of the numbers that the packages accept."""
 
 MAX_COORDINATE = 1e9  # m; beyond it float64 resolves less than a micrometre
-MIN_LENGTH = 1e-6  # m; shorter segments have no direction worth the name
+MIN_LENGTH = 1e-6  # m; shorter segments have no reliable direction
 MAX_LENGTH = 1e4  # m, of a segment, and of a range
 MAX_SIGMA = 1e3  # m
 MAX_ANGLE = 1e3  # rad

@@ -22,7 +22,7 @@ THREE_SIGMA_TAIL = math.erfc(3.0 / math.sqrt(2.0))
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """What is not fixed.
+    """The unobservable part of the pose.
 
     Attributes
     ----------
@@ -33,8 +33,8 @@ class Freedom:
         Along which the translation is free; None when nothing is, or when it is the rotation (segments that are taken
         to have no spread, all through one point).
     slack : float
-        How far in metres the translation may move along `direction` and fit no worse by three standard deviations;
-        inf for lines that are parallel to rounding.
+        Distance in metres that the translation may move along `direction` and fit no worse by three standard
+        deviations; inf for lines that are parallel to rounding.
     """
 
     degenerate: bool
@@ -93,7 +93,7 @@ def find_freedom(used: JointSums, noise: JointSums | None, theta: float, *, para
     theta : float
         The rotation, radians.
     parallel : bool
-        Whether the lines are parallel within the noise.
+        True if the lines are parallel within the noise.
     """
     weighing = used if noise is None else noise
     what, x, y, slack = freedom(used.compensated, weighing.compensated, float(theta), noise is not None, parallel)

@@ -25,7 +25,7 @@ class OneStepSums:
     They are taken about one reference transform, which changes nothing but rounding and the point where angles wrap.
     The paper's Alg. 1 wraps each angle next to the one before (and as printed adds the differences in place of the
     angles): its sums then depend on the order, and an angle cannot be taken out again. With one reference angle for the
-    whole set they do not, and it can. Where angles spread over less than a half turn the mean is the same; pairs far
+    whole set they do not, and it can. If angles spread over less than a half turn the mean is the same; pairs far
     off the reference should not be in the set.
 
     Additions and removals are compensated (double-double); moving the reference is done in plain doubles.
@@ -76,7 +76,7 @@ class OneStepSums:
         return OneStepSums(total, self.reference)
 
     def about(self, reference: RigidTransform) -> OneStepSums:
-        """Return the sums about another reference, without wrapping any angle anew."""
+        """Return the sums about another reference, without wrapping any angle again."""
         old = self.reference
         if reference == old:
             return self

@@ -1,4 +1,4 @@
-"""What a caller can ask of a registration."""
+"""Options of a registration."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class RegistrationOptions:
         Weighted least squares over rotation and translation together, or the paper's closed form (Eqs. 5 to 15), which
         takes the rotation first and depends on where the origin is.
     rotation : "wahba" or "mitsuta"
-        How the paper averages angles: Eqs. (10) to (15) or Alg. 1. The joint estimator takes its starting angle from
+        The paper's average of angles: Eqs. (10) to (15) or Alg. 1. The joint estimator takes its starting angle from
         it and nothing else.
     k_translation, k_rotation : float
         The paper's coefficients of the two parts of the ambiguity, 0 to 1e30.
     evaluate_at : RigidTransform or None
-        Where else to evaluate the ambiguity.
+        A further pose at which to evaluate the ambiguity.
     oriented : bool
-        Whether the directions of segments mean anything. If not, scan segments are turned round as one rotation wants.
+        True if the directions of segments mean anything. If not, scan segments are turned round as one rotation wants.
     weighting : "uniform", "shorter_length" or "information"
         1; the length of the shorter segment of a pair in metres (Sec. 4.2); or
         ``1 / (sigma_scan^2 / points + sigma_map^2)``.

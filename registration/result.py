@@ -1,4 +1,4 @@
-"""What a registration answers."""
+"""The result of a registration."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Ambiguity:
 
 @dataclass(frozen=True, slots=True)
 class RegistrationDiagnostics:
-    """Numbers beside the pose, with the weights that were used.
+    """Diagnostics of the pose, with the weights that were used.
 
     Attributes
     ----------

@@ -58,7 +58,7 @@ class Segments:
         endpoints : array-like of shape (n, 4)
             Metres, n may be 0.
         argument : str
-            What an error calls the argument.
+            Name of the argument in errors.
 
         Raises
         ------
@@ -146,11 +146,11 @@ class MeasuredSegments:
     ----------
     segments : Segments
     sigma : (n,) standard deviation of single points normal to the wall, metres
-    point_counts : (n,) number of points behind each segment; below 1 where nobody counted them and it is short
+    point_counts : (n,) number of points behind each segment; below 1 for a short segment whose points were not counted
     centroids : (n, 2) mean of those points, metres
     spreads : (n,) their second moment along the segment, m^2
     counted : bool
-        Whether the points were counted; if not, what one wall shows together has 2 at least.
+        True if the points were counted; if not, the segments of one wall together have 2 at least.
     """
 
     segments: Segments
@@ -161,7 +161,7 @@ class MeasuredSegments:
     counted: bool = True
 
     def __post_init__(self) -> None:
-        # For a kernel an array that may be written to is another type, and each type is compiled anew.
+        # For a kernel an array that may be written to is another type, and each type is compiled separately.
         for name in ("sigma", "point_counts", "centroids", "spreads"):
             array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, _frozen(array.view()))
@@ -190,7 +190,7 @@ class MeasuredSegments:
             Mean of the points and their second moment along the segment; default midpoint and ``length^2 / 12``, that
             of points spread evenly.
         argument : str
-            What an error calls the argument.
+            Name of the argument in errors.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class MeasuredSegments:
         n = len(segments)
         given = np.full(n, sigma, dtype=np.float64) if np.ndim(sigma) == 0 else sigma
         sigmas = _checked(given, (n,), 0.0, MAX_SIGMA, f"{argument}.sigma")
-        # What is derived of segments was checked with them.
+        # Values that are derived from segments were checked with them.
         if point_counts is None:
             counts = _frozen(segments.lengths / DEFAULT_POINT_SPACING)
         else:

@@ -1,4 +1,4 @@
-"""What the kernels are handed: arrays that belong together."""
+"""Arguments of the kernels: arrays that belong together."""
 
 from __future__ import annotations
 

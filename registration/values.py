@@ -1,6 +1,6 @@
 """Values that are made for each answer and handed from one part of the packages to another.
 
-What callers get is frozen at run time, too, but for the dozens of correspondences.
+Results are frozen at run time, too, except the many correspondences.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 else:
 
     def value(*, frozen: bool, slots: bool = False, eq: bool = True) -> Callable[[type[Any]], type[Any]]:
-        """Make a dataclass that nobody changes: as `dataclass`, but only type checkers hold anybody to ``frozen``.
+        """Make an immutable dataclass: as `dataclass`, but only type checkers enforce ``frozen``.
 
         At run time a frozen one sets each field by way of `object.__setattr__`, and takes five times as long to make.
         """

@@ -1,4 +1,4 @@
-"""How far the walls of a map are off, as the residuals of the pairs on them show it."""
+"""Estimation of the walls' error of a map from the residuals of the pairs on them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .result import RegistrationResult
 from .segments import MeasuredSegments, Segments
 from .solve import DEFAULT_OPTIONS, register
 
-# What walls are off by before any is seen, and how many walls that counts as; as `association.tuning` has them.
+# The error of walls before any residual, and the number of walls that it counts as; as `association.tuning` has them.
 USUAL_WALL_ERROR = 0.02  # m
 USUAL_WALLS = 2.0
 LEAST_WALL_ERROR = 0.003  # m
@@ -24,7 +24,7 @@ def register_estimating(
     pairs: ArrayLike,
     options: RegistrationOptions = DEFAULT_OPTIONS,
 ) -> RegistrationResult:
-    """Register as `register` does, on a map of which nobody knows how far its walls are off.
+    """Register as `register` does, on a map with an unknown error of its walls.
 
     The error is estimated from what the joint fit leaves between the walls, shrunk to that of usual maps where the
     walls are few.
@@ -76,7 +76,7 @@ def _wall_error(
     def mean(values: np.ndarray) -> np.ndarray:
         return np.asarray(np.bincount(wall_of_pair, weights * values) / summed)
 
-    # How the residuals change with x, y and theta: n, and n . (d theta x R m).
+    # Derivatives of the residuals by x, y and theta: n, and n . (d theta x R m).
     normals = map_segments.normals[pairs[:, 1]]
     arms = result.pose.apply(scan.segments.midpoints[seen]) - [result.pose.x, result.pose.y]
     turning = normals[:, 1] * arms[:, 0] - normals[:, 0] * arms[:, 1]
@@ -90,6 +90,6 @@ def _wall_error(
     free = np.clip(1.0 - leverages, 0.0, 1.0)
     count = USUAL_WALLS + float(free.sum())
     found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float((mean(result.offsets) ** 2 - free / summed).sum())
-    # What so few walls show is uncertain itself: Student's t has that much more variance.
+    # An estimate from few walls is uncertain: Student's t has that much more variance.
     variance = max(found / count, LEAST_WALL_ERROR**2) * (1.0 + 2.0 / max(1.0, count - 2.0))
     return float(np.sqrt(variance))

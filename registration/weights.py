@@ -1,4 +1,4 @@
-"""How much each pair counts, and what is known of its noise."""
+"""Weights of the pairs, and their noise."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class PairWeights:
     Attributes
     ----------
     used : (n,)
-        What the estimator and the ambiguities weigh with.
+        The weights of the estimator and the ambiguities.
     information : (n,) 1/m^2
-        What chi2 and the covariance take for 1 / variance: the caller's own weights, or else the noise, or else `used`.
+        1 / variance of chi2 and the covariance: the caller's own weights, or else the noise, or else `used`.
     noise : (n,) 1/m^2, or None
-        1 / variance by the sigmas; None where a pair has none. Whether a set is degenerate is a question of noise, and
+        1 / variance by the sigmas; None where a pair has none. True if a set is degenerate is a question of noise, and
         not of how a caller weighs.
     """
 

@@ -32,7 +32,7 @@ SAID = {
     State.SEARCHING: (WARN, "no pose is agreed yet"),
     State.AGREED: (OK, "the pose is agreed"),
     State.CONTRADICTED: (ERROR, "the agreed pose is contradicted by the last scans"),
-    State.LOST: (ERROR, "the localizer of the robot has another pose than the scans"),
+    State.LOST: (ERROR, "the pose of the localizer differs from that of the scans"),
 }
 
 

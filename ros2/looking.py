@@ -89,7 +89,7 @@ def look_of(
     if np.isnan(laser.cleaned).all():
         raise FrameError(
             f"no valid range in the scan of {quoted(message.header.frame_id)}: none of {len(laser.ranges)} ranges is a "
-            f"number of at least {laser.range_min:g} m (range_min); is the laser on?"
+            f"number of at least {laser.range_min:g} m (range_min); check that the laser is on and not covered"
         )
     middle = nanoseconds(message.header.stamp) + round(0.5e9 * increment * len(laser.ranges))
     speed = odometry.speed(middle) if increment else None
@@ -99,7 +99,8 @@ def look_of(
     told = {note.code: note.message for note in notes.assumed.values()}
     if not mount.level:
         told["tilted"] = (
-            f"the scan plane is tilted by {math.degrees(mount.tilt):.0f} degrees; ranges are taken as they are"
+            f"the scan plane is tilted by {math.degrees(mount.tilt):.0f} degrees, "
+            "expected a horizontal plane; ranges are used without correction"
         )
     moving = motion_warning(look)
     if moving is not None:

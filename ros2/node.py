@@ -211,8 +211,8 @@ class Node:
         matrix = self._frames.between(child, base)
         if matrix is None:
             raise FrameError(
-                f"odometry is of {quoted(child)}, and no transform connects it with {quoted(base)}; publish one, "
-                "or name the base frame with --base"
+                f"found odometry of {quoted(child)}, expected a transform from it to {quoted(base)}; publish one, "
+                "or set the base frame with --base"
             )
         return planar(matrix)[0]
 

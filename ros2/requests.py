@@ -36,7 +36,10 @@ class Requests:
         for message in messages:
             name = message.data
             if len(name) > MAX_NAME or len(self._waiting) >= MOST_REQUESTS:
-                problem = f"expected an id of at most {MAX_NAME} characters, and {MOST_REQUESTS} open requests"
+                problem = (
+                    f"the request is ignored: expected an id of at most {MAX_NAME} "
+                    f"characters, and at most {MOST_REQUESTS} open requests"
+                )
                 self.results.publish(status_of(name[:MAX_NAME], "", (ERROR, problem)))
             else:
                 self._waiting[name] = time.monotonic()
@@ -65,5 +68,8 @@ class Requests:
         for name, since in list(self._waiting.items()):
             if now - since > RESULT_SECONDS:
                 del self._waiting[name]
-                problem = f"no pose was agreed within {RESULT_SECONDS:g} s; move the robot, or see /diagnostics"
+                problem = (
+                    f"no pose was agreed within {RESULT_SECONDS:g} s; drive 0.5 m or rotate "
+                    "by 30 degrees, and read /diagnostics"
+                )
                 self.results.publish(status_of(name, "", (ERROR, problem)))

@@ -101,5 +101,5 @@ class Searcher:
         except InputError as error:
             problem = f"the scan cannot be used: {error}"
         except Exception as error:  # the robot goes on without this scan
-            problem = f"a defect of linefix, please report it: {type(error).__name__}: {error}"
+            problem = f"a defect of linefix; please report it: {type(error).__name__}: {error}"
         return Found(stamp, located, problem, time.monotonic() - begun, task.generation)

@@ -50,7 +50,7 @@ class Silence:
         elif not has_map:
             self._log(self._reason(self._topics.maps[0]))
         elif now - self._searched >= SILENT_SECONDS:
-            self._log("scans come, and none can be searched; see /diagnostics")
+            self._log("scans arrive, but none can be searched; read the problem on /diagnostics")
         if self._topics.initial.incompatible:
             self._log(
                 f"a subscriber of {self._topics.initial.name} requests an incompatible QoS; expected reliable or best "
@@ -60,7 +60,10 @@ class Silence:
     def _reason(self, topic: Subscription[Any]) -> str:
         domain = self._options.domain
         if topic.publishers:
-            return f"no message on {topic.name} for {SILENT_SECONDS:g} s, although it has a publisher"
+            silent = f"no message on {topic.name} for {SILENT_SECONDS:g} s, although it has a publisher"
+            return f"{silent}; check the driver and the network"
         if topic.incompatible:
-            return f"the publisher of {topic.name} in domain {domain} has an incompatible QoS"
-        return f"no publisher on {topic.name} in domain {domain}"
+            return (
+                f"the publisher of {topic.name} in domain {domain} has an incompatible QoS; publish with reliable QoS"
+            )
+        return f"no publisher on {topic.name} in domain {domain}; check the topic, ROS_DOMAIN_ID and the network"

@@ -24,14 +24,13 @@ from .admission.origins import Origins
 from .admission.readiness import Readiness
 from .http.bodies import BodyReceiver
 from .http.openapi import Contract, describe
-from .http.plain_paths import PlainPaths
 from .http.probe import StoreProbe
 from .http.reception import Reception
 from .http.refusing import handle_errors
 from .http.routes import analyze, associate, batch, check, importing, maps, operations, pages, register, vectorize
 from .http.services import KEY, Services
-from .importing.bounds import Bounds
 from .importing.folders import remove_abandoned
+from .importing.reader import Bounds
 from .maps import IndexCache, MapStore
 from .maps.errors import StoreError
 from .maps.lookup import MapLookup
@@ -39,8 +38,7 @@ from .parsing.errors import ParserEndedError
 from .parsing.parser_process import ParserProcess
 from .part import WHOLE, Part
 from .settings import Settings
-from .telemetry.metrics import Metrics
-from .telemetry.refusals import RefusalTally
+from .telemetry.metrics import Metrics, RefusalTally
 from .telemetry.traces import traces_of_environment
 from .threads import Threads
 from .version import VERSION
@@ -110,7 +108,6 @@ def create_app(settings: Settings, part: Part = WHOLE, started: Started = _unatt
             ),
             expose_headers=("ETag", "Retry-After", "X-Request-Id"),
         )
-    app.add_middleware(PlainPaths)
     app.add_middleware(Reception, services=services)
     return app
 

@@ -71,7 +71,7 @@ def cannot_keep_maps(settings: Settings) -> str | None:
 
     Running all the same the service would never be ready, and only its log would say why.
     """
-    from .database_file import file_of, make_file
+    from .database_location import file_of, make_file
 
     kept = file_of(settings.url)
     if kept is None or kept.exists():

@@ -16,9 +16,9 @@ from pydantic import AllowInfNan, Field, SecretStr, ValidationError, field_valid
 from pydantic_settings import BaseSettings, CliSettingsSource, NoDecode, SettingsConfigDict
 from sqlalchemy import URL
 
-from .admission.issuer import ALGORITHMS, Issuer
 from .admission.key_file import KeyFileError, read_keys
-from .database_url import database_url
+from .admission.keys import ALGORITHMS, Issuer
+from .database_location import database_url
 from .schemas.limits import Limits
 
 Finite = Annotated[float, AllowInfNan(False)]
@@ -61,7 +61,7 @@ def _cores() -> int:
 
 
 class SettingsError(Exception):
-    """The settings contradict each other or are out of range; the message says which."""
+    """The settings contradict each other or are out of range; the message names them."""
 
 
 class Settings(BaseSettings):
@@ -77,73 +77,100 @@ class Settings(BaseSettings):
 
     host: str = Field("127.0.0.1", description="address to listen on")
     port: int = Field(8000, ge=0, le=65535, description="port to listen on; 0 takes a free one")
-    data_dir: Path = Field(default_factory=_data_home, description="where maps are kept")
+    data_dir: Path = Field(default_factory=_data_home, description="folder of the map store (SQLite)")
     database_url: SecretStr | None = Field(
         None,
         description="postgresql://user:password@host/name or sqlite:///path; default: SQLite in the data directory",
     )
-    keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field((), description="bearer keys that may do everything")
+    keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field(
+        (), description="bearer keys with all rights, comma separated"
+    )
     keys_file: Path | None = Field(
-        None, description="keys with roles, as digests; a file, or a directory of them; read again when it changes"
+        None, description="file with keys and roles, or folder of such files; a change applies within 2 s"
     )
-    jwt_issuer: str | None = Field(None, description="whose JSON Web Tokens are taken beside keys")
-    jwt_audience: str | None = Field(None, description="for whom these tokens have to be")
-    jwt_keys: str | None = Field(None, description="path, or https URL, of that issuer's JSON Web Key Set")
+    jwt_issuer: str | None = Field(None, description="issuer whose JSON Web Tokens are accepted in addition to keys")
+    jwt_audience: str | None = Field(None, description="audience that these tokens must have")
+    jwt_keys: str | None = Field(None, description="path or https URL of the JSON Web Key Set of this issuer")
     jwt_algorithms: Annotated[tuple[str, ...], NoDecode] = Field(
-        ("RS256", "ES256", "EdDSA"), description="of their signatures, comma separated"
+        ("RS256", "ES256", "EdDSA"), description="accepted signature algorithms, comma separated"
     )
-    jwt_leeway_s: Finite = Field(30.0, ge=0.0, le=600.0, description="seconds that the issuer's clock may differ")
+    jwt_leeway_s: Finite = Field(
+        30.0, ge=0.0, le=600.0, description="seconds by which the clock of the issuer may differ"
+    )
     hosts: Annotated[tuple[str, ...], NoDecode] = Field(
-        (), description="without keys: names under which the service is asked for, comma separated"
+        (), description="without keys: accepted host names in the Host header, comma separated"
     )
     cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
-        (), description="sites whose pages may ask, as https://site.example, comma separated"
+        (), description="sites whose pages may send requests, as https://site.example, comma separated"
     )
-    tls_cert: Path | None = Field(None, description="certificate chain, PEM: then the service speaks HTTPS alone")
-    tls_key: Path | None = Field(None, description="its private key, PEM, without a password")
-    allow_anonymous: bool = Field(False, description="without keys, listen on other addresses than loopback")
+    tls_cert: Path | None = Field(
+        None, description="file of the certificate chain, PEM; the service then accepts HTTPS only"
+    )
+    tls_key: Path | None = Field(None, description="file of the private key, PEM, without a password")
+    allow_anonymous: bool = Field(
+        False, description="accept every client: listen on other addresses than loopback without keys"
+    )
 
     workers: int = Field(1, ge=1, le=256, description="processes that share the port, the searches and the queue")
     searches: int = Field(default_factory=_cores, ge=1, le=1024, description="searches that run at once")
-    queue: int = Field(16, ge=0, le=10_000, description="requests that may wait for a search")
-    max_body_bytes: int = Field(32_000_000, ge=1_000, le=1_000_000_000, description="of a request, unpacked")
-    max_values: int = Field(2_000_000, ge=1_000, description="numbers, strings, arrays and objects in a request")
+    queue: int = Field(16, ge=0, le=10_000, description="maximum number of requests that wait for a search")
+    max_body_bytes: int = Field(
+        32_000_000, ge=1_000, le=1_000_000_000, description="maximum bytes of a request, uncompressed"
+    )
+    max_values: int = Field(
+        2_000_000, ge=1_000, description="maximum number of numbers, strings, arrays and objects in a request"
+    )
     max_bodies_bytes: int = Field(
-        96_000_000, ge=1_000, description="of all requests being read at once, unpacked; of one key half of that"
+        96_000_000,
+        ge=1_000,
+        description="maximum bytes of all requests that are being read, uncompressed; half of it for one key",
     )
     max_answers_bytes: int = Field(
-        64_000_000, ge=1_000, description="of large answers that wait to be read; of one key half of that"
+        64_000_000, ge=1_000, description="maximum bytes of large answers that wait to be read; half of it for one key"
     )
-    max_stored_bytes: int = Field(4_000_000_000, ge=1_000, description="of all stored maps together")
+    max_stored_bytes: int = Field(4_000_000_000, ge=1_000, description="maximum bytes of all stored maps")
     max_import_bytes: int = Field(
-        1_000_000_000, ge=400_000_000, description="of memory to read one map of another tool; one is read at a time"
+        1_000_000_000,
+        ge=400_000_000,
+        description="maximum bytes of memory of the process that reads an import; one import is read at a time",
     )
     max_connections: int = Field(
-        512, ge=8, le=100_000, description="open at once; fewer where the system has few descriptors"
+        512,
+        ge=8,
+        le=100_000,
+        description="maximum number of open connections; fewer if the system has fewer descriptors",
     )
-    max_map_segments: int = Field(200_000, ge=1, description="of one map")
-    max_scan_segments: int = Field(2_000, ge=1, description="of one scan")
-    max_beams: int = Field(20_000, ge=1, description="ranges or points of one scan")
-    max_correspondences: int = Field(200_000, ge=1, description="of one registration")
-    max_batch: int = Field(256, ge=1, description="scans of one batch")
-    max_deadline_ms: Finite = Field(30_000.0, gt=0.0, le=3.6e6, description="and the deadline where none is asked for")
-    cache_bytes: int = Field(112_000_000, ge=0, description="of indexed maps kept in memory")
+    max_map_segments: int = Field(200_000, ge=1, description="maximum number of segments of a map")
+    max_scan_segments: int = Field(2_000, ge=1, description="maximum number of segments of a scan")
+    max_beams: int = Field(20_000, ge=1, description="maximum number of ranges or points of a scan")
+    max_correspondences: int = Field(200_000, ge=1, description="maximum number of correspondences of a registration")
+    max_batch: int = Field(256, ge=1, description="maximum number of scans of a batch")
+    max_deadline_ms: Finite = Field(
+        30_000.0, gt=0.0, le=3.6e6, description="longest deadline of a request in milliseconds, and the default"
+    )
+    cache_bytes: int = Field(112_000_000, ge=0, description="bytes of indexed maps that are cached in memory")
     request_timeout_s: Finite = Field(
         9.0,
         gt=0.0,
         le=3600.0,
         allow_inf_nan=False,
-        description="seconds for a head, at most 60, and as many for a body",
+        description="seconds for the head of a request (at most 60), and for its body",
     )
-    drain_s: Finite = Field(1.0, ge=0.0, le=5.0, description="how long to answer while no longer ready")
+    drain_s: Finite = Field(
+        1.0, ge=0.0, le=5.0, description="seconds of answering after SIGTERM, while /readyz returns 503"
+    )
     hang_s: Finite = Field(
         30.0,
         ge=2.0,
         le=3600.0,
         allow_inf_nan=False,
-        description="after which a worker whose event loop stands still is replaced",
+        description="seconds until a worker with a blocked event loop is replaced",
     )
-    log_level: str = Field("info", pattern="^(debug|info|warning|error)$", description="of the log on stderr")
+    log_level: str = Field(
+        "info",
+        pattern="^(debug|info|warning|error)$",
+        description="level of the log on stderr: debug, info, warning or error",
+    )
 
     @field_validator("keys", "hosts", "jwt_algorithms", "cors_origins", mode="before")
     @classmethod
@@ -231,7 +258,7 @@ def read_settings(arguments: Sequence[str]) -> Settings:
     if any(argument.partition("=")[0] == "--keys" for argument in arguments):
         # Arguments of a process are seen by everyone on the machine.
         raise SettingsError(
-            "keys: set LINEFIX_KEYS, or name a file with --keys-file; an argument is no place for a key"
+            "keys: set LINEFIX_KEYS, or name a file with --keys-file; other users of the machine can see arguments"
         )
     parser = argparse.ArgumentParser(prog="linefix serve", description=HELP, allow_abbrev=False)
     try:

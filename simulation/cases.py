@@ -39,7 +39,7 @@ DRAWS = 20  # of buildings, until one has such a place, or room for its clutter
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Where a pose is to be looked for: `radius` metres and `angle` radians around `pose`, in the map frame."""
+    """The window of a search: `radius` metres and `angle` radians around `pose`, in the map frame."""
 
     pose: RigidTransform
     radius: float
@@ -63,7 +63,7 @@ class Case:
     ranges : (m,) metres
         As it reports them.
     truth : RigidTransform or None
-        map_from_scan; None for a stranger, of whose answers none is right.
+        map_from_scan; None for an out-of-map scan, for which no answer is right.
     window : Window or None
         The only place to look, where there is one.
     scene : Segments
@@ -73,7 +73,8 @@ class Case:
     clutter : float
         Share of the beams that end on people and pallets.
     shown : Segments
-        What the map should show: of the building, or of part of it, in that frame; of another building in its own.
+        The walls that the map should show: those of the building or a part of it, in that frame; of another building
+        in its own.
     """
 
     world: str

@@ -76,7 +76,7 @@ def clutter(
     Parameters
     ----------
     standing : Segments
-        What stands there already, metres.
+        The segments that are already there, metres.
     pose : RigidTransform
         Of the scanner, in the frame of `standing`.
     scanner : Scanner

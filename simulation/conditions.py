@@ -1,4 +1,4 @@
-"""What happens to buildings, maps and lasers between the drawing of a map and a search in it."""
+"""Changes of buildings, maps and lasers between the drawing of a map and a search in it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Stranger(StrEnum):
     UNMAPPED = "the scan is from a part of the building that is not mapped"
     SISTER = "the map is of another building of the same owner"
     OTHER_TYPE = "the map is of another kind of building"
-    MIRRORED = "the laser is mounted upside down, and nobody said so"
+    MIRRORED = "the laser is mounted upside down, without notice"
     WINDOW = "the window that is searched does not hold the truth"
 
 
@@ -37,7 +37,7 @@ def as_mapped(building: Building, _rng: np.random.Generator) -> Building:
 
 
 def as_declared(scanner: Scanner, _rng: np.random.Generator) -> Scanner:
-    """Return the laser that it is said to be."""
+    """Return the laser as it is declared."""
     return scanner
 
 
@@ -58,9 +58,9 @@ class Condition:
     laser : callable
         From the laser as it is declared to what it really is.
     full_turn : bool
-        Whether lasers of 360 degrees occur; else all see 270.
+        True if lasers of 360 degrees occur; else all see 270.
     corrected : bool
-        Whether the beams' angles are declared as they really are: the robot knows how fast it turned.
+        True if the beams' angles are declared as they really are: the robot knows how fast it turned.
     stranger : Stranger or None
         Why no pose is right; None where the truth is in the map.
     """
@@ -152,7 +152,7 @@ CONDITIONS: dict[str, Condition] = {
     "sister": Condition("in another building of the same style", stranger=Stranger.SISTER),
     "other_type": Condition("in another kind of building", stranger=Stranger.OTHER_TYPE),
     "mirrored": Condition("from a laser mounted upside down", laser=_upside_down, stranger=Stranger.MIRRORED),
-    # Where only strangers come with exact maps, an error of the map looks like a proof that the robot is in it.
+    # If only out-of-map scans had exact maps, an error of the map would seem to prove that the robot is in it.
     "rough": Condition("the map has one of the errors above, and the building has changed", today=rearranged,
                        draw_map=_with_some_error),
     "rough_unmapped": Condition("unmapped, and rough", today=rearranged, draw_map=_with_some_error,

@@ -1,4 +1,4 @@
-"""Whether outlines stand in each other."""
+"""Test for outlines that intersect."""
 
 from __future__ import annotations
 

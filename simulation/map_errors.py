@@ -1,4 +1,4 @@
-"""How a map comes to differ from the building that it is of."""
+"""Errors of a map relative to its building."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ Opening = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class OfficePlan:
-    """What a floor is like; lengths in metres.
+    """Dimensions of a floor; lengths in metres.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Where in a building a robot can stand."""
+"""Free poses of a robot in a building."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 CLEARANCE = 0.4  # m; what a robot keeps from everything
 RAYS = 72
-FAR = 25.0  # m; a place is told by what is seen within,
+FAR = 25.0  # m; range within which a place is recognized,
 SEEN = 0.2  # the least share of the rays that meet anything,
 NEAR_ENOUGH = 15.0  # m; and what the nearest of them meets lies within
 TRIES = 4000

@@ -20,12 +20,12 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Scanner:
-    """What the scanner is like. The default sees 360 degrees in 1,080 beams, 20 m far, with 2 cm noise.
+    """Properties of a scanner. The default has 1,080 beams over 360 degrees, 20 m range and 2 cm noise.
 
     Attributes
     ----------
     beams : int
-        How many, 1 to 100,000.
+        Number of beams, 1 to 100,000.
     angle_min : float
         Of the first beam in the scan frame, radians.
     angle_increment : float
@@ -39,11 +39,11 @@ class Scanner:
     quantum : float
         Step to which ranges are rounded, metres, 0 for none.
     bias : float
-        What is added to every range, metres: a scanner that measures too long or too short.
+        Bias of every range, metres: a scanner that measures too long or too short.
     saturated : bool
-        Whether a beam without return reads `range_max`, as some drivers report it, instead of inf.
+        True if a beam without return reads `range_max`, as some drivers report it, instead of inf.
     one_sided : bool
-        Whether a segment is seen from its left only and let through from its right. By default every segment stops
+        True if a segment is seen from its left only and let through from its right. By default every segment stops
         every beam, and `SimulatedScan.facing` says from which side.
 
     Raises
@@ -147,7 +147,7 @@ def scan(
     map : Segments
         Metres in the map frame.
     pose : RigidTransform
-        Where the scanner stands, map_from_scan. A segment whose line runs exactly through it is not seen.
+        Pose of the scanner, map_from_scan. A segment whose line runs exactly through it is not seen.
     scanner : Scanner, optional
     rng : numpy.random.Generator, optional
         Of noise and dropouts; needed where the scanner has either.

@@ -21,7 +21,7 @@ from .errors import SimulationError
 Floats = NDArray[np.float64]
 Corner = tuple[float, float]
 
-# What a box keeps away from a world's poses, metres.
+# Distance of a box from a world's poses, metres.
 CLEARANCE = 0.5
 
 
@@ -37,7 +37,7 @@ class World:
     poses : tuple of RigidTransform
         map_from_scan.
     mapped : int
-        How many of the segments, the first ones, a map of this world has; the rest are unmapped obstacles.
+        Number of the segments, from the first, that a map of this world has; the rest are unmapped obstacles.
     """
 
     name: str
@@ -149,7 +149,7 @@ def with_obstacles(world: World, boxes: int, rng: np.random.Generator, size: tup
     ----------
     world : World
     boxes : int
-        How many, at least 0.
+        Number, at least 0.
     rng : numpy.random.Generator
     size : (float, float)
         Least and greatest length of their sides, metres.

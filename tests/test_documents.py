@@ -9,9 +9,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-DOCUMENTS = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")])
+DOCUMENTS = sorted(
+    [
+        *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")),
+        *(path for folder in ("docs", "examples", "deploy", "clients") for path in ROOT.glob(f"{folder}/**/*.md")),
+    ]
+)
 MADE = "out/"  # what a command writes is there only afterwards
 LINK = re.compile(r"\]\((?!https?:|#)([^)\s#]+)")
+PLACE = re.compile(r"\]\((?!https?:)([^)\s#]*)#([^)\s]+)\)")
 FILE = re.compile(r"(?<![\w./-])(?:[\w.*-]+/)+[\w*-]+\.(?:py|json|md|png|csv|cpp|toml)\b")
 FOLDER = re.compile(r"`((?:service|association|registration|vectorization|simulation|tests|docs|examples)/[\w/.-]*)`")
 MODULE = re.compile(r"python -m ([a-z_.]+)")
@@ -19,11 +25,22 @@ TARGET = re.compile(r"`make ([a-z-]+)|^make ([a-z-]+)", re.MULTILINE)
 TEST = re.compile(r"`(test_\w+)`")
 
 
+def anchors(document: Path) -> set[str]:
+    """Return the anchors of the headings of a document, as GitHub and MyST make them."""
+    text = re.sub(r"^```.*?^```", "", document.read_text(), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 def missing(document: Path) -> Iterator[str]:
     text = document.read_text()
     for path in {*LINK.findall(text)}:
         if not (document.parent / path).exists():
             yield f"link to {path}"
+    for path, anchor in {*PLACE.findall(text)}:
+        target = document.parent / path if path else document
+        if target.suffix == ".md" and target.exists() and anchor not in anchors(target):
+            yield f"link to {path}#{anchor}"
     rest = LINK.sub("", text)
     for path in {*FILE.findall(rest), *FOLDER.findall(rest)}:
         if not path.startswith(MADE) and not any(ROOT.glob(path.rstrip("/"))):

@@ -1,4 +1,4 @@
-"""What vectorization refuses.
+"""Errors of vectorization.
 
 ::
 

@@ -29,7 +29,7 @@ BEAMS_OFF = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a sensor moved while it scanned: a constant twist in its own frame.
+    """Motion of a sensor during a scan: a constant twist in its own frame.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class LaserScan:
 
     @property
     def places(self) -> Floats:
-        """Where the sensor was at each beam, ``(m, 3)`` x, y, theta in the scan frame; metres and radians."""
+        """Pose of the sensor at each beam, ``(m, 3)`` x, y, theta in the scan frame; metres and radians."""
         m = len(self.ranges)
         return np.zeros((m, 3)) if self.motion is None else self.motion.places(m)
 
@@ -140,7 +140,7 @@ class LaserScan:
     def cleaned(self) -> Floats:
         """The ranges with every beam without return at inf and every beam of which nothing is known at nan.
 
-        Nothing is known, too, of what is said to be nearer than a segment is long.
+        Ranges shorter than the shortest segment are unknown, too.
         """
         return clean(self.ranges, max(self.range_min, MIN_LENGTH), min(self.range_max, MAX_LENGTH))
 

@@ -1,4 +1,4 @@
-"""What the kernels' records hold; see `registration.layout` for how records are used.
+"""The records of the kernels; see `registration.layout` for how records are used.
 
 The sensor is at the origin, and points come counter-clockwise about it.
 """
@@ -17,7 +17,7 @@ POINT = np.dtype(
 )  # fmt: skip
 
 # Sums over points. Those of consecutive points are kept as running totals: the difference of two is the sums of the
-# points between, so a line is fitted to any stretch in constant time. Where noise has no direction the rays' sums are
+# points between, so a line is fitted to any stretch in constant time. If noise has no direction the rays' sums are
 # those of the unit matrix, and the ray's projection on any normal is 1.
 SUMS = np.dtype(
     [
@@ -50,7 +50,7 @@ FITTED = np.dtype(
     ]
 )  # fmt: skip
 
-# What is known of the scanner and its noise. The variance of a point normal to a line is ``variance (n.u)^2 + floor``.
+# Properties of the scanner and its noise. The variance of a point normal to a line is ``variance (n.u)^2 + floor``.
 SCANNER = np.dtype(
     [
         ("increment", "f8"),  # rad, between neighbouring rays; 0 for points without rays

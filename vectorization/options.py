@@ -1,4 +1,4 @@
-"""What a caller can ask of the vectorizer."""
+"""Options of the vectorizer."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .errors import InvalidOptionError
 
 @dataclass(frozen=True, slots=True)
 class VectorizationOptions:
-    """How fine to be.
+    """Resolution of the segments.
 
     Attributes
     ----------

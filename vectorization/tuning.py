@@ -51,7 +51,7 @@ LEAST_INCREMENT = 1e-6
 # Steps are compared with the usual step between beams: this quantile of so many steps around. It allows for points that
 # come three times and for a few gaps. Points are repeated where the steps below REPEATED are that fraction of all, and
 # VALLEY_DEPTH times as frequent as those from VALLEY to REPEATED_STEP, by so many standard deviations of the counts.
-# Points that are spaced at random, as in a subsample of a cloud, have 1.6 times as many. Where points are repeated,
+# Points that are spaced at random, as in a subsample of a cloud, have 1.6 times as many. If points are repeated,
 # those nearer than REPEATED_STEP are left out. Measured on drawn scans with each point two or three times: repeats are
 # found up to a scatter of a sixth of the points' spacing, in most scans up to a third.
 SAME_BEAM = 0.8
@@ -81,10 +81,10 @@ SCATTERED = 6.0
 # The farthest point's distance from the chord, in standard deviations, from which on a stretch is split there.
 CHORD_GATE = 3.5
 
-# What a further break must take off the chi-square: two parameters of a line and the choice of the break's place.
+# Minimum reduction of the chi-square by a further break: two parameters of a line and the choice of the break's place.
 BREAK_PENALTY = 20.0
 
-# How far, in points, a break is moved at most, and at how many places a break in an even stretch is tried.
+# Maximum shift of a break in points, and number of places at which a break in an even stretch is tried.
 BREAK_REACH = 8
 BREAK_TRIALS = 24
 
@@ -135,7 +135,7 @@ WORST_KNOWN = 4.0
 WORST_ANGLE = 0.12
 WORST_FIT = 6.0
 
-# Standard deviations within which the last point of a line is taken for its own: what lies beside a wall begins there.
+# Standard deviations within which the last point of a line belongs to it: beyond, an object next to the wall begins.
 END_GATE = 2.0
 
 # Corners -------------------------------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ class Vectorization:
 
     @property
     def viewpoint(self) -> tuple[float, float]:
-        """Where the segments were seen from, metres: the middle of the way, of a scanner that moved."""
+        """Viewpoint of the segments, metres: the middle of the way, of a scanner that moved."""
         if self.beams is None or self.beams.origins is None or not len(self.beams.origins):
             return 0.0, 0.0
         x, y = self.beams.origins.mean(axis=0).tolist()
@@ -96,7 +96,7 @@ def vectorize(
         Ranges, or points in scanning order, metres.
     options : VectorizationOptions, optional
     viewpoint : (float, float) or None
-        Where the sensor stood, metres, for points only. Segments have it on their left, and noise acts along the rays
+        Position of the sensor, metres, for points only. Segments have it on their left, and noise acts along the rays
         from it. None: not seen from one place; segments run as the points do, and noise has no direction.
 
     Returns

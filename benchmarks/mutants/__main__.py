@@ -55,7 +55,7 @@ def draw(items: Sequence[WorkItem], count: int, seed: int) -> set[str]:
     items : sequence of WorkItem
         All mutants of a package.
     count : int
-        How many are drawn; 0 for all.
+        Number of are drawn; 0 for all.
     seed : int
     """
     able = [item for item in items if not WITHOUT_EFFECT.fullmatch(item.mutations[0].operator_name)]

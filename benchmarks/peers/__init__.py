@@ -1,4 +1,4 @@
-"""Linefix beside other solvers: ``python -m benchmarks peers``, with the packages of the group ``peers`` installed."""
+"""Linefix next to other solvers: ``python -m benchmarks peers``, with the packages of the group ``peers`` installed."""
 
 from .report import peers, versions
 

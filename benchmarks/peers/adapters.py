@@ -99,7 +99,7 @@ class KissMatcher(OfCorners):
     bound, gain : float
         Metres that distances may differ, and the share of it that the solver allows.
     tips : bool
-        Whether a second point, a metre along the first segment, lets distances see directions.
+        True if a second point, a metre along the first segment, lets distances see directions.
     """
 
     bound: float = 0.15
@@ -364,7 +364,7 @@ class Entry:
 
     @property
     def installed(self) -> bool:
-        """Whether its module can be found."""
+        """Return whether its module can be found."""
         return importlib.util.find_spec(self.module) is not None
 
 

@@ -25,7 +25,7 @@ ON_MAP = np.array([0.15, math.radians(6.0)])  # m and radians; gates of what a p
 
 @dataclass(frozen=True, slots=True)
 class CornerOptions:
-    """How corners are made and matched.
+    """Options for making and matching corners.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class CornerOptions:
     most : int
         Correspondences at most; those of corners near their segments come first.
     headings : int
-        How many of the headings with most votes are tried, 0 for all correspondences at once.
+        Number of of the headings with most votes are tried, 0 for all correspondences at once.
     """
 
     seen_reach: float = 1.0
@@ -79,7 +79,7 @@ class Matches:
 
 
 def match(scan: Floats, known: MapCorners, options: CornerOptions) -> list[Matches]:
-    """Return correspondences, one set for each heading that is worth trying."""
+    """Return correspondences, one set for each heading that is tried."""
     seen = cross_lines(scan, options.seen_reach)
     order = np.argsort(seen[:, 8], kind="stable")
     gates = np.array([math.radians(options.turn), options.slack, options.most])

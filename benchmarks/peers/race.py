@@ -30,14 +30,14 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "TBB_NU
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """What a peer made of a query.
+    """The result of a peer for a query.
 
     Attributes
     ----------
     right : bool
         Within `DISTANCE` and `ANGLE` of the truth.
     usable : bool or None
-        What it says itself.
+        Its own verdict.
     ms : float
         Processor time of all its threads; the limit where it ran out.
     out_of_time : bool
@@ -50,7 +50,7 @@ class Attempt:
 
 
 class Racer:
-    """A peer in a process of its own, started anew when it was ended."""
+    """A peer in a process of its own, started again when it was ended."""
 
     def __init__(self, key: str, limit: float = LIMIT, options: dict[str, Any] | None = None) -> None:
         self._key, self._limit, self._options = key, limit, options or {}

@@ -1,4 +1,4 @@
-"""Linefix beside its peers: the same queries for all, success and processor time, and what Linefix says of itself."""
+"""Linefix next to its peers: the same queries for all, success and processor time, and what Linefix says of itself."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ PLANS = {50: OfficePlan(rooms=3, corridors=1), 200: OfficePlan(rooms=4, corridor
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """How hard a drawn query is.
+    """The difficulty: a drawn query is.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Level:
     cut : (float, float) or None
         Least and greatest share of its length to which each segment is cut.
     whole : bool
-        What `counts` counts.
+        The unit of `counts`.
     """
 
     name: str
@@ -75,13 +75,13 @@ class PeerQuery:
     scan : Floats
         ``(m, 4)`` end points in the scan's frame.
     on_map : NDArray
-        ``(m,)`` the map segment that each is a part of, -1 for clutter; empty where nobody knows.
+        ``(m,)`` the map segment that each is a part of, -1 for clutter; empty if unknown.
     pose, guess : RigidTransform
-        The truth, and half a metre and ten degrees beside it.
+        The truth, and half a metre and ten degrees next to it.
     sigma : float
         Metres.
     one_place : bool
-        Whether it was seen from the origin of its frame; else its segments end where two points of that sigma lie.
+        True if it was seen from the origin of its frame; else its segments end where two points of that sigma lie.
     """
 
     map: Floats
@@ -104,7 +104,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """What the tables call it."""
+        """Its name in the tables."""
         return f"{self.kind}, {self.level}" if self.size is None else f"{self.kind}, {self.size:,}, {self.level}"
 
 
@@ -143,7 +143,7 @@ KINDS: dict[str, Callable[[int, np.random.Generator], Floats]] = {"polygons": po
 
 
 def draw_query(segments: Floats, level: Level, rng: np.random.Generator) -> PeerQuery:
-    """Draw what is seen near a place; the place is beside a segment drawn from the map."""
+    """Draw what is seen near a place; the place is next to a segment drawn from the map."""
     wanted = int(rng.integers(level.counts[0], level.counts[1] + 1))
     inliers = round(wanted * (1.0 - level.outliers)) if level.whole else wanted
     outliers = round(inliers * level.outliers / (1.0 - level.outliers))

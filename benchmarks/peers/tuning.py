@@ -1,7 +1,7 @@
 """Find each peer's best settings for each level, on queries of their own: ``python -m benchmarks.peers.tuning``.
 
-Coordinate search: one setting after another takes each of its values, twice around. What counts is the share of right
-answers; ten times the processor time must buy two points of it. Prints what is to be pasted into `settings`.
+Coordinate search: one setting after another takes each of its values, twice around. The objective is the fraction of
+right answers; ten times the processor time must buy two points of it. Prints what is to be pasted into `settings`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def queries_of(level: str, count: int) -> list[PeerQuery]:
 
 
 def worth(key: str, options: dict[str, Any], queries: list[PeerQuery]) -> float:
-    """Return what settings are worth: the share of right answers, less something for the time."""
+    """Return what settings score: the share of right answers, less something for the time."""
     peer = PEERS[key].make(**options)
     right, spent, prepared = 0, 0.0, {}
     for k, query in enumerate(queries):

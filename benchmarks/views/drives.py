@@ -33,13 +33,13 @@ TOUCHING = 1e-6  # m; a beam that reads the same in two scenes meets the same wa
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What was seen from a place, and where that was: in the map, or where the building stands.
+    """The scan of a place, and the pose of the place: in the map, or in the building.
 
     Attributes
     ----------
     scan : Scan
     pose : RigidTransform
-    ranges : (m,) metres, or None where nobody asks what they are beside a map
+    ranges : (m,) metres, or None if they are not compared with a map
     """
 
     scan: Scan
@@ -116,7 +116,7 @@ def way_back(scene: Segments, pose: RigidTransform, length: float, rng: np.rando
 def world_looks(case: Case, length: float) -> list[Look]:
     """Return what the scanner of a case sees on its way; its own scan first.
 
-    Where the map is of another part of the building, the way ends before any of that is seen.
+    If the map is of another part of the building, the way ends before any of that is seen.
     """
     rng = np.random.default_rng([case.number, 7])
     looks = []

@@ -1,4 +1,4 @@
-"""What came of scans of one view or several, and the rows that say so."""
+"""The result of scans of one view or several, and their rows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NEAR, TURNED = 0.3, 3.0  # m and degrees; farther off is wrong
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """What came of a scan.
+    """The result of a scan.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class Trial:
     ms : float
         Processor time, milliseconds.
     pose : RigidTransform or None
-        What was answered.
+        The answer.
     """
 
     usable: bool

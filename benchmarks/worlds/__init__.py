@@ -1,4 +1,4 @@
-"""Scans of worlds that nobody tuned on, and of strangers: ``python -m benchmarks worlds``."""
+"""Scans of worlds that were not used for tuning, and out-of-map scans: ``python -m benchmarks worlds``."""
 
 from .report import worlds
 

@@ -1,4 +1,4 @@
-"""Scans of drawn worlds: ``python -m benchmarks.worlds``; as a table beside the others ``python -m benchmarks worlds``.
+"""Scans of drawn worlds: ``python -m benchmarks.worlds``; as one of the tables ``python -m benchmarks worlds``.
 
 Every case is drawn by world, condition and number, so that the answers depend neither on what else is drawn nor on the
 number of processes, nor on whether Ray starts them.

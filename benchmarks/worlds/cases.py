@@ -24,12 +24,12 @@ class Question:
     Attributes
     ----------
     case : Case
-        What was drawn, with the truth.
+        A drawn case, with the truth.
     index : MapIndex
         Of the map, in whose frame the truth is.
     scans : dict
         By form. "ranges": the vectorized scan with its beams. "segments": its segments and the declared noise alone, as
-        of a caller who knows no more.
+        of a caller without further knowledge.
     prior : HardPrior or None
     """
 

@@ -1,4 +1,4 @@
-"""What is asked of the drawn worlds, beside what was measured.
+"""The goals of the drawn worlds, with the measured values.
 
 "Goal" is what must be reached whatever else pulls the other way, "aim" what is aimed at.
 """
@@ -73,7 +73,7 @@ def rows(outcomes: Sequence[WorldOutcome], half: str) -> list[Row]:
 
 
 def _kept(answers: Sequence[WorldOutcome], form: str, before: dict[str, float]) -> list[Row]:
-    """Judge what is usable and right beside what was so before, percent of the scans."""
+    """Judge what is usable and right next to what was so before, percent of the scans."""
     found = []
     for name, (conditions, least, aim) in KEPT.items():
         now = 100.0 * mean(o.usable and o.right for o in answers if o.condition in conditions)
@@ -85,7 +85,7 @@ def _kept(answers: Sequence[WorldOutcome], form: str, before: dict[str, float]) 
 
 
 def _let_in(answers: Sequence[WorldOutcome], form: str) -> list[Row]:
-    """Judge how many strangers get a usable answer although the scan shows that it is wrong."""
+    """Judge how many out-of-map scans get a usable answer although the scan shows that it is wrong."""
     found = []
     for condition, limits in LET_IN.items():
         told = [o.usable and could_be_told(o) for o in answers if o.condition == condition]

@@ -1,4 +1,4 @@
-"""What came of a question, as one flat record."""
+"""The result of a question, as one flat record."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ OF_THE_REGISTRATION = ("chi2", "dof", "reliability")
 
 @dataclass(frozen=True, slots=True)
 class WorldOutcome:
-    """An answer beside the truth; lengths in metres.
+    """An answer next to the truth; lengths in metres.
 
     Attributes
     ----------
     world, condition, number : str, str, int
-        What the case was drawn by.
+        The parameters of the case.
     held_out : bool
-        Whether nothing may be fitted on this world.
+        True if nothing may be fitted on this world.
     form : str
         "ranges" or "segments".
     truth, pose : [x, y, theta] or None
-        No truth for a stranger, no pose for `no_match`.
+        No truth for an out-of-map scan, no pose for `no_match`.
     status : str
     usable : bool
     reasons : list of str
         Their codes.
     probability : float or None
     distance, angle : float or None
-        How far the pose is off, metres and degrees.
+        The error of the pose, metres and degrees.
     read : float or None
         Share of the beams that read what the map shows from the pose.
     covariance : 6 numbers or None
@@ -103,27 +103,27 @@ class WorldOutcome:
 
     @property
     def stranger(self) -> bool:
-        """Whether no answer is right."""
+        """Return whether no answer is right."""
         return not in_map(self.condition)
 
     @property
     def right(self) -> bool:
-        """Whether the pose lies within 0.3 m and 3 degrees of the truth."""
+        """Return whether the pose lies within 0.3 m and 3 degrees of the truth."""
         return self._within(DISTANCE, ANGLE)
 
     @property
     def fine(self) -> bool:
-        """Whether the pose lies within 0.1 m and 1 degree of the truth."""
+        """Return whether the pose lies within 0.1 m and 1 degree of the truth."""
         return self._within(FINE_DISTANCE, FINE_ANGLE)
 
     @property
     def wrong(self) -> bool:
-        """Whether a robot would go by a pose that is not right."""
+        """Return whether a robot would go by a pose that is not right."""
         return self.usable and not self.right
 
     @property
     def said_elsewhere(self) -> bool:
-        """Whether the answer says that the robot is somewhere that is not on the map."""
+        """Return whether the answer reports that the robot is not on the map."""
         return self.status == Status.NO_MATCH or "not_on_map" in self.reasons
 
     def _within(self, distance: float, angle: float) -> bool:

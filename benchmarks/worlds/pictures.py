@@ -1,4 +1,4 @@
-"""Pictures of the drawn worlds, each with one scan, in a folder ``worlds`` beside the other pictures."""
+"""Pictures of the drawn worlds, each with one scan, in a folder ``worlds`` next to the other pictures."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def report(outcomes: Sequence[WorldOutcome]) -> list[Row]:
         group = [o for o in outcomes if o.held_out == held_out]
         if group:
             here = sum(not o.stranger for o in group) // len(FORMS)
-            counts = f"{here:,} scans in their map and {len(group) // len(FORMS) - here:,} strangers"
+            counts = f"{here:,} scans in their map and {len(group) // len(FORMS) - here:,} out-of-map scans"
             judged[half] = rows(group, half)
             print_rows(f"Drawn worlds for {half}, {counts}", judged[half])
     return judged.get("reporting", [])

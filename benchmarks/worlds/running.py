@@ -20,7 +20,7 @@ REPORT_EVERY = 5.0  # s
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """What one process does at a time: some numbers of one world and condition."""
+    """The work of one process at a time: some numbers of one world and condition."""
 
     world: str
     condition: str
@@ -29,7 +29,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What is drawn.
+    """The cases to draw.
 
     Attributes
     ----------

@@ -187,7 +187,7 @@ def quantile_bins(outcomes: Outcomes, size: int) -> list[tuple[int, float, float
 
 
 def print_calibration(outcomes: Outcomes) -> None:
-    """Print stated probabilities beside the share that is right, for scans in their map."""
+    """Print stated probabilities next to the share that is right, for scans in their map."""
     here = [o for o in outcomes if not o.stranger]
     rows = []
     for form in FORMS:

@@ -11,10 +11,11 @@ import typer
 
 from ..answering import answering
 from ..contract import Json
-from ..inputs import read_map_or_id, read_scan
+from ..inputs import read_map_or_id
 from ..logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of, sent, spread
 from ..options import AsJson, MapArgument, Server
 from ..printing import print_json, print_rows
+from ..scans import read_scan
 
 SAMPLES = 10  # of a log: ten from all over the building tell more than a hundred from one room
 
@@ -22,10 +23,10 @@ SAMPLES = 10  # of a log: ten from all over the building tell more than a hundre
 def check(
     on: MapArgument,
     scan: Annotated[
-        list[str] | None, typer.Option(metavar="FILE", help="A scan taken there, as JSON; several times.")
+        list[str] | None, typer.Option(metavar="FILE", help="A scan file from the building; repeat for more scans.")
     ] = None,
     log: Annotated[
-        Path | None, typer.Option(metavar="FILE", help=f"A bag or a CARMEN log; {SAMPLES} of its scans are taken.")
+        Path | None, typer.Option(metavar="FILE", help=f"A log from the building; {SAMPLES} of its scans are used.")
     ] = None,
     topic: Topic = None,
     tf_namespace: TfNamespace = None,
@@ -70,7 +71,7 @@ def check_rows(found: Json) -> list[tuple[str, str]]:
         tried = sum(one["status"] is not None for one in samples["scans"])
         rows.append(("scans", f"{samples['usable']} of {tried} usable, {samples['usable_as_advised']} as advised"))
         if tried < len(samples["scans"]):
-            rows.append(("note", f"no time was left for {len(samples['scans']) - tried} more scans"))
+            rows.append(("note", f"the time limit ended the check before {len(samples['scans']) - tried} more scans"))
     elif not found["complete"]:
-        rows.append(("note", "no time was left to look at everything"))
+        rows.append(("note", "the time limit ended the check; the findings are not complete"))
     return rows

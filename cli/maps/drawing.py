@@ -14,7 +14,7 @@ from .files import write_document
 
 def draw(
     on: MapArgument,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="png; or svg, dxf, geojson, csv, json.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File to write: png, svg, dxf, geojson, csv or json.")],
     server: Server = None,
 ) -> None:
     """Draw a map: walls in black, a green tick on the free side of each."""

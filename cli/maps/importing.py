@@ -29,32 +29,39 @@ class SaidOfFile:
     """What a file does not say itself, as options."""
 
     units: Annotated[
-        str | None, typer.Option(help="Of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
+        str | None, typer.Option(help="Unit of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
     ] = None
     layers: Annotated[
-        list[str] | None, typer.Option(metavar="PATTERN", help="Layers of a drawing, such as *WALL*; several times.")
+        list[str] | None,
+        typer.Option(metavar="PATTERN", help="Layers of a drawing to read, such as *WALL*; repeat for more patterns."),
     ] = None
     point: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="X Y", help="A free place, metres: directions of walls are found from there."),
+        typer.Option(metavar="X Y", help="A free place in metres; the directions of walls follow from it."),
     ] = None
     drawn: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="What lines are of walls: faces (default) or centres.")
+        str | None,
+        typer.Option(
+            metavar="WHAT", help="Meaning of the lines of a drawing: faces or centres of walls. Default: detected."
+        ),
     ] = None
     thickness: Annotated[
-        float | None, typer.Option(metavar="METRES", help="Of walls that are drawn by their centre line.")
+        float | None, typer.Option(metavar="METRES", help="Thickness of walls that are drawn by centre lines.")
     ] = None
     directions: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="drawn: free space lies on the left of each line; or none.")
+        str | None,
+        typer.Option(
+            metavar="WHAT", help="drawn: free space lies on the left of each line; none: directions have no meaning."
+        ),
     ] = None
     local_metres: Annotated[bool, typer.Option("--local-metres", help="The coordinates of a GeoJSON are metres.")] = (
         False
     )
-    topic: Annotated[str | None, typer.Option(help="Of the grid in a bag.")] = None
+    topic: Annotated[str | None, typer.Option(help="Topic of the grid in a bag.")] = None
     unknown: Annotated[
         str | None,
         typer.Option(
-            metavar="GREY", help="Grey value of the unknown cells of a picture, 0 to 255; none: no such cells."
+            metavar="GREY", help="Grey value of unknown cells in a picture, 0 to 255, or none. Default: detected."
         ),
     ] = None
 
@@ -80,17 +87,20 @@ class SaidOfFile:
 def import_map(
     file: Annotated[
         Path,
-        typer.Argument(help="yaml of map_server, dxf, svg, geojson, csv, json, or a bag with an OccupancyGrid."),
+        typer.Argument(
+            help="Map file: yaml of map_server, dxf, svg, geojson, csv, json, or a bag with an OccupancyGrid."
+        ),
     ],
     said: SaidOfFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the map there: json, dxf, svg, geojson or csv.")
+        Path | None, typer.Option(metavar="FILE", help="Write the map to this file: json, dxf, svg, geojson or csv.")
     ] = None,
     picture: Picture = None,
     log: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="A bag or a CARMEN log of scans taken there: how thick walls are is found from some."
+            metavar="FILE",
+            help="A log with scans of the building: estimate the thickness of walls drawn by centre lines from it.",
         ),
     ] = None,
     server: Server = None,
@@ -98,7 +108,9 @@ def import_map(
 ) -> None:
     """Read a map of another tool, say what was made of it and what is doubtful in it, and write it as a map file."""
     if log is not None and server is not None:
-        raise WrongUseError("--log looks at scans here: leave --server out, and put the map there afterwards")
+        raise WrongUseError(
+            "--log: not possible with --server; leave --server out, and store the map with linefix map put afterwards"
+        )
     answer = imported(file, said.fields, server)
     if log is not None:
         answer = beside_log(answer, file, said.fields, log)
@@ -148,7 +160,7 @@ def beside_log(answer: Json, file: Path, fields: Fields, log: Path) -> Json:
         return {**answer, "check": checked}
     thickness = f"{max(0.0, drawn + thicker):.2f}"
     again = imported(file, {**fields, "drawn": ["centres"], "thickness": [thickness]}, None)
-    message = f"walls are {thickness} m thick, found from scans of {log.name}"
+    message = f"walls are {thickness} m thick, estimated from scans of {log.name}"
     kept = [note for note in again["report"]["assumed"] if note["code"] != "thickness_given"]
     found = {"code": "thickness_found", "message": message, "count": 0}
     again["report"]["assumed"] = [*kept, found]

@@ -14,12 +14,14 @@ from ..options import AsJson, Server
 from ..printing import print_json, print_rows, print_table
 from .files import write_document
 
-MapId = Annotated[str, typer.Argument(metavar="ID", help="1 to 128 of A-Z a-z 0-9 . _ -")]
+MapId = Annotated[str, typer.Argument(metavar="ID", help="Id of the map: 1 to 128 of A-Z a-z 0-9 . _ -")]
 
 
 def put(
     map_id: MapId,
-    file: Annotated[str, typer.Argument(metavar="FILE", help="A map file: json, or what map import reads.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A map file: json, or another file that map import reads.")
+    ],
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
@@ -51,7 +53,12 @@ def list_maps(server: Server = None, as_json: AsJson = False) -> None:
 
 def get(
     map_id: MapId,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="json, dxf, svg, geojson or csv.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write the map to this file: json, dxf, svg, geojson or csv. Default: print it."
+        ),
+    ] = None,
     server: Server = None,
 ) -> None:
     """Print a stored map as JSON, or write it to a file."""
@@ -71,5 +78,5 @@ def remove(map_id: MapId, server: Server = None) -> None:
 
 def _checked(map_id: str) -> str:
     if not MAP_ID.fullmatch(map_id):
-        raise WrongUseError("an id is 1 to 128 of A-Z a-z 0-9 . _ -")
+        raise WrongUseError("the id is not valid: expected 1 to 128 of A-Z a-z 0-9 . _ -")
     return map_id

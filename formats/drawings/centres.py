@@ -1,4 +1,4 @@
-"""Whether a drawing has its walls by their centre lines, and how thick they are."""
+"""Detection of walls that are drawn by centre lines, and their thickness."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Flags = NDArray[np.bool_]
 
 MOST_LINES = 3000  # that are compared with each other; larger drawings are taken for faces
 FACE_APART = (0.03, 0.6)  # m; how far the other face of a wall lies
-FEW_FACES = 0.15  # of the length; that has another face beside it where walls are drawn by their centre lines
+FEW_FACES = 0.15  # of the length; that has a second face next to it if walls are drawn by their centre lines
 MOST_MEET = 0.5  # of the length; of lines that take part in a T or a crossing there
 THINNEST, THICKEST = 0.03, 1.5  # m; a width that a wall may have, and no pen
-# Between partitions and outer walls. `python -m benchmarks imports` tells what comes of it where they are 0.1 to 0.3 m.
+# Between partitions and outer walls. `python -m benchmarks imports` measures the result for 0.1 to 0.3 m.
 USUAL = 0.2  # m
 
 
 @dataclass(frozen=True, slots=True)
 class Walls:
-    """How thick the walls of centre lines are, ``(n,)`` metres, and what stands in the report of it."""
+    """Thickness of the walls of centre lines, ``(n,)`` metres, and the note of the report."""
 
     thickness: Floats
     code: str
@@ -87,7 +87,7 @@ def walls_of(widths: Floats, options: ImportOptions) -> Walls:
 
 
 def _neighbours(endpoints: Floats, lengths: Floats) -> tuple[Floats, Flags]:
-    """Return of each line how much of it has a parallel one beside it, metres, and whether it meets two or more arms.
+    """Return for each line the length with a parallel line next to it, metres, and whether it meets two arms or more.
 
     The end of a line is one arm, and its middle is two: at a corner two arms meet, at a T three.
     """

@@ -30,11 +30,11 @@ class Drawing:
     metres : float or None
         Per unit of the drawing; None where it does not say.
     oriented : bool
-        Whether the drawing says that free space lies on the left of its lines.
+        True if the drawing declares free space on the left of its lines.
     sigma, frame_id, meta
         As in `LineMap`, where the file says.
     segments : list of (k, 4)
-        What was drawn so far, units of the drawing.
+        The lines so far, units of the drawing.
     widths : list of float
         Of each polyline, units of the drawing; 0 where it has none.
     layer_names : list of str
@@ -70,7 +70,7 @@ class Drawing:
         points : array-like of shape (n, 2)
             Units of the drawing.
         closed : bool
-            Whether a line runs from the last point to the first.
+            True if a line runs from the last point to the first.
         width : float
             Units of the drawing.
         layer : str
@@ -115,7 +115,7 @@ class Drawing:
 
     @property
     def extent(self) -> str:
-        """Where the lines are, for messages, units of the drawing; empty where there are none."""
+        """The extent of the lines, for messages, units of the drawing; empty where there are none."""
         if not self.segments:
             return ""
         corners = np.vstack(self.segments).reshape(-1, 2)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 # It would print every repair of a broken file; they are counted in the report.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
-# The layer of lines that have free space on their left; the one way in which a DXF says so.
+# The layer of lines that have free space on their left; the only way to declare this in a DXF.
 FREE_LEFT = "FREE_LEFT"
 
 # Of layers, in some languages of drawings.

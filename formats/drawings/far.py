@@ -1,4 +1,4 @@
-"""Lines that lie far from all others, which stretch a map and are hardly ever walls."""
+"""Lines that lie far from all others, which stretch a map and are rarely walls."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from ..options import ImportOptions
 from ..report import Notes
 from .drawing import Drawing
 
-OWN = "linefix"  # the member in which our own files say what they are
+OWN = "linefix"  # the member that identifies our own files
 
 Lines = Iterator[tuple[Any, bool]]
 

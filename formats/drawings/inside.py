@@ -24,7 +24,7 @@ SAMPLES = 64  # along a line at most
 
 
 class Sides(IntEnum):
-    """Where free space lies."""
+    """The free space of a drawing."""
 
     NEITHER = 0
     LEFT = 1

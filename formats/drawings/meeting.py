@@ -1,4 +1,4 @@
-"""Where lines of a drawing lie to one another."""
+"""Positions of the lines of a drawing relative to each other."""
 
 from __future__ import annotations
 

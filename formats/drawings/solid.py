@@ -59,7 +59,7 @@ def _reach(lines: Segments, thickness: Floats) -> Floats:
             along, off = in_frame(lines.endpoints[some, columns], lines.endpoints[:, :2], lines.directions)
             near = (np.abs(off) < MEETS) & (along > -MEETS) & (along < lines.lengths[:, None] + MEETS)
             near[some, np.arange(len(some))] = False
-            # Where another goes on straight there is no corner to fill; it only is no free end.
+            # If another line continues straight, there is no corner to fill; it only is no free end.
             straight = (near & parallel_to(lines.directions, lines.directions[some])).any(axis=0)
             through = np.where(near, 0.5 * thickness[:, None], 0.0).max(axis=0)
             reach[some, side] = np.where(straight, INSIDE, through)

@@ -1,4 +1,4 @@
-"""Whether the unit of a drawing is plausible, from how long its lines are."""
+"""Plausibility of the unit of a drawing, from the lengths of its lines."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def to_map(drawing: Drawing, options: ImportOptions) -> LineMap:
     Raises
     ------
     IncompleteFileError
-        When nobody says how long a unit is.
+        When the length of a unit is unknown.
     MalformedFileError
         When no wall is left, or one is longer than a map can have.
     InvalidOptionError
@@ -110,7 +110,7 @@ def _with_faces(endpoints: Floats, widths: Floats, drawing: Drawing, options: Im
 
 
 def _directed(endpoints: Floats, drawing: Drawing, options: ImportOptions) -> Floats:
-    """Return lines with free space on the left; in both directions where it is on both sides, or nobody can tell."""
+    """Return lines with free space on the left; in both directions if it is on both sides or unknown."""
     seen = sides_seen(endpoints, options.inside)
     backward = endpoints[:, [2, 3, 0, 1]]
     counts = {side: int((seen == side).sum()) for side in Sides}

@@ -26,7 +26,7 @@ class Grid:
     Attributes
     ----------
     occupancy : (rows, columns) float32
-        0 free to 1 occupied, nan where the file says that nothing is known; row 0 is the lowest, y points up.
+        0 free to 1 occupied, nan for unknown cells of the file; row 0 is the lowest, y points up.
     resolution : float
         Edge of a cell, metres.
     origin : RigidTransform
@@ -61,7 +61,7 @@ def classify(grid: Grid, notes: Notes) -> Cells:
     """Tell free, occupied and unknown cells apart.
 
     Unknown cells are found first, from the levels of the picture: no threshold makes them free or occupied. The others
-    follow the thresholds of the file where these agree with the picture. Where the thresholds leave most of the dark or
+    follow the thresholds of the file where these agree with the picture. If the thresholds leave most of the dark or
     of the light cells out, Otsu's threshold parts them.
 
     Parameters

@@ -35,7 +35,7 @@ Flags = NDArray[np.bool_]
 def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
     """Find the faces of the walls in a grid.
 
-    Contours of the free space have it on their left. What borders on cells of which nothing is known is no wall. The
+    Contours of the free space have it on their left. A border with unknown cells is no wall. The
     contour runs along the front of the occupied cells, the wall's surface behind it: see `surface_depth`.
 
     Parameters
@@ -53,7 +53,7 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
     Raises
     ------
     MalformedFileError
-        When there is no free cell beside an occupied one.
+        When no free cell borders on an occupied one.
     TooLargeError
         When there are too many segments.
     """
@@ -169,7 +169,7 @@ def sharpest_corner(contour: Floats) -> int:
 
 
 def _borders_on_wall(contour: Floats, padded: Cells) -> Flags:
-    """Tell which points of a contour, each halfway between two cells, have an occupied one beside them."""
+    """Tell which points of a contour, each halfway between two cells, border on an occupied one."""
     low, high = np.floor(contour).astype(np.intp), np.ceil(contour).astype(np.intp)
     wall: Flags = (padded[low[:, 1], low[:, 0]] == OCCUPIED) | (padded[high[:, 1], high[:, 0]] == OCCUPIED)
     return wall

@@ -1,4 +1,4 @@
-"""Maps of ROS's map_server: a description in YAML beside a picture."""
+"""Maps of ROS's map_server: a description in YAML with a picture."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ RAW_UNKNOWN = 100  # in mode raw: the greatest value that is an occupancy in per
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What the YAML says; names as there.
+    """The content of the YAML, with its names.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ def read_grid(
     Parameters
     ----------
     path : Path
-        Of the YAML; the picture is looked for beside it, whatever folder the YAML names.
+        Of the YAML; the picture is expected in the same folder, whatever folder the YAML names.
     options : ImportOptions
         Which grey value unknown cells have.
     notes : Notes
@@ -233,7 +233,7 @@ def _shades(told: Description) -> tuple[int, ...]:
 
 
 def _given(options: ImportOptions, told: Description) -> tuple[int, ...] | None:
-    """Return the levels of occupancy that the caller says stand for unknown cells; None where nothing is said."""
+    """Return the levels of occupancy that the caller declares as unknown; None by default."""
     if options.unknown is None or options.unknown == "none":
         return None if options.unknown is None else ()
     grey = int(options.unknown)

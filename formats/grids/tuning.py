@@ -38,7 +38,7 @@ EDGE_REACH = 3
 # free, for these to be used.
 BELIEVED = 0.5
 
-# Where the wall is ----------------------------------------------------------------------------------------------------
+# Position of the wall -----------------------------------------------------------------------------------------------
 
 # The wall's surface lies this share of the band of occupied cells behind its front, and in the first cell's middle at
 # least. A value between two public grids that have a log: offsets of answers are least at 0.5 cells where the band has
@@ -53,10 +53,10 @@ GREATEST_BAND = 10
 # freiburg-079 and intel 81 and 75 % are usable with 0.25, 82 and 83 % with 0.3, 79 and 87 % with 0.35.
 CONTOUR_SIGMA = 0.3
 
-# Points on either side that tell how sharp a corner is, where a contour has to begin at one.
+# Points on either side that determine the sharpness of a corner, if a contour has to begin at one.
 CORNER_REACH = 3
 
-# Least length of a segment, and points of a contour that are worth a try. Shorter pieces are what furnished rooms are
+# Least length of a segment, and points of a contour that are tried. Shorter pieces are what furnished rooms are
 # told by: with 6 cells 44 % of the scans of freiburg-079 were usable, with 3 cells 61 %.
 LEAST_LENGTH = 3.0
 LEAST_POINTS = 4

@@ -81,7 +81,7 @@ def given_levels(levels: tuple[int, ...]) -> UnknownLevels:
 def free_end(counts: Counts, unknown: int) -> float:
     """Return the level below which cells may be free, given the lightest level of unknown cells.
 
-    Where most lighter cells have one level, it is halfway between: resizing and compression make cells beside walls
+    If most lighter cells have one level, it is halfway between: resizing and compression make cells near walls
     lighter than unknown ones are.
     """
     lighter = counts[:unknown]

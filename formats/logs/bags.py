@@ -41,7 +41,7 @@ OLD_TRANSFORMS = "tf/msg/tfMessage"  # of ROS 1, laid out alike
 NAMED = 20  # topics that an error lists at most
 ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a message that rosbag2 has compressed; no encoding begins so
 
-# What rosbags lets through of a file that is broken on purpose.
+# Exceptions of rosbags for files that are broken on purpose.
 BROKEN = (
     ReaderError1, ReaderError2, SerdeError, apsw.Error, struct.error, zlib.error, OSError, EOFError, ValueError,
     TypeError, LookupError, AttributeError, ArithmeticError, AssertionError, RecursionError, RuntimeError, MemoryError,

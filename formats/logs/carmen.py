@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -49,8 +50,10 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
     name = name_of(path)
     wanted, stamps, first = options.topic, Stamps(notes), ""
     moves: bool | None = None
+    seen: Counter[str] = Counter()
     for number, words in _messages(path, notes):
         kind = words[0]
+        seen[kind] += 1
         if kind not in KINDS or (wanted is not None and kind != wanted):
             notes.add_dropped(f"message_{kind.lower()}", f"{kind} messages", 1)
             continue
@@ -78,7 +81,8 @@ def _scans(path: Path, options: LogOptions, notes: Notes) -> Iterator[LoggedScan
     if "scans" not in notes.read and first:
         raise none_usable(name, notes, first)
     if "scans" not in notes.read:
-        raise IncompleteFileError(f"has no {wanted or 'scan'} of CARMEN", argument=name)
+        there = ", ".join(f"{count} {kind}" for kind, count in sorted(seen.items())) or "no message of CARMEN"
+        raise IncompleteFileError(f"has no {wanted or 'scan'}; it has {there}", argument=name)
 
 
 def _moves(path: Path, kind: str) -> bool:

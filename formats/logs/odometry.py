@@ -118,8 +118,8 @@ def outer_frames(tree: Transforms, frame: str) -> list[str]:
 def moves(tree: Transforms, path: Sequence[str]) -> bool:
     """Tell whether a robot moves, by the frames from its sensor outwards: a mount that moves is no robot that does.
 
-    The frame that has to move is the robot's own. Where no frame has that name, a frame has to change its position in
-    its parent: a sensor that turns on a hinge does not.
+    The frame that has to move is the robot's own. If no frame has that name, a frame has to change its position in
+    its parent: a rotating sensor does not.
     """
     bases = [k for k, frame in enumerate(path) if frame.rpartition("/")[2] in BASES]
     if bases:

@@ -59,7 +59,7 @@ class LoggedScan:
     base_frame : str
         The robot's own frame, which `mount` is in.
     flipped : bool
-        Whether the sensor is mounted upside down: y becomes -y in its data before `pose` or `mount` apply.
+        True if the sensor is mounted upside down: y becomes -y in its data before `pose` or `mount` apply.
     """
 
     stamp_ns: int
@@ -80,13 +80,13 @@ class LoggedScan:
 
 
 class Log:
-    """The scans of a log, read anew by each iteration; a long log is never held whole.
+    """The scans of a log. Each iteration reads the file again, so a long log is never in memory as a whole.
 
     Attributes
     ----------
     format, name : str
     count : int or None
-        How many messages of scans there are, where the log says.
+        Number of scan messages, if the log has it.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Log:
 
     @property
     def report(self) -> ImportReport:
-        """What the last iteration read so far."""
+        """Notes of the last iteration so far."""
         return self._notes.report(self.format, (self.name,))
 
 

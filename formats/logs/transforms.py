@@ -36,7 +36,7 @@ def stamp_of(header: Any) -> int:
 def planar(matrix: Floats) -> tuple[RigidTransform, bool]:
     """Return what a transform of space does in the plane, and whether it turns the z axis down.
 
-    Where it does, y has to become -y first.
+    If it does, y has to become -y first.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Compiled sums and solvers over records; see ``layout.py`` for what these hold.
 
-Nothing here validates: callers hand over finite numbers and indices in range. Every kernel has a slow twin in
+Nothing here validates: callers pass finite numbers and valid indices. Every kernel has a slow reference in
 ``tests/reference.py``. Below are those that the kernels of other packages may call.
 """
 

@@ -1,4 +1,4 @@
-"""Both estimators, and what is told beside their answers: from weighted pairs to a fit in one call.
+"""Both estimators and their diagnostics: from weighted pairs to a fit in one call.
 
 There are two frames besides the caller's, or digits would be lost: the *local* one is the map's, about the middle of
 the map segments, and the *centred* one is the scan's, about the middle of the scan segments.
@@ -40,8 +40,8 @@ def fit(
     pairs : (n,) PAIR
         In the caller's frames; one of them counts at least.
     used, information, noise : (n,)
-        What the estimator weighs with; what chi2 and the covariance take for 1 / variance; 1 / variance by the sigmas,
-        (0,) where a pair has none. What does not count has 0 in each.
+        The weights of the estimator; 1 / variance of chi2 and the covariance; 1 / variance by the sigmas,
+        (0,) if a pair has none. Pairs that do not count have 0 in each.
     how : (1,) FITTING
     fitted : (1,) FITTED
 
@@ -68,7 +68,7 @@ def fit(
     pose = out.pose
     between = out.between
     if moves and (out.free == FREE or out.free == PARALLEL):
-        # Of those that fit the one is told whose translation in the caller's frames is shortest that way.
+        # Of those that fit the one receives whose translation in the caller's frames is shortest that way.
         back = out.free_x * (map_x + pose.x) + out.free_y * (map_y + pose.y)
         back = -min(out.slack, max(-out.slack, back))
         pose.x += back * out.free_x

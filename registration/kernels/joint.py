@@ -73,7 +73,7 @@ def joint_solve(sums: Record, theta0: float, use_wahba: bool) -> tuple[float, fl
     """Minimise ``x' Q x`` over the rigid transforms.
 
     Returns ``(theta, t_x, t_y, cost, observable)``. The search for theta starts at Wahba's angle (or at `theta0`),
-    since Q cannot tell a direction from its opposite, and takes Newton steps on the unit circle. Where all lines are
+    since Q cannot tell a direction from its opposite, and takes Newton steps on the unit circle. If all lines are
     parallel `observable` is False and the translation is the shortest of those that fit.
     """
     a = sums.xx

@@ -69,7 +69,7 @@ def invert3(m: Record, out: Record) -> bool:
 
 @kernel
 def invert3_scaled(m: Record, out: Record) -> None:
-    """Write the inverse of a positive definite matrix to `out`, with no more rounding than its condition asks for.
+    """Write the inverse of a positive definite matrix to `out`, with no more rounding than its condition implies.
 
     Scaled to a unit diagonal, as its units are unlike, and by pivots. It has to be regular, see `is_regular3`.
     """

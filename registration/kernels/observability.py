@@ -16,8 +16,8 @@ from .records import keep_alive
 MAX_DEVIATION = 0.5  # m; a translation less certain than this in some direction is not fixed
 SLACK = 3.0  # standard deviations that a fit may move and still be one
 
-# What a set of pairs leaves free: nothing; one direction of the translation, or that because all lines are parallel;
-# the rotation.
+# The freedom that a set of pairs leaves: none; one direction of the translation; the same because all lines are
+# parallel; the rotation.
 FIXED, FREE, PARALLEL, TURNING = range(4)
 
 
@@ -34,9 +34,9 @@ def freedom(
     theta : float
         The rotation, radians.
     with_noise : bool
-        Whether `noise` counts.
+        True if `noise` counts.
     parallel : bool
-        Whether the lines are parallel within the noise.
+        True if the lines are parallel within the noise.
     """
     small, big, x, y = eigen2(used[0].xx, used[0].xy, used[0].yy)
     if small <= PARALLEL_RATIO * big:

@@ -1,4 +1,4 @@
-"""What Python calls of the sums' kernels: they take arrays, as handing a single record over from Python is slow."""
+"""The sums' kernels for calls from Python: they take arrays, because passing a single record from Python is slow."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def one_step_sums(pairs: Records, x: float, y: float, alpha_ref: float, weights:
 def one_step_solve(values: Record, use_wahba: bool) -> tuple[float, float, float, bool]:
     """Return ``(a, t_x, t_y, observable)`` relative to the reference transform.
 
-    Eqs. (5) to (9) or (10) to (15), with the two minus signs of Eq. (8)'s D1 and D2 turned to plus. Where all lines are
+    Eqs. (5) to (9) or (10) to (15), with the two minus signs of Eq. (8)'s D1 and D2 turned to plus. If all lines are
     parallel `observable` is False and the translation is the shortest of those that fit.
     """
     v = values

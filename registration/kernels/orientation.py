@@ -29,7 +29,7 @@ def choose_rotation(pairs: Records, weights: Floats, is_noise: bool) -> tuple[fl
         About the centres of both sets.
     weights : (n,)
     is_noise : bool
-        Whether the weights are 1 / variance.
+        True if the weights are 1 / variance.
 
     Returns
     -------

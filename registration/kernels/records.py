@@ -1,4 +1,4 @@
-"""How long the elements of arrays of records live."""
+"""Lifetime of the elements of arrays of records."""
 
 from __future__ import annotations
 

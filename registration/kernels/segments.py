@@ -37,7 +37,7 @@ def lines_of(endpoints: Floats) -> Lines:
         along_x = endpoints[i, X2] - endpoints[i, X]
         along_y = endpoints[i, Y2] - endpoints[i, Y]
         length = math.hypot(along_x, along_y)
-        # That one has no length is told by its length.
+        # A segment without length is recognized by its length.
         dx = along_x / length if length > 0.0 else 0.0
         dy = along_y / length if length > 0.0 else 0.0
         x = endpoints[i, X] + 0.5 * along_x

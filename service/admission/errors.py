@@ -12,7 +12,6 @@
     ├── NotReadyError        the service does not serve yet, or no longer
     ├── QueueFullError       every place is taken
     ├── ShareUsedError       every place is taken, and this key has its share of them
-    ├── TooManyConnectionsError  every connection that may be open is at work
     ├── TooMuchHeldError     too many bytes of requests or answers are in memory
     ├── ShareHeldError       this key has its share of these bytes
     └── DeadlinePassedError  the deadline passed before the search started
@@ -98,13 +97,6 @@ class ShareUsedError(AdmissionError):
         super().__init__(
             "the queue is full, and this key or address has used its part of it; send the request again later"
         )
-
-
-class TooManyConnectionsError(AdmissionError):
-    """Every connection that may be open is at work."""
-
-    def __init__(self) -> None:
-        super().__init__("too many connections are open; close some, or send the request again later")
 
 
 class TooMuchHeldError(AdmissionError):

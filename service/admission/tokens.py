@@ -17,8 +17,8 @@ import jwt
 
 from .errors import UnknownKeyError
 from .grants import Grant, Role
-from .issuer import Issuer
 from .key_set import Keys, KeySetError, read_key_set
+from .keys import Issuer
 
 SCOPE = "linefix:"
 MAPS = "linefix_maps"

@@ -1,13 +1,18 @@
-"""Receiving a request's body: bounded in bytes and in time."""
+"""Receive a request's body, bounded in bytes and in time; drop the rest of a body that no route reads.
+
+A server that closes a connection with bytes unread has the system reset it, and the reset overtakes the answer: the
+client sees a broken connection in place of a refusal.
+"""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 
 from starlette.requests import Request
+from starlette.types import Message, Receive
 
 from ..admission.budget import ByteAccount, ByteBudget
 from ..admission.fair_queue import Holder
@@ -15,6 +20,7 @@ from ..schemas.errors import BodyTooLargeError
 from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 JSON, FORM = "application/json", "multipart/form-data"
+DROP_SECONDS = 1.0  # s that the rest of a body may take to come
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +106,40 @@ class BodyReceiver:
             yield Body(data, gzipped, account)
 
 
+class Intake:
+    """The body of one request.
+
+    Parameters
+    ----------
+    receive : Receive
+        Of the server.
+    headers : sequence of (bytes, bytes)
+    """
+
+    def __init__(self, receive: Receive, headers: Sequence[tuple[bytes, bytes]]) -> None:
+        self._receive = receive
+        # A client that asks before it sends its body has sent nothing yet.
+        self._unread = any(_announces_body(*field) for field in headers) and not any(
+            name == b"expect" for name, _ in headers
+        )
+
+    async def receive(self) -> Message:
+        """Return the next message."""
+        message = await self._receive()
+        self._unread = message["type"] == "http.request" and message.get("more_body", False)
+        return message
+
+    async def drop_rest(self, most_bytes: int) -> None:
+        """Read what is left and drop it, as far as it comes soon and is not too much."""
+        if not self._unread:
+            return
+        dropped = 0
+        with suppress(TimeoutError):
+            async with asyncio.timeout(DROP_SECONDS):
+                while self._unread and dropped <= most_bytes:
+                    dropped += len((await self.receive()).get("body", b""))
+
+
 def _is_gzip(request: Request, *, form: bool) -> bool:
     """Tell whether a body is gzip; refuse what by its head is not what is taken."""
     told = request.headers.get("content-type", FORM if form else JSON)
@@ -115,3 +155,7 @@ def _is_gzip(request: Request, *, form: bool) -> bool:
 
 def _is_json(media_type: str) -> bool:
     return media_type == JSON or (media_type.startswith("application/") and media_type.endswith("+json"))
+
+
+def _announces_body(name: bytes, value: bytes) -> bool:
+    return name == b"transfer-encoding" or (name == b"content-length" and value != b"0")

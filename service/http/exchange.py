@@ -1,31 +1,64 @@
-"""The exchange of one request: its ticket, state and clock, from its body to its answer.
+"""One request while it is served: its state from the first byte to the line in the log, and the exchange of its stages.
 
-The stages are functions of `receiving`, `map_stage` and `turns`, each of which takes an exchange.
+The stages are functions of `receiving`, `map_stage` and `searching`, each of which takes an exchange.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any, cast
 
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.types import Scope
 
 from ..admission.ticket import Ticket
-from ..work.job import Done, Job, Stopwatch
-from .sending import json_response
+from ..work.job import Job, Stopwatch
 from .services import Services, services_of
-from .state import RequestState, state_of
+
+_KEY = "request"  # in `scope["state"]`, next to the application's own
+
+
+@dataclass(slots=True)
+class RequestState:
+    """State of one request.
+
+    Attributes
+    ----------
+    arrived : float
+        When its head arrived, by the event loop's clock, seconds.
+    request_id : str
+    ticket : Ticket, or None
+        Its admission; None until it is admitted.
+    noted : dict
+        Further fields of its line in the log.
+    """
+
+    arrived: float
+    request_id: str
+    ticket: Ticket | None = None
+    noted: dict[str, object] = field(default_factory=dict)
+
+
+def attach(scope: Scope, state: RequestState) -> None:
+    """Store the state of a request in its scope."""
+    cast("dict[str, Any]", scope.setdefault("state", {}))[_KEY] = state
+
+
+def state_of(scope: Scope) -> RequestState | None:
+    """Return the state of a request, None where it has none yet."""
+    found = scope.get("state", {}).get(_KEY)
+    return found if isinstance(found, RequestState) else None
 
 
 @dataclass(slots=True)
 class Exchange:
-    """One request, and what it is answered with.
+    """One admitted request.
 
     Attributes
     ----------
     request : Request
     services : Services
-        Of the application that it came to.
+        Of its application.
     state : RequestState
     ticket : Ticket
     watch : Stopwatch
@@ -46,11 +79,6 @@ class Exchange:
         """Return the job of this request; without a deadline of its own it has the service's."""
         deadline = self.watch.deadline(deadline_ms, self.services.settings.max_deadline_ms)
         return Job(self.state.request_id, self.watch, deadline)
-
-    def answer(self, done: Done) -> Response:
-        """Return the result of the work as a response."""
-        self.note(**done.noted)
-        return json_response(done.body)
 
 
 def begin(request: Request) -> Exchange:

@@ -103,7 +103,6 @@ TABLE = (
         "The service is busy",
         (
             admission.QueueFullError,
-            admission.TooManyConnectionsError,
             admission.TooMuchHeldError,
             maps.BusyStoreError,
             parsing.ParserEndedError,

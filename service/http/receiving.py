@@ -15,7 +15,7 @@ from ..schemas.limits import Limits
 from ..telemetry.traces import stage
 from ..work.job import Stopwatch
 from .exchange import Exchange
-from .turns import take_other_turn, unless_hung_up
+from .searching import in_slot_of, unless_hung_up
 
 T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]
@@ -34,7 +34,7 @@ async def read(exchange: Exchange, reader: Reader[T]) -> T:
             if len(data) <= SMALL:
                 return reader(data, exchange.services.settings.limits())
             deadline = exchange.job().deadline
-            return await unless_hung_up(exchange, parse(exchange, reader, data, deadline), deadline)
+            return await unless_hung_up(exchange.request.receive, parse(exchange, reader, data, deadline), deadline)
 
 
 @asynccontextmanager
@@ -48,7 +48,7 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
         if body.gzipped:
             packed, max_bytes = len(data), services.settings.max_body_bytes
             call = partial(unpack, data, max_bytes, body.account.take)
-            data = await take_other_turn(exchange, services.parsing_apart, call, exchange.job().deadline)
+            data = await in_slot_of(services.parsing_apart, exchange, call, exchange.job().deadline)
             body.data.clear()
             body.account.give_back(packed)
         yield data
@@ -63,6 +63,6 @@ async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray, 
     services = exchange.services
     limits = services.settings.limits()
     if len(data) <= LARGE:
-        return await take_other_turn(exchange, services.parsing, partial(reader, data, limits), deadline)
+        return await in_slot_of(services.parsing, exchange, partial(reader, data, limits), deadline)
     call = partial(services.parser.call, reader, data, limits)
-    return await take_other_turn(exchange, services.parsing_apart, call, deadline)
+    return await in_slot_of(services.parsing_apart, exchange, call, deadline)

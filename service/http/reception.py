@@ -7,17 +7,23 @@ import logging
 import random
 import re
 import time
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING
+from unicodedata import category
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..admission.entrance import search_of
 from ..admission.errors import AdmissionError, MissingKeyError, ShareUsedError, UnknownKeyError
 from ..schemas.errors import RequestError
-from .errors import HttpError, NotHttpError
-from .intake import Intake
+from .bodies import Intake
+from .errors import ControlCharacterError, HttpError, NotHttpError
+from .exchange import RequestState, attach, state_of
 from .problems import INTERNAL, RAISED, problem_of
 from .services import Services
-from .state import RequestState, attach, state_of
+
+if TYPE_CHECKING:
+    from opentelemetry.trace import Span
 
 logger = logging.getLogger("linefix")
 LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would ask again at once
@@ -26,6 +32,7 @@ STRANGERS_BYTES = 65_536  # of the rest of a body that is dropped of who has sho
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
 NO_HOST = (b"host", b"")  # what the server has in place of a host where none was sent
+CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
 ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
 _HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
 _ID = re.compile(rb"^[A-Za-z0-9._:/+=@-]{1,128}$")
@@ -53,15 +60,21 @@ class Reception:
             return
         if NO_HOST in scope["headers"]:
             scope["headers"] = [field for field in scope["headers"] if field != NO_HOST]
-        state = RequestState(asyncio.get_running_loop().time(), request_id=taken_or_made(scope["headers"]))
+        state = RequestState(asyncio.get_running_loop().time(), taken_or_made(scope["headers"]))
         attach(scope, state)
         try:
             _require_framing(scope)
+            _require_plain(scope["path"])
             state.ticket = self._services.entrance.admit(scope)
         except (AdmissionError, HttpError, RequestError) as error:
             await self._refuse(error, state.request_id, scope, receive, send)
             return
-        await self._serve(state, scope, receive, send)
+        traces = self._services.traces
+        traced: AbstractContextManager[Span | None] = nullcontext()
+        if traces is not None:
+            traced = traces.request(scope["headers"])
+        with traced as span:
+            await self._serve(state, span, scope, receive, send)
 
     async def _refuse(self, error: Exception, request_id: str, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer in place of the application; counted, and logged once a second."""
@@ -83,9 +96,8 @@ class Reception:
 
         await problem.response(request_id)(scope, receive, send_refusal)
 
-    async def _serve(self, state: RequestState, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _serve(self, state: RequestState, span: Span | None, scope: Scope, receive: Receive, send: Send) -> None:
         started = time.perf_counter()
-        state.trail = None if self._services.traces is None else self._services.traces.begin()
         intake, most_bytes = Intake(receive, scope["headers"]), self._services.settings.max_body_bytes
         status = 0
         # Whoever can be read can be asked for its headers: the server leaves the body away.
@@ -111,13 +123,13 @@ class Reception:
         finally:
             assert state.ticket is not None
             state.ticket.arrive()
-            self._tell(inner, scope["method"], status, time.perf_counter() - started)
+            self._report(inner, scope["method"], status, time.perf_counter() - started, span)
 
-    def _tell(self, scope: Scope, method: str, status: int, seconds: float) -> None:
-        """Count and log a request; status 0 is a client that was gone before it was answered."""
+    def _report(self, scope: Scope, method: str, status: int, seconds: float, span: Span | None) -> None:
+        """Count and log a request; status 0 is a client that hung up before it was answered."""
         state = state_of(scope)
         assert state is not None
-        route = getattr(scope.get("route"), "path", "unmatched")
+        route = getattr(scope.get("route"), "path", OTHER)
         self._services.metrics.observe_request(route, method, status, seconds)
         usual = {
             "request_id": state.request_id,
@@ -127,10 +139,10 @@ class Reception:
             "ms": round(1e3 * seconds, 3),
         }
         logger.info("request", extra={**usual, **state.noted})
-        if state.trail is not None and self._services.traces is not None:
-            told = {"http.request.method": method, "http.route": route, "http.response.status_code": status}
-            told["linefix.request_id"] = state.request_id
-            self._services.traces.tell(state.trail, scope["headers"], f"{method} {route}", told)
+        if span is not None:
+            span.update_name(f"{method} {route}")
+            span.set_attributes({"http.request.method": method, "http.route": route})
+            span.set_attributes({"http.response.status_code": status, "linefix.request_id": state.request_id})
 
 
 def _require_framing(scope: Scope) -> None:
@@ -143,6 +155,18 @@ def _require_framing(scope: Scope) -> None:
     codings = [value.strip().lower() for name, value in scope["headers"] if name == b"transfer-encoding"]
     if codings not in ([], [b"chunked"]):
         raise NotHttpError
+
+
+def _require_plain(path: str) -> None:
+    """Refuse a path that has a control character, its escapes undone.
+
+    A router that looks for the end of a line takes ``/metrics%0A`` for ``/metrics``; the rule of a proxy for that path
+    does not.
+    """
+    if not path.isprintable():
+        for character in path:
+            if category(character) in CONTROL:
+                raise ControlCharacterError(character)
 
 
 def _add_headers(message: Message, request_id: str, *, close: bool = False) -> None:

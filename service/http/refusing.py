@@ -14,9 +14,9 @@ from starlette.routing import Match
 from ..schemas.errors import InvalidRequestError
 from ..schemas.faults import faults_of
 from .errors import BodyBrokenError, MethodNotAllowedError, NotFoundError, RefusedError
-from .hanging_up import HangUpError
+from .exchange import state_of
 from .problems import INTERNAL, RAISED, problem_of
-from .state import state_of
+from .searching import HangUpError
 
 logger = logging.getLogger("linefix")
 CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do

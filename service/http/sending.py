@@ -7,13 +7,18 @@ piece, and what they hold until then is counted: of all together, and of each wh
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Coroutine, Mapping
+from typing import Any
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
+from association import Deadline
+
+from ..work.job import Done
+from .exchange import Exchange, state_of
+from .searching import unless_hung_up
 from .services import services_of
-from .state import state_of
 
 PIECE = 32_768  # bytes; the server holds a few
 LARGE = 65_536  # bytes; smaller answers are handed over in one piece
@@ -64,3 +69,10 @@ def json_response(data: bytes, status: int = 200, headers: Mapping[str, str] | N
     """Return JSON that is encoded already."""
     kind = Response if len(data) <= LARGE else CountedResponse
     return kind(data, status, headers, JSON)
+
+
+async def answer(exchange: Exchange, work: Coroutine[Any, Any, Done], deadline: Deadline) -> Response:
+    """Wait for the work of a request and return its result as a response; raises also `HangUpError`."""
+    done = await unless_hung_up(exchange.request.receive, work, deadline)
+    exchange.note(**done.noted)
+    return json_response(done.body)

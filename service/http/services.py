@@ -11,13 +11,12 @@ from ..admission.entrance import Entrance
 from ..admission.gate import Gate
 from ..admission.keys import Keyring
 from ..admission.readiness import Readiness
-from ..importing.bounds import Bounds
+from ..importing.reader import Bounds
 from ..maps import MapStore
 from ..maps.lookup import MapLookup
 from ..parsing.parser_process import ParserProcess
 from ..settings import Settings
-from ..telemetry.metrics import Metrics
-from ..telemetry.refusals import RefusalTally
+from ..telemetry.metrics import Metrics, RefusalTally
 from ..telemetry.traces import Traces
 from ..threads import Threads
 from ..work.association import Associator
@@ -88,11 +87,6 @@ class Services:
     key_threads: Threads
     issuer_threads: Threads
     traces: Traces | None = None
-
-    @property
-    def working(self) -> bool:
-        """Whether anything runs at the gates."""
-        return any(gate.running for gate in self._gates)
 
     @property
     def _gates(self) -> tuple[Gate, ...]:

@@ -16,11 +16,11 @@ import orjson
 
 from association import CancelledError, Deadline
 
-from ..parsing.own_modules import command_of
+from ..parsing.parser_process import command_of
 from ..schemas.errors import Fault, InvalidRequestError
-from .bounds import NO_ROOM, Bounds
 from .errors import FileTooLargeError, FormatsMissingError, NoRoomError, TooLateError, UnknownFormatError
 from .folders import own_folder
+from .reader import NO_ROOM, Bounds
 
 READER = "service.importing.reader"
 LOOK_SECONDS = 0.05  # how often it is looked whether somebody still waits

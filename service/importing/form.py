@@ -1,41 +1,69 @@
-"""multipart/form-data to files and fields; read by python-multipart, which the extra ``[formats]`` brings."""
+"""multipart/form-data to files and fields, by python-multipart's `FormParser`, which the extra ``[formats]`` brings."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING
 
+from python_multipart import FormParser
 from python_multipart.exceptions import FormParserError
-from python_multipart.multipart import MultipartParser, parse_options_header
+from python_multipart.multipart import parse_options_header
 
 from ..schemas.errors import Fault, InvalidRequestError
 
 if TYPE_CHECKING:
-    from python_multipart.multipart import MultipartCallbacks
+    from python_multipart.multipart import Field, File
 
+FORM = "multipart/form-data"
 MOST_PARTS = 64
 MOST_FIELD_BYTES = 1000
 MOST_NAME_BYTES = 200
+IN_MEMORY = {"MAX_MEMORY_FILE_SIZE": math.inf}  # the whole form is in memory already
 
 
 @dataclass(slots=True)
 class Form:
-    """What was sent.
+    """A form.
 
     Attributes
     ----------
-    files : dict of str to bytearray
-        By name, without folders; none has the name of another.
+    files : dict of str to bytes
+        By name, without folders; each name is unique.
     fields : dict of str to list of str
     """
 
-    files: dict[str, bytearray] = field(default_factory=dict)
+    files: dict[str, bytes] = field(default_factory=dict)
     fields: dict[str, list[str]] = field(default_factory=dict)
+
+    def add_file(self, part: File) -> None:
+        """Add a part that has a filename."""
+        self._require_room()
+        name = _own_name(_decoded(part.file_name or b""))
+        if name in self.files:
+            raise InvalidRequestError([Fault("/files", "two files have the same name; rename one of them")])
+        assert isinstance(part.file_object, BytesIO)
+        self.files[name] = part.file_object.getvalue()
+
+    def add_field(self, part: Field) -> None:
+        """Add a part that has none."""
+        self._require_room()
+        value = part.value or b""
+        if len(value) > MOST_FIELD_BYTES:
+            raise InvalidRequestError(
+                [Fault("", f"expected fields of at most {MOST_FIELD_BYTES} bytes, found {len(value)}")]
+            )
+        self.fields.setdefault(_decoded(part.field_name or b""), []).append(_decoded(value))
+
+    def _require_room(self) -> None:
+        if len(self.files) + sum(map(len, self.fields.values())) >= MOST_PARTS:
+            raise _refused(f"expected at most {MOST_PARTS} parts, found more; send fewer")
 
 
 def read_form(content: bytes, content_type: str) -> Form:
-    """Take a form apart.
+    """Parse a form.
 
     Raises
     ------
@@ -45,87 +73,15 @@ def read_form(content: bytes, content_type: str) -> Form:
     boundary = parse_options_header(content_type)[1].get(b"boundary")
     if not boundary:
         raise _refused("expected a boundary in Content-Type, found none")
-    form, parts = Form(), _Parts()
+    form, ends = Form(), list[bool]()
     try:
-        parser = MultipartParser(boundary, parts.callbacks())
+        parser = FormParser(FORM, form.add_field, form.add_file, lambda: ends.append(True), boundary, config=IN_MEMORY)
         parser.write(content)
-    except (FormParserError, ValueError):
-        parts.whole = False
-    if not parts.whole:
-        raise _refused(f"is not multipart/form-data as Content-Type states, or has more than {MOST_PARTS} parts")
-    for disposition, data in parts.found:
-        _take(form, disposition, data)
+    except FormParserError:
+        ends.clear()
+    if not ends:
+        raise _refused("the body is not multipart/form-data as Content-Type states")
     return form
-
-
-class _Parts:
-    """Collects the parts while they are parsed: the Content-Disposition and the content of each."""
-
-    def __init__(self) -> None:
-        self.found: list[tuple[bytes, bytearray]] = []
-        self.whole = False
-        self._name, self._value = bytearray(), bytearray()
-        self._disposition, self._data = b"", bytearray()
-
-    def callbacks(self) -> MultipartCallbacks:
-        """Return what the parser calls."""
-        return {
-            "on_part_begin": self.part_begin,
-            "on_part_data": self.part_data,
-            "on_part_end": self.part_end,
-            "on_header_field": self.header_field,
-            "on_header_value": self.header_value,
-            "on_header_end": self.header_end,
-            "on_end": self.end,
-        }
-
-    def part_begin(self) -> None:
-        """Begin a part."""
-        if len(self.found) >= MOST_PARTS:
-            raise ValueError("too many parts")
-        self._disposition, self._data = b"", bytearray()
-
-    def header_field(self, data: bytes, start: int, end: int) -> None:
-        """Take up a piece of a header's name."""
-        self._name += data[start:end]
-
-    def header_value(self, data: bytes, start: int, end: int) -> None:
-        """Take up a piece of a header's value."""
-        self._value += data[start:end]
-
-    def header_end(self) -> None:
-        """Keep the one header that matters."""
-        if self._name.lower() == b"content-disposition":
-            self._disposition = bytes(self._value)
-        self._name, self._value = bytearray(), bytearray()
-
-    def part_data(self, data: bytes, start: int, end: int) -> None:
-        """Take up a piece of the content."""
-        self._data += memoryview(data)[start:end]
-
-    def part_end(self) -> None:
-        """Keep a part."""
-        self.found.append((self._disposition, self._data))
-
-    def end(self) -> None:
-        """Note that the last boundary was there."""
-        self.whole = True
-
-
-def _take(form: Form, disposition: bytes, data: bytearray) -> None:
-    told = {key: _decoded(value) for key, value in parse_options_header(disposition.decode("latin-1"))[1].items()}
-    name = told.get(b"name", "")
-    if b"filename" in told:
-        own = _own_name(told[b"filename"])
-        if own in form.files:
-            raise InvalidRequestError([Fault("/files", "two files have the same name; rename one of them")])
-        form.files[own] = data
-        return
-    if len(data) > MOST_FIELD_BYTES:
-        raise InvalidRequestError(
-            [Fault("", f"expected fields of at most {MOST_FIELD_BYTES} bytes, found {len(data)}")]
-        )
-    form.fields.setdefault(name, []).append(_decoded(bytes(data)))
 
 
 def _own_name(name: str) -> str:
@@ -142,8 +98,8 @@ def _decoded(value: bytes) -> str:
     try:
         return value.decode("utf-8")
     except UnicodeDecodeError:
-        raise _refused("has names or values that are not UTF-8; encode them in UTF-8") from None
+        raise _refused("the body has names or values that are not UTF-8; encode them in UTF-8") from None
 
 
 def _refused(message: str) -> InvalidRequestError:
-    return InvalidRequestError([Fault("", f"the body {message}" if message[0] in "ih" else message)])
+    return InvalidRequestError([Fault("", message)])

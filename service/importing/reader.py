@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 import orjson
 
 from ..schemas.errors import Fault, InvalidRequestError
-from .bounds import NO_ROOM, Bounds
 
 if TYPE_CHECKING:
     from formats import FormatError, ImportedMap
@@ -33,7 +32,31 @@ METADATA, BAG = "metadata.yaml", "bag"
 PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9 ._()+=@-]*")
 PLAIN_NAMES = "expected a file name of letters, digits, spaces and ._()+=@- for a file of a bag; rename the file"
 ENDING = re.compile(r"\.[a-z0-9]{1,8}")
+CPU_SECONDS = 20  # of a processor
+NO_ROOM = 3  # status of the process that reads where its files cannot be written
 OOM_SCORE = "1000"  # the first to go where the machine's memory ends
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """How much reading one map may take.
+
+    Attributes
+    ----------
+    memory_bytes : int
+        Of the process that reads.
+    file_bytes : int
+        Of one file.
+    segments : int
+        Of the map.
+    cpu_seconds : int
+        Of a processor.
+    """
+
+    memory_bytes: int
+    file_bytes: int
+    segments: int
+    cpu_seconds: int = CPU_SECONDS
 
 
 def main(told: str, folder: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.engine import Connection
 
-from ..database_file import file_of, make_file
+from ..database_location import file_of, make_file
 from .errors import ReadOnlyStoreError, StoreAwayError
 
 BUSY_SECONDS = 5.0

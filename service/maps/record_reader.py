@@ -12,7 +12,7 @@ from sqlalchemy import Engine
 from sqlalchemy.exc import SQLAlchemyError
 
 from .records import ABSENT, SEALED, MapRecord, seal
-from .tables import maps
+from .schema import maps
 
 
 class RecordReader:

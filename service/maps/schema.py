@@ -1,23 +1,69 @@
-"""The tables' version at start: they are made where there are none, and migrated by Alembic where they are older."""
+"""The tables of the map store; at start they are created where there are none, and migrated by Alembic where older."""
 
 from __future__ import annotations
 
 import threading
 from pathlib import Path
 
-from sqlalchemy import Column, Connection, Engine, MetaData, String, Table, inspect, text
+from sqlalchemy import (
+    Boolean,
+    Column,
+    Connection,
+    Engine,
+    Float,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    false,
+    inspect,
+    text,
+)
 
 from .errors import StoreAwayError
 from .failures import failures_as_store_errors
-from .tables import maps, metadata
 
 VERSION_TABLE = "linefix_schema"
-VERSIONS = ("0001", "0002", "0003")  # of the migrations; the last is what `tables` says
+VERSIONS = ("0001", "0002", "0003")  # of the migrations; the last is that of the tables below
 BEFORE_ALEMBIC, NEWEST = VERSIONS[0], VERSIONS[-1]
 _version_table = Table(VERSION_TABLE, MetaData(), Column("version_num", String(32), primary_key=True))  # as Alembic's
 _ADVISORY_LOCK = 0x6C696E65666978  # "linefix"
 # Alembic keeps what it migrates in module globals.
 _one_at_a_time = threading.Lock()
+
+metadata = MetaData()
+
+# Compared byte by byte whatever the database's collation, so that the order of a listing is one.
+MAP_ID = String(128).with_variant(String(128, collation="C"), "postgresql")
+
+# What a map is, short enough to be looked at before every search. A deleted map keeps its row, with an empty sha256:
+# its next revision is a new number, so that an old ETag never matches a new map.
+maps = Table(
+    "maps",
+    metadata,
+    Column("map_id", MAP_ID, primary_key=True),
+    Column("revision", Integer, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("segments", Integer, nullable=False),
+    Column("min_x", Float, nullable=False),
+    Column("min_y", Float, nullable=False),
+    Column("max_x", Float, nullable=False),
+    Column("max_y", Float, nullable=False),
+    Column("sigma", Float, nullable=True),
+    Column("oriented", Boolean, nullable=True),
+    Column("seal", String(64), nullable=False, server_default=""),
+    Column("quarantined", Boolean, nullable=False, server_default=false()),
+)
+
+# The content. Id and revision stand here a second time: where damage hides a row of `maps`, this one tells.
+documents = Table(
+    "map_documents",
+    metadata,
+    Column("map_id", MAP_ID, primary_key=True),
+    Column("revision", Integer, nullable=False),
+    Column("document", LargeBinary, nullable=False),
+)
 
 
 def upgrade(engine: Engine, writer: Engine) -> None:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from sqlalchemy import URL, Connection, Engine, Row, Select, Table, bindparam, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from ..database_file import file_of
+from ..database_location import file_of
 from .database import DatabaseFile, open_engine
 from .errors import CorruptMapError, ReadOnlyStoreError, StoreError, StoreFullError, UnknownMapError
 from .failures import damaged, failures_as_store_errors
@@ -28,8 +28,7 @@ from .records import (
     digest,
     is_sealed,
 )
-from .schema import upgrade
-from .tables import documents, maps
+from .schema import documents, maps, upgrade
 
 T = TypeVar("T")
 BEYOND = "\x7f"  # every letter that an id may have comes before it

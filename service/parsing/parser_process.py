@@ -20,14 +20,14 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 from ..memory import return_large_blocks
-from .channel import receive, send
 from .errors import ParserEndedError
-from .own_modules import command_of
 
 T = TypeVar("T")
 LARGE = 100_000  # bytes; parsing more would hold up everything else for some milliseconds
 NICE = 5  # searches go before it, at three times as much of a core that both want
 END_SECONDS = 1.0
+# By `python -m` what stands in the working folder would come first: another checkout, or anybody's `service.py`.
+PROGRAM = "import runpy, sys; sys.path[:] = {path!r}; runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
 
 
 class ParserProcess:
@@ -107,6 +107,44 @@ class ParserProcess:
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_SECONDS)
         self._process = self._connection = None
+
+
+def command_of(module: str, *arguments: str) -> list[str]:
+    """Return the command of a process that runs a module, which imports from where this process does."""
+    return [sys.executable, "-c", PROGRAM.format(path=sys.path, module=module), *arguments]
+
+
+def send(connection: Connection, value: Any) -> None:
+    """Send an object; arrays, and bytes that are wrapped in a `pickle.PickleBuffer`, are not copied on the way.
+
+    `multiprocessing` sends a pickle, which holds a copy of every array and of the whole body.
+
+    Raises
+    ------
+    OSError
+        When the other end is gone.
+    """
+    buffers: list[pickle.PickleBuffer] = []
+    head = pickle.dumps(value, protocol=5, buffer_callback=buffers.append)
+    connection.send(len(buffers))
+    connection.send_bytes(head)
+    for buffer in buffers:
+        connection.send_bytes(buffer.raw())
+
+
+def receive(connection: Connection) -> Any:
+    """Wait for an object; whoever may send here is trusted, since it comes as a pickle.
+
+    What was a `bytearray` is `bytes`, and arrays cannot be written to.
+
+    Raises
+    ------
+    OSError, EOFError
+        When the other end is gone.
+    """
+    count = connection.recv()
+    head, *buffers = [connection.recv_bytes() for _ in range(count + 1)]
+    return pickle.loads(head, buffers=buffers)
 
 
 def _wrapped(value: object) -> object:

@@ -19,7 +19,7 @@ from granian.http import HTTP1Settings
 from granian.log import LogLevels
 from granian.server import MPServer
 
-from ..database_file import file_of
+from ..database_location import file_of
 from ..maps.database import DatabaseFile
 from ..maps.errors import StoreError
 from ..settings import Settings

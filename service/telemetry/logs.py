@@ -6,6 +6,7 @@ count is told when there is room again.
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import queue
@@ -14,10 +15,6 @@ import time
 from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
-
-import orjson
-
-from ..printable import escaped
 
 STDERR = 2
 WAITING_LINES = 4096  # that are kept for a reader who is late
@@ -39,7 +36,8 @@ class JsonFormatter(logging.Formatter):
         line |= {name: value for name, value in vars(record).items() if name not in _USUAL}
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return escaped(orjson.dumps(line, default=str).decode())
+        # ASCII without controls: terminals obey some characters that JSON leaves as they are.
+        return json.dumps(line, default=str, separators=(",", ":")).replace("\x7f", "\\u007f")
 
 
 class PatientHandler(logging.Handler):

@@ -12,7 +12,7 @@ from filelock import FileLock
 
 from compiled import cache_directory, is_complete, mark_complete
 
-from ..parsing.own_modules import command_of
+from ..parsing.parser_process import command_of
 
 SECOND = "service.work.warmup"  # run as a program, it compiles about half of the kernels
 

@@ -84,8 +84,7 @@ def warm_up() -> None:
 
 
 def warm_up_first_half() -> None:
-    """Compile about half of the kernels: those of the search, of registration and of the analysis of maps."""
-    warm_up_registering()
+    """Compile about half of the kernels: those of the search and of the analysis of maps."""
     warm_up_searching()
     warm_up_analyzing()
 
@@ -93,6 +92,7 @@ def warm_up_first_half() -> None:
 def warm_up_second_half() -> None:
     """Compile the other kernels, in an order in which the two halves seldom meet at the same kernel."""
     warm_up_indexing()
+    warm_up_registering()
     warm_up_vectorizing()
     warm_up_explaining()
     warm_up_simulating()

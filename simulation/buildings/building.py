@@ -1,4 +1,4 @@
-"""What a building is to whoever scans it: what is fixed, what can be moved, and its doors."""
+"""A building for the simulation: its fixed walls, its movable things, and its doors."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Building:
     things : (n,) int64
         Which thing that can be moved each segment is part of, `FIXED` for none.
     kinds : tuple of str
-        What each of those things is: "car", "bed", "pallet".
+        The kind of each of those things: "car", "bed", "pallet".
     doors : (k, 4)
-        The doorways' leaves as they stand when closed: the hinge, then the other jamb; metres. An open leaf swings to
+        The doorways' leaves when closed: the side of the axis, then the other jamb; metres. An open leaf swings to
         the left of that.
     """
 

@@ -1,4 +1,4 @@
-"""What buildings with corridors have in common: rooms in rows behind a wall."""
+"""Parts of buildings with corridors: rooms in rows behind a wall."""
 
 from __future__ import annotations
 

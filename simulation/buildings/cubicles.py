@@ -30,7 +30,7 @@ class Cubicles:
     bay : float
         Between columns.
     tidy : bool
-        Whether every cell has its desk, and chairs are pushed under it.
+        True if every cell has its desk, and chairs are pushed under it.
     """
 
     cell: tuple[float, float]

@@ -25,11 +25,11 @@ class Facades:
     street : float
         From one row of houses to the other.
     setback : float
-        How far fronts vary.
+        Variation of the fronts.
     door : (float, float)
         Width and depth of the recess of a door.
     terraced : bool
-        Whether all houses are alike.
+        True if all houses are alike.
     """
 
     house: tuple[float, float]

@@ -25,14 +25,14 @@ from .warehouse import RackLegs, Warehouse
 
 
 class Style(Protocol):
-    """What buildings of one owner have in common: dimensions, but not counts and places."""
+    """Properties that buildings of one owner share: dimensions, but not counts and places."""
 
     def build(self, rng: np.random.Generator) -> Building:
         """Draw one building."""
 
 
 class Draw(Protocol):
-    """How the styles of a family are drawn."""
+    """The distribution of the styles of a family."""
 
     def __call__(self, rng: np.random.Generator) -> Style:
         """Draw a style."""
@@ -50,7 +50,7 @@ class Family:
         Takes a `numpy.random.Generator`, returns a style, whose `build` draws buildings: sisters, where it is called
         more than once.
     held_out : bool
-        Whether buildings of this kind serve to report figures alone: nothing is fitted or tuned on them.
+        True if buildings of this kind serve to report figures alone: nothing is fitted or tuned on them.
     """
 
     what: str

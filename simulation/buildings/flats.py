@@ -34,7 +34,7 @@ class MirroredFlats:
     stairs : float
         Width of a stairwell.
     tidy : bool
-        Whether the furniture stands alike in all flats, as holiday homes have it.
+        True if the furniture stands alike in all flats, as holiday homes have it.
     """
 
     size: tuple[float, float]

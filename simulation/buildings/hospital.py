@@ -28,9 +28,9 @@ class Hospital:
     corridor : float
         Its width.
     bathroom : (float, float)
-        Inside each room, beside its door.
+        Inside each room, next to its door.
     tidy : bool
-        Whether every bed stands in its place.
+        True if every bed stands in its place.
     """
 
     module: float

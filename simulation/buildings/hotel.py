@@ -31,7 +31,7 @@ class Hotel:
     bed : float
         Its width.
     tidy : bool
-        Whether the furniture stands alike in all rooms.
+        True if the furniture stands alike in all rooms.
     """
 
     module: float

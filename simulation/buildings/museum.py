@@ -27,7 +27,7 @@ class Museum:
     wall : float
         Thickness.
     crowded : bool
-        Whether anything stands in the galleries.
+        True if anything stands in the galleries.
     """
 
     gallery: tuple[float, float]

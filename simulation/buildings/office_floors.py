@@ -26,7 +26,7 @@ class OfficeFloors:
         Least and greatest; near to each other in a building that repeats itself.
     depth, corridor_width : float
     tidy : bool
-        Whether every desk stands in the middle of its room, and nothing else.
+        True if every desk stands in the middle of its room, and nothing else.
     """
 
     room_width: tuple[float, float]

@@ -1,6 +1,6 @@
 """Paper to draw a building on: rooms, openings between them, blocks that stand in them, things that can be moved.
 
-Free space comes to lie on the left of every segment by itself: rooms are drawn counter-clockwise, what stands in them
+Free space lies on the left of every segment automatically: rooms are drawn counter-clockwise, what stands in them
 clockwise. Corners are always given counter-clockwise.
 """
 
@@ -23,12 +23,12 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
 SAME = 1e-6  # m; an opening's mouth lies on a wall that is no farther off
-SHORTEST = 1e-6  # m; what is left of a wall beside an opening, if longer, stays
+SHORTEST = 1e-6  # m; the rest of a wall next to an opening, if longer, stays
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Where a part of a plan lies: ``p_plan = matrix p_part + shift``.
+    """The transform of a part of a plan: ``p_plan = matrix p_part + shift``.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Frame:
 
     @property
     def mirrored(self) -> bool:
-        """Whether left becomes right."""
+        """Return whether left becomes right."""
         (a, b), (c, d) = self.matrix
         return bool(a * d - b * c < 0.0)
 
@@ -52,7 +52,7 @@ class Frame:
 
 @dataclass(slots=True)
 class _Sheet:
-    """What was drawn, in the plan's frame, each an ``(k, 4)`` array."""
+    """The drawn segments, in the plan's frame, each an ``(k, 4)`` array."""
 
     walls: list[Floats] = field(default_factory=list)
     mouths: list[Floats] = field(default_factory=list)
@@ -106,9 +106,9 @@ class Plan:
         start, end : (float, float)
             On a wall that is drawn from `start` towards `end`, free space on the left: the ends of the opening.
         depth : float
-            How thick the wall is, metres; the room behind begins there.
+            Thickness of the wall, metres; the room behind begins there.
         door : bool
-            Whether a leaf hangs in it, on the side of `start`.
+            True if a leaf hangs in it, on the side of `start`.
         """
         a, b, back_a, back_b = self._passage(start, end, depth)
         self._sheet.walls += [_segment(a, back_a), _segment(back_b, b)]

@@ -36,7 +36,7 @@ class RoundRooms:
     side : float
         About the length of a wall: circles are drawn as polygons.
     furnished : bool
-        Whether there are benches and altars.
+        True if there are benches and altars.
     """
 
     radius: tuple[float, float]

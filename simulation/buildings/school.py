@@ -30,9 +30,9 @@ class School:
     lockers : float
         Depth of the rows of lockers along the corridor's walls, 0 for none.
     one_sided : bool
-        Whether rooms lie on one side alone, and windows on the other.
+        True if rooms lie on one side alone, and windows on the other.
     tidy : bool
-        Whether tables stand in line.
+        True if tables stand in line.
     """
 
     classroom: tuple[float, float]
@@ -80,7 +80,7 @@ class School:
         plan.room(box(0.0, 0.0, width, depth))
         door(plan, 0.4, DOOR, WALL)
         if self.lockers > 0.0:
-            # In the corridor, beside the door.
+            # In the corridor, next to the door.
             plan.thing("lockers", box(0.45 * width, -WALL - self.lockers, 0.9 * width, -WALL - 0.02))
         loose = 0.0 if self.tidy else 1.0
         plan.thing("teacher's desk", oblong(1.6, 0.65 * depth, 0.7, 1.5, loose * rng.normal(0.0, 0.05)))

@@ -19,7 +19,7 @@ OFFICE = (7.0, 4.5)  # m
 
 @dataclass(frozen=True, slots=True)
 class Racks:
-    """How racks stand in a hall; lengths in metres.
+    """The arrangement of racks in a hall; lengths in metres.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Warehouse:
     full : float
         Share of the bays that hold a load.
     tidy : bool
-        Whether all loads are of one size and stand in line.
+        True if all loads are of one size and stand in line.
     """
 
     racks: Racks

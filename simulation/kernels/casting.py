@@ -1,6 +1,6 @@
 """Ray casting.
 
-Nothing here validates: callers hand over finite numbers. The kernel has a slow twin in
+Nothing here validates: callers pass finite numbers. The kernel has a slow reference in
 ``tests/simulation/reference.py``.
 """
 

@@ -16,7 +16,7 @@ from association.consensus.scaling import scale_near_one
 from association.explain import search_and_explain
 from association.scan.scan import mirrored, scaled, turned_round
 from association.verdict.verdict import judge
-from association.warnings import warnings_of
+from association.warnings import warnings_of_causes
 
 from .scenes import INSIDE, ROOM, beams_of, context_of, index_of, maze, pose, scan_of, seen
 
@@ -30,8 +30,7 @@ def told(scan: Scan, index: MapIndex = INDEX, **options: Any) -> dict[str, str]:
     explanations = search_and_explain(context)
     verdict = judge(context, explanations)
     causes = find_causes(context, explanations, verdict, time.monotonic() - 60.0)  # time enough
-    found = warnings_of(context, explanations.search, verdict, causes)
-    return {one.code: one.message for one in found if one.code in ("mirrored", "reversed", "unit_scale")}
+    return {one.code: one.message for one in warnings_of_causes(causes)}
 
 
 def test_nothing_is_told_of_a_scan_that_is_usable() -> None:

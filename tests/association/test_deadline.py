@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 import threading
 import time
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
-from association import AssociationOptions, CancelledError, Deadline, MapIndex, Scan, associate
+from association import AssociationOptions, AssociationResult, CancelledError, Deadline, MapIndex, Scan, associate
 
-from .scenes import index_of, scan_of
+from .scenes import INSIDE, equal_rooms, index_of, scan_of, seen
 
 EXHAUSTIVE = AssociationOptions(exhaustive=True)
+BUILDING, MANY = index_of(equal_rooms(6)), 10**9
 MOST_SECONDS = 60.0  # s, that a test waits for what has to happen
 
 
@@ -115,3 +118,39 @@ def test_a_forked_process_has_a_clock_of_its_own() -> None:
         with Deadline(time.monotonic() + 0.05).watched() as flag:
             os._exit(0 if is_set(flag) else 1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def as_json(found: AssociationResult) -> str:
+    return json.dumps(asdict(found), default=lambda value: value.tolist())
+
+
+class Looks(Deadline):
+    """A deadline that passes at a look, whatever the time."""
+
+    def __init__(self, left: int) -> None:
+        super().__init__()
+        self.left = left
+
+    @property
+    def passed(self) -> bool:
+        self.left -= 1
+        return self.left < 0
+
+
+@pytest.mark.parametrize("viewpoint", [(0.0, 0.0), None])
+def test_whenever_the_deadline_passes_a_complete_answer_is_that_without_one(
+    viewpoint: tuple[float, float] | None,
+) -> None:
+    """Of an answer that claims to be complete, alternatives and the margin were left out where it passed late."""
+    sent = scan_of(seen(equal_rooms(6), INSIDE, noise=0.01, cut=0.4, clutter=3)[0], viewpoint=viewpoint)
+    options = AssociationOptions(max_alternatives=20)
+
+    def found(deadline: Deadline) -> AssociationResult:
+        return associate(BUILDING, sent, None, options, deadline)
+
+    counted = Looks(MANY)
+    whole, looks = as_json(found(counted)), MANY - counted.left
+    answers = [found(Looks(left)) for left in range(looks + 1)]
+    assert not any(one.usable for one in answers if not one.search.complete)
+    assert all(as_json(one) == whole for one in answers if one.search.complete)
+    assert {one.search.complete for one in answers} == {True, False}

@@ -20,7 +20,7 @@ os.environ |= {"RAY_agent_register_timeout_ms": "300000", "RAY_raylet_start_wait
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
 from ray.cluster_utils import Cluster
-from fleet import FleetOptions, OnRay, associate_many
+from batch import FleetOptions, OnRay, associate_many
 
 log, room, out = sys.argv[1:]
 cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})

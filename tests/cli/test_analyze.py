@@ -57,8 +57,9 @@ def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     ended = linefix(*asked, "--drive", "2", "--landmark", "box.json")
     assert ended.code == 0, ended.err
     assert "usable" in ended.out
-    assert re.search(r"^usable +2[0-4] \((8[3-9]|9\d|100) %\)$", ended.out, re.MULTILINE)
+    assert re.search(r"^usable +2[0-4] \((8[3-9]|9\d|100) %\), simulated", ended.out, re.MULTILINE)
     assert "at once or on the way" in ended.out
+    assert "without people and furniture" in ended.out
     assert "with the landmark" in ended.out
     features = json.loads((folder / "a.geojson").read_text())["features"]
     assert len(features) > 15

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from examples.running import free_port
+from registration import RigidTransform, Segments
+from simulation import Scanner, scan
 from tests.running import RunningService
 
 from .running import Linefix, refused
@@ -127,3 +132,83 @@ def test_a_position_that_is_open_is_told_without_a_probability(linefix: Linefix,
     assert "degenerate, not usable" in ended.out
     assert "probability" not in ended.out
     assert json.loads(linefix("locate", "corridor.json", "walls.json", "--json").out)["probability"] is None
+
+
+LASER_YAML = """header:
+  stamp:
+    sec: 12
+    nanosec: 5
+  frame_id: laser
+angle_min: {angle_min}
+angle_max: {angle_max}
+angle_increment: {increment}
+time_increment: 0.0
+scan_time: 0.0
+range_min: 0.05
+range_max: 30.0
+ranges:
+{ranges}
+intensities: []
+---
+"""
+
+
+def laser_message() -> dict[str, Any]:
+    """Return a LaserScan taken in the room, with a beam without return, one too near and an unknown one."""
+    scanner = Scanner(beams=360, angle_increment=math.tau / 360)
+    pose = RigidTransform(1.0, 1.0, 0.5)
+    ranges = scan(Segments.from_array(ROOM), pose, scanner, np.random.default_rng(3)).ranges.tolist()
+    ranges[10], ranges[200], ranges[300] = math.inf, -math.inf, math.nan
+    return {"angle_min": scanner.angle_min, "angle_increment": scanner.angle_increment, "range_max": 30.0} | {
+        "ranges": ranges
+    }
+
+
+def test_a_laser_scan_with_infinity_and_nan_is_read(linefix: Linefix, folder: Path) -> None:
+    message = laser_message()
+    known = [60.0 if r == math.inf else r if math.isfinite(r) else None for r in message["ranges"]]
+    (folder / "known.json").write_text(json.dumps({"laser": message | {"ranges": known}}))
+    expected = lasting(json.loads(linefix("locate", "room.json", "known.json", "--json").out))
+    assert expected["usable"]
+    for form in (message, {"laser": message}):
+        (folder / "laser.json").write_text(json.dumps(form))
+        assert "Infinity" in (folder / "laser.json").read_text()
+        ended = linefix("locate", "room.json", "laser.json", "--json")
+        assert ended.code == 0, ended.err
+        assert lasting(json.loads(ended.out)) == expected
+
+
+def echoed(ranges: list[str]) -> str:
+    message = laser_message()
+    step = message["angle_increment"]
+    return LASER_YAML.format(
+        angle_min=message["angle_min"],
+        angle_max=message["angle_min"] + 359 * step,
+        increment=step,
+        ranges="\n".join(f"- {value}" for value in ranges),
+    )
+
+
+def test_the_yaml_of_ros2_topic_echo_is_read(linefix: Linefix, folder: Path) -> None:
+    names = {math.inf: ".inf", -math.inf: "-.inf"}
+    ranges = [".nan" if math.isnan(r) else names.get(r, repr(r)) for r in laser_message()["ranges"]]
+    (folder / "scan.yaml").write_text(echoed(ranges) * 2)
+    ended = linefix("locate", "room.json", "scan.yaml", "--json")
+    assert ended.code == 0, ended.err
+    answer = json.loads(ended.out)
+    assert answer["usable"]
+    assert answer["pose"]["x"] == pytest.approx(1.0, abs=0.05)
+    assert answer["stamp"] == {"sec": 12, "nanosec": 5}
+
+
+def test_ranges_that_ros2_topic_echo_has_cut_are_refused(linefix: Linefix, folder: Path) -> None:
+    (folder / "scan.yaml").write_text(echoed([*["2.0"] * 128, "'...'"]))
+    said = refused(linefix("locate", "room.json", "scan.yaml"), 3)
+    assert "after 128 values" in said
+    assert "--full-length" in said
+
+
+def test_help_lists_every_exit_code(linefix: Linefix, folder: Path) -> None:
+    told = linefix("--help").out
+    for code in range(5):
+        assert re.search(rf"\b{code} ", told), code

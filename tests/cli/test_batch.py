@@ -58,7 +58,7 @@ def test_a_batch_that_was_killed_goes_on(tmp_path: Path, linefix: Linefix) -> No
         (("gone.parquet", "--maps", "room.json", "--out", "o.parquet"), 3, "gone.parquet"),
         (("a.parquet", "--maps", "nowhere", "--out", "o.parquet"), 3, "nowhere: holds no map"),
         (("room.json", "--maps", "room.json", "--out", "o.parquet", "--ray", "--workers", "2"), 2, "--workers"),
-        (("a.parquet", "--maps", "room.json", "--out", "."), 2, "is a folder"),
+        (("a.parquet", "--maps", "room.json", "--out", "."), 2, "found the folder"),
     ],
     ids=["no output", "no log", "no map", "workers on Ray", "folder"],
 )

@@ -121,7 +121,7 @@ def test_an_answer_of_another_shape_is_named(
     head = b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n"
     with sending(head % len(body) + body, b"") as url:
         line = refused(linefix(*command, "--server", url), 4)
-        assert f"the answer of {url} is not that of this version of Linefix: /" in line
+        assert f"the answer of {url} does not match this version of Linefix: /" in line
         assert "check the URL" in line
 
 
@@ -145,7 +145,7 @@ def test_pages_of_maps_without_end_are_refused(linefix: Linefix, monkeypatch: py
     monkeypatch.setattr(server, "MAX_PAGES", 5)
     body = b'{"maps": [], "corrupt": [], "next": "a b\\r\\n"}'
     with sending(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body, b"") as url:
-        assert "lists more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)
+        assert "found more than 5 pages" in refused(linefix("map", "list", "--server", url), 4)
 
 
 def test_what_terminals_obey_is_escaped(linefix: Linefix, folder: Path) -> None:
@@ -184,7 +184,7 @@ def test_a_byte_order_mark_is_passed_over(linefix: Linefix, folder: Path, comman
 
 def test_text_in_utf_16_is_named(linefix: Linefix, folder: Path) -> None:
     (folder / "scan.json").write_text(json.dumps({"segments": WALLS}), encoding="utf-16")
-    assert "scan.json: is text in UTF-16; save it as UTF-8" in refused(linefix("locate", "room.json", "scan.json"), 3)
+    assert "scan.json: found text in UTF-16, expected UTF-8" in refused(linefix("locate", "room.json", "scan.json"), 3)
 
 
 def test_a_description_that_stands_for_too_much_is_refused(linefix: Linefix, folder: Path) -> None:

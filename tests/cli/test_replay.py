@@ -50,8 +50,10 @@ def test_a_line_a_scan(linefix: Linefix, truth: list[RigidTransform], mode: str)
     ended = linefix("replay", "drive.log", "--map", "floor.json", "--mode", mode, "--json")
     found = lines(ended)
     assert [line["stamp"] for line in found] == [100 + 0.5 * k for k in range(SCANS)]
-    told = ["stamp", "status", "usable", "probability", "pose", "reasons", "timing_ms", "child_frame_id", "error"]
-    assert list(found[0]) == told
+    told = ["stamp", "status", "usable", "probability", "pose", "covariance", "reasons", "timing_ms", "child_frame_id"]
+    assert list(found[0]) == [*told, "error"]
+    usable = next(line for line in found if line["usable"])
+    assert np.linalg.eigvalsh(np.array(usable["covariance"])).min() > 0.0
     assert sum(line["usable"] for line in found) >= SCANS // 2
     assert_right(found, truth)
     assert "ROBOTLASER1" in ended.err  # which of the topics was taken
@@ -87,7 +89,7 @@ def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, tr
     [
         (("nowhere.log", "--map", "floor.json"), 2, "nowhere.log: there is no such file"),
         (("empty.log", "--map", "floor.json"), 3, "empty.log: has no scan"),
-        (("drive.log", "--map", "floor.json", "--topic", "FLASER"), 3, "FLASER"),
+        (("drive.log", "--map", "floor.json", "--topic", "FLASER"), 3, "no FLASER; it has 12 ROBOTLASER1"),
         (("drive.log", "--map", "hall"), 3, "hall: no such file, and no map is stored"),
         (("drive.txt", "--map", "floor.json"), 3, "ends in one of .bag"),
         (("drive.log",), 2, "--map"),

@@ -112,7 +112,7 @@ def test_without_odometry_its_covariance_says_how_far_it_may_be_off(linefix: Lin
     assert "no odometry was found" in ended.err
     assert "each scan is searched on the whole map" in ended.err
     assert "scans with a time_increment, but without the motion of the sensor" in ended.err
-    assert "covariances allow for a motion of 0.5 m/s and 1.0 rad/s" in ended.err
+    assert "covariances include an unknown motion of 0.5 m/s and 1.0 rad/s" in ended.err
 
 
 @pytest.mark.parametrize("odometry", [True, False])
@@ -190,3 +190,16 @@ def test_a_check_reports_what_was_left_out_of_the_log(linefix: Linefix, folder: 
     ended = linefix("map", "check", "room.json", "--log", "again/robot_mcap")
     assert ended.code == 0
     assert "invalid transforms" in ended.err
+
+
+def test_a_scanner_that_is_mounted_upside_down_is_named(linefix: Linefix, folder: Path) -> None:
+    (folder / "room.json").write_text(json.dumps({"segments": ROOM}))
+    bag = Robots("mcap", folder)
+    bag.transform("/tf_static", 0, "base_link", "laser", (MOUNT.x, MOUNT.y, 0.2), (1.0, 0.0, 0.0, 0.0))
+    for k, robot in enumerate(robots()):
+        seen = swept(ROOM, robot, RigidTransform(MOUNT.x, MOUNT.y, 0.0), moving=False, seed=k)
+        put_scan(bag, (k + 1) * SECOND, seen[::-1].copy())
+    bag.done()
+    ended = linefix(*ASKED)
+    assert sum(line["usable"] for line in lines(ended)) >= COUNT - 1
+    assert "laser mounted upside down at (0.300, 0.100) m" in ended.err

@@ -56,7 +56,7 @@ def test_poses_are_those_of_the_robot_where_the_log_has_its_mount(
         assert_at(line, pose.compose(MOUNT.inverse()))
     first = [float(number) for number in (folder / "poses.tum").read_text().split()[:3]]
     assert first[1:] == pytest.approx([usable[0][0]["pose"]["x"], usable[0][0]["pose"]["y"]])
-    assert "of robot, the robot, with ROBOTLASER1 mounted at (0.400, -0.200) m, 68.8 degrees, as the log says" in (
+    assert "of robot, the robot, with ROBOTLASER1 mounted at (0.400, -0.200) m, 68.8 degrees, from the log" in (
         ended.err
     )
 
@@ -66,7 +66,7 @@ def test_a_mount_that_is_given_goes_first(linefix: Linefix, truth: list[RigidTra
     (line, pose), *_ = ((line, pose) for line, pose in zip(lines(ended), truth, strict=True) if line["usable"])
     assert_at(line, pose.compose(RigidTransform(-1.0, 0.5, 0.3).inverse()))
     assert line["child_frame_id"] == "base_link"
-    assert "as --mount says" in ended.err
+    assert "from --mount" in ended.err
     assert "--mount" in refused(linefix(*ASKED, "--mount", "0", "nan", "0"), 2)
 
 
@@ -81,7 +81,7 @@ def test_without_a_mount_they_are_those_of_the_laser(
     (line, pose), *_ = ((line, pose) for line, pose in zip(lines(ended), truth, strict=True) if line["usable"])
     assert_at(line, pose)
     assert line["child_frame_id"] == "RAWLASER1"
-    assert "--mount X Y THETA would give those of the robot" in ended.err
+    assert "set --mount X Y THETA for those of the robot" in ended.err
 
 
 def test_a_scan_that_a_server_refuses_is_a_row_and_the_replay_goes_on(

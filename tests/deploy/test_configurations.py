@@ -6,8 +6,10 @@ import configparser
 import os
 import re
 import shutil
+import socket
 import subprocess
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -16,7 +18,7 @@ import trustme
 from ruamel.yaml import YAML
 
 from examples.running import free_port
-from service.database_url import database_url
+from service.database_location import database_url
 from service.schemas import examples
 from service.settings import Settings
 from tests.running import JSON, RunningService, until
@@ -133,6 +135,30 @@ def test_a_proxy_stands_in_front(
             assert client.put("/v1/maps/m", json=examples.MAP, headers=bearer).json()["code"] == "forbidden"
             assert client.post("/v1/associate", content=b" " * 34_000_000, headers=bearer).status_code == 413
             assert client.get("/metrics").status_code == 200  # from here
+    finally:
+        process.terminate()
+        process.wait(60)
+
+
+@pytest.mark.parametrize("said", [b"", b"\x16\x03\x01"], ids=["nothing", "the beginning of a handshake"])
+def test_connections_that_say_little_end_at_nginx(
+    said: bytes, start_service: Callable[..., RunningService], tmp_path: Path
+) -> None:
+    """The service alone would leave other clients waiting: it has eight connections, and ends none of them in time."""
+    if shutil.which("nginx") is None:
+        pytest.skip("no nginx")
+    running, port = start_service(max_connections=8, request_timeout_s=600), free_port()
+    with (tmp_path / "proxy.log").open("wb") as log:
+        process = subprocess.Popen(nginx(running.port, port, tmp_path), stdout=log, stderr=log)
+    try:
+        with (
+            ExitStack() as held,
+            httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=False, timeout=60) as client,
+        ):
+            until(lambda: _answers(client))
+            for _ in range(64):
+                held.enter_context(socket.create_connection(("127.0.0.1", port))).sendall(said)
+            assert httpx.get(f"https://127.0.0.1:{port}/livez", verify=False, timeout=60).status_code == 200
     finally:
         process.terminate()
         process.wait(60)

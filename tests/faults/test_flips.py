@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.schemas import examples

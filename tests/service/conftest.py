@@ -11,7 +11,7 @@ from pathlib import Path
 import psycopg
 import pytest
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapStore
 
 SERVER = "LINEFIX_TEST_POSTGRESQL"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from service.database_url import database_url
+from service.database_location import database_url
 
 
 @pytest.mark.parametrize("text", ["mysql://u:sesame@h/d", "nothing", "postgresql+asyncpg://u:sesame@h/d", ""])

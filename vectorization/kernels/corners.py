@@ -26,7 +26,7 @@ from .lines import abscissa_on, distance_from, fit_line
 
 
 class Corner(NamedTuple):
-    """Where two lines meet, if they do between their nearest points."""
+    """The intersection of two lines, if it lies between their nearest points."""
 
     found: bool
     x: float  # m
@@ -37,7 +37,7 @@ class Corner(NamedTuple):
 def cut_corners(points: Records, lines: Records, scanner: Record, closed: bool) -> None:
     """Move the ends of neighbouring lines to their intersection where it lies between their nearest points' rays.
 
-    The points next to it go to the line on their side of the corner, and both are fitted anew.
+    The points next to it go to the line on their side of the corner, and both are fitted again.
     """
     m = len(lines)
     for k in range(m - 1):

@@ -229,7 +229,7 @@ def bridge(
 
 @kernel
 def rejoin(points: Records, lines: Records, scanner: Record) -> int:
-    """Make one of neighbouring lines, in place, that their points do not tell apart by their full likelihood.
+    """Make one of neighbouring lines, in place, that their points do not distinguish by the full likelihood.
 
     The running sums take the noise for the same all along a piece and sometimes break a wall for it. Returns how many
     lines are left.

@@ -38,7 +38,7 @@ def trace(points: Records, scanners: Records, closed: bool, min_points: int, min
     points : (n,) POINT
     scanners : (1,) SCANNER
     closed : bool
-        Whether the last point's neighbour is the first.
+        True if the last point's neighbour is the first.
     min_points : int
     min_length : float
         Metres.
@@ -133,7 +133,7 @@ def fit_and_extend(points: Records, taken: Flags, line: Record, scanner: Record,
 
 @kernel
 def strays(point: Record, line: Record, scanner: Record) -> bool:
-    """Tell whether a point, the last of its line, is better taken for one of what lies beside the wall."""
+    """Tell whether a point, the last of its line, belongs rather to an object next to the wall."""
     e = distance_from(line, point)
     cosine = incidence(line, point)
     return e * e > END_GATE * END_GATE * (scanner.variance * cosine * cosine + scanner.floor)
@@ -173,7 +173,7 @@ def extend(points: Records, start: int, direction: int, taken: Flags, line: Reco
 
 @kernel
 def describe(lines: Records, x: float, y: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return what is told of each line, moved to the place (x, y) of the sensor: endpoints, sigma, centroid and rms.
+    """Return the results of each line, moved to the place (x, y) of the sensor: endpoints, sigma, centroid and rms.
 
     Sigma is such that count / sigma^2 is the weight, and widened where the points lie worse than chance lets them.
     """

@@ -1,4 +1,4 @@
-"""What both clients send, and when it is sent again."""
+"""Requests of both clients, and the rule for sending them again."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FIRST_WAIT = 0.5  # s, doubled with each try, where the service does not say
 
 @dataclass(frozen=True)
 class Form:
-    """A body of files, each with its name, and fields beside them."""
+    """A body of named files and fields."""
 
     files: Sequence[tuple[str, bytes]]
     fields: Mapping[str, str | Sequence[str]]
@@ -53,7 +53,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Settings:
-    """How a client speaks to a service.
+    """Settings of a client.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Settings:
     timeout : float
         Seconds for one try.
     retries : int
-        How often a request is sent again after 429 or 503.
+        Number of times that a request is sent again after 429 or 503.
     """
 
     url: str

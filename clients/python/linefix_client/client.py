@@ -1,6 +1,6 @@
 """The two clients: one for threads, one for event loops; method for method the operations of the service.
 
-Every method raises `ProblemError` when the service refuses, and `UnreachableError` when nobody answers. A request that
+Every method raises `ProblemError` when the service rejects it, and `UnreachableError` without an answer. A request that
 is answered by 429 or 503 was not carried out; it is sent again when `Retry-After` says.
 """
 
@@ -37,11 +37,11 @@ class Client:
     ----------
     url : str
     key : str, optional
-        Where the service wants one.
+        Needed if the service requires one.
     timeout : float
         Seconds for one try.
     retries : int
-        How often a request is sent again after 429 or 503.
+        Number of times that a request is sent again after 429 or 503.
     transport : optional
         Of httpx, such as one with a certificate of one's own.
     """
@@ -156,11 +156,11 @@ class AsyncClient:
     ----------
     url : str
     key : str, optional
-        Where the service wants one.
+        Needed if the service requires one.
     timeout : float
         Seconds for one try.
     retries : int
-        How often a request is sent again after 429 or 503.
+        Number of times that a request is sent again after 429 or 503.
     transport : optional
         Of httpx, such as one with a certificate of one's own.
     """

@@ -19,7 +19,7 @@ from .shapes import SHAPES, Measure, Points
 from .visible import Visible
 from .xml import kind_of, parse_xml
 
-# Attributes of the root in which our own drawings say what they are.
+# Attributes of the root that identify our own drawings.
 METRES, ORIENTED = "data-metres-per-unit", "data-free-space-on-left"
 
 

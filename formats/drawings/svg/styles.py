@@ -1,4 +1,4 @@
-"""What CSS says of elements: presentation attributes, style elements and style attributes, in the order of CSS."""
+"""CSS of elements: presentation attributes, style elements and style attributes, in the order of CSS."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ Matrix = Any
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """What an element has of those that it is in.
+    """The properties that an element inherits.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ class Place:
         The element's own units.
     visible : bool
     stroked, filled : bool or None
-        Whether lines, and areas, are painted; None: nobody says.
+        True if lines, and areas, are painted; None: not specified.
     copied : tuple of Element
-        What the use elements around it refer to.
+        The targets of the enclosing use elements.
     """
 
     layers: tuple[str, ...] = ()
@@ -281,7 +281,7 @@ def _is_zero(value: str | None) -> bool:
 
 
 def _paints(paint: str | None, opacity: str | None, inherited: bool | None) -> bool | None:
-    """Tell whether a stroke or a fill paints anything; None where nobody says."""
+    """Tell whether a stroke or a fill paints anything; None if not specified."""
     if _is_zero(opacity):
         return False
     return inherited if paint is None else paint.lower() not in NOTHING

@@ -17,8 +17,9 @@ from ...work.job import Done, Job
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up
 from ..receiving import read
-from ..turns import take_turn, unless_hung_up
-from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from ..searching import in_slot
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
 
 router = APIRouter()
@@ -58,7 +59,7 @@ async def post_analyze_inline(request: Request) -> Response:
 
 async def _answer(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeRequest) -> Response:
     job = exchange.job(asked.deadline_ms)
-    return exchange.answer(await unless_hung_up(exchange, _work(exchange, on, asked, job), job.deadline))
+    return await answer(exchange, _work(exchange, on, asked, job), job.deadline)
 
 
 async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: AnalyzeRequest, job: Job) -> Done:
@@ -67,7 +68,7 @@ async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: Analyze
     async with looking_up(exchange, named, job.deadline, oriented=None) as on:
         await index_map(exchange, on, job.deadline, oriented=None)
         work = partial(begin_analysis, lookup, on, asked, job)
-        tally = await take_turn(exchange, work, job.deadline, job.searching.is_set)
+        tally = await in_slot(exchange, work, job.deadline, job.searching.is_set)
     await _take_looks(exchange, tally, job)
     return await exchange.services.parse_threads.run(partial(analysis_done, tally, asked, job))
 
@@ -77,7 +78,7 @@ async def _take_looks(exchange: Exchange, tally: Tally, job: Job) -> None:
     more = not tally.done
     while more:
         try:
-            more = await take_turn(exchange, partial(take_looks, tally, job.deadline), job.deadline)
+            more = await in_slot(exchange, partial(take_looks, tally, job.deadline), job.deadline)
         except DeadlinePassedError:
             return
         await asyncio.sleep(0)

@@ -14,9 +14,9 @@ from ...work.job import Done, Job
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up
 from ..receiving import read
-from ..turns import take_turn, unless_hung_up
-from .direct import DirectRoute
-from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from ..searching import in_slot
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
 router = APIRouter(tags=["associate"], route_class=DirectRoute)
 
@@ -34,7 +34,7 @@ async def post_associate(request: Request) -> Response:
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
-    return exchange.answer(await unless_hung_up(exchange, _work(exchange, asked, job), job.deadline))
+    return await answer(exchange, _work(exchange, asked, job), job.deadline)
 
 
 async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
@@ -43,4 +43,4 @@ async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
     async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
         ready = await index_map(exchange, on, job.deadline, oriented=oriented)
         work = partial(exchange.services.associator.answer, asked, on, job, ready)
-        return await take_turn(exchange, work, job.deadline, job.searching.is_set)
+        return await in_slot(exchange, work, job.deadline, job.searching.is_set)

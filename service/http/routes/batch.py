@@ -23,9 +23,9 @@ from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up
 from ..problems import INTERNAL, problem_of
 from ..receiving import read
-from ..turns import take_turn, unless_hung_up
-from .direct import DirectRoute
-from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from ..searching import in_slot
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
 logger = logging.getLogger("linefix")
 router = APIRouter(tags=["associate"], route_class=DirectRoute)
@@ -44,7 +44,7 @@ async def post_batch(request: Request) -> Response:
     exchange = begin_search(request)
     asked, items = await read(exchange, read_batch)
     job = exchange.job(asked.options.deadline_ms)
-    return exchange.answer(await unless_hung_up(exchange, _work(exchange, asked, items, job), job.deadline))
+    return await answer(exchange, _work(exchange, asked, items, job), job.deadline)
 
 
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
@@ -53,7 +53,7 @@ async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchIt
     async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
         ready = await index_map(exchange, on, job.deadline, oriented=oriented)
         index = partial(associator.target, on, asked.options, job.deadline, ready)
-        target = await take_turn(exchange, index, job.deadline, heeds=lambda: False)
+        target = await in_slot(exchange, index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
     calls = [
         partial(associator.find_for_batch, target, index, item, asked.options, job.deadline)
@@ -78,7 +78,7 @@ async def _answer_all(
     async def take_turns() -> None:
         for index, call in todo:
             try:
-                found = await take_turn(exchange, call, job.deadline)
+                found = await in_slot(exchange, call, job.deadline)
             except CancelledError:
                 raise
             except Exception as error:

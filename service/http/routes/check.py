@@ -23,8 +23,9 @@ from ...work.job import Done, Job
 from ..exchange import Exchange, begin_search
 from ..map_stage import index_map, looking_up
 from ..receiving import read
-from ..turns import take_turn, unless_hung_up
-from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from ..searching import in_slot
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
 from .maps import MapIdPath
 
 router = APIRouter(tags=["maps"])
@@ -49,7 +50,7 @@ async def get_check(
     """Check a map: its directions, its drawing, its size, and its similar places."""
     exchange = begin_search(request)
     job = exchange.job(deadline_ms)
-    return exchange.answer(await unless_hung_up(exchange, _work(exchange, map_id, None, job), job.deadline))
+    return await answer(exchange, _work(exchange, map_id, None, job), job.deadline)
 
 
 @router.post(
@@ -65,7 +66,7 @@ async def post_check(request: Request, map_id: MapIdPath) -> Response:
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, CheckRequest))
     job = exchange.job(asked.deadline_ms)
-    return exchange.answer(await unless_hung_up(exchange, _work(exchange, map_id, asked, job), job.deadline))
+    return await answer(exchange, _work(exchange, map_id, asked, job), job.deadline)
 
 
 async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Done:
@@ -75,13 +76,13 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
         await index_map(exchange, on, job.deadline, oriented=True)
         work = partial(check, lookup, on, asked, job)
-        checked = await take_turn(exchange, work, job.deadline, job.searching.is_set)
+        checked = await in_slot(exchange, work, job.deadline, job.searching.is_set)
     judged = None
     if asked is not None:
         calls = [partial(sample, checked, asked, number, job) for number in range(len(asked.scans))]
         samples = await _try_all(exchange, calls, job)
         try:
-            judged = await take_turn(exchange, partial(conclude, checked, samples, job), job.deadline)
+            judged = await in_slot(exchange, partial(conclude, checked, samples, job), job.deadline)
         except DeadlinePassedError:  # no turn is left: it then concludes from what it has, and searches nothing
             judged = await exchange.services.parse_threads.run(partial(conclude, checked, samples, job))
     return await exchange.services.parse_threads.run(partial(check_done, checked, judged, asked, job))
@@ -95,7 +96,7 @@ async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | Non
     async def take_turns() -> None:
         for index, call in todo:
             try:
-                found[index] = await take_turn(exchange, call, job.deadline)
+                found[index] = await in_slot(exchange, call, job.deadline)
             except DeadlinePassedError:
                 return
 

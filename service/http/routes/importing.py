@@ -17,8 +17,9 @@ from ...work.job import Done, Job
 from ..bodies import FORM
 from ..exchange import Exchange, begin_search
 from ..receiving import parse, receive
-from ..turns import take_other_turn, take_turn, unless_hung_up
-from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems
+from ..searching import in_slot, in_slot_of
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems
 
 router = APIRouter(tags=["maps"])
 _TAKES: dict[str, Any] = {
@@ -44,7 +45,7 @@ async def post_import(request: Request) -> Response:
     async with receive(exchange, form=True) as content:
         job = exchange.job()
         work = _work(exchange, content, request.headers.get("content-type", ""), job)
-        return exchange.answer(await unless_hung_up(exchange, work, job.deadline))
+        return await answer(exchange, work, job.deadline)
 
 
 async def _work(exchange: Exchange, content: bytearray, content_type: str, job: Job) -> Done:
@@ -54,9 +55,9 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     """
     services, deadline = exchange.services, job.deadline
     reading = partial(read_apart, content, content_type, services.import_bounds, deadline)
-    read = await take_other_turn(exchange, services.importing, reading, deadline)
+    read = await in_slot_of(services.importing, exchange, reading, deadline)
     job.watch.lap("read")
     line_map = await parse(exchange, partial(read_model, InlineMap), read.map, deadline)
     indexing = partial(index_import, services.lookup, line_map, deadline)
-    index = await take_other_turn(exchange, services.indexing, indexing, deadline)
-    return await take_turn(exchange, partial(answer_import, index, line_map, read, job), deadline)
+    index = await in_slot_of(services.indexing, exchange, indexing, deadline)
+    return await in_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)

@@ -19,7 +19,7 @@ from ..exchange import begin
 from ..map_stage import ask_store
 from ..receiving import read
 from ..sending import json_response
-from .documenting import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
+from .declaring import EVERYWHERE, READS_BODY, REQUEST_ID, problems, takes
 
 router = APIRouter(tags=["maps"])
 MapIdPath = Annotated[

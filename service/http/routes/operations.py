@@ -9,7 +9,7 @@ from ...schemas.replies import Limits, Live, Version
 from ...version import VERSION
 from ..sending import json_response
 from ..services import services_of
-from .documenting import EVERYWHERE, problems
+from .declaring import EVERYWHERE, problems
 
 router = APIRouter(tags=["operations"])
 

@@ -13,9 +13,9 @@ from ...schemas.requests import VectorizeRequest
 from ...work.vectorization import answer_vectorization
 from ..exchange import begin_search
 from ..receiving import read
-from ..turns import search
-from .direct import DirectRoute
-from .documenting import EVERYWHERE, READS_BODY, SEARCHES, problems, takes
+from ..searching import in_slot
+from ..sending import answer
+from .declaring import EVERYWHERE, READS_BODY, SEARCHES, DirectRoute, problems, takes
 
 router = APIRouter(tags=["vectorize"], route_class=DirectRoute)
 
@@ -33,4 +33,6 @@ async def post_vectorize(request: Request) -> Response:
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, VectorizeRequest))
     job = exchange.job()
-    return exchange.answer(await search(exchange, partial(answer_vectorization, asked, job), job.deadline))
+    return await answer(
+        exchange, in_slot(exchange, partial(answer_vectorization, asked, job), job.deadline), job.deadline
+    )

@@ -6,12 +6,13 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
-from association import AssociationOptions, Deadline, HardPrior, Reason, Status, associate, tuning
+from association import AssociationOptions, Deadline, HardPrior, Reason, Status, associate, report, tuning
 from association.consensus.ranking import Ranked
 from association.context import SearchContext
 from association.search import candidates
@@ -246,11 +247,23 @@ def test_an_incomplete_search_is_never_usable() -> None:
     assert [reason.code for reason in stopped.reasons] == ["search_incomplete"]
 
 
-@pytest.mark.parametrize("during", ["null_of", "loose_twin_share", "search"])
-def test_what_is_compared_after_the_deadline_is_not_usable(during: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The deadline passes while the mirrored scan or the rivals are compared, or at the very end of the search."""
+@pytest.mark.parametrize(
+    ("module", "during"),
+    [
+        (candidates, "search"),
+        (verdict, "null_of"),
+        (verdict, "loose_twin_share"),
+        (verdict, "with_lines_of_sight"),
+        (report, "with_lines_of_sight"),
+        (report, "missing_segments"),
+    ],
+)
+def test_what_is_compared_after_the_deadline_is_not_usable(
+    module: ModuleType, during: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The deadline passes at the end of the search, while rivals are compared, or while the answer is put together."""
     index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
-    sent, module = scan_of(seen(ROOM, INSIDE)[0]), candidates if during == "search" else verdict
+    sent = scan_of(seen(ROOM, INSIDE)[0])
     compared, deadline = getattr(module, during), Deadline(time.monotonic() + 60.0)
 
     def late(*arguments: Any) -> Any:

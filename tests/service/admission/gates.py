@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
-from typing import Any, TypeVar
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 from association import Deadline
 from service.admission.fair_queue import Holder
@@ -15,6 +16,7 @@ from service.admission.gate import Gate
 from service.admission.ticket import Ticket
 
 T = TypeVar("T")
+P = ParamSpec("P")
 PATIENCE = 30.0  # s for what has to come about
 
 
@@ -79,6 +81,11 @@ async def gate_of(slots: int, queue: int, long_per_slot: int = 0) -> AsyncIterat
         gate.close()
 
 
-def in_loop(scenario: Callable[[], Any]) -> None:
-    """Run a scenario in an event loop of its own."""
-    asyncio.run(asyncio.wait_for(scenario(), 60.0))
+def in_loop(scenario: Callable[P, Coroutine[Any, Any, None]]) -> Callable[P, None]:
+    """Return a test, or another function, that runs a scenario in an event loop of its own."""
+
+    @wraps(scenario)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        asyncio.run(asyncio.wait_for(scenario(*args, **kwargs), 60.0))
+
+    return run

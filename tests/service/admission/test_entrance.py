@@ -90,141 +90,124 @@ def test_the_table_is_asked_for_no_longer_paths_than_a_route_can_have() -> None:
     assert asked_of("GET", path + "x").access is None
 
 
-def test_a_lesser_key_is_for_what_was_said_and_no_more(tmp_path: Path) -> None:
+@in_loop
+async def test_a_lesser_key_is_for_what_was_said_and_no_more(tmp_path: Path) -> None:
     """Any key may ask how much a request may hold; what is not in the table is for keys that may do everything."""
+
     (tmp_path / "keys").write_text(
         key_lines("reads", ["read"]) + key_lines("all of hq", ["read", "associate", "write"], "hq-")
     )
     keyring = Keyring([SecretStr("all")], KeyFile(tmp_path / "keys"))
 
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            door = Door(gate, keyring, Origins((), guarded=True), LIMIT)
-            assert door.ask("GET", "/v1/maps/hq-3", key("all of hq")).maps == "hq-"
-            for name in ("reads", "all of hq", "all"):
-                door.ask("GET", "/v1/limits", key(name))
-                door.ask("GET", "/v1/maps", key(name))
-            for name, path in (("reads", "/v1/maps/hq-3"), ("all", "/v1/maps/hq-3"), ("all", "/v1/nothing")):
-                door.ask("GET", path, key(name))
-            for name, method, path, lacking in (
-                ("reads", "PUT", "/v1/maps/hq-3", "the role `write`"),
-                ("reads", "POST", "/v1/associate", "the role `associate`"),
-                ("reads", "GET", "/v1/nothing", "every role"),
-                ("all of hq", "GET", "/v1/nothing", "every role"),
-            ):
-                with pytest.raises(MissingRoleError, match=f"the key lacks {lacking}"):
-                    door.ask(method, path, key(name))
-            with pytest.raises(ForeignMapError):
-                door.ask("GET", "/v1/maps/other", key("all of hq"))
-
-    in_loop(scenario)
+    async with gate_of(1, 1) as gate:
+        door = Door(gate, keyring, Origins((), guarded=True), LIMIT)
+        assert door.ask("GET", "/v1/maps/hq-3", key("all of hq")).maps == "hq-"
+        for name in ("reads", "all of hq", "all"):
+            door.ask("GET", "/v1/limits", key(name))
+            door.ask("GET", "/v1/maps", key(name))
+        for name, path in (("reads", "/v1/maps/hq-3"), ("all", "/v1/maps/hq-3"), ("all", "/v1/nothing")):
+            door.ask("GET", path, key(name))
+        for name, method, path, lacking in (
+            ("reads", "PUT", "/v1/maps/hq-3", "the role `write`"),
+            ("reads", "POST", "/v1/associate", "the role `associate`"),
+            ("reads", "GET", "/v1/nothing", "every role"),
+            ("all of hq", "GET", "/v1/nothing", "every role"),
+        ):
+            with pytest.raises(MissingRoleError, match=f"the key lacks {lacking}"):
+                door.ask(method, path, key(name))
+        with pytest.raises(ForeignMapError):
+            door.ask("GET", "/v1/maps/other", key("all of hq"))
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT"])
 @pytest.mark.parametrize("path", ["/v1/associate", "/v1/maps/m", "/nothing"])
-def test_a_body_that_says_it_is_too_long_is_sent_away(method: str, path: str) -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            door = entrance(gate, KEYS)
-            door.ask(method, path, length(LIMIT) + key("open"))
-            with pytest.raises(BodyTooLargeError):
-                door.ask(method, path, length(LIMIT + 1) + key("open"))
-
-    in_loop(scenario)
+@in_loop
+async def test_a_body_that_says_it_is_too_long_is_sent_away(method: str, path: str) -> None:
+    async with gate_of(1, 1) as gate:
+        door = entrance(gate, KEYS)
+        door.ask(method, path, length(LIMIT) + key("open"))
+        with pytest.raises(BodyTooLargeError):
+            door.ask(method, path, length(LIMIT + 1) + key("open"))
 
 
-def test_the_length_of_what_has_no_body_is_of_no_interest() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            for method in ("GET", "HEAD", "DELETE"):
-                entrance(gate).ask(method, "/v1/maps/m", length(LIMIT + 1))
-            entrance(gate).ask("POST", "/v1/associate", [(b"content-length", b"soon")])
-
-    in_loop(scenario)
+@in_loop
+async def test_the_length_of_what_has_no_body_is_of_no_interest() -> None:
+    async with gate_of(1, 1) as gate:
+        for method in ("GET", "HEAD", "DELETE"):
+            entrance(gate).ask(method, "/v1/maps/m", length(LIMIT + 1))
+        entrance(gate).ask("POST", "/v1/associate", [(b"content-length", b"soon")])
 
 
-def test_a_ticket_says_whose_key_it_is() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            door = entrance(gate, KEYS)
-            holders = {door.ask("POST", path, key("sesame")).holder for path in (*SEARCHING, "/v1/maps/m")}
-            assert holders == {Keyring(KEYS).grant(key("sesame")).holder}
-
-    in_loop(scenario)
+@in_loop
+async def test_a_ticket_says_whose_key_it_is() -> None:
+    async with gate_of(1, 1) as gate:
+        door = entrance(gate, KEYS)
+        holders = {door.ask("POST", path, key("sesame")).holder for path in (*SEARCHING, "/v1/maps/m")}
+        assert holders == {Keyring(KEYS).grant(key("sesame")).holder}
 
 
-def test_who_has_no_key_is_sent_away_at_once() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            door = entrance(gate, KEYS)
-            for path in (*SEARCHING, "/v1/maps/m", "/v1/nothing", "/v1/"):
-                for headers, error in ((key("wrong"), UnknownKeyError), ([], MissingKeyError)):
-                    with pytest.raises(error):
-                        door.ask("POST", path, headers)
-            for path in ("/livez", "/v1", "/docs"):
-                assert door.ask("GET", path, key("wrong")).holder is None
-
-    in_loop(scenario)
+@in_loop
+async def test_who_has_no_key_is_sent_away_at_once() -> None:
+    async with gate_of(1, 1) as gate:
+        door = entrance(gate, KEYS)
+        for path in (*SEARCHING, "/v1/maps/m", "/v1/nothing", "/v1/"):
+            for headers, error in ((key("wrong"), UnknownKeyError), ([], MissingKeyError)):
+                with pytest.raises(error):
+                    door.ask("POST", path, headers)
+        for path in ("/livez", "/v1", "/docs"):
+            assert door.ask("GET", path, key("wrong")).holder is None
 
 
-def test_without_keys_an_address_is_a_holder() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            door = entrance(gate)
-            for method, path in (("POST", "/v1/associate"), ("GET", "/v1/maps")):
-                assert door.ask(method, path, []).holder == bytes((192, 0, 2, 1))
-            with pytest.raises(ForeignHostError):
-                door.ask("GET", "/v1/maps", [(b"host", b"evil.example")])
-
-    in_loop(scenario)
+@in_loop
+async def test_without_keys_an_address_is_a_holder() -> None:
+    async with gate_of(1, 1) as gate:
+        door = entrance(gate)
+        for method, path in (("POST", "/v1/associate"), ("GET", "/v1/maps")):
+            assert door.ask(method, path, []).holder == bytes((192, 0, 2, 1))
+        with pytest.raises(ForeignHostError):
+            door.ask("GET", "/v1/maps", [(b"host", b"evil.example")])
 
 
-def test_only_searches_are_sent_away_when_it_is_full() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 0) as gate:
-            await gate.block()
-            door = entrance(gate)
-            for path in SEARCHING:
-                with pytest.raises(QueueFullError):
-                    door.ask("POST", path, [])
-                door.ask("GET", path, [])
-            for method, path in (("PUT", "/v1/maps/m"), ("GET", "/livez"), ("POST", "/v1/associate/"), ("POST", "/")):
-                door.ask(method, path, [])
-
-    in_loop(scenario)
-
-
-def test_a_full_queue_is_looked_at_for_the_key_that_comes() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 1) as gate:
-            door = entrance(gate, KEYS)
-            for _ in range(2):
-                door.ask("POST", "/v1/associate", key("sesame")).announce()
+@in_loop
+async def test_only_searches_are_sent_away_when_it_is_full() -> None:
+    async with gate_of(1, 0) as gate:
+        await gate.block()
+        door = entrance(gate)
+        for path in SEARCHING:
             with pytest.raises(QueueFullError):
-                door.ask("POST", "/v1/associate", key("sesame"))
-            door.ask("POST", "/v1/associate", key("open")).announce()
-            with pytest.raises(ShareUsedError):
-                door.ask("POST", "/v1/associate", key("sesame"))
-            # What is wrong with a key is told before anything of the queue.
-            with pytest.raises(UnknownKeyError):
-                door.ask("POST", "/v1/associate", key("wrong"))
-
-    in_loop(scenario)
+                door.ask("POST", path, [])
+            door.ask("GET", path, [])
+        for method, path in (("PUT", "/v1/maps/m"), ("GET", "/livez"), ("POST", "/v1/associate/"), ("POST", "/")):
+            door.ask(method, path, [])
 
 
-def test_only_what_searches_is_expected_at_the_gate() -> None:
-    async def scenario() -> None:
-        async with gate_of(1, 0) as gate:
-            door = entrance(gate, KEYS)
-            for method, path, name in (
-                ("PUT", "/v1/maps/m", "sesame"),
-                ("GET", "/v1/associate", "sesame"),
-            ):
-                door.ask(method, path, key(name)).announce()
-                assert not gate.full
-            ticket: Ticket = door.ask("POST", "/v1/associate", key("sesame"))
-            assert not gate.full  # its body may never come
-            ticket.announce()
-            assert gate.full
+@in_loop
+async def test_a_full_queue_is_looked_at_for_the_key_that_comes() -> None:
+    async with gate_of(1, 1) as gate:
+        door = entrance(gate, KEYS)
+        for _ in range(2):
+            door.ask("POST", "/v1/associate", key("sesame")).announce()
+        with pytest.raises(QueueFullError):
+            door.ask("POST", "/v1/associate", key("sesame"))
+        door.ask("POST", "/v1/associate", key("open")).announce()
+        with pytest.raises(ShareUsedError):
+            door.ask("POST", "/v1/associate", key("sesame"))
+        # What is wrong with a key is told before anything of the queue.
+        with pytest.raises(UnknownKeyError):
+            door.ask("POST", "/v1/associate", key("wrong"))
 
-    in_loop(scenario)
+
+@in_loop
+async def test_only_what_searches_is_expected_at_the_gate() -> None:
+    async with gate_of(1, 0) as gate:
+        door = entrance(gate, KEYS)
+        for method, path, name in (
+            ("PUT", "/v1/maps/m", "sesame"),
+            ("GET", "/v1/associate", "sesame"),
+        ):
+            door.ask(method, path, key(name)).announce()
+            assert not gate.full
+        ticket: Ticket = door.ask("POST", "/v1/associate", key("sesame"))
+        assert not gate.full  # its body may never come
+        ticket.announce()
+        assert gate.full

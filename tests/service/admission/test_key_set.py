@@ -20,8 +20,8 @@ from jwt.algorithms import ECAlgorithm, RSAAlgorithm
 
 from service.admission import key_set, tokens
 from service.admission.errors import UnknownKeyError
-from service.admission.issuer import Issuer
 from service.admission.key_set import KeySetError, read_key_set
+from service.admission.keys import Issuer
 from service.admission.tokens import Tokens
 from tests.running import RunningService, client_of, until
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing, key_lines

@@ -21,8 +21,7 @@ from pydantic import SecretStr
 from service.admission import tokens
 from service.admission.errors import UnknownKeyError
 from service.admission.grants import Role
-from service.admission.issuer import Issuer
-from service.admission.keys import Keyring
+from service.admission.keys import Issuer, Keyring
 from service.admission.tokens import Tokens
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing
 

@@ -1,8 +1,10 @@
-"""The examples of docs/http.md are requests that work."""
+"""The examples of docs/reference/http are requests that work."""
 
 from __future__ import annotations
 
+import json
 import re
+from itertools import dropwhile, takewhile
 from pathlib import Path
 
 import httpx
@@ -11,12 +13,28 @@ import pytest
 from service.http.problems import TABLE
 
 ROOT = Path(__file__).parents[3]
-TEXT = (ROOT / "docs" / "http.md").read_text()
-OPERATIONS = (ROOT / "docs" / "operations.md").read_text()
-README = (ROOT / "README.md").read_text()
-STORED = re.findall(
-    r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'", TEXT
+PAGES = (
+    "index",
+    "register",
+    "associate",
+    "batch",
+    "vectorize",
+    "maps",
+    "check",
+    "import",
+    "analyze",
+    "errors",
+    "operations",
 )
+HTTP = {name: (ROOT / "docs" / "reference" / "http" / f"{name}.md").read_text() for name in PAGES}
+TEXT = "\n".join(HTTP.values())
+LIMITS = (ROOT / "docs" / "reference" / "limits.md").read_text()
+OPERATIONS = (ROOT / "docs" / "guides" / "deployment.md").read_text()
+TUTORIAL = (ROOT / "docs" / "tutorials" / "http.md").read_text()
+README = (ROOT / "README.md").read_text()
+CONTRACT = Path(__file__).with_name("openapi-0.1.0.json")
+PUT = r"curl -s -X PUT localhost:8000(/v1/maps/\S+) -H 'Content-Type: application/json' -d '([^']*)'"
+STORED = re.findall(PUT, TEXT)
 ASKED = r"curl -s localhost:8000(/v1/\S+) -H 'Content-Type: application/json' -d '([^']*)'"
 EXAMPLES = re.findall(ASKED, TEXT)
 
@@ -63,6 +81,25 @@ def test_the_first_thing_that_a_reader_tries_is_answered_as_the_readme_says(clie
     assert [float(number) for number in said.groups()] == pytest.approx(list(answer["pose"].values()), abs=1e-3)
 
 
+def test_the_tutorial_is_answered_as_it_says(client: httpx.Client) -> None:
+    ((place, document),) = re.findall(PUT, TUTORIAL)
+    client.put(place, content=document.encode()).raise_for_status()
+    ((path, body),) = re.findall(ASKED, TUTORIAL)
+    answer = client.post(path, content=body.encode()).json()
+    client.delete(place)
+    assert (answer["status"], answer["usable"]) == ("ok", True)
+    assert list(answer["pose"].values()) == pytest.approx([1.0, 1.0, 1.57], abs=0.01)
+
+
+@pytest.mark.parametrize(("page", "answer"), [("register", "RegisterAnswer"), ("associate", "AssociateAnswer")])
+def test_the_fields_that_a_page_explains_are_those_of_the_contract(page: str, answer: str) -> None:
+    schemas = json.loads(CONTRACT.read_text())["components"]["schemas"]
+    rows = HTTP[page].partition("Answer" if page == "register" else "## The answer")[2].splitlines()
+    table = list(takewhile(lambda row: row.startswith("|"), dropwhile(lambda row: not row.startswith("|"), rows)))
+    explained = {name for row in table[2:] for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+    assert explained | {"request_id", "timing_ms"} == set(schemas[answer]["properties"])
+
+
 def test_every_code_is_described() -> None:
     for kind in TABLE:
         assert re.search(rf"\| [^|]*{kind.status}[^|]*\| [^|]*`{kind.code}`", TEXT), kind.code
@@ -72,14 +109,13 @@ def test_every_finding_of_a_check_is_described() -> None:
     source = "".join(path.read_text() for path in (ROOT / "association" / "checking").glob("*.py"))
     codes = set(re.findall(r'Finding\(\s*"(\w+)"', source))
     assert len(codes) >= 13
-    described = TEXT.partition("### Check")[2].partition("## Errors")[0]
-    assert {code for code in codes if f"| `{code}` |" not in described} == set()
+    assert {code for code in codes if f"| `{code}` |" not in HTTP["check"]} == set()
 
 
 def test_the_named_settings_exist() -> None:
     from service.settings import Settings
 
-    for name in re.findall(r"LINEFIX_([A-Z_]+)", TEXT + OPERATIONS):
+    for name in re.findall(r"LINEFIX_([A-Z_]+)", TEXT + LIMITS + OPERATIONS):
         assert name.lower() in (*Settings.model_fields, "kernels"), name
 
 
@@ -96,7 +132,7 @@ ROW = re.compile(r"\| `(\w+)` \| (\S+)[^|]*\| (above )?(\d+)[^|]*\| (\d*)[^|]*\|
 def test_the_settings_are_as_the_table_says() -> None:
     from service.settings import Settings
 
-    rows = ROW.findall(TEXT.partition("## Operations")[2])
+    rows = ROW.findall(LIMITS)
     fields = {name: field for name, field in Settings.model_fields.items() if field.annotation in (int, float)}
     assert {name for name, *_ in rows} == fields.keys()
     for name, default, above, least, most in rows:

@@ -1,114 +1,114 @@
-"""Giving up what is done for a client that is gone."""
+"""Work for a client that hangs up ends."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import pytest
 
 from association import Deadline
-from service.http.hanging_up import FIRST_SECONDS, HangUpError, unless
+from service.http.searching import WATCH_AFTER, HangUpError, unless_hung_up
+
+Receive = Callable[[], Awaitable[dict[str, Any]]]
 
 
-async def after(seconds: float) -> None:
-    await asyncio.sleep(seconds)
+def connected_until(future: asyncio.Future[None]) -> Receive:
+    """Return what a server gives to an application whose client stays until a future is done."""
+
+    async def receive() -> dict[str, Any]:
+        await future
+        return {"type": "http.disconnect"}
+
+    return receive
 
 
-async def worked(seconds: float, ends: list[str]) -> str:
+def run(main: Callable[[Receive, asyncio.Future[None], asyncio.Future[str]], Coroutine[Any, Any, None]]) -> None:
+    """Run a test with a client, the future that ends its connection, and the future that ends the work."""
+
+    async def ran() -> None:
+        loop = asyncio.get_running_loop()
+        gone, result = loop.create_future(), loop.create_future()
+        await asyncio.wait_for(main(connected_until(gone), gone, result), 10.0)
+
+    asyncio.run(ran())
+
+
+async def waited(result: asyncio.Future[str], ends: list[str]) -> str:
     try:
-        await asyncio.sleep(seconds)
+        return await result
     finally:
         ends.append("ended")
-    return "done"
 
 
-def run(main: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(asyncio.wait_for(main, 10.0))
-
-
-def test_who_stays_gets_what_came_of_it() -> None:
-    async def main() -> None:
-        deadline, ends, tasks = Deadline(), list[str](), asyncio.all_tasks()
-        assert await unless(lambda: after(60.0), worked(2.0 * FIRST_SECONDS, ends), deadline) == "done"
+def test_the_result_is_returned_and_the_watch_ends() -> None:
+    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
+        deadline, tasks = Deadline(), asyncio.all_tasks()
+        asyncio.get_running_loop().call_later(2.0 * WATCH_AFTER, result.set_result, "done")
+        assert await unless_hung_up(receive, waited(result, []), deadline) == "done"
         assert not deadline.cancelled
-        await asyncio.sleep(0.01)
-        assert asyncio.all_tasks() == tasks  # nobody watches any more
+        while asyncio.all_tasks() != tasks:
+            await asyncio.sleep(0)
 
-    run(main())
+    run(main)
 
 
 def test_a_short_answer_is_not_watched() -> None:
-    async def main() -> None:
-        asked: list[int] = []
+    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
+        gone.set_result(None)  # no watch, or it would be noticed
+        result.set_result("done")
+        assert await unless_hung_up(receive, waited(result, []), Deadline()) == "done"
 
-        async def gone() -> None:
-            asked.append(1)
-
-        assert await unless(gone, worked(0.0, []), Deadline()) == "done"
-        await asyncio.sleep(2.0 * FIRST_SECONDS)
-        assert asked == []
-
-    run(main())
+    run(main)
 
 
-def test_what_is_done_for_who_is_gone_ends() -> None:
-    async def main() -> None:
+def test_the_work_for_a_client_that_hung_up_ends() -> None:
+    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
         deadline, ends = Deadline(), list[str]()
+        gone.set_result(None)
         with pytest.raises(HangUpError):
-            await unless(lambda: after(0.01), worked(60.0, ends), deadline)
+            await unless_hung_up(receive, waited(result, ends), deadline)
         assert deadline.cancelled
         assert ends == ["ended"]
-        await asyncio.sleep(0.01)  # and this task goes on
+        await asyncio.sleep(0)  # and this task goes on
 
-    run(main())
-
-
-def test_who_leaves_at_the_moment_of_the_result_cancels_nothing_later() -> None:
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        for first in (0, 1):
-            left, result = loop.create_future(), loop.create_future()
-
-            async def gone(left: asyncio.Future[None] = left) -> None:
-                await left
-
-            async def work(result: asyncio.Future[None] = result) -> str:
-                await result
-                return "done"
-
-            def both(pair: tuple[asyncio.Future[None], ...]) -> None:
-                for future in pair:
-                    future.set_result(None)
-
-            loop.call_later(2.0 * FIRST_SECONDS, both, (left, result) if first else (result, left))
-            assert await unless(gone, work(), Deadline()) == "done"
-            await asyncio.sleep(0.01)
-
-    run(main())
+    run(main)
 
 
-def test_a_server_that_ends_is_no_client_that_is_gone() -> None:
-    async def main() -> None:
+@pytest.mark.parametrize("first", ["hang-up", "result"])
+def test_a_hang_up_at_the_moment_of_the_result_cancels_nothing_later(first: str) -> None:
+    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
+        def both() -> None:
+            ends = [lambda: gone.set_result(None), lambda: result.set_result("done")]
+            for end in ends if first == "hang-up" else reversed(ends):
+                end()
+
+        asyncio.get_running_loop().call_later(2.0 * WATCH_AFTER, both)
+        assert await unless_hung_up(receive, waited(result, []), Deadline()) == "done"
+        await asyncio.sleep(0)
+
+    run(main)
+
+
+def test_a_server_that_ends_is_no_hang_up() -> None:
+    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
         deadline, ends = Deadline(), list[str]()
-        task = asyncio.ensure_future(unless(lambda: after(60.0), worked(60.0, ends), deadline))
-        await asyncio.sleep(2.0 * FIRST_SECONDS)
+        task = asyncio.ensure_future(unless_hung_up(receive, waited(result, ends), deadline))
+        await asyncio.sleep(0)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
         assert deadline.cancelled
         assert ends == ["ended"]
 
-    run(main())
+    run(main)
 
 
-def test_an_error_of_the_work_is_told() -> None:
-    async def wrong() -> None:
-        raise ZeroDivisionError
-
-    async def main() -> None:
+def test_an_error_of_the_work_is_raised() -> None:
+    async def main(receive: Receive, gone: asyncio.Future[None], result: asyncio.Future[str]) -> None:
+        result.set_exception(ZeroDivisionError())
         with pytest.raises(ZeroDivisionError):
-            await unless(lambda: after(60.0), wrong(), Deadline())
+            await unless_hung_up(receive, waited(result, []), Deadline())
 
-    run(main())
+    run(main)

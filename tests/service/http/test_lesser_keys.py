@@ -6,13 +6,11 @@ import base64
 import gzip
 import json
 from collections.abc import Iterator
-from pathlib import Path
 
-import httpx
 import pytest
 
 from service.schemas import examples
-from tests.running import RunningService, running, until
+from tests.running import RunningService, running
 from tests.service.issuing import AUDIENCE, ISSUER, Issuing, key_lines
 
 ADMIN, READER, ASKER, WRITER = (f"the-key-of-the-{who}" for who in ("owner", "reader", "asker", "writer"))
@@ -162,18 +160,3 @@ def test_a_header_of_a_token_that_breaks_parsers(kept: RunningService, header: b
     claims = ".".join(Issuing().token().split(".")[1:])
     token = base64.urlsafe_b64encode(header).rstrip(b"=").decode() + "." + claims
     assert told(kept, "GET /v1/maps HTTP/1.1", f"Authorization: Bearer {token}")[9:12] == b"403"
-
-
-def test_a_key_that_was_taken_back_is_so_on_an_open_connection(tmp_path: Path) -> None:
-    keys = tmp_path / "keys.toml"
-    keys.write_text(key_lines("first", ["read"]) + key_lines("second", ["read"]))
-    with running(tmp_path, keys_file=keys) as service, httpx.Client(base_url=service.url) as client:
-
-        def status(key: str) -> int:
-            return client.get("/v1/maps", headers=bearer(key)).status_code
-
-        assert (status("first"), status("second")) == (200, 200)
-        (tmp_path / "new").write_text(key_lines("second", ["read"]))
-        (tmp_path / "new").replace(keys)
-        until(lambda: status("first") == 403)
-        assert status("second") == 200

@@ -252,23 +252,6 @@ def test_a_wish_for_another_protocol_is_ignored(service: RunningService, apart: 
     assert answer.startswith(b"HTTP/1.1 400 " if apart else b"HTTP/1.1 200 ")
 
 
-def test_media_types(client: httpx.Client) -> None:
-    for headers in ({"content-type": "text/plain"}, {"content-type": "application/xml"}, {"content-encoding": "br"}):
-        refused(client.post("/v1/associate", content=b"{}", headers=headers), 415, "unsupported_media_type")
-
-
-def test_counts_over_the_limits(client: httpx.Client) -> None:
-    limits = client.get("/v1/limits").json()
-    row = [0.0, 0.0, 1.0, 0.0]
-    for path, body in (
-        ("/v1/associate", associate_body(scan={"segments": [row] * (limits["max_scan_segments"] + 1)})),
-        ("/v1/associate", associate_body(map={"segments": [row] * (limits["max_map_segments"] + 1)})),
-        ("/v1/vectorize", {"points": [[0.0, 1.0]] * (limits["max_beams"] + 1)}),
-        ("/v1/associate:batch", {"map": {"segments": ROOM}, "scans": [{}] * (limits["max_batch"] + 1)}),
-    ):
-        refused(client.post(path, content=orjson_dumps(body)), 413, "too_large")
-
-
 def test_deep_free_values(client: httpx.Client) -> None:
     deep: Any = 1
     for _ in range(200):

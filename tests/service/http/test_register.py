@@ -80,11 +80,3 @@ def test_no_pairs_are_no_answer_and_no_error(client: httpx.Client) -> None:
 
 def test_weights_replace_the_weighting(client: httpx.Client) -> None:
     assert [row["weight"] for row in registered(client, weights=[3.0, 5.0])["residuals"]] == [3.0, 5.0]
-
-
-def test_the_same_request_has_the_same_answer(client: httpx.Client) -> None:
-    first, second = (
-        {name: value for name, value in registered(client).items() if name not in ("request_id", "timing_ms")}
-        for _ in range(2)
-    )
-    assert first == second

@@ -19,10 +19,10 @@ from PIL import Image
 from association import CancelledError, Deadline
 from service.importing import folders
 from service.importing.bounded import ReadMap, read_apart
-from service.importing.bounds import Bounds
 from service.importing.errors import FileTooLargeError, FormatsMissingError, TooLateError
 from service.importing.folders import PREFIX, remove_abandoned
-from service.parsing.own_modules import command_of
+from service.importing.reader import Bounds
+from service.parsing.parser_process import command_of
 from tests.running import children_of, until
 
 from .forms import SQUARE, TYPE, YAML, encoded, form

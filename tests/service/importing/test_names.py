@@ -13,8 +13,7 @@ import ezdxf
 import numpy as np
 import pytest
 
-from service.importing.bounds import Bounds
-from service.importing.reader import read_files
+from service.importing.reader import Bounds, read_files
 from service.schemas.errors import InvalidRequestError
 from tests.formats.test_logs import Recorder
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from service.importing.bounds import Bounds
-from service.importing.reader import read_files
+from service.importing.reader import Bounds, read_files
 from service.schemas.errors import InvalidRequestError
 
 from .forms import SQUARE, TYPE, YAML, form

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from sqlalchemy import Engine, event, text
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.database import open_engine
 
@@ -16,8 +16,8 @@ ANY = Preconditions()
 
 
 @contextmanager
-def opened(url: str) -> Iterator[MapStore]:
-    store = MapStore(database_url(url))
+def opened(url: str, most_bytes: int | None = None) -> Iterator[MapStore]:
+    store = MapStore(database_url(url), most_bytes=most_bytes)
     try:
         store.open()
         yield store

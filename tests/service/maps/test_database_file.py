@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from service.app import create_app
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps.errors import StoreAwayError
 from service.part import Part

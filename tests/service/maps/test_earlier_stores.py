@@ -17,7 +17,7 @@ from typing import Any
 import psycopg
 import pytest
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapStore
 from service.maps.errors import UnknownMapError
 from service.schemas import examples

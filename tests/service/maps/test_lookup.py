@@ -12,7 +12,7 @@ import pytest
 
 from association import Deadline, InvalidMapError
 from registration import InputError
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import CachedMap, IndexCache, MapOutline, MapStore, Preconditions
 from service.maps.errors import BusyStoreError, UnknownMapError
 from service.maps.lookup import OVERHEAD, MapLookup, outline_of

@@ -16,7 +16,7 @@ import psycopg
 import pytest
 from sqlalchemy import Engine, event
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 from service.maps import database as connections
 from service.maps.errors import BusyStoreError, UnknownMapError
@@ -26,7 +26,7 @@ ANY = Preconditions()
 # Another process does what it is told, line by line, on the same database.
 OTHER = """
 import sys
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions
 store = MapStore(database_url(sys.argv[1]))
 for line in sys.stdin:

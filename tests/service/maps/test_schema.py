@@ -14,11 +14,11 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Column, Engine, Float, Integer, LargeBinary, MetaData, String, Table, event, inspect, text
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapStore, Preconditions, schema
 from service.maps.database import open_engine
 from service.maps.errors import CorruptMapError, StoreAwayError, UnknownMapError
-from service.maps.tables import metadata
+from service.maps.schema import metadata
 
 BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
 ROUGH = b'{"segments":[[0,0,1,0]],"sigma":0.07}'
@@ -115,7 +115,7 @@ def test_workers_that_start_together(database: str, old: bool) -> None:
     if old:
         make_old(database)
     program = (
-        "import sys; from service.database_url import database_url; from service.maps import MapOutline, MapStore; "
+        "import sys; from service.database_location import database_url; from service.maps import MapStore; "
         "store = MapStore(database_url(sys.argv[1])); sys.stdin.read(1); store.open(); store.close()"
     )
     workers = [

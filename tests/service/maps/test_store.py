@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.database_url import database_url
+from service.database_location import database_url
 from service.maps import MapOutline, MapRecord, MapStore, MapSummary, Preconditions
 from service.maps.errors import (
     CorruptMapError,
@@ -252,8 +252,7 @@ def test_a_damaged_map_can_be_deleted(store: MapStore, database: str) -> None:
 
 
 def test_all_maps_together_take_no_more_than_they_may(database: str) -> None:
-    store = MapStore(database_url(database), most_bytes=10_000)
-    try:
+    with opened(database, 10_000) as store:
         store.put("a", bytes(5_000), BOX, ANY)
         with pytest.raises(StoreFullError, match="10000 bytes"):
             store.put("b", bytes(5_000), BOX, ANY)
@@ -267,18 +266,13 @@ def test_all_maps_together_take_no_more_than_they_may(database: str) -> None:
         for number in range(3):  # ids take room, too, also of maps that are gone
             with pytest.raises(StoreFullError):
                 store.put(f"c{number}", b"", BOX, ANY)
-    finally:
-        store.close()
 
 
 def test_one_map_may_take_it_all(database: str) -> None:
-    store = MapStore(database_url(database), most_bytes=10_000)
-    try:
+    with opened(database, 10_000) as store:
         with pytest.raises(StoreFullError):
             store.put("a", bytes(9_501), BOX, ANY)
         assert store.put("a", bytes(9_500), BOX, ANY) == (1, True)
-    finally:
-        store.close()
 
 
 def test_a_map_that_was_put_a_thousand_times(store: MapStore, database: str) -> None:
@@ -301,8 +295,7 @@ def test_a_map_that_comes_before_others_is_a_map_of_its_own(store: MapStore) -> 
 
 def test_the_maps_of_one_prefix_take_no_more_than_half(database: str) -> None:
     """Class of attack: what is shared by all is filled by one. Ids that were used once count, too."""
-    store = MapStore(database_url(database), most_bytes=20_000)
-    try:
+    with opened(database, 20_000) as store:
         store.put("hq-a", bytes(5_000), BOX, ANY, "hq-")
         with pytest.raises(StoreFullError, match="10000 bytes"):
             store.put("hq-b", bytes(4_001), BOX, ANY, "hq-")
@@ -319,14 +312,3 @@ def test_the_maps_of_one_prefix_take_no_more_than_half(database: str) -> None:
             store.delete(f"hq-{number}", ANY)
         with pytest.raises(StoreFullError):
             store.put("hq-more", bytes(1), BOX, ANY, "hq-")
-    finally:
-        store.close()
-
-
-def test_a_key_for_all_maps_has_all_of_the_store(database: str) -> None:
-    store = MapStore(database_url(database), most_bytes=20_000)
-    try:
-        store.put("a", bytes(19_000), BOX, ANY)
-        assert len(store.load("a").document) == 19_000
-    finally:
-        store.close()

@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 
 import registration
-from service.parsing.channel import receive, send
 from service.parsing.errors import NotJsonError, ParserEndedError
-from service.parsing.parser_process import NICE, ParserProcess
+from service.parsing.parser_process import NICE, ParserProcess, receive, send
 from service.parsing.reading import read_map, read_model
 from service.schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError
 from service.schemas.parts import MapDocument

@@ -76,7 +76,7 @@ def test_a_search_is_told_with_its_stages_below_the_callers_span(
     client = start_service().client
     headers = {"traceparent": f"00-{TRACE}-{PARENT}-01", "x-request-id": "mine"}
     client.post("/v1/associate", json=examples.ASSOCIATE, headers=headers).raise_for_status()
-    until(lambda: len(collector.named("search")) > 0)
+    until(lambda: len(collector.named("POST /v1/associate")) > 0)  # ends last
     (request,) = collector.named("POST /v1/associate")
     assert (request.trace_id.hex(), request.parent_span_id.hex()) == (TRACE, PARENT)
     assert {one.key: one.value.string_value or one.value.int_value for one in request.attributes} == {
