@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, AssociationResult, CancelledError, Deadline, MapIndex, Scan, associate
+from association.layout import Integers
 
 from .scenes import INSIDE, equal_rooms, index_of, scan_of, seen
 
@@ -29,7 +30,7 @@ def long_search() -> tuple[MapIndex, Scan]:
     return index, scan_of(np.vstack([np.stack([begin, at, length, at], 1), np.stack([at, begin, at, length], 1)]))
 
 
-def is_set(flag: np.ndarray[tuple[int], np.dtype[np.uint8]]) -> bool:
+def is_set(flag: Integers) -> bool:
     """Return whether a flag is set before this test has waited too long."""
     until = time.monotonic() + MOST_SECONDS
     while not flag[0] and time.monotonic() < until:
