@@ -225,7 +225,7 @@ def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
 def _tell(tally: Tally) -> None:
     count = max(1, tally.count)
     table = [(verdict, number, f"{100.0 * number / count:.1f} %") for verdict, number in tally.verdicts.most_common()]
-    print_table(("verdict", "scans", "share"), table)
+    print_table(("verdict", "scans", "fraction"), table)
     if tally.reasons:
         print_table(("why not usable", "scans"), tally.reasons.most_common())
     if tally.warnings:

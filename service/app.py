@@ -57,11 +57,7 @@ PROGRESS_SECONDS = 5.0  # between two lines that say how far compiling is
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
-def _unattended(services: Services) -> None:
-    """Do nothing when an application starts."""
-
-
-def create_app(settings: Settings, part: Part = WHOLE, started: Started = _unattended) -> FastAPI:
+def create_app(settings: Settings, part: Part = WHOLE, started: Started | None = None) -> FastAPI:
     """Return an application that has not started anything yet.
 
     Parameters
@@ -69,7 +65,7 @@ def create_app(settings: Settings, part: Part = WHOLE, started: Started = _unatt
     settings : Settings
     part : Part
         Which of several processes this is.
-    started : callable
+    started : callable, optional
         Called with the application's parts, in its event loop, when it starts.
     """
     services = _services(settings, part)
@@ -184,7 +180,7 @@ def _budget(settings: Settings, part: Part, most: int) -> ByteBudget:
 
 @asynccontextmanager
 async def _lifespan(
-    app: FastAPI, services: Services, part: Part, started: Started
+    app: FastAPI, services: Services, part: Part, started: Started | None
 ) -> AsyncIterator[dict[str, Services]]:
     getting_ready = asyncio.create_task(_get_ready(services))
     refreshing = asyncio.create_task(services.metrics.refresh_now_and_then())
@@ -192,7 +188,8 @@ async def _lifespan(
         asyncio.create_task(_follow(services.key_threads, services.keyring.refresh)),
         asyncio.create_task(_follow(services.issuer_threads, services.keyring.refresh_tokens)),
     ]
-    started(services)
+    if started is not None:
+        started(services)
     if part.opens_late:
         await getting_ready
     try:
@@ -246,17 +243,17 @@ async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and say how far it is."""
     logger.info("compiling the kernels, which takes about a minute; later starts load them from the cache")
     services.readiness.compiled = compiled_fraction
-    telling = asyncio.create_task(_tell_progress())
+    logging_progress = asyncio.create_task(_log_progress())
     try:
         with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
             await services.parse_threads.run(partial(services.parser.call, compile_kernels))
     finally:
-        telling.cancel()
+        logging_progress.cancel()
     services.parser.close()
     services.readiness.compiled = None
 
 
-async def _tell_progress() -> None:
+async def _log_progress() -> None:
     while True:
         await asyncio.sleep(PROGRESS_SECONDS)
         logger.info("compiling", extra={"share": round(compiled_fraction(), 2)})

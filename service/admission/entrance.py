@@ -19,7 +19,7 @@ Headers = Sequence[tuple[bytes, bytes]]
 
 
 def search_of(method: str, path: str) -> str | None:
-    """Return the route of a request that needs a turn at the gate, a map's id left out; None where it needs none."""
+    """Return the route of a request that needs a slot at the gate, a map's id left out; None where it needs none."""
     access = asked_of(method, path).access
     return access.path if access is not None and access.searches else None
 

@@ -1,4 +1,4 @@
-"""Whose turn is next: the queue is shared fairly between those who hold keys."""
+"""The queue for slots, shared fairly between keys."""
 
 from __future__ import annotations
 
@@ -7,24 +7,25 @@ from collections import Counter, deque
 from collections.abc import Callable
 
 Holder = bytes | None
-"""Who asks: the digest of a key, or an address where the service has no keys; None where that is not known."""
+"""Whose request it is: the digest of a key, or an address where the service has no keys; None where unknown."""
 
-Turn = asyncio.Future[None]
+Waiter = asyncio.Future[None]
+"""A request that waits for a slot: done when it gets one, or when it is refused."""
 
 
 class FairQueue:
-    """Waiting turns, one line per holder; the holder that has used the least time is served first.
+    """Waiting requests, one line per holder; the holder that has used the least time is served first.
 
     A holder counts as active while it has something waiting, running or on its way. One that comes anew starts where
     the least served of the active ones is: it neither pays for old use nor has credit from the time it was away.
     """
 
     def __init__(self) -> None:
-        self._lines: dict[Holder, deque[Turn]] = {}
+        self._lines: dict[Holder, deque[Waiter]] = {}
         self._running: Counter[Holder] = Counter()
         self._coming: Counter[Holder] = Counter()
         self._used: dict[Holder, float] = {}
-        self._fixed: set[Turn] = set()
+        self._fixed: set[Waiter] = set()
         self.waiting = 0
 
     @property
@@ -33,7 +34,7 @@ class FairQueue:
         return len(self._used)
 
     def places_of(self, holder: Holder) -> int:
-        """Return how many turns of a holder wait, run, or are on their way."""
+        """Return how many requests of a holder wait, run, or are on their way."""
         return len(self._lines.get(holder, ())) + self._running[holder] + self._coming[holder]
 
     def expect(self, holder: Holder) -> None:
@@ -46,42 +47,42 @@ class FairQueue:
         self._coming[holder] -= 1
         self._forget_idle(holder)
 
-    def join(self, holder: Holder, *, fixed: bool) -> Turn:
-        """Return a turn at the end of the holder's line; a fixed one is never taken away again."""
+    def join(self, holder: Holder, *, fixed: bool) -> Waiter:
+        """Add a request to the end of the holder's line and return it; a fixed one is never refused later."""
         self._activate(holder)
-        turn: Turn = asyncio.get_running_loop().create_future()
-        self._lines.setdefault(holder, deque()).append(turn)
+        waiter: Waiter = asyncio.get_running_loop().create_future()
+        self._lines.setdefault(holder, deque()).append(waiter)
         self.waiting += 1
         if fixed:
-            self._fixed.add(turn)
-        return turn
+            self._fixed.add(waiter)
+        return waiter
 
-    def leave(self, holder: Holder, turn: Turn) -> None:
-        """Give up a turn that has not come."""
-        self._lines[holder].remove(turn)
-        self._left(holder, turn)
+    def leave(self, holder: Holder, waiter: Waiter) -> None:
+        """Remove a request that still waits."""
+        self._lines[holder].remove(waiter)
+        self._left(holder, waiter)
 
-    def next(self, may_start: Callable[[Holder], bool]) -> Turn | None:
-        """Take the turn that is next and count it as running; None when no holder waits that may start something."""
+    def next(self, may_start: Callable[[Holder], bool]) -> Waiter | None:
+        """Remove the next request and count it as running; None when no holder waits that may start something."""
         waiting = [holder for holder, line in self._lines.items() if line and may_start(holder)]
         if not waiting:
             return None
         # Of equals the one that has stood in front for longest: lines are kept in the order in which they began.
         holder = min(waiting, key=self._used.__getitem__)
-        turn = self._lines[holder].popleft()
+        waiter = self._lines[holder].popleft()
         self.started(holder)
-        self._left(holder, turn)
-        return turn
+        self._left(holder, waiter)
+        return waiter
 
-    def take_from_the_greediest(self, share: float) -> Turn | None:
-        """Take the youngest turn of whoever has the most places, if these are more than a share."""
+    def take_from_the_greediest(self, share: float) -> Waiter | None:
+        """Remove the youngest request of the holder with the most places, if these are more than a share."""
         lines = [(self.places_of(holder), holder) for holder, line in self._lines.items() if set(line) - self._fixed]
         places, greediest = max(lines, key=lambda item: item[0], default=(0, None))
         if places <= share:
             return None
-        turn = next(turn for turn in reversed(self._lines[greediest]) if turn not in self._fixed)
-        self.leave(greediest, turn)
-        return turn
+        waiter = next(waiter for waiter in reversed(self._lines[greediest]) if waiter not in self._fixed)
+        self.leave(greediest, waiter)
+        return waiter
 
     def started(self, holder: Holder) -> None:
         """Note that something of a holder runs."""
@@ -98,8 +99,8 @@ class FairQueue:
         self._used[holder] += seconds
         self._forget_idle(holder)
 
-    def _left(self, holder: Holder, turn: Turn) -> None:
-        self._fixed.discard(turn)
+    def _left(self, holder: Holder, waiter: Waiter) -> None:
+        self._fixed.discard(waiter)
         self.waiting -= 1
         line = self._lines.pop(holder)
         if line:

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from association import CancelledError, Deadline
 
 from .errors import DeadlinePassedError, QueueFullError, ShareUsedError
-from .fair_queue import FairQueue, Holder, Turn
+from .fair_queue import FairQueue, Holder, Waiter
 from .threads import GateThreads, Running
 from .ticket import Ticket
 
@@ -124,10 +124,10 @@ class Gate:
             self._require_share(holder)
 
     async def run(self, function: Callable[[], T], deadline: Deadline, ticket: Ticket, heeds: Callable[[], bool]) -> T:
-        """Run a function when its turn comes.
+        """Run a function as soon as it has a slot.
 
         A caller that is cancelled leaves the queue; what already runs keeps its slot until it returns or is long, so
-        that there are never more running than slots. Cancel the deadline to make it return soon. A further turn of a
+        that there are never more running than slots. Cancel the deadline to make it return soon. A further part of a
         request that had one is waited for however long the queue is.
 
         Parameters
@@ -142,7 +142,7 @@ class Gate:
         QueueFullError, ShareUsedError
             When the queue is full, or the place went to a holder that has fewer.
         DeadlinePassedError
-            When the deadline passes before the turn comes, or before the function heeds it.
+            When the deadline passes before there is a slot, or before the function heeds it.
         CancelledError
             When everything is told to give up.
         """
@@ -210,7 +210,7 @@ class Gate:
         self._fill()
 
     def _may_start(self, holder: Holder) -> bool:
-        """Tell whether a holder may start a search: not while it has its share of the long ones."""
+        """Return whether a holder may start a search: not while it has its share of the long ones."""
         return not self._most_long or self._long[holder] < self._most_long_of_one
 
     def _require_share(self, holder: Holder) -> None:
@@ -237,16 +237,16 @@ class Gate:
             return
         if not ticket.admitted:
             self._make_room(holder)
-        turn = self._queue.join(holder, fixed=ticket.admitted)
+        waiter = self._queue.join(holder, fixed=ticket.admitted)
         try:
-            await asyncio.wait({turn}, timeout=_left(deadline))
+            await asyncio.wait({waiter}, timeout=_left(deadline))
         except asyncio.CancelledError:
-            self._give_up(holder, turn)
+            self._give_up(holder, waiter)
             raise
-        if not turn.done():
-            self._queue.leave(holder, turn)
+        if not waiter.done():
+            self._queue.leave(holder, waiter)
             raise DeadlinePassedError
-        turn.result()
+        waiter.result()
 
     def _make_room(self, holder: Holder) -> None:
         """Raise when the queue is full; for a holder with less than its share take a place from another."""
@@ -258,11 +258,11 @@ class Gate:
             raise QueueFullError
         taken.set_exception(ShareUsedError())
 
-    def _give_up(self, holder: Holder, turn: Turn) -> None:
-        """Leave the queue, or hand on the turn that has just come."""
-        if not turn.done():
-            self._queue.leave(holder, turn)
-        elif turn.exception() is None:
+    def _give_up(self, holder: Holder, waiter: Waiter) -> None:
+        """Leave the queue, or hand on the slot that has just come."""
+        if not waiter.done():
+            self._queue.leave(holder, waiter)
+        elif waiter.exception() is None:
             self._free_slot(holder, 0.0)
 
     def _finish(self, done: asyncio.Future[Any], run: _Run) -> None:
@@ -287,9 +287,9 @@ class Gate:
 
     def _fill(self) -> None:
         """Hand free slots to those that wait and may start."""
-        while self._taken < self.slots and (turn := self._queue.next(self._may_start)) is not None:
+        while self._taken < self.slots and (waiter := self._queue.next(self._may_start)) is not None:
             self._taken += 1
-            turn.set_result(None)
+            waiter.set_result(None)
 
 
 def _left(deadline: Deadline) -> float | None:

@@ -49,7 +49,7 @@ class Grant:
         return self.roles == EVERY_ROLE and not self.maps
 
     def sees(self, map_id: str) -> bool:
-        """Tell whether a map is one of those that there are for it."""
+        """Return whether a map is one of those that there are for it."""
         return map_id.startswith(self.maps)
 
 
@@ -66,7 +66,7 @@ class Access:
     role : Role, or None
         None: any key will do.
     searches : bool
-        Whether it needs a turn at the gate.
+        Whether it needs a slot at the gate.
     """
 
     methods: str

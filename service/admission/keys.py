@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import ipaddress
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
@@ -15,6 +15,7 @@ from pydantic import SecretStr
 from .errors import MissingKeyError, UnknownKeyError
 from .fair_queue import Holder
 from .grants import Grant
+from .key_file import KeyFile
 
 Client = tuple[str, int] | None
 # Whoever can check such a signature cannot make one; "none" and shared secrets are not among them.
@@ -44,17 +45,6 @@ class Issuer:
     leeway: float = 30.0
 
 
-class KeySource(Protocol):
-    """Keys that may change while the service runs: those of a file."""
-
-    @property
-    def grants(self) -> Mapping[bytes, Grant]:
-        """What each may do, by its digest."""
-
-    def refresh(self) -> None:
-        """Look for changes; off the event loop."""
-
-
 class TokenSource(Protocol):
     """What checks tokens."""
 
@@ -72,13 +62,13 @@ class Keyring:
     ----------
     keys : sequence of SecretStr
         That may do everything.
-    file : KeySource, or None
+    file : KeyFile, or None
     tokens : TokenSource, or None
         With none of the three whoever comes is let in.
     """
 
     def __init__(
-        self, keys: Sequence[SecretStr], file: KeySource | None = None, tokens: TokenSource | None = None
+        self, keys: Sequence[SecretStr], file: KeyFile | None = None, tokens: TokenSource | None = None
     ) -> None:
         digests = (digest_of(key.get_secret_value().encode()) for key in keys)
         self._whole = {digest: Grant(digest) for digest in digests}

@@ -65,7 +65,7 @@ class Origins:
             raise ForeignOriginError
 
     def is_preflight(self, method: str, headers: Iterable[tuple[bytes, bytes]]) -> bool:
-        """Tell whether a browser asks what the page of a named origin may send; it has no key for that."""
+        """Return whether a browser asks what the page of a named origin may send; it has no key for that."""
         if method != "OPTIONS" or not self._named:
             return False
         found = dict(headers)
@@ -91,7 +91,7 @@ def _is_address(name: str) -> bool:
 
 
 def _is_same(origin: str, host: str | None) -> bool:
-    """Tell whether a page's origin is the host that it asks, whichever scheme a proxy before it speaks."""
+    """Return whether a page's origin is the host that it asks, whichever scheme a proxy before it speaks."""
     try:
         page = urlsplit(origin)
         asked = urlsplit(f"//{host or ''}")

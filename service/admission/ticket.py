@@ -35,7 +35,7 @@ class Ticket:
     Attributes
     ----------
     admitted : bool
-        Whether it has had a turn: what was let in once is not sent away later.
+        Whether it has had a slot: an admitted request is not refused later.
     """
 
     __slots__ = ("_announced", "_gate", "admitted", "holder", "maps")

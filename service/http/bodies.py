@@ -141,7 +141,7 @@ class Intake:
 
 
 def _is_gzip(request: Request, *, form: bool) -> bool:
-    """Tell whether a body is gzip; refuse what by its head is not what is taken."""
+    """Return whether a body is gzip; refuse what by its head is not what is taken."""
     told = request.headers.get("content-type", FORM if form else JSON)
     media_type = told.split(";")[0].strip().lower()
     if media_type != FORM if form else not _is_json(media_type):

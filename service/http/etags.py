@@ -44,12 +44,12 @@ def demands_of(request: Request) -> Preconditions:
 
 
 def is_conditional(request: Request) -> bool:
-    """Tell whether a reader names what it has."""
+    """Return whether a reader names what it has."""
     return "if-none-match" in request.headers
 
 
 def is_unchanged(request: Request, revision: int) -> bool:
-    """Tell whether a reader has this revision already."""
+    """Return whether a reader has this revision already."""
     none_match = _joined(request, "if-none-match")
     return none_match is not None and (none_match == "*" or revision in _revisions(none_match, weak=True))
 

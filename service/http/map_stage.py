@@ -28,7 +28,7 @@ STORE_SECONDS = 8.0  # for an answer of the store; a write may wait for others f
 async def looking_up(
     exchange: Exchange, asked: InlineMap | StoredMap, deadline: Deadline, *, oriented: bool | None
 ) -> AsyncIterator[InlineMap | FoundMap]:
-    """Look a stored map up before its turn at the gate: a database server that hangs delays no other request.
+    """Look a stored map up before its slot at the gate: a database server that hangs delays no other request.
 
     Its document counts as held until the block ends. `oriented` None is as the map itself says.
 
@@ -68,9 +68,9 @@ async def looking_up(
 async def index_map(
     exchange: Exchange, on: InlineMap | FoundMap, deadline: Deadline, *, oriented: bool | None
 ) -> CachedMap | None:
-    """Index a map for which that takes long, in a turn of another kind: its threads go behind all searches.
+    """Index a map for which that takes long, in a slot of another gate: its threads go behind all searches.
 
-    None where it is left to the search's own turn.
+    None where it is left to the search's own slot.
     """
     services = exchange.services
     if not services.lookup.takes_long(on):

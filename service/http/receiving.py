@@ -55,10 +55,10 @@ async def receive(exchange: Exchange, *, form: bool = False) -> AsyncIterator[by
 
 
 async def parse(exchange: Exchange, reader: Reader[T], data: bytes | bytearray, deadline: Deadline) -> T:
-    """Check a body when its turn comes.
+    """Check a body as soon as it has a slot.
 
-    Turns are shared between callers, as those at the gate are, and are others than these: no search waits for a large
-    body. Nor do bodies for larger ones, which another process parses.
+    These slots are shared between callers, and are not those of the searches: no search waits for a large body. A small
+    body does not wait for a larger one, which another process parses.
     """
     services = exchange.services
     limits = services.settings.limits()

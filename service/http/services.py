@@ -40,7 +40,7 @@ class Services:
     entrance : Entrance
     gate : Gate
     parsing, parsing_apart, indexing : Gate
-        Where bodies have their turns to be parsed, by a thread and by another process, and large maps to be indexed.
+        Slots to parse bodies, in a thread and in another process, and to index large maps.
     keyring : Keyring
     bodies : BodyReceiver
     answers : ByteBudget

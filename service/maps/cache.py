@@ -52,7 +52,7 @@ class IndexCache:
         return len(self._ready)
 
     def has(self, key: Hashable) -> bool:
-        """Tell whether a map is there."""
+        """Return whether a map is there."""
         with self._lock:
             return key in self._ready
 

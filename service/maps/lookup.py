@@ -86,7 +86,7 @@ class MapLookup:
         return FoundMap(record, None)
 
     def takes_long(self, asked: InlineMap | FoundMap) -> bool:
-        """Tell whether it may take long until a map is ready to be searched."""
+        """Return whether it may take long until a map is ready to be searched."""
         if isinstance(asked, InlineMap):
             return len(asked.segments) > LONG_SEGMENTS
         return asked.document is not None and len(asked.document) > LONG_BYTES
@@ -152,7 +152,7 @@ class MapLookup:
 
 
 def is_oriented(asked: bool | None, own: bool | None) -> bool:
-    """Tell whether directions mean anything: as the request says, else as the map does, else yes."""
+    """Return whether directions mean anything: as the request says, else as the map does, else yes."""
     return next((said for said in (asked, own) if said is not None), True)
 
 

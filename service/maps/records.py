@@ -105,7 +105,7 @@ def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
 
 
 def is_sealed(row: Row[Any]) -> bool:
-    """Tell whether a row of `maps` is as it was written."""
+    """Return whether a row of `maps` is as it was written."""
     return bool(row.seal == seal(*(getattr(row, name) for name in SEALED)))
 
 

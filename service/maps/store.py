@@ -244,7 +244,7 @@ def _whole(connection: Connection, map_id: str) -> Row[Any]:
 
 
 def _matches(row: Row[Any], record: MapRecord) -> bool:
-    """Tell whether the document that came with a row is the one that its record names."""
+    """Return whether the document that came with a row is the one that its record names."""
     return bool(row.document_revision == record.revision and digest(row.document) == record.sha256)
 
 

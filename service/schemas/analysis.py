@@ -30,7 +30,9 @@ class ScannerFields(Strict):
     ] = Field(math.tau, description="field of view about straight ahead, radians")
     beams: Annotated[int, Field(ge=8, le=20_000)] = Field(720, description="over the field of view")
     range_max: Annotated[float, Field(ge=0.5, le=1000.0)] = Field(20.0, description="metres")
-    sigma: Annotated[float, Field(ge=1e-6, le=10.0)] = Field(0.02, description="of the ranges, metres")
+    sigma: Annotated[float, Field(ge=1e-6, le=10.0)] = Field(
+        0.02, description="standard deviation of the ranges, metres"
+    )
 
 
 class AnalyzeRequest(Strict):
@@ -52,7 +54,7 @@ class AnalyzeRequest(Strict):
         description="segments of a possible landmark, in the map frame: each place is also tried with it in the "
         "building and on the map; the free side of a box is its outside",
     )
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of the scanner's noise")
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of the scanner's noise")
     deadline_ms: Annotated[float, Field(ge=0.0, le=600_000.0)] | None = Field(
         None, description="milliseconds; places that it leaves no time for are omitted"
     )
@@ -77,7 +79,7 @@ class WithLandmarkAnswer(Answer):
 
     status: Literal["ok", "ambiguous", "degenerate", "no_match"]
     usable: bool
-    probability: Share | None = Field(description="as of /v1/associate; null for `degenerate`")
+    probability: Share | None = Field(description="probability, as of /v1/associate; null for `degenerate`")
 
 
 class AnalyzedPlaceAnswer(Answer):
@@ -85,10 +87,10 @@ class AnalyzedPlaceAnswer(Answer):
 
     pose: PoseAnswer = Field(description="true pose of the robot")
     status: Literal["ok", "ambiguous", "degenerate", "no_match"] = Field(
-        description="as of /v1/associate; `ambiguous` also for a usable answer at a wrong place"
+        description="status, as of /v1/associate; `ambiguous` also for a usable answer at a wrong place"
     )
     usable: bool = Field(description="whether the answer is usable and correct")
-    probability: Share | None = Field(description="as of /v1/associate; null for `degenerate`")
+    probability: Share | None = Field(description="probability, as of /v1/associate; null for `degenerate`")
     similar_pose: PoseAnswer | None = Field(description="another pose that fits the scan about as well")
     unobservable: Row2 | None = Field(
         description="unit vector in the map frame along which the position is unobservable"
@@ -128,6 +130,6 @@ class AnalyzeAnswer(Answer):
     spacing: float = Field(description="metres between places")
     complete: bool = Field(description="false if the deadline ended the analysis early")
     map: MapReference | None = Field(description="null where the map came with the request")
-    client_ref: Any = Field(description="as sent")
+    client_ref: Any = Field(description="returned as it was sent")
     request_id: str
     timing_ms: TimingAnswer

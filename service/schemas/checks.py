@@ -16,18 +16,18 @@ class FindingAnswer(Answer):
     """A finding of a check."""
 
     code: FindingCode = Field(description="stable; later versions may add codes")
-    message: str = Field(description="what is doubtful and what to do, for people")
+    message: str = Field(description="doubtful part and remedy, for people")
     segments: list[Index] = Field(description="indices of the map's segments, the first 1,000")
-    count: Index = Field(description="of all of them")
+    count: Index = Field(description="number of all such segments")
 
 
 class SizeAnswer(Answer):
     """Size of a map."""
 
-    segment_count: Index = Field(description="how many segments it has, as sent")
+    segment_count: Index = Field(description="number of segments, as sent")
     walls: Index = Field(description="number of walls, with collinear segments joined")
-    length: float = Field(description="of the walls together, metres")
-    diagonal: float = Field(description="of the box around them, metres")
+    length: float = Field(description="total length of the walls, metres")
+    diagonal: float = Field(description="diagonal of the box around the walls, metres")
 
 
 class AdviceAnswer(Answer):
@@ -58,8 +58,8 @@ class SampleAnswer(Answer):
 class SamplesAnswer(Answer):
     """Results of the sample scans."""
 
-    usable: Index = Field(description="of them, in the map as it is")
-    usable_as_advised: Index = Field(description="with the map's properties as advised")
+    usable: Index = Field(description="number of usable scans in the map as it is")
+    usable_as_advised: Index = Field(description="number of usable scans with the advised properties of the map")
     wall_thickness: float | None = Field(description="metres by which walls are thicker than drawn; null: no estimate")
     scans: list[SampleAnswer]
 
@@ -80,6 +80,6 @@ class CheckAnswer(MapCheckAnswer):
 
     samples: SamplesAnswer | None = Field(description="null without scans")
     map: MapReference
-    client_ref: Any = Field(description="as sent")
+    client_ref: Any = Field(description="returned as it was sent")
     request_id: str
     timing_ms: TimingAnswer

@@ -121,7 +121,9 @@ class MeasuredFields(Strict):
         None, description="number of points on each segment; default length / 0.05, and at least 2 on each wall"
     )
     centroids: CentroidRows | None = Field(None, description="mean of those points, as /v1/vectorize gives it, metres")
-    spreads: Spreads | None = Field(None, description="their second moment along the segment, m^2; with `centroids`")
+    spreads: Spreads | None = Field(
+        None, description="second moment of those points along the segment, m^2; send it with `centroids`"
+    )
 
     @model_validator(mode="after")
     def _both_moments(self) -> MeasuredFields:
@@ -141,7 +143,7 @@ class Header(Strict):
 
     stamp: FreeJson = Field(None, description="returned as it was sent")
     frame_id: FrameId = Field("", description="frame of the scan where it names none itself")
-    seq: Any = Field(None, description="of ROS 1; not used")
+    seq: Any = Field(None, description="sequence number of ROS 1; not used")
 
 
 Increment = Annotated[
@@ -165,7 +167,7 @@ class Laser(Strict):
     range_max: Annotated[float, Field(gt=0.0, le=1e9)] | None = Field(
         None, description="metres; a range of exactly this is a return"
     )
-    header: Header | None = Field(None, description="of a LaserScan message")
+    header: Header | None = Field(None, description="header of a LaserScan message")
     time_increment: Annotated[float, Field(ge=0.0, le=1.0)] | None = Field(
         None,
         description="seconds from beam to beam; with a `twist` the motion during the scan is corrected; without it "
@@ -174,8 +176,8 @@ class Laser(Strict):
     angle_max: Annotated[float, Field(ge=-1e9, le=1e9)] | None = Field(
         None, description="radians, of the last beam; must agree with the other angles within 1.5 beams"
     )
-    scan_time: Any = Field(None, description="of a LaserScan message; not used")
-    intensities: Any = Field(None, description="of a LaserScan message; not used")
+    scan_time: Any = Field(None, description="field of a LaserScan message; not used")
+    intensities: Any = Field(None, description="field of a LaserScan message; not used")
 
 
 Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
@@ -201,7 +203,7 @@ class LaserScan(_Scan):
     """A scan as ranges."""
 
     laser: Laser
-    sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+    sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
     twist: Twist | None = Field(
         None,
         description="velocity of the sensor during the scan, in its own frame; 0: at rest; the pose of the answer is "
@@ -233,7 +235,7 @@ class PointScan(_Scan):
     """A scan as points in scanning order."""
 
     points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
-    sigma: RaySigma | None = Field(None, description="of single points, metres; null: estimated")
+    sigma: RaySigma | None = Field(None, description="standard deviation of single points, metres; null: estimated")
 
 
 def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None:
@@ -254,7 +256,9 @@ def scan_kind(value: Any, beside: frozenset[str] = _BESIDE_A_SCAN) -> str | None
 class SoftPriorFields(Pose):
     """A Gaussian over the pose. It is part of the score, and never fused into pose or covariance."""
 
-    covariance: Covariance = Field(description="of additive (x, y, theta); m^2, m rad, rad^2; positive definite")
+    covariance: Covariance = Field(
+        description="covariance of additive (x, y, theta); m^2, m rad, rad^2; positive definite"
+    )
 
 
 class HardPriorFields(Pose):
@@ -295,7 +299,7 @@ class SearchOptions(Strict):
         0.9999, description="probability of not missing a better pose at which the search ends"
     )
     exhaustive: bool = Field(False, description="try every base, independent of `confidence`")
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="of random sampling")
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of random sampling")
     sampling: Literal["ordered", "random"] = Field(
         "ordered", description="order of the bases: informative and cheap ones first, or random by `seed`"
     )

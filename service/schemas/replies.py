@@ -62,17 +62,17 @@ class PoseAnswer(Answer):
 class AmbiguityAnswer(Answer):
     """The paper's ambiguity, with the weights used."""
 
-    translation: float = Field(description="of the translation")
-    rotation: float = Field(description="of the rotation")
+    translation: float = Field(description="ambiguity of the translation")
+    rotation: float = Field(description="ambiguity of the rotation")
     total: float = Field(description="sum of both")
 
 
 class RegistrationDiagnosticsAnswer(Answer):
     """Diagnostics of a registration."""
 
-    ambiguity: AmbiguityAnswer = Field(description="at the answered pose")
-    ambiguity_before: AmbiguityAnswer = Field(description="at T = 0")
-    ambiguity_at: AmbiguityAnswer | None = Field(description="at `evaluate_at`")
+    ambiguity: AmbiguityAnswer = Field(description="ambiguity at the returned pose")
+    ambiguity_before: AmbiguityAnswer = Field(description="ambiguity at the pose 0, 0, 0")
+    ambiguity_at: AmbiguityAnswer | None = Field(description="ambiguity at the pose `evaluate_at`")
     similarity: float | None = Field(description="1 / total ambiguity; null where that is 0")
     reliability: float = Field(description="0 to 1: how well the directions fix the translation; scale-free")
     determinant: float = Field(description="D of equation 8 of the paper")
@@ -90,7 +90,7 @@ class Residual(Answer):
     map: Index
     offset: float = Field(description="metres, signed, at the scan segment's midpoint")
     angle: float = Field(description="radians")
-    weight: float = Field(description="as used; 1/m^2 with information weighting")
+    weight: float = Field(description="weight of the pair in the estimate; 1/m^2 with information weighting")
 
 
 class RegisterAnswer(Answer):
@@ -99,7 +99,9 @@ class RegisterAnswer(Answer):
     status: Literal["ok", "degenerate"]
     usable: bool = Field(description="ok, and chi2 below its 99.9 % quantile")
     pose: PoseAnswer | None
-    covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
+    covariance: Matrix | None = Field(
+        description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2"
+    )
     unobservable: Row2 | None = Field(
         description="unit vector in the map frame along which the position is unobservable"
     )
@@ -113,13 +115,15 @@ class SegmentOfView(Answer):
     """A segment of a scan of several views."""
 
     view: Index
-    scan: Index = Field(description="of that view's segments")
+    scan: Index = Field(description="index of the segment in the view")
 
 
 class CorrespondenceAnswer(Residual):
     """A scan segment found on a map segment."""
 
-    view: Index | None = Field(None, description="of a scan of several views; `scan` is an index in it")
+    view: Index | None = Field(
+        None, description="index of the view, for a scan of several views; `scan` is then an index in this view"
+    )
     overlap: Share = Field(description="fraction of the scan segment's length that lies on the map")
     alternatives: list[Index] = Field(description="other map segments that pass the gates")
 
@@ -128,10 +132,12 @@ class AlternativeAnswer(Answer):
     """Another pose that explains part of the scan."""
 
     pose: PoseAnswer
-    covariance: Matrix | None = Field(description="as of the pose of the answer; null where it is degenerate")
-    score: float = Field(description="as of the diagnostics, nats")
+    covariance: Matrix | None = Field(
+        description="covariance of this pose, as `covariance` of the answer; null if the pose is degenerate"
+    )
+    score: float = Field(description="score of this pose, as `diagnostics.score`, nats")
     ambiguity: AmbiguityAnswer
-    reliability: float = Field(description="as of the diagnostics")
+    reliability: float = Field(description="reliability of this pose, as `diagnostics.reliability`")
     inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
 
 
@@ -152,7 +158,7 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
     inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
     score: float = Field(description="log-likelihood minus that of a scan of clutter alone, nats")
     runner_up: float | None = Field(
-        description="score of the best other pose over `score`; null: no other pose above `search.complete_above` of it"
+        description="best other score as a fraction of `score`; null: none above `search.complete_above`"
     )
     margin: float | None = Field(
         description="`score` minus that of the best other pose, nats; null: no other pose above "
@@ -173,8 +179,8 @@ class SearchAnswer(Answer):
     bases: Index = Field(description="bases that were tried")
     hypotheses: Index = Field(description="poses that the bases proposed")
     verified: Index = Field(description="poses that were scored completely")
-    seed: int = Field(description="as of the options")
-    sampling: Literal["ordered", "random"] = Field(description="as of the options")
+    seed: int = Field(description="value of the option")
+    sampling: Literal["ordered", "random"] = Field(description="value of the option")
     complete_above: float = Field(
         description="fraction of the best score above which no pose was missed whose matches agree within their "
         "tolerances; 1 for an incomplete search"
@@ -185,7 +191,7 @@ class WarningAnswer(Answer):
     """A warning about the scan, the map or the search."""
 
     code: WarningCode = Field(description="stable; later versions may add codes")
-    message: str = Field(description="what is wrong and what to do, for people")
+    message: str = Field(description="fault and remedy, for people")
 
 
 class ReasonAnswer(Answer):
@@ -213,21 +219,23 @@ class FoundAnswer(Answer):
     )
     message: str = Field(description="the verdict in words, for people")
     pose: PoseAnswer | None
-    covariance: Matrix | None = Field(description="of additive (x, y, theta) in the map frame; m^2, m rad, rad^2")
+    covariance: Matrix | None = Field(
+        description="covariance of additive (x, y, theta) in the map frame; m^2, m rad, rad^2"
+    )
     unobservable: Row2 | None = Field(description="unit vector in the map frame along which the position is not fixed")
     frame_id: str = Field(description="the map's")
     child_frame_id: str = Field(description="the scan's")
-    stamp: Any = Field(description="as sent")
-    correspondences: list[CorrespondenceAnswer] = Field([], description="where included")
+    stamp: Any = Field(description="returned as it was sent")
+    correspondences: list[CorrespondenceAnswer] = Field([], description="correspondences, if they are included")
     unmatched_scan: list[Index] | list[SegmentOfView] = Field(
         description="scan segments without a match; of several views with the view"
     )
     missing_map: list[Index] = Field(
-        [], description="where included: map segments that the scan should contain, but does not"
+        [], description="if included: map segments that the scan should contain, but does not"
     )
     diagnostics: AssociationDiagnosticsAnswer | None
     reasons: list[ReasonAnswer] = Field(description="why it is not usable, the most important first")
-    alternatives: list[AlternativeAnswer] = Field([], description="where included: distinct poses, best first")
+    alternatives: list[AlternativeAnswer] = Field([], description="if included: other distinct poses, best first")
     search: SearchAnswer
     segments: list[Row4] | list[list[Row4] | None] | None = Field(
         None,
@@ -241,7 +249,7 @@ class AssociateAnswer(FoundAnswer):
     """The answer of a search."""
 
     map: MapReference | None
-    client_ref: Any = Field(description="as sent")
+    client_ref: Any = Field(description="returned as it was sent")
     request_id: str
     timing_ms: TimingAnswer
 
@@ -259,7 +267,7 @@ class Problem(Answer):
     type: str
     title: str
     status: Annotated[int, Field(ge=400, le=599)]
-    detail: str = Field(description="what is wrong; with `errors` the pointer and message of the first")
+    detail: str = Field(description="the fault; with `errors` the pointer and message of the first")
     code: ProblemCode = Field(description="stable, for programs; later versions may add codes")
     request_id: str
     errors: Annotated[list[Place], Field(max_length=20)] = Field([])
@@ -270,7 +278,7 @@ class BatchResult(Answer):
 
     index: Index
     status_code: int
-    result: FoundAnswer | None = Field(None, description="with status_code 200")
+    result: FoundAnswer | None = Field(None, description="answer of /v1/associate, if `status_code` is 200")
     problem: Problem | None = Field(None, description="otherwise")
 
 
@@ -279,7 +287,7 @@ class BatchAnswer(Answer):
 
     results: list[BatchResult]
     map: MapReference | None
-    client_ref: Any = Field(description="as sent")
+    client_ref: Any = Field(description="returned as it was sent")
     request_id: str
     timing_ms: TimingAnswer
 
@@ -289,11 +297,13 @@ class VectorizeAnswer(Answer):
 
     segments: list[Row4] = Field(description="`[x1, y1, x2, y2]`, metres, free space on the left")
     point_counts: list[int] = Field(description="points behind each")
-    centroids: list[Row2] = Field(description="of those points, metres")
-    spreads: list[float] = Field(description="their second moment along the segment, m^2")
-    sigma: float = Field(description="of single ranges or points, metres; given or estimated")
-    sigmas: list[float] = Field(description="of each segment's points normal to the wall, metres; a scan's `sigma`")
-    rms: list[float] = Field(description="of the points' distances from their segment, metres")
+    centroids: list[Row2] = Field(description="mean of those points, metres")
+    spreads: list[float] = Field(description="second moment of those points along the segment, m^2")
+    sigma: float = Field(description="standard deviation of single ranges or points, metres; as sent, or estimated")
+    sigmas: list[float] = Field(
+        description="standard deviation of each segment's points normal to the wall, metres; `sigma` of a scan"
+    )
+    rms: list[float] = Field(description="root mean square of the points' distances from their segment, metres")
     warnings: list[WarningAnswer] = Field(description="`points_not_in_order`, `motion_unknown`, as of /v1/associate")
     request_id: str
     timing_ms: TimingAnswer
@@ -304,9 +314,9 @@ class MapSummaryAnswer(Answer):
 
     map_id: str
     revision: Annotated[int, Field(ge=1)]
-    segment_count: Index = Field(description="how many segments it has")
+    segment_count: Index = Field(description="number of segments")
     bounds: Row4 = Field(description="min_x, min_y, max_x, max_y; metres")
-    sigma: float | None = Field(description="of its lines, metres; null: not stated")
+    sigma: float | None = Field(description="standard deviation of the lines, metres; null: not stated")
     oriented: bool | None = Field(description="whether free space lies on the left of its segments; null: not stated")
 
 
@@ -337,24 +347,24 @@ class Version(Answer):
 class Limits(Answer):
     """Limits of requests; a request beyond one is rejected."""
 
-    max_body_bytes: int = Field(description="of a request, unpacked")
+    max_body_bytes: int = Field(description="bytes of a request, uncompressed")
     max_values: int = Field(description="numbers, strings, arrays and objects in a request")
-    max_bodies_bytes: int = Field(description="of all requests being read at once, by one of several workers")
-    max_answers_bytes: int = Field(description="of large answers that wait to be read, in one of several workers")
+    max_bodies_bytes: int = Field(description="bytes of all requests that one worker reads at once")
+    max_answers_bytes: int = Field(description="bytes of large answers of one worker that wait to be read")
     max_connections: int = Field(description="open at once")
     request_timeout_s: float = Field(description="seconds that a request may take to arrive, head and body")
     max_map_segments: int = Field(description="segments of one map")
     max_scan_segments: int = Field(description="segments of one scan")
     max_beams: int = Field(description="ranges or points of one scan, or view")
-    max_views: int = Field(description="of one scan")
+    max_views: int = Field(description="views of one scan")
     max_beams_together: int = Field(description="ranges or points of all views of one scan")
     max_segments_together: int = Field(description="segments of all views of one scan")
-    max_correspondences: int = Field(description="of one registration")
+    max_correspondences: int = Field(description="correspondences of one registration")
     max_batch: int = Field(description="scans of one batch")
     max_deadline_ms: float = Field(description="largest deadline, and the default, milliseconds")
     searches: int = Field(description="searches that run at once")
     queue: int = Field(description="requests that may wait for a search")
-    max_magnitude: float = Field(description="of any number")
+    max_magnitude: float = Field(description="magnitude of any number")
     min_segment_length: float = Field(description="metres")
     max_segment_length: float = Field(description="metres")
     max_map_extent: float = Field(description="metres")

@@ -71,7 +71,7 @@ class AssociateRequest(Strict):
     """Unknown correspondences."""
 
     map: AnyMap = Field(description="the map to search, or the id of a stored one")
-    scan: AnyScan = Field(description="as segments, ranges, points or views")
+    scan: AnyScan = Field(description="the scan: segments, ranges, points or views")
     prior: AnyPrior | None = Field(None, description="prior knowledge of the pose; null: none")
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="returned as it was sent")
@@ -82,9 +82,11 @@ class BatchRequest(Strict):
 
     map: AnyMap = Field(description="the map to search, or the id of a stored one")
     # Each is validated by itself, as `BatchItem`.
-    scans: list[Annotated[AnyScan, SkipValidation]] = Field(min_length=1, description="as `scan` of /v1/associate")
+    scans: list[Annotated[AnyScan, SkipValidation]] = Field(
+        min_length=1, description="scans, each as `scan` of /v1/associate"
+    )
     priors: list[Annotated[AnyPrior | None, SkipValidation]] | None = Field(
-        None, description="as `prior` of /v1/associate or null, one per scan"
+        None, description="one prior per scan, as `prior` of /v1/associate, or null"
     )
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="returned as it was sent")
@@ -137,7 +139,7 @@ class CheckRequest(Strict):
 class VectorizeOptions(Strict):
     """How to cut points into segments."""
 
-    sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+    sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
     min_points: Annotated[int, Field(ge=3, le=1000)] = Field(4, description="least number of points on a segment")
     min_length: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(0.1, description="least length of a segment, metres")
     max_gap: Annotated[float, Field(gt=0.0, le=1e4)] | None = Field(

@@ -59,7 +59,7 @@ class LaserView(_View):
     """A view as ranges."""
 
     laser: Laser
-    sigma: RaySigma | None = Field(None, description="of single ranges, metres; null: estimated")
+    sigma: RaySigma | None = Field(None, description="standard deviation of single ranges, metres; null: estimated")
     twist: Twist | None = Field(
         None, description="velocity of the sensor during the scan, in its own frame; 0: at rest"
     )
@@ -75,7 +75,7 @@ class PointView(_View):
     """A view as points in scanning order."""
 
     points: PointRows = Field(description="`[x, y]` each, metres, in the sensor's frame, in scanning order")
-    sigma: RaySigma | None = Field(None, description="of single points, metres; null: estimated")
+    sigma: RaySigma | None = Field(None, description="standard deviation of single points, metres; null: estimated")
 
 
 def _view_kind(value: Any) -> str | None:
@@ -97,7 +97,7 @@ AnyView = Annotated[
 class ViewsScan(Strict):
     """A scan of several views: of the sensors of a robot, or from places along its way."""
 
-    views: list[AnyView] = Field(min_length=1, description="at most `max_views`")
+    views: list[AnyView] = Field(min_length=1, description="the views, at most `max_views` of /v1/limits")
     frame_id: FrameId = Field("base_link", description="frame that the views share; `child_frame_id` of the answer")
     stamp: FreeJson = Field(None, description="returned as it was sent")
 

@@ -31,7 +31,7 @@ class Stopwatch:
         return {**self._parts, "total": round(1e3 * (time.monotonic() - self._begun), 3)}
 
     def deadline(self, asked_ms: float | None, most_ms: float) -> Deadline:
-        """Return when to end: so many milliseconds after the body had arrived, waiting for a turn included."""
+        """Return when to end: so many milliseconds after the body had arrived, waiting for a slot included."""
         allowed = most_ms if asked_ms is None else min(asked_ms, most_ms)
         return Deadline(at=self._begun + allowed / 1e3)
 

@@ -63,7 +63,7 @@ async def _answer(exchange: Exchange, on: InlineMap | StoredMap, asked: AnalyzeR
 
 
 async def _work(exchange: Exchange, named: InlineMap | StoredMap, asked: AnalyzeRequest, job: Job) -> Done:
-    """Index the map in one turn at the gate, and try its places in as many short ones as it takes."""
+    """Index the map in one slot at the gate, and try its places in as many short ones as it takes."""
     lookup = exchange.services.lookup
     async with looking_up(exchange, named, job.deadline, oriented=None) as on:
         await index_map(exchange, on, job.deadline, oriented=None)

@@ -38,7 +38,7 @@ async def post_associate(request: Request) -> Response:
 
 
 async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
-    """Search in one turn at the gate, in which the map is indexed, too, where that takes no time to speak of."""
+    """Search in one slot at the gate, in which a small map is indexed, too."""
     oriented = asked.options.oriented
     async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
         ready = await index_map(exchange, on, job.deadline, oriented=oriented)

@@ -48,7 +48,7 @@ async def post_batch(request: Request) -> Response:
 
 
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
-    """Index the map in one turn, and search for each scan in another."""
+    """Index the map in one slot, and search for each scan in another."""
     associator, oriented = exchange.services.associator, asked.options.oriented
     async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
         ready = await index_map(exchange, on, job.deadline, oriented=oriented)
@@ -68,14 +68,14 @@ async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchIt
 async def _answer_all(
     exchange: Exchange, calls: Sequence[Callable[[], BatchResult]], job: Job, account: ByteAccount
 ) -> list[BatchResult]:
-    """Search for every scan, as many at once as there are cores; others' requests get their turns in between.
+    """Search for every scan, as many at once as there are cores; other requests get slots in between.
 
     What is found counts as held. When that is too much, the rest is not searched for.
     """
     results: dict[int, BatchResult] = {}
     todo = iter(enumerate(calls))
 
-    async def take_turns() -> None:
+    async def work_through() -> None:
         for index, call in todo:
             try:
                 found = await in_slot(exchange, call, job.deadline)
@@ -86,13 +86,13 @@ async def _answer_all(
             account.take(len(found.body))
             results[index] = found
 
-    turns = [asyncio.ensure_future(take_turns()) for _ in range(min(exchange.services.gate.slots, len(calls)))]
+    tasks = [asyncio.ensure_future(work_through()) for _ in range(min(exchange.services.gate.slots, len(calls)))]
     try:
-        await asyncio.gather(*turns)
+        await asyncio.gather(*tasks)
     except BaseException:
         job.deadline.cancel()
-        for turn in turns:
-            turn.cancel()
+        for task in tasks:
+            task.cancel()
         raise
     return [results[index] for index in range(len(calls))]
 

@@ -70,7 +70,7 @@ async def post_check(request: Request, map_id: MapIdPath) -> Response:
 
 
 async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job: Job) -> Done:
-    """Check the map in one turn at the gate, and try each sample in another."""
+    """Check the map in one slot at the gate, and try each sample in another."""
     lookup = exchange.services.lookup
     async with looking_up(exchange, StoredMap(map_id=map_id), job.deadline, oriented=True) as on:
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
@@ -83,22 +83,22 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
         samples = await _try_all(exchange, calls, job)
         try:
             judged = await in_slot(exchange, partial(conclude, checked, samples, job), job.deadline)
-        except DeadlinePassedError:  # no turn is left: it then concludes from what it has, and searches nothing
+        except DeadlinePassedError:  # no slot is left: it then concludes from what it has, and searches nothing
             judged = await exchange.services.parse_threads.run(partial(conclude, checked, samples, job))
     return await exchange.services.parse_threads.run(partial(check_done, checked, judged, asked, job))
 
 
 async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | None]], job: Job) -> list[Sample | None]:
-    """Try every sample, as many at once as there are cores; those whose turn comes too late are left out."""
+    """Try every sample, as many at once as there are cores; those whose slot comes too late are left out."""
     found: list[Sample | None] = [None] * len(calls)
     todo = iter(enumerate(calls))
 
-    async def take_turns() -> None:
+    async def work_through() -> None:
         for index, call in todo:
             try:
                 found[index] = await in_slot(exchange, call, job.deadline)
             except DeadlinePassedError:
                 return
 
-    await asyncio.gather(*(take_turns() for _ in range(min(exchange.services.gate.slots, len(calls)))))
+    await asyncio.gather(*(work_through() for _ in range(min(exchange.services.gate.slots, len(calls)))))
     return found

@@ -49,7 +49,7 @@ async def post_import(request: Request) -> Response:
 
 
 async def _work(exchange: Exchange, content: bytearray, content_type: str, job: Job) -> Done:
-    """Read the files and index what came of them in turns of other kinds than a search's, and check it in one of these.
+    """Read the files and index the map in slots of their own, and check it in a slot of a search.
 
     Meanwhile searches have all the slots at the gate.
     """

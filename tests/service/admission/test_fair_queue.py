@@ -1,8 +1,8 @@
-"""Whose turn is next."""
+"""Whose waiter is next."""
 
 from __future__ import annotations
 
-from service.admission.fair_queue import FairQueue, Holder, Turn
+from service.admission.fair_queue import FairQueue, Holder, Waiter
 
 from .gates import in_loop
 
@@ -13,7 +13,7 @@ def anyone(_: Holder) -> bool:
     return True
 
 
-def joined(queue: FairQueue, *holders: Holder) -> list[Turn]:
+def joined(queue: FairQueue, *holders: Holder) -> list[Waiter]:
     return [queue.join(holder, fixed=False) for holder in holders]
 
 
@@ -54,11 +54,11 @@ async def test_old_use_is_forgotten_with_whoever_has_nothing_left() -> None:
 async def test_each_holder_s_turns_come_in_order_and_nobody_waits_for_nothing() -> None:
     queue = FairQueue()
     assert queue.next(anyone) is None
-    turns = joined(queue, A, A, A)
+    waiters = joined(queue, A, A, A)
     assert queue.waiting == 3
-    assert [queue.next(anyone) for _ in range(4)] == [*turns, None]
+    assert [queue.next(anyone) for _ in range(4)] == [*waiters, None]
     assert (queue.waiting, queue.places_of(A)) == (0, 3)  # they run
-    for _ in turns:
+    for _ in waiters:
         queue.finished(A, 1.0)
     assert (queue.holders, queue.places_of(A)) == (0, 0)
 
@@ -68,9 +68,9 @@ async def test_places_are_what_waits_runs_and_comes() -> None:
     queue = FairQueue()
     queue.expect(A)
     queue.started(A)
-    (turn,) = joined(queue, A)
+    (waiter,) = joined(queue, A)
     assert (queue.places_of(A), queue.holders, queue.waiting) == (3, 1, 1)
-    queue.leave(A, turn)
+    queue.leave(A, waiter)
     assert (queue.places_of(A), queue.waiting) == (2, 0)
     queue.expect_no_longer(A)
     queue.finished(A, 0.0)
