@@ -1,7 +1,7 @@
 # Linefix as an image: the wheel with its pinned dependencies and kernels compiled ahead, run by a user without rights.
 #   docker build -t linefix .
 #   docker run --rm --read-only -p 127.0.0.1:8000:8000 -v linefix:/data -e LINEFIX_ALLOW_ANONYMOUS=1 linefix
-# For x86-64 and arm64 (not tried): docker buildx build --platform linux/amd64,linux/arm64 -t linefix .
+# For x86-64 and arm64: docker buildx build --platform linux/amd64,linux/arm64 -t linefix .
 ARG BASE_IMAGE=python:3.13-slim
 
 FROM ${BASE_IMAGE} AS build
@@ -10,11 +10,14 @@ WORKDIR /src
 # Bytecode is compiled to be used unchecked: copying changes the files' times, and every start would compile it again.
 ENV COMPILE="/opt/linefix/bin/python -m compileall -q -j 0 --invalidation-mode unchecked-hash"
 # The dependencies alone first: a change of the code does not install them again. Wheels alone, each with its hash, so
-# that nothing of a package is run to install it. Then what never runs goes: their tests, sources, headers, stubs.
+# that nothing of a package is run to install it; on arm64 but for Cyclone DDS. Then what never runs goes: their tests,
+# sources, headers, stubs.
 COPY requirements/build.txt requirements/runtime.txt requirements/
+COPY deploy/cyclonedds-on-arm64 deploy/
 RUN python3 -m venv /opt/tools \
     && /opt/tools/bin/pip install --quiet --require-hashes --only-binary :all: --requirement requirements/build.txt \
     && python3 -m venv --without-pip /opt/linefix \
+    && sh deploy/cyclonedds-on-arm64 \
     && /opt/tools/bin/pip --python /opt/linefix/bin/python \
         install --quiet --no-compile --require-hashes --only-binary :all: --requirement requirements/runtime.txt \
     && find /opt/linefix/lib -depth -type d \( -name tests -o -name test \) -exec rm -r {} + \
@@ -35,9 +38,10 @@ COPY linefix linefix
 COPY ros2 ros2
 COPY service service
 COPY cli cli
+COPY clients/python clients/python
 # Given the time of a commit, the wheel is that of `make wheel`, to the byte.
 ARG SOURCE_DATE_EPOCH
-RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . \
+RUN /opt/tools/bin/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir /wheels . ./clients/python \
     && /opt/tools/bin/pip --python /opt/linefix/bin/python install --quiet --no-compile --no-deps /wheels/*.whl \
     && /opt/tools/bin/python .ci/materials.py /opt/linefix/sbom.cdx.json /opt/linefix/bin/python \
     && find /opt/linefix/bin -mindepth 1 ! -name 'python*' ! -name linefix -delete \
@@ -47,7 +51,7 @@ ENV LINEFIX_KERNELS=/opt/linefix/kernels NUMBA_CPU_NAME=generic NUMBA_CPU_FEATUR
 WORKDIR /
 RUN PYTHONDONTWRITEBYTECODE=1 /opt/linefix/bin/python -c "from service.work.compiling import compile_kernels; compile_kernels()"
 RUN cd "$(/opt/linefix/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
-    && $COMPILE compiled registration vectorization association simulation formats map_quality batch linefix ros2 service cli \
+    && $COMPILE compiled registration vectorization association simulation formats map_quality batch linefix ros2 service cli linefix_client \
     && chmod -R u=rwX,go=rX /opt/linefix
 
 FROM ${BASE_IMAGE}
@@ -59,6 +63,11 @@ RUN useradd --system --uid 10001 --user-group --home-dir /data --no-create-home 
     && find / -xdev -type f -perm /6000 -exec chmod a-s {} + \
     && rm -rf /usr/local/bin/pip* /usr/local/lib/python3*/ensurepip /usr/local/lib/python3*/site-packages/pip*
 COPY --from=build /opt/linefix /opt/linefix
+# On arm64: the C library of Cyclone DDS.
+RUN if [ -e /opt/linefix/packages ]; then \
+        apt-get update --quiet && xargs apt-get install --yes --quiet --no-install-recommends < /opt/linefix/packages \
+        && rm -rf /var/lib/apt/lists/*; \
+    fi
 ENV PATH=/opt/linefix/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     LINEFIX_KERNELS=/opt/linefix/kernels \

@@ -8,7 +8,7 @@ export OMP_NUM_THREADS = 1
 export OPENBLAS_NUM_THREADS = 1
 export MKL_NUM_THREADS = 1
 
-.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page wheel image-check sbom audit lock clean
+.PHONY: help docs demo clients client-types test lint types layers kernels unit serve long faults bench experiments peers overload endings siege mutants fuzz page pictures wheel image-check sbom audit lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -106,6 +106,12 @@ page: $(VENV)/.ready  ## build the page from web/ into service/page/ (needs node
 	cd web && npm ci --no-audit --no-fund && npm run build
 	$(BIN)/python -m examples.scenes
 
+pictures: $(VENV)/.ready  ## draw the pictures of README and documents that need no data; the page with chromium
+	$(BIN)/python -m examples.animation
+	$(BIN)/python -m examples.concepts
+	$(BIN)/python -m benchmarks.verdicts
+	$(BIN)/python -m examples.demo && cp out/demo.png docs/demo.png
+
 wheel: $(VENV)/.ready  ## build the wheel of the last commit into dist/, twice: both have to be the same to the byte
 	BIN=$(BIN) .ci/wheel
 
@@ -121,7 +127,7 @@ audit: $(VENV)/.ready  ## look the pinned packages up in the published advisorie
 PIN := -m uv pip compile --quiet --universal --python-version 3.11 --no-emit-index-url --no-annotate --no-header
 
 lock: $(VENV)/.ready  ## pin the dependencies anew, by hash where the image is made of them
-	$(BIN)/python $(PIN) --generate-hashes --extra formats pyproject.toml -o requirements/runtime.txt
+	$(BIN)/python $(PIN) --generate-hashes --extra formats pyproject.toml requirements/image.in -o requirements/runtime.txt
 	$(BIN)/python $(PIN) --extra formats --extra batch --extra ray --extra otel --extra ros2 --group dev pyproject.toml -o requirements/dev.txt
 	$(BIN)/python $(PIN) --generate-hashes -c requirements/dev.txt --group build -o requirements/build.txt
 	$(BIN)/python $(PIN) -c requirements/dev.txt --group peers -o requirements/peers.txt

@@ -154,7 +154,8 @@ def unlisted(image: Image) -> list[str]:
         materials["require_licences"](bill)
     except materials["MaterialsError"] as error:
         return [str(error)]
-    told = [*bill["components"], bill["metadata"].get("component", {"name": "no service", "version": ""})]
+    ours = bill["metadata"].get("component", {"name": "no service", "version": ""})
+    told = [*bill["components"], ours, *ours.get("components", [])]
     listed = {f"{canonicalize_name(one['name'])} {one['version']}" for one in told}
     folders = {name.parent.name for name, _ in image.of(HOME) if name.name == "METADATA"}
     parts = [folder.removesuffix(".dist-info").split("-") for folder in folders if folder.endswith(".dist-info")]

@@ -19,7 +19,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PINS, BILL = Path("requirements/runtime.txt"), Path("out/sbom.json")
-OURS = "linefix"
+OURS, CLIENT = "linefix", "linefix-client"
 COPYLEFT = re.compile(r"(?<!L)(?<!Lesser )\b(A?GPL|(Affero )?General Public License)", re.IGNORECASE)
 LESSER = re.compile(r"LGPL|Lesser General Public License", re.IGNORECASE)
 
@@ -61,6 +61,9 @@ def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
     if OURS in components:
         ours = components[OURS]
         metadata["component"] = {"type": "application", **{key: ours[key] for key in ("bom-ref", "name", "version")}}
+        if CLIENT in components:
+            client = {key: components[CLIENT][key] for key in ("bom-ref", "name", "version")}
+            metadata["component"]["components"] = [{"type": "library", **client}]
     refs = {one["bom-ref"] for one in [*parts, metadata.get("component", parts[0])]}
     needs = [
         {**one, "dependsOn": [ref for ref in one.get("dependsOn", []) if ref in refs]}

@@ -29,7 +29,8 @@ from .result import (
     Status,
 )
 from .to_scale import Factor
-from .tuning import HINGES
+from .tuning import HINGES, TWIN_TEMPERATURE
+from .verdict.features import weigh
 from .verdict.verdict import Verdict
 from .warnings import warnings_of, warnings_of_causes
 
@@ -43,7 +44,7 @@ def report(
     """
     answer = None if verdict.status is Status.NO_MATCH else explanations.answer
     others = explanations.ranked if answer is None else explanations.others
-    alternatives = _alternatives(context, explanations, others, usable=verdict.usable)
+    alternatives = _alternatives(context, explanations, others, verdict)
     missing = () if answer is None else _missing_map(context, answer)
     if context.deadline.passed:
         verdict = verdict.cut_short()
@@ -137,18 +138,18 @@ def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
 
 
 def _alternatives(
-    context: SearchContext, explanations: Explanations, others: Iterable[Ranked], *, usable: bool
+    context: SearchContext, explanations: Explanations, others: Iterable[Ranked], verdict: Verdict
 ) -> tuple[Alternative, ...]:
-    if usable and "alternatives" not in context.options.parts:
+    if verdict.usable and "alternatives" not in context.options.parts:
         return ()
     shown = tuple(islice(with_lines_of_sight(context, explanations.ranked, others), context.options.max_alternatives))
     if not shown:
         return ()
-    settled = settle(context, shown)
+    settled, probabilities = settle(context, shown), _probabilities(explanations.answer, verdict, shown)
     found: list[Alternative] = []
     for some in slices_between_looks(context, len(settled)):
         measures = _measures(context, shown[some], settled[some])
-        found += map(partial(_alternative, context), shown[some], settled[some], measures)
+        found += map(partial(_alternative, context), shown[some], settled[some], measures, probabilities[some])
     return tuple(found)
 
 
@@ -161,7 +162,23 @@ def _measures(context: SearchContext, shown: Sequence[Ranked], settled: Sequence
     return measures
 
 
-def _alternative(context: SearchContext, other: Ranked, settled: Settled, measures: list[float]) -> Alternative:
+def _probabilities(answer: Answer | None, verdict: Verdict, others: Sequence[Ranked]) -> list[float | None]:
+    """Return the probability that each of some other poses is right, 0 to 1; None where the verdict has none to share.
+
+    They share it as in `twin_share`: the best explanation weighs 1, another one what it is counted, reduced by its gap.
+    """
+    if answer is None or verdict.status is Status.NO_MATCH or verdict.probability is None or verdict.contradicted:
+        return [None] * len(others)
+    weighed = weigh(answer.best, others)
+    parts = weighed["counted"] * np.exp(np.minimum(0.0, weighed["gap"]) / TWIN_TEMPERATURE)
+    inside = [one.inside for one in others]  # a hard prior excludes the others
+    found: list[float | None] = (verdict.probability * parts * inside).tolist()
+    return found
+
+
+def _alternative(
+    context: SearchContext, other: Ranked, settled: Settled, measures: list[float], probability: float | None
+) -> Alternative:
     translation, mitsuta, wahba, reliability = measures
     return Alternative(
         pose=context.in_map(settled.pose),
@@ -170,4 +187,5 @@ def _alternative(context: SearchContext, other: Ranked, settled: Settled, measur
         ambiguity=Ambiguity(translation, wahba if context.options.rotation == "wahba" else mitsuta),
         reliability=reliability,
         inlier_fraction=other.share,
+        probability=probability,
     )

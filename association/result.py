@@ -142,7 +142,14 @@ class AssociationDiagnostics:
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """Another pose that explains part of the scan; ambiguity and reliability as of the best, with the same sigmas."""
+    """Another pose that explains part of the scan; ambiguity and reliability as of the best, with the same sigmas.
+
+    Attributes
+    ----------
+    probability : float or None
+        That this pose is right, 0 to 1: all of them and the answer's together make at most 1. None where the answer has
+        none, or contradicts the prior.
+    """
 
     pose: RigidTransform
     covariance: Floats | None
@@ -150,6 +157,7 @@ class Alternative:
     ambiguity: Ambiguity
     reliability: float
     inlier_fraction: float
+    probability: float | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@
     logs, blocks        logs to Parquet files whose row groups are blocks; the scans of one block
     maps                which map a scan lies on
     searching           one block's scans to rows
-    parts               what a run has done so far, so that one that was killed goes on
-    processes, on_ray   who does the work
+    parts               the results so far, from which a run that was killed continues
+    processes, on_ray   the workers
 
 The extra ``linefix[batch]`` brings the libraries, ``linefix[ray]`` Ray besides.
 """

@@ -21,7 +21,7 @@ from vectorization import LaserScan, Motion
 from .errors import UnreadableScansError
 from .tables import MOTION
 
-SIGMA = 0.02  # m, of points behind segments whose sigma nobody says; as over HTTP
+SIGMA = 0.02  # m, of the points of segments without a sigma; as over HTTP
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Row:
 
     @property
     def stamp(self) -> int | None:
-        """Nanoseconds; None where nobody says."""
+        """Nanoseconds; None where it is unknown."""
         stamp = self.values.get("stamp")
         return None if stamp is None else int(stamp)
 

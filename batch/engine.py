@@ -1,4 +1,4 @@
-"""What does the work: a function called once for each item, by whoever is there."""
+"""Engines: they call a function for each of many items, in workers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Lost:
 class Engine(Protocol):
     """Calls a function for many items.
 
-    A worker that ends early costs the time of what it was at: that is done anew, `ATTEMPTS` times.
+    An item whose worker ends early is done again, up to `ATTEMPTS` times.
     """
 
     def run(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[Item, Result | Lost]]:

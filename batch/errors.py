@@ -1,4 +1,4 @@
-"""What this package refuses before it starts; what is wrong with one scan is told in that scan's row.
+"""Errors of a run before it starts; an error about one scan is in that scan's row.
 
 ::
 
@@ -24,4 +24,4 @@ class UnreadableMapsError(FleetError):
 
 
 class OtherRunError(FleetError):
-    """What lies there belongs to another run."""
+    """The folder of results belongs to another run."""

@@ -48,7 +48,7 @@ class Layout:
 
     @property
     def done(self) -> bool:
-        """Whether the file is there."""
+        """Whether the file exists."""
         return Path(self.path).exists()
 
     def blocks(self) -> list[Block]:

@@ -8,20 +8,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from association import MapIndex
+import linefix
+from formats.maps import DRAWINGS
 
 from .errors import UnreadableMapsError
 
-SUFFIXES = (".json", ".yaml", ".yml", ".dxf", ".svg", ".geojson", ".csv")
+SUFFIXES = (".yaml", ".yml", *DRAWINGS)
 KEPT = 16  # indices that a worker holds; one of 20,000 segments takes some 10 MB
-
-
-@dataclass(frozen=True, slots=True)
-class SearchedMap:
-    """A map that is ready to be searched."""
-
-    index: MapIndex
-    oriented: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +63,7 @@ class MapShelf:
             return stem
         return next(iter(self.files)) if len(self.files) == 1 else None
 
-    def get(self, name: str | None) -> SearchedMap:
+    def get(self, name: str | None) -> linefix.MapIndex:
         """Return a map.
 
         Raises
@@ -86,15 +79,12 @@ class MapShelf:
 
 
 @lru_cache(maxsize=KEPT)
-def read_index(path: str) -> SearchedMap:
-    """Return the index of a map's file.
+def read_index(path: str) -> linefix.MapIndex:
+    """Return the index of a map file.
 
     Raises
     ------
     InputError
         When it cannot be read or searched.
     """
-    from formats import read_map
-
-    found = read_map(path).map
-    return SearchedMap(MapIndex.build(found.segments, found.sigma, oriented=found.oriented), found.oriented)
+    return linefix.index_map(linefix.read_map(path))

@@ -1,4 +1,4 @@
-"""What a run has done so far: a folder beside the output, with which one that was killed goes on."""
+"""The results of a run so far, in a folder next to the output: a run that was killed continues from them."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class Parts:
 
     @property
     def scans(self) -> Path:
-        """Where logs of other tools are laid out."""
+        """Folder of the logs that are laid out as Parquet files."""
         return self.folder / "scans"
 
     @property
     def poses(self) -> Path:
-        """Where the rows are."""
+        """Folder of the rows."""
         return self.folder / "poses"
 
     def keep(self, block: Block, rows: pa.Table) -> None:
@@ -94,7 +94,7 @@ def _left(block: Block, done: set[tuple[int, int]]) -> list[Block]:
 
 @contextmanager
 def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
-    """Give the parts of an output to one run at a time.
+    """Open the parts of an output, for one run at a time.
 
     Parameters
     ----------

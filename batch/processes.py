@@ -27,7 +27,7 @@ class _Worker:
 
 @dataclass(frozen=True, slots=True)
 class Processes:
-    """Workers that are started anew where they end early.
+    """Worker processes; one that ends early is replaced.
 
     They are spawned, never forked: the compiled kernels and the caller's threads would not outlive a fork.
 
@@ -75,7 +75,7 @@ class Processes:
 
 
 def _give(worker: _Worker, waiting: deque[int], items: Sequence[object]) -> None:
-    """Hand a worker what is next; one that has just ended is noticed when its answer is awaited."""
+    """Send the next item to a worker; a worker that has just ended is noticed when its answer is read."""
     worker.number = waiting.popleft() if waiting else None
     if worker.number is not None:
         with contextlib.suppress(OSError):
@@ -99,7 +99,7 @@ def _ended(worker: _Worker) -> None:
 
 def _work(function: Callable[[Item], Result], pipe: Connection) -> None:
     """Answer until the other end is closed, or its process has ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # from the terminal, where the one who asks is told, too
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # from the terminal; the parent process receives it as well
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         while True:
             pipe.send(attempt(function, pipe.recv()))

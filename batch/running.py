@@ -25,7 +25,7 @@ PathLike = str | os.PathLike[str]
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is.
+    """Progress of a run.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What is in the output.
+    """Counts of the rows of the output.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ def associate_many(
     engine : Engine, optional
         Who does the work; this machine's processes, one for each core, where none is given.
     watch : callable, optional
-        Told after each step.
+        Called after each step.
 
     Returns
     -------

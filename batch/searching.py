@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 import pyarrow as pa
 
-from association import AssociationOptions, AssociationResult, Deadline, associate
+import linefix
+from linefix import AssociationOptions, AssociationResult, Deadline
 from registration import InputError
 
 from .blocks import Block, Row, rows_of
@@ -20,7 +21,7 @@ from .tables import POSES
 
 @dataclass(frozen=True, slots=True)
 class FleetOptions:
-    """How to search many scans.
+    """Options of a run.
 
     Attributes
     ----------
@@ -57,13 +58,9 @@ class BlockSearch:
         """Return what came of one scan, whatever is wrong with it: no scan costs another its row."""
         name = self.maps.name(row.values.get("map_id"), block.log)
         try:
-            on = self.maps.get(name)
-            scan, search = row.scan(), self.options.search
-            if search.oriented and not on.oriented:
-                search = replace(search, oriented=False)
-            begun = time.perf_counter()
+            index, scan, begun = self.maps.get(name), row.scan(), time.perf_counter()
             deadline = Deadline(time.monotonic() + 1e-3 * self.options.deadline_ms)
-            result = associate(on.index, scan, None, search, deadline)
+            result = linefix.locate(index, scan, options=self.options.search, deadline=deadline)
             return {"map_id": name, "search_ms": 1e3 * (time.perf_counter() - begun), **_answered(result)}
         except InputError as error:
             return {"map_id": name, "usable": False, "error": f"invalid: {error}"}
@@ -79,7 +76,7 @@ def _prepared(prepare: Callable[[], None] | None) -> None:
 
 
 def lost_row(block: Block) -> pa.Table:
-    """Return the row of a block of one scan whose search ends whoever does it."""
+    """Return the row of a block of one scan whose search ends every worker."""
     row = {"log": block.log, "index": block.start, "usable": False}
     return pa.Table.from_pylist([row | {"error": "worker_lost: its search ended each worker early"}], schema=POSES)
 

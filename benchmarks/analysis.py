@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from map_quality.analyze import Analysis, Robot, Standing
+from map_quality import Analysis, Robot, Standing
 from registration import Segments
 
 from .outcomes import progress

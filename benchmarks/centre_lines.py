@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from association import Deadline, MapIndex
 from formats import ImportOptions, LineMap, read_map, write_map
 from linefix import scan_of
-from map_quality.check import find_thickness
+from map_quality import find_thickness
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 from vectorization import LaserScan

@@ -74,13 +74,14 @@ def frontier(form: str, examples: Sequence[Example], bars: Sequence[float] = BAR
 
 def draw(found: dict[str, list[Point]], chosen: dict[str, Point]) -> None:
     """Draw what is kept over what is let in, a plot for each form, with the point that was chosen."""
-    figure, [axes] = panels(1, len(found), (5.2, 4.0), "What is kept over what is let in, as the bar moves")
+    title = "Accepted right answers over accepted out-of-map scans, by threshold"
+    figure, [axes] = panels(1, len(found), (5.2, 4.0), title)
     for ax, (form, points) in zip(axes, found.items(), strict=True):
         for colour, name in zip(COLOURS, KEPT, strict=False):
             ax.plot([p.let_in for p in points], [p.kept[name] for p in points], ".-", color=colour, label=name)
             ax.plot(chosen[form].let_in, chosen[form].kept[name], "o", color=colour, markersize=9)
-        ax.set(title=f"as {form}", xlabel=f"let in: {' and '.join(STRANGE)}, usable where it could be told, %",
-               ylabel="kept: usable and right, % of the scans", ylim=(0, 100))  # fmt: skip
+        ax.set(title=f"as {form}", xlabel=f"usable out-of-map scans ({' and '.join(STRANGE)}), %",
+               ylabel="usable and right, % of the scans", ylim=(0, 100))  # fmt: skip
         ax.set_xlim(left=0)
         ax.legend(loc="lower right", title=f"circle: the bar of {chosen[form].bar:g}")
     save(figure, "verdict-frontier")

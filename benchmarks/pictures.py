@@ -49,7 +49,7 @@ def draw_reliability(name: str, title: str, found: Sequence[tuple[int, float, fl
             spread = 2.0 * (share * (1.0 - share) / count) ** 0.5
             face = COLOURS[1] if count >= telling else "white"
             ax.errorbar(p, share, yerr=spread, color=COLOURS[1], marker="o", markerfacecolor=face, capsize=2)
-    ax.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="stated probability", ylabel="share that is right")
+    ax.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="stated probability", ylabel="fraction that is right")
     ax.text(0.98, 0.04, f"hollow: fewer than {telling} answers", ha="right", transform=ax.transAxes, fontsize=8)
     width = 1.0 / max(1, len(found))
     below.bar([(k + 0.5) * width for k in range(len(found))], [max(c, 0.5) for c, _, _ in found], 0.9 * width,

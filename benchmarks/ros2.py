@@ -24,8 +24,8 @@ from association import MapIndex, associate
 from formats.logs.lasers import laser_of
 from formats.report import Notes
 from ros2 import messages
-from ros2.frames import NS
 from ros2.odometry import nanoseconds
+from ros2.transforms import NS
 from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription, Waiting
 
 from .collection import Collection, Query

@@ -14,17 +14,17 @@ from textwrap import fill
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from association import AssociationOptions, AssociationResult, HardPrior, MapIndex, Prior, Scan, associate
+from formats.colours import CRITICAL, INK, OTHER, UNMATCHED, VERDICTS, verdict_of
 from registration import MeasuredSegments, RigidTransform, Segments
 
 FOLDER = Path(__file__).parents[1] / "docs"
 LETTERS = 40  # of a title's line
-# Okabe and Ito's colours, told apart by every kind of colour vision.
-INK, GREY, MAP = "#1b1f24", "#8a929c", "#c3c9d0"
-BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-STATUS_COLOURS = {"ok": GREEN, "ambiguous": ORANGE, "degenerate": BLUE, "no_match": VERMILION}
+MAP = "#c3c9d0"
 
 # A floor of three unlike rooms on a corridor, metres; free space on the left.
 FLOOR = np.array([
@@ -132,31 +132,53 @@ def draw(scene: Scene, scan_axes: Axes, map_axes: Axes) -> None:
     """Draw the scan as it was sent, and the map with the scan where the answer lays it."""
     answer, sent = scene.answer(), scene.scan.measured.segments.endpoints.reshape(-1, 2, 2)
     matched = {pair.scan for pair in answer.correspondences}
-    colours = [INK if k in matched else VERMILION for k in range(len(sent))]
+    colours = [INK if k in matched else UNMATCHED for k in range(len(sent))]
     scan_axes.add_collection(LineCollection(list(sent), colors=colours, linewidths=1.8))
     scan_axes.plot(0.0, 0.0, marker=(3, 0, -90), color=INK, markersize=8)
     map_axes.add_collection(LineCollection(list(scene.walls.reshape(-1, 2, 2)), colors=MAP, linewidths=3.5))
-    colour = STATUS_COLOURS[answer.status]
+    colour = VERDICTS[verdict_of(answer.status, usable=answer.usable)]
     if answer.pose is not None:
         for other in [one.pose for one in answer.alternatives if answer.diagnostics is not None
                       and one.score > 0.8 * answer.diagnostics.score]:  # fmt: skip
-            _lay(map_axes, sent, other, GREY, 0.8)
+            _lay(map_axes, sent, other, OTHER, 0.8)
         _lay(map_axes, sent, answer.pose, colour, 1.8)
         if answer.unobservable is not None:
             _arrow(map_axes, answer.pose, answer.unobservable, 3.0, colour)
         hinge = None if answer.diagnostics is None else answer.diagnostics.critical_wall
         if hinge is not None and not answer.usable and answer.unobservable is None:
             wall = scene.walls[list(hinge.map)].reshape(-1, 2, 2)
-            map_axes.add_collection(LineCollection(list(wall), colors=BLUE, linewidths=6.0, alpha=0.35))
+            map_axes.add_collection(LineCollection(list(wall), colors=CRITICAL, linewidths=8.0, zorder=1.5))
     for axes in (scan_axes, map_axes):
         axes.autoscale()
         axes.margins(0.08)
         axes.set(aspect="equal", xticks=[], yticks=[])
         axes.spines[:].set_color("#e1e4e8")
     told = fill(", ".join(one.code for one in answer.reasons) or "usable", LETTERS)
-    scan_axes.set_title(f"{scene.title}\nas sent", fontsize=8, color=INK)
+    scan_axes.set_title(fill(scene.title, 22), fontsize=8, color=INK)
+    for axes in (scan_axes, map_axes):
+        _scale(axes)
     warned = "".join(f"\nwarning: {one.code}" for one in answer.warnings)
-    map_axes.set_title(f"{answer.status}\n{told}{warned}", fontsize=8, color=colour, weight="bold")
+    map_axes.set_title(f"{answer.status}\n{told}{warned}", fontsize=8, color=INK, weight="bold")
+
+
+def _scale(axes: Axes) -> None:
+    """Draw a bar of a round length below what is drawn."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    metres = 10.0 ** math.floor(math.log10(0.4 * (right - left)))
+    y = low - 0.04 * (right - left)
+    axes.plot([left, left + metres], [y, y], color=INK, linewidth=2.0, solid_capstyle="butt")
+    axes.text(left + 1.1 * metres, y, f"{metres:g} m", fontsize=7, va="center", color=INK)
+    axes.set_ylim(low - 0.09 * (right - left), high)
+
+
+def _legend(figure: Figure) -> None:
+    """Name the colours of lines that are drawn, below the plots."""
+    lines = [line for axes in figure.axes for line in axes.collections]
+    drawn = {to_hex(colour) for line in lines for colour in line.get_edgecolor()}
+    entries = [("map", MAP), ("matched scan segment, as sent", INK), ("unmatched", UNMATCHED), ("alternative", OTHER)]
+    entries += [("critical wall", CRITICAL), *((f"pose: {name}", colour) for name, colour in VERDICTS.items())]
+    handles = [Line2D([], [], color=c, linewidth=3.0, label=text) for text, c in entries if c in drawn]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
 
 
 def _lay(axes: Axes, sent: np.ndarray, pose: RigidTransform, colour: str, width: float) -> None:
@@ -173,11 +195,12 @@ def _arrow(axes: Axes, pose: RigidTransform, direction: tuple[float, float], len
 def picture(name: str, scenes: Sequence[Scene], columns: int) -> None:
     """Write one picture of several scenes."""
     rows = -(-len(scenes) // columns)
-    figure = Figure(figsize=(4.1 * columns, 2.5 * rows), layout="constrained")
+    figure = Figure(figsize=(4.6 * columns, 2.1 * rows + 0.6), layout="constrained")
     grid = figure.add_gridspec(rows, columns)
     for k, scene in enumerate(scenes):
         block = grid[k // columns, k % columns].subgridspec(1, 2, width_ratios=[1, 2])
         draw(scene, figure.add_subplot(block[0]), figure.add_subplot(block[1]))
+    _legend(figure)
     path = FOLDER / f"{name}.png"
     figure.savefig(path, dpi=90)
     print(path)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from association import Deadline, MapIndex
-from map_quality.analyze import Analysis, PlaceVerdict, Robot, Standing
+from map_quality import Analysis, PlaceVerdict, Robot, Standing
 from registration import Segments
 
 from .contract import Progress
@@ -27,7 +27,7 @@ _deadline = Deadline()
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What another process needs to take part; an index does not travel, it is built anew.
+    """Input of another process; it builds the index again, because an index is not sent.
 
     Attributes
     ----------

@@ -19,16 +19,14 @@ from rich.progress import Progress as Bar
 
 from registration import InputError, Segments
 
+from .asking import server_at
 from .compiling import compile_first
 from .contract import Json, Progress
 from .errors import RefusedError, WrongUseError
-from .grouping import grouped
 from .inputs import needing_formats, read_map_file, read_map_or_id
-from .keeping import server_at
-from .options import AsJson, MapArgument, Server
+from .options import AsJson, MapArgument, Server, grouped
 from .printing import print_json, print_rows
 
-COLOURS = {"ok": (46, 125, 70), "ambiguous": (214, 130, 20), "degenerate": (150, 60, 160), "no_match": (190, 40, 40)}
 SUFFIXES = (".json", ".geojson")
 # Arguments of the library by the options that they come from.
 OPTIONS = {f"laser.{name.replace('-', '_')}": f"--{name}" for name in ("fov", "beams", "range-max", "sigma")}
@@ -47,7 +45,7 @@ class ScannerOptions:
 
 @dataclass(frozen=True, slots=True)
 class FurtherOptions:
-    """What else is to be found out of each place, as options."""
+    """Further questions about each place, as options."""
 
     drive: Annotated[
         float, typer.Option(metavar="METRES", help="Maximum distance to drive until the pose is usable, at most 30.")
@@ -58,20 +56,27 @@ class FurtherOptions:
     ] = None
 
 
+@dataclass(frozen=True, slots=True)
+class PlaceOptions:
+    """The places to analyze, and the time for them, as options."""
+
+    spacing: Annotated[
+        float | None,
+        typer.Option(metavar="METRES", help="Distance between places. Default: about 400 places on the map."),
+    ] = None
+    point: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="Analyze only places that are connected with this one."),
+    ] = None
+    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time limit of the analysis.")] = None
+
+
 @grouped
 def analyze(
     on: MapArgument,
     scanner: ScannerOptions,
     further: FurtherOptions,
-    spacing: Annotated[
-        float | None,
-        typer.Option(metavar="METRES", help="Distance between places. Default: about 400 places on the map."),
-    ] = None,
-    point: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="X Y", help="Analyze only places that are connected with this one."),
-    ] = None,
-    deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time limit of the analysis.")] = None,
+    places: PlaceOptions,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the result as .json or .geojson.")] = None,
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result on the map as .png.")] = None,
     server: Server = None,
@@ -87,12 +92,12 @@ def analyze(
         )
     landmark = [] if further.landmark is None else read_map_file(further.landmark).get("segments", [])
     if server is None:
-        answer = _analyzed(target, Asked(scanner, further.drive, landmark, spacing, point, deadline_ms))
+        answer = _analyzed(target, Asked(scanner, further.drive, landmark, places))
     else:
-        body: Json = {"map": target, "laser": asdict(scanner), "spacing": spacing, "deadline_ms": deadline_ms}
-        body |= {"drive": further.drive, "landmark": landmark}
-        if point is not None:
-            body["point"] = list(point)
+        body: Json = {"map": target, "laser": asdict(scanner), "drive": further.drive, "landmark": landmark}
+        body |= {"spacing": places.spacing, "deadline_ms": places.deadline_ms}
+        if places.point is not None:
+            body["point"] = list(places.point)
         with closing(server_at(server)) as service:
             answer = service.analyze(body)
     if out is not None:
@@ -112,22 +117,20 @@ class Asked:
     scanner: ScannerOptions
     drive: float
     landmark: ArrayLike
-    spacing: float | None
-    point: tuple[float, float] | None
-    deadline_ms: float | None
+    places: PlaceOptions
 
 
 def _analyzed(target: Json, asked: Asked) -> Json:
     """Return the answer of ``POST /v1/analyze``, worked out here on all cores, however long it takes."""
     import linefix
-    from map_quality.analyze import Analysis, Robot
-    from service.work.analyzing import analysis_json
+    from linefix.map_answers import analysis_json
+    from map_quality import Analysis, Robot
 
     from .all_cores import look_on_all_cores
     from .stored import map_here, require_size, settings_here
 
-    if asked.deadline_ms is not None and not asked.deadline_ms >= 0.0:
-        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {asked.deadline_ms:g}")
+    if asked.places.deadline_ms is not None and not asked.places.deadline_ms >= 0.0:
+        raise WrongUseError(f"--deadline-ms: expected milliseconds from 0 on, found {asked.places.deadline_ms:g}")
     found, cores = map_here(target), settings_here().searches
     require_size(found.document)
     compile_first()
@@ -137,10 +140,12 @@ def _analyzed(target: Json, asked: Asked) -> Json:
         robot = Robot(laser.fov, laser.beams, laser.range_max, laser.sigma)
         landmark = Segments.from_array(asked.landmark, argument="landmark")
         index = linefix.index_map(found.document)
-        analysis = Analysis.over(index, robot, asked.spacing, asked.point, drive=asked.drive, landmark=landmark)
+        analysis = Analysis.over(
+            index, robot, asked.places.spacing, asked.places.point, drive=asked.drive, landmark=landmark
+        )
     except InputError as error:
         raise RefusedError(OPTIONS.get(error.argument, error.argument) + f": {error.message}") from None
-    deadline = linefix.Deadline(None if asked.deadline_ms is None else begun + 1e-3 * asked.deadline_ms)
+    deadline = linefix.Deadline(None if asked.places.deadline_ms is None else begun + 1e-3 * asked.places.deadline_ms)
     with _progress() as progress:
         looks = look_on_all_cores(analysis, cores, deadline, progress)
     spent = round(1e3 * (time.monotonic() - begun), 3)
@@ -174,21 +179,16 @@ def features(answer: Json) -> Json:
 
 def _draw(document: Json, answer: Json, picture: Path) -> None:
     with needing_formats("drawing"):
-        from formats import LineMap, PlaceMark, draw_map
+        from formats import VERDICTS, LineMap, PlaceMark, draw_map, rgb, verdict_of
 
         segments = Segments.from_array(document["segments"], argument="map.segments")
         oriented = document.get("oriented") is not False
         marks = [
-            PlaceMark(one["pose"]["x"], one["pose"]["y"], answer["spacing"], COLOURS[_kind(one)])
+            PlaceMark(one["pose"]["x"], one["pose"]["y"], answer["spacing"], rgb(VERDICTS[kind]))
             for one in answer["places"]
+            for kind in [verdict_of(one["status"], usable=one["usable"])]
         ]
         draw_map(LineMap(segments, oriented=oriented), picture, marks=marks)
-
-
-def _kind(place: Json) -> str:
-    """Return how a place is told: one that is ok, but not usable, is as good as ambiguous."""
-    status: str = place["status"]
-    return "ambiguous" if status == "ok" and not place["usable"] else status
 
 
 def _rows(answer: Json) -> Iterator[tuple[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,33 +17,46 @@ from rich.progress import Task as Bar
 from rich.text import Text
 
 from registration import InputError
-from service.work.compiling import compile_kernels
 
+from .compiling import compile_kernels
 from .errors import RefusedError, WrongUseError
-from .options import AsJson
+from .options import AsJson, grouped
 from .printing import noted, print_json, print_rows
 
 if TYPE_CHECKING:
     from batch import Engine, FleetOptions, LogNote, Progress, Summary
 
 
+@dataclass(frozen=True, slots=True)
+class WorkerOptions:
+    """The workers of a run, as options."""
+
+    workers: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Number of processes. Default: the number of cores.")
+    ] = None
+    ray: Annotated[bool, typer.Option("--ray", help="Run on a Ray cluster: that of RAY_ADDRESS, or a new one.")] = False
+    block: Annotated[
+        int, typer.Option(min=1, max=65_536, metavar="N", help="Number of scans in the block of a worker.")
+    ] = 512
+
+
+@dataclass(frozen=True, slots=True)
+class SearchChoice:
+    """How to search each scan, as options."""
+
+    undirected: Annotated[bool, typer.Option("--undirected", help="The directions of segments have no meaning.")] = (
+        False
+    )
+    deadline_ms: Annotated[float, typer.Option(min=1.0, metavar="MS", help="Time limit of each search.")] = 10_000.0
+
+
+@grouped
 def batch(
     logs: Annotated[list[str], typer.Argument(metavar="LOGS", help="Parquet files, bags, MCAP files or CARMEN logs.")],
     maps: Annotated[Path, typer.Option(metavar="MAPS", help="A map file, or a folder of map files.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The Parquet file to write, one row per scan.")],
-    workers: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Number of processes. Default: the number of cores.")
-    ] = None,
-    ray: Annotated[
-        bool, typer.Option("--ray", help="Run on a Ray cluster: that of RAY_ADDRESS, or a new one.")
-    ] = False,
-    block: Annotated[
-        int, typer.Option(min=1, max=65_536, metavar="N", help="Number of scans in the block of a worker.")
-    ] = 512,
-    undirected: Annotated[
-        bool, typer.Option("--undirected", help="The directions of segments have no meaning.")
-    ] = False,
-    deadline_ms: Annotated[float, typer.Option(min=1.0, metavar="MS", help="Time limit of each search.")] = 10_000.0,
+    workers: WorkerOptions,
+    search: SearchChoice,
     as_json: AsJson = False,
 ) -> None:
     """Find where the scans of many logs were taken; a run that was killed goes on where it was.
@@ -57,10 +70,10 @@ def batch(
         from batch import associate_many
 
         with shown_progress() as watch:
-            options = _options(block, deadline_ms, undirected=undirected)
-            summary = associate_many(logs, maps, out, options, _engine(workers, ray=ray), watch)
+            options = _options(workers.block, search)
+            summary = associate_many(logs, maps, out, options, _engine(workers), watch)
     except ModuleNotFoundError as error:
-        extra = "ray" if ray else "batch"
+        extra = "ray" if workers.ray else "batch"
         raise RefusedError(
             f'linefix batch needs the package {error.name}: in a checkout, pip install ".[{extra}]"'
         ) from None
@@ -81,22 +94,22 @@ def _first_error(out: Path) -> str:
     return next((str(told) for told in pq.read_table(out, columns=["error"])["error"].to_pylist() if told), "unknown")
 
 
-def _options(block: int, deadline_ms: float, *, undirected: bool) -> FleetOptions:
+def _options(block: int, chosen: SearchChoice) -> FleetOptions:
     from association import AssociationOptions
     from batch import FleetOptions
 
-    search = AssociationOptions(max_alternatives=0, parts=(), oriented=not undirected)
-    return FleetOptions(search, deadline_ms, block, compile_kernels)
+    search = AssociationOptions(max_alternatives=0, parts=(), oriented=not chosen.undirected)
+    return FleetOptions(search, chosen.deadline_ms, block, compile_kernels)
 
 
-def _engine(workers: int | None, *, ray: bool) -> Engine | None:
+def _engine(chosen: WorkerOptions) -> Engine | None:
     from batch import OnRay, Processes
 
-    if ray:
-        if workers is not None:
+    if chosen.ray:
+        if chosen.workers is not None:
             raise WrongUseError("--workers: not possible with --ray, which uses all cores of the cluster; leave it out")
         return OnRay()
-    return None if workers is None else Processes(workers)
+    return None if chosen.workers is None else Processes(chosen.workers)
 
 
 def _rows(summary: Summary, seconds: float) -> list[tuple[str, str]]:

@@ -14,6 +14,8 @@ from service.parsing.errors import ParserEndedError
 from service.parsing.parser_process import ParserProcess
 from service.work.compiling import compile_kernels
 
+__all__ = ["compile_first", "compile_kernels"]
+
 LOOK_SECONDS = 0.3
 
 

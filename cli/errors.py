@@ -88,7 +88,8 @@ class Asked:
         first, _, rest = pointer.removeprefix("/").partition("/")
         if first == "files":
             return self.files[int(rest)] if rest.isdecimal() and int(rest) < len(self.files) else self.files[0]
-        return f"--{first.replace('_', '-')}" if first else self.files[0]
+        option = "point" if first == "inside" else first.replace("_", "-")  # the name that `formats` has for it
+        return f"--{option}" if first else self.files[0]
 
 
 NOTHING = Asked()

@@ -10,15 +10,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from linefix.map_answers import map_json
 from registration import InputError, Segments
-from service.parsing.errors import NotJsonError
-from service.parsing.reading import parse
-from service.schemas.errors import TooManyError
-from service.schemas.limits import Limits
+from service.contract import InvalidRequestError, Limits, NotJsonError, TooManyError, fault_of, parse
 
 from .contract import Json
-from .errors import NOTHING, Asked, RefusedError, WrongUseError
-from .keeping import keeping
+from .errors import NOTHING, Asked, RefusedError, WrongUseError, error_of
 from .printing import noted, plain
 
 if TYPE_CHECKING:
@@ -91,25 +88,6 @@ def read_map_or_id(name: str) -> Json:
     return read_map_file(name)
 
 
-def document_at(name: str, server: str | None) -> Json:
-    """Return a map itself: that of a file, or a stored one.
-
-    Raises
-    ------
-    WrongUseError, RefusedError
-        When there is none, or it is not taken.
-    """
-    return whole_map(read_map_or_id(name), server)
-
-
-def whole_map(on: Json, server: str | None) -> Json:
-    """Return the map of a request itself, also where the request has its id; raises `RefusedError` where it is gone."""
-    if "map_id" not in on:
-        return on
-    with keeping(server) as maps:
-        return maps.get(on["map_id"])
-
-
 def read_map_file(name: str) -> Json:
     """Return the map of a file: JSON as it is, what other tools write as read by `formats`.
 
@@ -129,7 +107,7 @@ def read_map_file(name: str) -> Json:
 
             imported = read_map(path)
         _print_choice(imported.report)
-        return document_of(imported.map)
+        return map_json(imported.map)
     told = read_json(name)
     if isinstance(told, list):
         return {"segments": told}
@@ -148,17 +126,6 @@ def _print_choice(report: ImportReport) -> None:
                 print(f"{'map':10}{plain(noted(asdict(note)))}", file=sys.stderr)
 
 
-def document_of(line_map: LineMap) -> Json:
-    """Return a map as the contract has it."""
-    return {
-        "segments": line_map.segments.endpoints.tolist(),
-        "sigma": line_map.sigma,
-        "oriented": line_map.oriented,
-        "frame_id": line_map.frame_id,
-        "meta": line_map.meta,
-    }
-
-
 def line_map_of(document: Json) -> LineMap:
     """Return a map as `formats` has it.
 
@@ -174,8 +141,8 @@ def line_map_of(document: Json) -> LineMap:
 
 
 @contextmanager
-def needing_formats(what: str, asked: Asked = NOTHING) -> Iterator[None]:
-    """Say in one line where the extra ``[formats]`` is missing, or refuses a file.
+def needing_formats(what: str) -> Iterator[None]:
+    """Raise `RefusedError` if the extra ``[formats]`` is missing, or refuses a file.
 
     Raises
     ------
@@ -186,6 +153,22 @@ def needing_formats(what: str, asked: Asked = NOTHING) -> Iterator[None]:
     except ModuleNotFoundError:
         raise RefusedError(f'{what} needs the extra formats: in a checkout, pip install ".[formats]"') from None
     except InputError as error:
-        if asked.files and error.argument == "inside":
-            raise RefusedError(f"--point: {error.message}") from None
-        raise RefusedError(str(error)) from None
+        told = f"--point: {error.message}" if error.argument == "inside" else str(error)
+        raise RefusedError(told) from None
+
+
+@contextmanager
+def refusing(asked: Asked = NOTHING) -> Iterator[None]:
+    """Raise `RefusedError` in place of the errors about a request."""
+    try:
+        yield
+    except InvalidRequestError as error:
+        faults = error.faults
+    except TooManyError as error:
+        named = [{"pointer": error.pointer, "message": str(error)}] if error.pointer else []
+        raise error_of(413, "", str(error), named, asked) from None
+    except InputError as error:
+        faults = (fault_of(error),)
+    else:
+        return
+    raise error_of(422, "", "", [{"pointer": one.pointer, "message": one.message} for one in faults], asked)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -13,15 +13,16 @@ import numpy as np
 import linefix
 from registration import InputError, RigidTransform
 
-from .answering import answering
+from .asking import server_at, whole_map
 from .compiling import compile_first
-from .contract import Json, Service
+from .contract import Json
 from .errors import RefusedError
-from .inputs import whole_map
 from .logs import sent
 
 if TYPE_CHECKING:
     from formats import LoggedScan
+
+    from .server import Server
 
 SEARCH = linefix.AssociationOptions(max_alternatives=0, parts=())
 
@@ -64,7 +65,7 @@ class Locator(Protocol):
 
 @contextmanager
 def locating(on: Json, server: str | None) -> Iterator[Locator]:
-    """Give who locates scans in a map: this process, or the server at a URL.
+    """Give a locator for a map: this process, or the server at a URL.
 
     Raises
     ------
@@ -72,8 +73,8 @@ def locating(on: Json, server: str | None) -> Iterator[Locator]:
         When the map is not taken, or no server answers.
     """
     if server is not None:
-        with answering(server) as service:
-            yield Remote(service, on)
+        with closing(server_at(server)) as remote:
+            yield Remote(remote, on)
         return
     from .stored import require_size, settings_here
 
@@ -128,7 +129,7 @@ class Local:
 class Remote:
     """A server, over HTTP."""
 
-    def __init__(self, service: Service, on: Json) -> None:
+    def __init__(self, service: Server, on: Json) -> None:
         self._service = service
         self._map = on
 

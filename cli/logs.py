@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, TextIO, TypeVar
 
 import typer
 
-from linefix.mounted import HERE
-
 from .contract import Json
 from .errors import WrongUseError
 from .inputs import needing_formats
@@ -19,10 +17,8 @@ from .printing import noted, plain
 
 if TYPE_CHECKING:
     from formats import Log, LoggedScan, LogOptions
-    from vectorization import LaserScan
 
 T = TypeVar("T")
-FARTHEST = 1e4  # m; where a log names no greatest range
 Topic = Annotated[
     str | None,
     typer.Option(
@@ -73,7 +69,7 @@ def options_of(
 
 
 def scans_of(log: Log) -> Iterator[LoggedScan]:
-    """Give the scans of a log one by one; raises `RefusedError` where it is broken."""
+    """Yield the scans of a log; raises `RefusedError` where it is broken."""
     with needing_formats(f"reading {log.name}"):
         yield from log
 
@@ -92,25 +88,7 @@ def print_notes(log: Log, where: TextIO) -> None:
 
 
 def sent(one: LoggedScan) -> Json:
-    """Return a scan of a log as a request has it: one view, with the mount, and the motion where it is known."""
-    laser, mount = one.laser, one.mount or HERE
-    most = laser.range_max if math.isfinite(laser.range_max) else FARTHEST
-    view: Json = {
-        "laser": {
-            "angle_min": laser.angle_min,
-            "angle_increment": laser.angle_increment,
-            "ranges": _ranges(laser, most),
-            "range_max": most,
-            "time_increment": one.time_increment,
-        },
-        "pose": {"x": mount.x, "y": mount.y, "theta": mount.theta},
-        "flipped": one.flipped,
-    }
-    if laser.motion is not None:
-        view["twist"] = {"vx": laser.motion.vx, "vy": laser.motion.vy, "omega": laser.motion.omega}
-    return {"views": [view], "stamp": one.stamp}
+    """Return a scan of a log as a request has it."""
+    from formats import scan_json
 
-
-def _ranges(laser: LaserScan, most: float) -> list[float | None]:
-    """Return ranges as JSON has them: null where nothing is known, and beyond the greatest where nothing came back."""
-    return [None if math.isnan(r) else 2.0 * most if math.isinf(r) else r for r in laser.cleaned.tolist()]
+    return scan_json(one)

@@ -1,9 +1,14 @@
-"""Options that several commands have."""
+"""Options of several commands, and options that belong together as one argument of a command."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from inspect import Parameter, Signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -28,3 +33,25 @@ ScanArgument = Annotated[
     ),
 ]
 Picture = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the result to this PNG file.")]
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """Let each argument of a command that is a dataclass stand for options, one for each of its fields.
+
+    typer makes an option of each argument, and has no groups.
+    """
+    parameters = inspect.signature(command, eval_str=True).parameters.values()
+    groups: dict[str, Any] = {one.name: one.annotation for one in parameters if is_dataclass(one.annotation)}
+    flat: list[Parameter] = []
+    for one in parameters:
+        group = groups.get(one.name)
+        flat += [one] if group is None else inspect.signature(group, eval_str=True).parameters.values()
+
+    @wraps(command)
+    def called(**values: Any) -> None:
+        for name, group in groups.items():
+            values[name] = group(**{field.name: values.pop(field.name) for field in fields(group)})
+        command(**values)
+
+    called.__signature__ = Signature([one.replace(kind=Parameter.KEYWORD_ONLY) for one in flat])  # type: ignore[attr-defined]
+    return called

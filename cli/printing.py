@@ -7,17 +7,18 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-import orjson
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from service.contract import encode
 
 from .contract import Json
 
 
 def print_json(answer: Any) -> None:
     """Print one document in one line, without what a terminal would obey."""
-    sys.stdout.write(escaped(orjson.dumps(answer).decode()) + "\n")
+    sys.stdout.write(escaped(encode(answer).decode()) + "\n")
 
 
 def console() -> Console:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .answering import answering
+from .asking import ask
 from .contract import Json
 from .inputs import read_json, read_map_file
 from .options import AsJson, ScanArgument, Server
@@ -35,8 +35,7 @@ def register(
         body["correspondences"] = read_json(pairs)
     if undirected:
         body["options"] = {"oriented": False}
-    with answering(server) as service:
-        answer = service.ask("register", body)
+    answer = ask("register", body, server)
     if as_json:
         print_json(answer)
         return

@@ -20,13 +20,14 @@ from rich.progress import track
 from linefix.mounted import SPEED, TURN
 from registration import RigidTransform
 
+from .asking import whole_map
 from .contract import Json
 from .errors import CommandError, NoSuchMapError, RefusedError
 from .frames import Frames, odometry_of
-from .inputs import line_map_of, needing_formats, read_map_or_id, whole_map
+from .inputs import line_map_of, needing_formats, read_map_or_id
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
-from .options import AsJson, Server
+from .options import AsJson, Server, grouped
 from .printing import plain, print_json, print_rows, print_table
 from .tracking import Tracker
 
@@ -48,7 +49,7 @@ class Mode(StrEnum):
 
 @dataclass(slots=True)
 class Tally:
-    """What came of the scans so far."""
+    """Counts and poses of the scans so far."""
 
     verdicts: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
@@ -82,28 +83,43 @@ class Tally:
             self.others.append(found.pose)
 
 
-def replay(
-    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
-    on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
-    topic: Topic = None,
-    tf_namespace: TfNamespace = None,
+@dataclass(frozen=True, slots=True)
+class LogChoice:
+    """What to read of a log, as options."""
+
+    topic: Topic = None
+    tf_namespace: TfNamespace = None
+    mount: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y THETA", help="Pose of the laser on the robot, metres and radians."),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class ScanChoice:
+    """Which scans to localize, and how, as options."""
+
     mode: Annotated[
         Mode,
         typer.Option(
             help="track: use odometry from the last usable pose as a prior; global: search each scan on the whole map."
         ),
-    ] = Mode.TRACK,
-    every: Annotated[int, typer.Option(metavar="N", min=1, help="Use each Nth scan.")] = 1,
+    ] = Mode.TRACK
+    every: Annotated[int, typer.Option(metavar="N", min=1, help="Use each Nth scan.")] = 1
+
+
+@grouped
+def replay(
+    log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
+    on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
+    source: LogChoice,
+    scans: ScanChoice,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the usable poses to this file in the TUM format.")
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses red, others grey."),
-    ] = None,
-    mount: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(metavar="X Y THETA", help="Pose of the laser on the robot, metres and radians."),
+        typer.Option(metavar="FILE", help="Draw map and poses to this PNG file: usable poses green, others grey."),
     ] = None,
     server: Server = None,
     as_json: AsJson = False,
@@ -113,14 +129,14 @@ def replay(
     Poses are those of the robot if --mount or the log has the mount of the laser. Otherwise they are those of the
     laser.
     """
-    options = options_of(topic, tf_namespace, mount)
-    told, source = read_map_or_id(on), opened(log, options)
+    options = options_of(source.topic, source.tf_namespace, source.mount)
+    told, opened_log = read_map_or_id(on), opened(log, options)
     tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
     with locating(told, server) as locator:
-        scans = _shown(islice(scans_of(source), 0, None, every), source, every)
+        taken = _shown(islice(scans_of(opened_log), 0, None, scans.every), opened_log, scans.every)
         try:
-            for one, found in located(locator, scans, frames, mode):
+            for one, found in located(locator, taken, frames, scans.mode):
                 tally.take(one.stamp_ns, found)
                 if as_json:
                     print_json(_line(one, found, frames))
@@ -134,7 +150,7 @@ def replay(
         write_tum(tally.usable, out)
     if picture is not None:
         _draw(whole_map(told, server), tally, picture)
-    _tell_log(source, frames, sys.stderr if as_json else sys.stdout)
+    _tell_log(opened_log, frames, sys.stderr if as_json else sys.stdout)
     if not as_json:
         _tell(tally)
     if broken is not None:
@@ -146,7 +162,7 @@ def replay(
 def located(
     locator: Locator, scans: Iterator[LoggedScan], frames: Frames, mode: Mode
 ) -> Iterator[tuple[LoggedScan, Found | RefusedError]]:
-    """Give each scan with where it was taken, or why it is refused.
+    """Yield each scan with its pose, or the reason why it is refused.
 
     In mode track the prior comes from the answers before and odometry.
     """
@@ -175,12 +191,12 @@ def located(
 
 
 def _hopeless(refusals: list[str] | None) -> bool:
-    """Tell whether all scans so far, and some of them, were refused in the same words: it may be for the map."""
+    """Return whether many scans, and all so far, were refused with the same message: the map may be the reason."""
     return refusals is not None and len(refusals) == HOPELESS and len(set(refusals)) == 1
 
 
 def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[LoggedScan]:
-    """Give the scans on, and show how far it is, on a terminal."""
+    """Yield the scans; show the progress on a terminal."""
     total = None if log.count is None else -(-log.count // every)
     where = Console(stderr=True)
     yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
@@ -211,7 +227,7 @@ def _draw(document: Json, tally: Tally, picture: Path) -> None:
 
 
 def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
-    """Say what was taken of the log and what was not, and whose poses are told."""
+    """Print what was read of the log, and whose poses are printed."""
     print_notes(log, where)
     codes = {note.code for note in log.report.assumed}
     if "no_odometry" in codes:

@@ -14,9 +14,10 @@ import typer
 
 from service.work.warmup import warm_up
 
+from .asking import document_at
 from .errors import RefusedError, WrongUseError
-from .grouping import grouped
-from .inputs import document_at, needing_formats
+from .inputs import needing_formats
+from .options import grouped
 
 if TYPE_CHECKING:
     import linefix

@@ -6,8 +6,7 @@ import json
 import math
 from typing import Any
 
-from service.parsing.errors import NotJsonError
-from service.schemas.errors import TooManyError
+from service.contract import NotJsonError, TooManyError
 
 from .contract import Json
 from .errors import RefusedError

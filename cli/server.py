@@ -12,9 +12,7 @@ from typing import Any
 from linefix_client import Client, LinefixError, ProblemError, schema
 from pydantic import TypeAdapter, ValidationError
 
-from service.importing.fields import Fields
-
-from .contract import KEY, Json, Question, id_of
+from .contract import KEY, Fields, Json, Question, id_of
 from .errors import NOTHING, Asked, CommandError, NoServerError, WrongUseError, error_of
 
 SECONDS = 120.0  # to wait for an answer: more than the longest deadline that a service has by default
@@ -91,7 +89,7 @@ class Server:
         return self._answer(schema.MapDocument, Asked(map_id), self._client.get_map, map_id)
 
     def maps(self) -> Iterator[Json]:
-        """Give what is told of each stored map, page by page."""
+        """Yield the summary of each stored map, page by page."""
         cursor: str | None = None
         for _ in range(MAX_PAGES):
             page = self._answer(schema.MapList, NOTHING, self._client.list_maps, cursor=cursor)

@@ -1,4 +1,4 @@
-"""Maps that are stored where a service with the settings of this environment would store them."""
+"""The store of maps that a service with the settings of this environment uses."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from dataclasses import dataclass
 import orjson
 from pydantic import ValidationError
 
-from service.http.problems import problem_of
+from service.contract import InlineMap
 from service.maps import MapStore, Preconditions
+from service.maps.errors import CorruptMapError, StoreError, UnknownMapError
 from service.maps.lookup import outline_of
 from service.parsing.reading import read_map
 from service.settings import Settings
-from service.work.answers import outline_json
 
 from .contract import Json, id_of
-from .errors import NOTHING, Asked, CommandError, RefusedError, WrongUseError, error_of
+from .errors import NoServerError, NoSuchMapError, RefusedError, WrongUseError
+from .inputs import refusing
 
 MAPS_AT_ONCE = 1000
 
@@ -52,11 +53,11 @@ class StoredMaps:
 
     def put(self, map_id: str, document: Json) -> Json:
         """Store a map where a service with these settings would."""
-        with refusing():
+        with refusing(), _reaching(map_id):
             asked, kept = read_map(orjson.dumps(document), self._settings.limits())
             outline = outline_of(asked)
             revision, _ = self._store.put(map_id, kept, outline, Preconditions())
-            return outline_json(map_id, revision, outline)
+            return outline.as_json(map_id, revision)
 
     def get(self, map_id: str) -> Json:
         """Return a stored map."""
@@ -64,23 +65,23 @@ class StoredMaps:
 
     def found(self, map_id: str) -> FoundMap:
         """Return a stored map with its revision."""
-        with refusing(Asked(map_id)):
+        with _reaching(map_id):
             stored = self._store.load(map_id)
             reference = {"map_id": map_id, "revision": stored.record.revision}
             return FoundMap(orjson.loads(stored.document), reference)
 
     def maps(self) -> Iterator[Json]:
-        """Give what is told of each stored map, by id."""
+        """Yield the summary of each stored map, by id."""
         after: str | None = ""
         while after is not None:
-            with refusing():
+            with _reaching():
                 page = self._store.list(MAPS_AT_ONCE, after)
-            yield from (outline_json(one.map_id, one.revision, one.outline) for one in page.maps)
+            yield from (one.outline.as_json(one.map_id, one.revision) for one in page.maps)
             after = page.next
 
     def remove(self, map_id: str) -> None:
         """Remove a stored map."""
-        with refusing(Asked(map_id)):
+        with _reaching(map_id):
             self._store.delete(map_id, Preconditions())
 
 
@@ -103,16 +104,19 @@ def require_size(document: Json) -> None:
         )
 
 
+def require_storable(line_map: InlineMap) -> None:
+    """Raise `InputError` where a map could not be stored."""
+    outline_of(line_map)
+
+
 @contextmanager
-def refusing(asked: Asked = NOTHING) -> Iterator[None]:
-    """Turn what the service would answer as a problem into an error of the command line."""
+def _reaching(map_id: str = "") -> Iterator[None]:
+    """Raise an error of the command line in place of those of the store; `map_id` is what is sought there."""
     try:
         yield
-    except CommandError:
-        raise
-    except Exception as error:
-        problem = problem_of(error)
-        if problem is None:
-            raise
-        faults = [{"pointer": fault.pointer, "message": fault.message} for fault in problem.faults]
-        raise error_of(problem.kind.status, problem.kind.code, problem.detail, faults, asked) from error
+    except UnknownMapError:
+        raise NoSuchMapError(map_id) from None
+    except CorruptMapError as error:
+        raise RefusedError(str(error)) from None
+    except StoreError as error:
+        raise NoServerError(str(error)) from None

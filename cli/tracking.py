@@ -1,4 +1,4 @@
-"""What is known of a pose from the last one and the odometry since: the prior of the next scan."""
+"""The prior of the next scan: the last usable pose and the odometry since."""
 
 from __future__ import annotations
 

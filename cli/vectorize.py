@@ -9,7 +9,7 @@ from typing import Annotated
 import orjson
 import typer
 
-from .answering import answering
+from .asking import ask
 from .contract import Json
 from .options import AsJson, ScanArgument, Server
 from .printing import print_json, print_rows, print_table
@@ -36,8 +36,7 @@ def vectorize(
     sigma = told.get("sigma") if sigma is None else sigma
     if sigma is not None:
         asked["options"] = {"sigma": sigma}
-    with answering(server) as service:
-        answer = service.ask("vectorize", asked)
+    answer = ask("vectorize", asked, server)
     if out is not None:
         out.write_bytes(orjson.dumps(_scan_of(told, answer)) + b"\n")
     if as_json:

@@ -32,7 +32,7 @@ def main() -> int:
     with running_service() as (url, pid):
         print(f"ready at {url} after {time.monotonic() - begun:.1f} s, process {pid}\n")
         stored = call(url, "PUT", "/v1/maps/demo", {"segments": building.endpoints.tolist(), "frame_id": "building"})
-        print(f"PUT /v1/maps/demo: {stored['segments']} segments, revision {stored['revision']}\n")
+        print(f"PUT /v1/maps/demo: {stored['segment_count']} segments, revision {stored['revision']}\n")
         exhibits = [ask(url, case) for case in cases]
     print(f"the service has ended\n\npicture: {_picture(building, exhibits)}")
     wrong = [exhibit.case.title for exhibit in exhibits if exhibit.answer["status"] != exhibit.case.expected]

@@ -17,6 +17,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from formats.colours import AMBIGUOUS, INK, USABLE
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
@@ -31,7 +32,7 @@ DRIFT = np.array([0.02, 0.02, math.radians(1.0)])  # m, m, rad after a metre; st
 MOST_VIEWS = 24
 SHOWN = 6  # pictures at most
 NEARLY = 0.93  # of the best score; places that explain as much are shown
-GREEN, ORANGE, GREY, INK = "#009E73", "#E69F00", "#a9b1ba", "#1b1f24"
+GREEN, ORANGE, GREY = USABLE, AMBIGUOUS, "#a9b1ba"
 
 
 @dataclass(frozen=True)

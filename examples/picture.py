@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from formats.colours import AMBIGUOUS, INK, POINT, UNMATCHED, VERDICTS, verdict_of
 from registration import RigidTransform, Segments
 
 from .building import Case
@@ -22,10 +23,7 @@ from .words import comparison_in_words, equals, verdict_in_words
 matplotlib.use("Agg")
 Floats = NDArray[np.float64]
 
-# Okabe and Ito's colours, told apart by every kind of colour vision; line widths and marks differ as well.
-INK, GREY, MAP = "#1b1f24", "#8a929c", "#a9b1ba"
-BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-COLOURS = {"ok": GREEN, "ambiguous": ORANGE, "degenerate": BLUE, "no_match": VERMILION}
+GREY, MAP = POINT, "#a9b1ba"
 MARGIN = 1.2  # m about what is shown
 
 
@@ -54,10 +52,14 @@ def draw(map_segments: Segments, exhibits: list[Exhibit], path: Path) -> None:
     figure.savefig(path)
 
 
+def _colour_of(answer: dict[str, Any]) -> str:
+    return VERDICTS[verdict_of(answer["status"], usable=answer["usable"])]
+
+
 def _caption(axes: Any, exhibit: Exhibit) -> None:
     """Write case, verdict and truth above the scan."""
     answer = exhibit.answer
-    colour = COLOURS[answer["status"]]
+    colour = _colour_of(answer)
     verdict = axes.annotate(
         f"{answer['status']}, {'usable' if answer['usable'] else 'not usable'}",
         (0.0, 1.0),
@@ -66,7 +68,7 @@ def _caption(axes: Any, exhibit: Exhibit) -> None:
         textcoords="offset points",
         fontsize=13,
         weight="bold",
-        color=INK if colour == ORANGE else "white",
+        color=INK if colour == AMBIGUOUS else "white",
         bbox={"boxstyle": "round,pad=0.35", "facecolor": colour, "edgecolor": "none"},
     )
     axes.annotate(
@@ -88,7 +90,7 @@ def _draw_scan(axes: Any, exhibit: Exhibit, numbers: dict[int, int]) -> None:
         found = i in numbers
         axes.plot(
             *ends.T,
-            color=INK if found else VERMILION,
+            color=INK if found else UNMATCHED,
             lw=2.2 if found else 1.4,
             ls="-" if found else (0, (2, 1.2)),
             zorder=3,
@@ -106,7 +108,7 @@ def _draw_map(axes: Any, map_segments: Segments, exhibit: Exhibit, numbers: dict
     axes.add_collection(LineCollection(list(walls), colors=MAP, linewidths=1.3, zorder=1))
     shown: list[Floats] = []
     points = exhibit.case.scan.points
-    colour = COLOURS[answer["status"]]
+    colour = _colour_of(answer)
     if answer["pose"] is None:
         shown.append(walls.reshape(-1, 2))
     else:
@@ -198,19 +200,22 @@ def _legend(figure: Figure) -> None:
     figure.legend(
         handles=[
             line("map", color=MAP, lw=1.5),
-            line("matched wall, and its number in the scan", color=INK, lw=2.2),
-            line("seen but on no map", color=VERMILION, lw=1.4, ls=(0, (2, 1.2))),
-            line("measured points", color=GREY, marker=".", ls="", markersize=5),
-            line("the same, at the pose answered", color=GREEN, marker=".", ls="", markersize=5),
-            line("robot, as answered", color=GREEN, marker=(3, 0, -90), ls="", markersize=9),
+            line("matched wall, with its number", color=INK, lw=2.2),
+            line("on no map", color=UNMATCHED, lw=1.4, ls=(0, (2, 1.2))),
+            line("measured point", color=GREY, marker=".", ls="", markersize=5),
+            *(
+                line(f"at the pose: {name.replace('_', ' ')}", color=colour, marker=(3, 0, -90), ls="", markersize=9)
+                for name, colour in VERDICTS.items()
+                if name != "no_match"
+            ),
             line("A, B: alternatives", markerfacecolor="white", color=INK, marker=(3, 0, -90), ls="", markersize=9),
             line("truth", color=INK, marker="+", ls="", markersize=11, markeredgewidth=1.6),
         ],
         loc="lower left",
         bbox_to_anchor=(0.008, 0.005),
-        ncols=8,
+        ncols=9,
         frameon=False,
-        fontsize=9.5,
+        fontsize=9,
         handletextpad=0.5,
-        columnspacing=1.6,
+        columnspacing=1.3,
     )

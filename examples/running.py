@@ -38,7 +38,11 @@ def running_service(**settings: object) -> Iterator[tuple[str, int]]:
     port = free_port()
     url = f"http://127.0.0.1:{port}"
     # Settings of the caller's own service have no say here.
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("LINEFIX_")}
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith("LINEFIX_") or name == "LINEFIX_KERNELS"
+    }
     environment |= {f"LINEFIX_{name.upper()}": str(value) for name, value in settings.items()}
     with tempfile.TemporaryDirectory(prefix="linefix-demo-") as folder:
         log = Path(folder) / "log"

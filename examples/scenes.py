@@ -66,7 +66,7 @@ def flat() -> Scene:
     building = FAMILIES["apartments"].draw(rng).build(rng).segments
     return Scene(
         "A flat",
-        "Rooms of different shapes: one place explains the scan.",
+        "Rooms of different shapes. Only one pose explains the scan.",
         building.endpoints,
         np.zeros((0, 4)),
         free_place(building, rng, 0.8),
@@ -81,7 +81,7 @@ def office() -> Scene:
     boxes = [_box(pose.x + 1.1, pose.y - 0.9, 0.6, 0.4, 0.3), _box(pose.x - 1.0, pose.y + 1.2, 0.8, 0.5, -0.2)]
     return Scene(
         "An office",
-        "Furniture that is on no map stands about; the walls are enough.",
+        "The map does not show the furniture. The walls are enough.",
         floor.segments.endpoints,
         np.vstack(boxes),
         RigidTransform(pose.x - 0.2, pose.y + 0.1, 0.6),
@@ -104,8 +104,8 @@ def rooms() -> Scene:
     top = [[b, 2.0, a, 2.0] for a, b in zip(edges[::2], edges[1::2], strict=True)]
     hall = [[-1.0, 0.0, 12.6, 0.0], [12.6, 0.0, 12.6, 2.0], *top[::-1], [-1.0, 2.0, -1.0, 0.0]]
     return Scene(
-        "Look-alike rooms",
-        "Three equal rooms: inside one of them the robot cannot know which. Drag it to the corridor.",
+        "Three equal rooms",
+        "A scan from inside one of three equal rooms fits all of them. Drag the robot to the corridor.",
         np.vstack([*pieces, np.array(hall)]),
         np.zeros((0, 4)),
         RigidTransform(step + 2.6, 4.2, 1.9),
@@ -117,7 +117,7 @@ def plain_corridor() -> Scene:
     """Draw a corridor without ends in sight."""
     return Scene(
         "A corridor",
-        "Two parallel walls: the position along them stays free. Drag the robot to an end.",
+        "Two parallel walls. The position along them is unobservable. Drag the robot to an end.",
         np.vstack([corridor(50.0, 2.4).segments.endpoints, [[25.0, -1.2, 25.0, 1.2]]]),
         np.zeros((0, 4)),
         RigidTransform(-3.0, 0.3, 0.2),
@@ -131,7 +131,7 @@ def warehouse() -> Scene:
     building = FAMILIES["warehouse"].draw(rng).build(rng).segments
     return Scene(
         "A warehouse",
-        "Rack beside rack, each like the next.",
+        "Rows of similar racks.",
         building.endpoints,
         np.zeros((0, 4)),
         free_place(building, rng, 0.8),

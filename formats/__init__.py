@@ -1,5 +1,6 @@
 """Files of other tools in and out: maps, logs, poses. The extra ``linefix[formats]`` brings the libraries."""
 
+from .colours import VERDICTS, rgb, verdict_of
 from .errors import (
     FormatError,
     IncompleteFileError,
@@ -9,20 +10,24 @@ from .errors import (
     UnsupportedFormatError,
     UprightFrameError,
 )
-from .line_map import ImportedMap, LineMap
+from .line_map import GridPicture, ImportedMap, LineMap
 from .logs.scan import UNUSABLE, Log, LoggedScan, LogOptions
+from .logs.sending import scan_json
 from .maps import MAP_SUFFIXES, map_of_grid, read_map
 from .options import ImportOptions
 from .picture import PlaceMark, draw_map
 from .poses import StampedPose, pose_message, write_tum
-from .recordings import read_log
+from .recordings import LOG_SUFFIXES, read_log
 from .report import ImportReport, Note
 from .writing import write_map
 
 __all__ = [
+    "LOG_SUFFIXES",
     "MAP_SUFFIXES",
     "UNUSABLE",
+    "VERDICTS",
     "FormatError",
+    "GridPicture",
     "ImportOptions",
     "ImportReport",
     "ImportedMap",
@@ -44,6 +49,9 @@ __all__ = [
     "pose_message",
     "read_log",
     "read_map",
+    "rgb",
+    "scan_json",
+    "verdict_of",
     "write_map",
     "write_tum",
 ]

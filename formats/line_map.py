@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from registration import Segments
+import numpy as np
+from numpy.typing import NDArray
+
+from registration import RigidTransform, Segments
 
 from .report import ImportReport
 
@@ -33,6 +36,25 @@ class LineMap:
     meta: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class GridPicture:
+    """A grid as a picture.
+
+    Attributes
+    ----------
+    pixels : (rows, columns) uint8
+        0 occupied to 255 free; unknown cells are 205, as map_saver writes them. Row 0 is the highest.
+    pose : RigidTransform
+        map_from_picture: of the lower left corner.
+    resolution : float
+        Edge of a pixel, metres.
+    """
+
+    pixels: NDArray[np.uint8]
+    pose: RigidTransform
+    resolution: float
+
+
 @dataclass(frozen=True, slots=True)
 class ImportedMap:
     """A map of another tool's, and what was done to make it.
@@ -41,7 +63,10 @@ class ImportedMap:
     ----------
     map : LineMap
     report : ImportReport
+    picture : GridPicture or None
+        Of the grid that the map comes from; None for a drawing.
     """
 
     map: LineMap
     report: ImportReport
+    picture: GridPicture | None = None

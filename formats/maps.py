@@ -15,7 +15,7 @@ from .drawings.tables import read_csv, read_json
 from .drawings.walls import to_map
 from .errors import MalformedFileError, UnsupportedFormatError
 from .files import name_of
-from .grids.cells import Grid
+from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
 from .line_map import ImportedMap, LineMap
@@ -83,7 +83,7 @@ def _read_map_server(file: Path, options: ImportOptions, pictures: Mapping[str, 
     notes = Notes()
     grid, files = read_grid(file, options, notes, pictures)
     line_map = _from_grid(grid, notes, files[0], "map")
-    return ImportedMap(line_map, notes.report("map_server", files))
+    return ImportedMap(line_map, notes.report("map_server", files), picture_of(grid))
 
 
 def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
@@ -98,7 +98,7 @@ def _read_bag(file: Path, options: ImportOptions) -> ImportedMap:
             f"{error.message}; {found.topic} is a costmap, in which obstacles are inflated: name the topic of the map",
             argument=name,
         ) from error
-    return ImportedMap(line_map, notes.report(found.format, (name,)))
+    return ImportedMap(line_map, notes.report(found.format, (name,)), picture_of(found.grid))
 
 
 def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
@@ -118,7 +118,7 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
     """
     notes = Notes()
     grid, frame = grid_of(message, name, notes)
-    return ImportedMap(_from_grid(grid, notes, name, frame), notes.report("occupancy_grid", (name,)))
+    return ImportedMap(_from_grid(grid, notes, name, frame), notes.report("occupancy_grid", (name,)), picture_of(grid))
 
 
 def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:

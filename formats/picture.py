@@ -11,10 +11,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from registration import RigidTransform
 
+from .colours import INK, MATCHED, POINT, USABLE, VERDICTS, WALL, rgb
 from .errors import UnsupportedFormatError
 from .line_map import LineMap
 
@@ -22,8 +23,10 @@ SIZE = 1600  # pixels of the longer edge
 MARGIN = 20  # pixels
 TICK = 10.0  # pixels; towards the free side
 MARK = 5.0  # pixels; of a pose
-WALL, FREE_SIDE, PAPER = (20, 20, 20), (30, 140, 60), (255, 255, 255)
-PATH, DOUBTFUL = (200, 40, 40), (150, 150, 150)
+STRIP = 60  # pixels; below the map, for the scale and the legend
+LETTERS = 22  # pixels; height of the text
+LEAST_BAR = 120  # pixels; of the scale
+PAPER = (255, 255, 255)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +46,9 @@ def draw_map(
     doubtful: Iterable[RigidTransform] = (),
     marks: Iterable[PlaceMark] = (),
 ) -> None:
-    """Draw a map as PNG: walls in black, a green tick on the free side of each, poses in red, doubtful ones in grey.
+    """Draw a map as PNG: walls in grey, a blue tick on the free side of each, poses in green, doubtful ones in grey.
 
-    Marks are painted below all that.
+    Marks are painted below all that. The strip below the map has the scale and a legend of what is drawn.
 
     Parameters
     ----------
@@ -69,8 +72,9 @@ def draw_map(
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = (SIZE - 2 * MARGIN) / max(float((high - low).max()), 1.0)
     width, height = (max(1, math.ceil(float(v) * scale)) + 2 * MARGIN for v in high - low)
-    picture = Image.new("RGB", (width, height), PAPER)
+    picture = Image.new("RGB", (max(width, SIZE), height + STRIP), PAPER)
     draw = ImageDraw.Draw(picture)
+    marks, poses, doubtful = list(marks), list(poses), list(doubtful)
 
     def place(x: float, y: float) -> tuple[float, float]:
         return MARGIN + (x - float(low[0])) * scale, height - MARGIN - (y - float(low[1])) * scale
@@ -82,13 +86,36 @@ def draw_map(
     for (x1, y1, x2, y2), (mx, my), (nx, ny) in zip(
         map.segments.endpoints, map.segments.midpoints, map.segments.normals, strict=True
     ):
-        draw.line([place(x1, y1), place(x2, y2)], fill=WALL, width=2)
+        draw.line([place(x1, y1), place(x2, y2)], fill=rgb(WALL), width=2)
         if map.oriented:
             x, y = place(mx, my)
-            draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=FREE_SIDE, width=2)
-    for pose, colour in [*((pose, DOUBTFUL) for pose in doubtful), *((pose, PATH) for pose in poses)]:
+            draw.line([(x, y), (x + TICK * nx, y - TICK * ny)], fill=rgb(MATCHED), width=2)
+    for pose, colour in [*((pose, rgb(POINT)) for pose in doubtful), *((pose, rgb(USABLE)) for pose in poses)]:
         x, y = place(pose.x, pose.y)
         tip = x + 2 * MARK * math.cos(pose.theta), y - 2 * MARK * math.sin(pose.theta)
         draw.ellipse([x - MARK / 2, y - MARK / 2, x + MARK / 2, y + MARK / 2], fill=colour)
         draw.line([(x, y), tip], fill=colour, width=1)
+    entries = [("wall", rgb(WALL))] + [("free side", rgb(MATCHED))] * map.oriented
+    entries += [("usable pose", rgb(USABLE))] * bool(poses) + [("pose that is not usable", rgb(POINT))] * bool(doubtful)
+    painted = {mark.colour for mark in marks}
+    entries += [(name.replace("_", " "), rgb(one)) for name, one in VERDICTS.items() if rgb(one) in painted]
+    _annotate(draw, height, scale, entries)
     picture.save(path, format="PNG")
+
+
+def _annotate(
+    draw: ImageDraw.ImageDraw, top: float, scale: float, entries: Iterable[tuple[str, tuple[int, int, int]]]
+) -> None:
+    """Draw the scale and a legend of names and colours; `top` of the strip in pixels, `scale` in pixels per metre."""
+    font = ImageFont.load_default(LETTERS)
+    metres = 10.0 ** math.floor(math.log10(LEAST_BAR / scale))
+    metres *= next(one for one in (1, 2, 5, 10) if one * metres * scale >= LEAST_BAR)
+    x, y = float(MARGIN), top + 0.5 * STRIP
+    draw.line([(x, y - 6), (x, y), (x + metres * scale, y), (x + metres * scale, y - 6)], fill=rgb(INK), width=3)
+    x += metres * scale + 12
+    for text, colour in [(f"{metres:g} m", None), *entries]:
+        if colour is not None:
+            draw.rectangle([x, y - 6, x + 26, y + 6], fill=colour)
+            x += 34
+        draw.text((x, y), text, fill=rgb(INK), font=font, anchor="lm")
+        x += draw.textlength(text, font=font) + 28

@@ -13,6 +13,8 @@ from .logs.ros import read_bag
 from .logs.scan import Log, LogOptions
 
 TEXTS = (".log", ".clf", ".carmen")
+LOG_SUFFIXES = (*SUFFIXES, *TEXTS)
+"""Of files that `read_log` reads."""
 DEFAULT_OPTIONS = LogOptions()
 
 
@@ -40,7 +42,7 @@ def read_log(path: str | os.PathLike[str], options: LogOptions = DEFAULT_OPTIONS
         return read_bag(file, options)
     if file.suffix.lower() in TEXTS:
         return read_carmen(file, options)
-    known = ", ".join((*SUFFIXES, *TEXTS))
+    known = ", ".join(LOG_SUFFIXES)
     raise UnsupportedFormatError(
         f"expected the folder of a bag, or a file that ends in one of {known}", argument=name_of(file)
     )

@@ -42,6 +42,7 @@ from registration import (
 )
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
+from .checking import CheckedMap, check
 from .locating import index_map, locate, scan_of
 from .mounted import MountedScan, view_of
 
@@ -54,6 +55,7 @@ __all__ = [
     "AssociationOptions",
     "AssociationResult",
     "Beams",
+    "CheckedMap",
     "Deadline",
     "HardPrior",
     "ImportOptions",
@@ -77,6 +79,7 @@ __all__ = [
     "View",
     "assemble",
     "associate",
+    "check",
     "draw_map",
     "index_map",
     "locate",

@@ -1,1 +1,38 @@
-"""What is doubtful in a map, and where on it localization fails."""
+"""What is doubtful in a map, and where on it a robot would fail to localize.
+
+`check` looks at a map by itself and with sample scans taken in it; `analyze` puts a virtual scanner on a grid of poses
+and searches each of its scans in the map. Both call the search as a program would; a finding never changes an answer.
+"""
+
+from .analyze.analyze import Analysis, PlaceVerdict
+from .analyze.standing import Standing, standing_places
+from .check.check import check_map
+from .check.judging import judge_samples
+from .check.result import Advice, Finding, FindingCode, MapCheck, Place, SampleReport, Size
+from .check.samples import Sample, try_sample
+from .check.thickness import conclude, find_thickness, fit_better_mirrored, thickness_finding
+from .views import AnalysisError, Robot
+
+__all__ = [
+    "Advice",
+    "Analysis",
+    "AnalysisError",
+    "Finding",
+    "FindingCode",
+    "MapCheck",
+    "Place",
+    "PlaceVerdict",
+    "Robot",
+    "Sample",
+    "SampleReport",
+    "Size",
+    "Standing",
+    "check_map",
+    "conclude",
+    "find_thickness",
+    "fit_better_mirrored",
+    "judge_samples",
+    "standing_places",
+    "thickness_finding",
+    "try_sample",
+]

@@ -3,16 +3,19 @@
 ::
 
     node              Node: the main loop between messages and searches
-    options           what the node is told; names of topics and frames
+    options, names    options of the node; names of topics and frames
     connecting        the DDS domain, within the range that the variables of ROS allow
     topics, wire      all topics; readers, writers and their quality of service
+    discovery         which endpoints others have on a topic
     messages          the messages, byte for byte as ROS has them
-    frames            the tree of frames, and where a laser is mounted
+    frames            the tree of frames
+    transforms        a transform, checked; where a laser is mounted
     odometry          the motion of the robot between two times
     gathering         scans of several scanners that belong together
     locating          one scan to the robot's pose
     searching         the thread of the searches
     map_conversion    an OccupancyGrid to a map, in a process of its own
+    localization      results of scans to what is published of the pose
     agreement         several scans that agree through odometry
     deciding          when initialpose is published
     watching          whether the localizer of the robot agrees
@@ -20,12 +23,13 @@
     health, silence   diagnostics, status, log; why nothing happens
     requests          requests with an id, and their results
     reporting         results as messages
-    tuning, text      limits and thresholds; text from outside
+    tuning            limits and thresholds
 """
 
 from .connecting import ConnectionRefusedError, domain_of
+from .names import OptionError, checked_namespace, namespace_of, remapping_of
 from .node import Node
-from .options import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
+from .options import NodeOptions
 
 __all__ = [
     "ConnectionRefusedError",

@@ -1,4 +1,4 @@
-"""Several scans that agree through odometry: only then is a robot told where it is. No DDS in here.
+"""Several scans that agree through odometry: only their pose is published. No DDS in here.
 
 The state is a list of hypotheses, each a pose of the robot in the map that odometry carries along:
 
@@ -47,7 +47,7 @@ HERE = RigidTransform(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """What one scan says about the pose of the robot.
+    """The result of one scan, and odometry at its time.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ def chi_square(a: RigidTransform, b: RigidTransform, covariance: Floats) -> floa
 
 
 def _verdict(begin: Observation, scan: Observation) -> bool | None:
-    """Return whether a scan agrees with what odometry predicts; None where it says nothing about it."""
+    """Return whether a scan agrees with what odometry predicts; None where that is undecided."""
     step = step_between(begin, scan)
     if step is None or scan.pose is None:
         return None

@@ -14,16 +14,16 @@ LOCALHOST = (
     "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"
     '<Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
-NOBODY = (
+ISOLATED = (
     "<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast></General><Discovery>"
     "<ParticipantIndex>none</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
-RANGES = {"": "", "SUBNET": "", "SYSTEM_DEFAULT": "", "NOT_SET": "", "LOCALHOST": LOCALHOST, "OFF": NOBODY}
+RANGES = {"": "", "SUBNET": "", "SYSTEM_DEFAULT": "", "NOT_SET": "", "LOCALHOST": LOCALHOST, "OFF": ISOLATED}
 MOST_DOMAIN = 232
 
 
 class ConnectionRefusedError(ValueError):
-    """The variables of the environment do not describe a connection; the message says which, and what to do."""
+    """The variables of the environment do not describe a connection; the message names it and the remedy."""
 
 
 def domain_of(environment: Mapping[str, str]) -> int:

@@ -29,7 +29,7 @@ class InitialPose:
         return self._wanted
 
     def want(self) -> None:
-        """Publish the next agreed pose: somebody requested it, or subscribed."""
+        """Publish the next agreed pose, after a request or a new subscription."""
         self._wanted = True
 
     def decide(self, event: Event, *, localizer_agrees: bool | None, lost: bool, now: float) -> str | None:

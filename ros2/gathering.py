@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 
 from registration import InputError
 
-from .frames import FrameError, Frames, Mount
+from .frames import Frames
 from .looking import Look, look_of
 from .messages import LaserScan
+from .names import MAX_NAME, quoted
 from .odometry import OdometryHistory, nanoseconds
 from .options import NodeOptions
-from .text import MAX_NAME, quoted
+from .transforms import FrameError, Mount
 
 
 @dataclass(slots=True)

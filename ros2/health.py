@@ -9,6 +9,7 @@ from enum import StrEnum
 
 from .messages import DiagnosticArray, DiagnosticStatus, Header, Time
 from .reporting import ERROR, OK, WARN, status_of
+from .transforms import NS
 from .tuning import LOG_SECONDS, REPEAT_SECONDS
 from .wire import Publisher
 
@@ -16,7 +17,7 @@ MOST_PROBLEMS = 100  # different ones that are remembered
 
 
 class State(StrEnum):
-    """What the node knows."""
+    """The state of the node."""
 
     NO_MAP = "no_map"
     NO_SCAN = "no_scan"
@@ -26,7 +27,7 @@ class State(StrEnum):
     LOST = "lost"
 
 
-SAID = {
+STATES = {
     State.NO_MAP: (WARN, "no map has been published"),
     State.NO_SCAN: (WARN, "no scan can be searched"),
     State.SEARCHING: (WARN, "no pose is agreed yet"),
@@ -34,6 +35,12 @@ SAID = {
     State.CONTRADICTED: (ERROR, "the agreed pose is contradicted by the last scans"),
     State.LOST: (ERROR, "the pose of the localizer differs from that of the scans"),
 }
+
+
+def current_time() -> Time:
+    """Return the time of the clock."""
+    now = time.time_ns()
+    return Time(now // NS, now % NS)
 
 
 @dataclass(slots=True)
@@ -93,12 +100,12 @@ class Health:
             return
         self._beat = now
         values = {"state": state.value, **values}
-        self.publish("localization", stamp, SAID[state], values)
+        self.publish("localization", stamp, STATES[state], values)
         prefix, hardware_id = self.names
-        self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, SAID[state], values))
+        self.status.publish(status_of(f"{prefix}linefix: localization", hardware_id, STATES[state], values))
         if changed:
             self._state = state
-            self.log(f"state {state.value}: {SAID[state][1]}")
+            self.log(f"state {state.value}: {STATES[state][1]}")
 
 
 def _is_new(times: dict[str, float], text: str, now: float, seconds: float) -> bool:

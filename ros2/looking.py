@@ -15,10 +15,10 @@ from formats.report import Notes
 from linefix.mounted import motion_warning
 from registration import RigidTransform
 
-from .frames import FrameError, Mount
 from .messages import LaserScan, Time
+from .names import quoted
 from .odometry import OdometryHistory, Speed, nanoseconds
-from .text import quoted
+from .transforms import FrameError, Mount
 
 HERE = RigidTransform(0.0, 0.0, 0.0)
 
@@ -82,7 +82,7 @@ def look_of(
     InputError
         When it is no scan, or the scanner turned nearly as fast as it scans.
     FrameError
-        When no range says anything.
+        When no range is valid.
     """
     notes = Notes()
     laser, increment = laser_of(message, notes), time_increment_of(message, notes) if motion else 0.0
@@ -96,16 +96,16 @@ def look_of(
     laser = laser if speed is None else replace(laser, motion=motion_of(increment, mount, speed))
     header, place = message.header, mount.base_from_laser
     look = Look(header.stamp, header.frame_id, laser, increment, place, mount.flipped, base_from_then)
-    told = {note.code: note.message for note in notes.assumed.values()}
+    problems = {note.code: note.message for note in notes.assumed.values()}
     if not mount.level:
-        told["tilted"] = (
+        problems["tilted"] = (
             f"the scan plane is tilted by {math.degrees(mount.tilt):.0f} degrees, "
             "expected a horizontal plane; ranges are used without correction"
         )
     moving = motion_warning(look)
     if moving is not None:
-        told[moving.code] = moving.message
-    return replace(look, notes=told)
+        problems[moving.code] = moving.message
+    return replace(look, notes=problems)
 
 
 def motion_of(time_increment: float, mount: Mount, speed: Speed) -> linefix.Motion:

@@ -24,7 +24,7 @@ import numpy as np
 import linefix
 
 from .messages import Header, MapMetaData, OccupancyGrid, SerializedGrid
-from .text import MAX_NAME
+from .names import MAX_NAME
 from .tuning import CONVERSION_BYTES, CONVERSION_IDLE, CONVERSION_PATIENCE, CONVERSION_SECONDS, MAX_GRID_BYTES
 
 

@@ -1,10 +1,15 @@
-"""The messages of ROS 2 that the bridge hears and sends, as DDS has them: names of types end in ``dds_::Name_``."""
+"""The messages of ROS 2 that the node receives and publishes, as in DDS: names of types end in ``dds_::Name_``."""
 
 # Annotations are read while the program runs, so they are no strings here.
 from dataclasses import dataclass, field
 
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, byte, float32, float64, int8, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import array, float32, float64, int8, int32, sequence, uint8, uint32
+
+try:
+    from cyclonedds.idl.types import byte
+except ImportError:  # Cyclone DDS before 11; both are one byte
+    byte = uint8
 
 
 def _type(package: str, name: str) -> str:

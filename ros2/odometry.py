@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from registration import RigidTransform
 
-from .frames import NS, matrix_of, planar
 from .messages import Odometry, Time
+from .transforms import NS, matrix_of, planar
 from .tuning import CLOCK_BACK_NS, MAX_SPEED, MAX_TURN_RATE, STALE_NS
 
 KEPT = 2000  # messages; 20 s at 100 Hz
@@ -39,7 +39,7 @@ def nanoseconds(stamp: Time) -> int:
 
 
 class OdometryHistory:
-    """Poses and speeds of the robot in its odometry frame, of late.
+    """The newest poses and speeds of the robot in its odometry frame.
 
     Attributes
     ----------

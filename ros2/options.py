@@ -1,22 +1,15 @@
-"""What the node is told: topics, frames, when a pose is published; and how names of topics are resolved."""
+"""The options of the node: topics, frames, when a pose is published."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from .text import MAX_NAME
+from .names import absolute_name
 
 When = Literal["start", "lost", "always"]
-
-_NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
-
-
-class OptionError(ValueError):
-    """An option cannot be used; the message names it, what was found, and what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,51 +95,3 @@ class NodeOptions:
         base = self.base_frame.strip("/")
         prefixed = bool(self.prefix) and frame.startswith(self.prefix)
         return f"{self.prefix}{base}" if prefixed and not base.startswith(self.prefix) else base
-
-
-def namespace_of(scans: Sequence[str]) -> str:
-    """Return the namespace that absolute topics of scans have: ``/robot1`` for ``/robot1/scan``, else empty."""
-    above = scans[0].rpartition("/")[0] if scans and scans[0].startswith("/") else ""
-    return above.rstrip("/")
-
-
-def absolute_name(name: str, namespace: str) -> str:
-    """Return a topic's name with its namespace, as ROS expands it; ``~/`` stands for the node ``linefix``.
-
-    Raises
-    ------
-    OptionError
-        When it is no name of a topic.
-    """
-    if not _NAME.fullmatch(name.replace("~/", "~", 1)) or len(name) > MAX_NAME:
-        raise OptionError(f"found the topic {name[:80]!r}, expected a name such as /robot1/scan")
-    if name.startswith("/"):
-        return name
-    inner = f"linefix/{name[2:]}" if name.startswith("~/") else name
-    return f"{namespace}/{inner}"
-
-
-def checked_namespace(namespace: str) -> str:
-    """Return a namespace as ``/robot1``, or empty for the root.
-
-    Raises
-    ------
-    OptionError
-        When it is none.
-    """
-    inner = namespace.strip("/")
-    return absolute_name(f"/{inner}", "") if inner else ""
-
-
-def remapping_of(rule: str) -> tuple[str, str]:
-    """Return both names of a remapping, ``from:=to``.
-
-    Raises
-    ------
-    OptionError
-        When it is none.
-    """
-    begin, found, end = rule.partition(":=")
-    if not found or not begin or not end:
-        raise OptionError(f"found the remapping {rule[:80]!r}, expected FROM:=TO, such as scan:=/front/scan")
-    return begin, end

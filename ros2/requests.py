@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass, field
 
 from .messages import DiagnosticStatus, PoseWithCovarianceStamped, String
+from .names import MAX_NAME
 from .reporting import ERROR, OK, status_of
-from .text import MAX_NAME
 from .tuning import RESULT_SECONDS
 from .wire import Publisher, Subscription
 

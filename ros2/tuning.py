@@ -42,7 +42,7 @@ TURNED = math.radians(30.0)  # between the scans that agree, or
 RESTED_NS = 5_000_000_000  # ns at rest
 FORGOTTEN_NS = 60_000_000_000  # ns after which a hypothesis without support is dropped
 MAX_HYPOTHESES = 20
-INCONCLUSIVE_NATS = 10.0  # a pose that is not listed explains the scan worse by at least so much, or nothing is said
+INCONCLUSIVE_NATS = 10.0  # a scan decides only if poses that are not listed score lower by at least this
 
 # What is published, and when.
 LOCALIZER_SIGMA = 0.1  # m; how far a localizer that is right may be off besides its own covariance,

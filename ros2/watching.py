@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from registration import RigidTransform
 
 from .agreement import Observation, chi_square
-from .frames import Frames, matrix_of, planar
+from .frames import Frames
 from .messages import PoseWithCovarianceStamped
 from .odometry import OdometryHistory, nanoseconds
+from .transforms import matrix_of, planar
 from .tuning import (
     AGREEING_CHI_SQUARE,
     LOCALIZER_SIGMA,

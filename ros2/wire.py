@@ -15,6 +15,8 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from .discovery import Endpoints
+
 Message = TypeVar("Message", bound=IdlStruct)
 
 MOST = 200  # messages that are taken from a reader at a time
@@ -74,6 +76,7 @@ class Subscription(Generic[Message]):
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name, self.problem = name, problem
         self.readers: list[Any] = [DataReader(participant, topic, qos=profile) for profile in profiles]
+        self._writers = Endpoints(participant, topic_name(name), profiles, writers=True)
 
     def take(self) -> Sequence[Message]:
         """Return the messages that came since the last call, oldest first, at most `MOST` of each reader."""
@@ -82,12 +85,12 @@ class Subscription(Generic[Message]):
     @property
     def publishers(self) -> int:
         """How many publishers are connected."""
-        return max(len(reader.get_matched_publications()) for reader in self.readers)
+        return len(self._writers.connected)
 
     @property
     def incompatible(self) -> bool:
         """Whether there are publishers whose quality of service fits none of the readers."""
-        return all(reader.get_requested_incompatible_qos_status().total_count > 0 for reader in self.readers)
+        return self._writers.incompatible
 
     def _taken(self, reader: Any) -> list[Message]:
         found: list[Message] = []
@@ -113,7 +116,8 @@ class Publisher(Generic[Message]):
         topic: Any = Topic(participant, topic_name(name), kind)
         self.name = name
         self._writer: Any = DataWriter(participant, topic, qos=quality)
-        self._known: frozenset[int] = frozenset()
+        self._readers = Endpoints(participant, topic_name(name), [quality], writers=False)
+        self._known: frozenset[Any] = frozenset()
 
     def publish(self, message: Message) -> None:
         """Publish a message."""
@@ -122,16 +126,16 @@ class Publisher(Generic[Message]):
     @property
     def incompatible(self) -> bool:
         """Whether there are subscribers whose quality of service does not fit."""
-        return bool(self._writer.get_offered_incompatible_qos_status().total_count > 0)
+        return self._readers.incompatible
 
     @property
     def subscribed(self) -> bool:
-        """Whether somebody is subscribed."""
-        return bool(self._writer.get_matched_subscriptions())
+        """Whether there is a subscriber."""
+        return bool(self._readers.connected)
 
     def joined(self) -> bool:
-        """Return whether somebody subscribed since the last call."""
-        known, self._known = self._known, frozenset(self._writer.get_matched_subscriptions())
+        """Return whether there is a new subscriber since the last call."""
+        known, self._known = self._known, self._readers.connected
         return bool(self._known - known)
 
 

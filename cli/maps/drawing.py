@@ -1,15 +1,17 @@
-"""``linefix map draw``: a picture of a map."""
+"""``linefix map draw``: maps to pictures, and to the files of other tools."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
+import orjson
 import typer
 
-from ..inputs import document_at, line_map_of, needing_formats
+from ..asking import document_at
+from ..contract import Json
+from ..inputs import line_map_of, needing_formats
 from ..options import MapArgument, Server
-from .files import write_document
 
 
 def draw(
@@ -17,7 +19,7 @@ def draw(
     out: Annotated[Path, typer.Option(metavar="FILE", help="File to write: png, svg, dxf, geojson, csv or json.")],
     server: Server = None,
 ) -> None:
-    """Draw a map: walls in black, a green tick on the free side of each."""
+    """Draw a map: walls in grey, a blue tick on the free side of each."""
     document = document_at(on, server)
     if out.suffix.lower() != ".png":
         write_document(document, out)
@@ -26,3 +28,20 @@ def draw(
         from formats import draw_map
 
         draw_map(line_map_of(document), out)
+
+
+def write_document(document: Json, out: Path) -> None:
+    """Write a map in the format of the file's name.
+
+    Raises
+    ------
+    RefusedError
+        When it has another, or the extra ``[formats]`` is missing.
+    """
+    if out.suffix.lower() == ".json":
+        out.write_bytes(orjson.dumps(document) + b"\n")
+        return
+    with needing_formats(f"writing {out.name}"):
+        from formats import write_map
+
+        write_map(line_map_of(document), out)

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from service.importing.fields import Fields
-
-from ..answering import answering
-from ..contract import Json
-from ..errors import WrongUseError
-from ..grouping import grouped
-from ..inputs import line_map_of, needing_formats
-from ..options import AsJson, Picture, Server
+from .. import here
+from ..asking import server_at
+from ..contract import Fields, Json
+from ..errors import Asked, WrongUseError
+from ..inputs import line_map_of, needing_formats, refusing
+from ..options import AsJson, Picture, Server, grouped
 from ..printing import noted, print_json, print_rows
 from .checking import check_rows, samples_of
-from .files import write_document
+from .drawing import write_document
+
+if TYPE_CHECKING:
+    from formats import ImportOptions
 
 IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
 
@@ -64,6 +66,27 @@ class SaidOfFile:
             metavar="GREY", help="Grey value of unknown cells in a picture, 0 to 255, or none. Default: detected."
         ),
     ] = None
+
+    @property
+    def options(self) -> ImportOptions:
+        """The same for `formats`; raises `InputError` where a value is out of its range."""
+        from formats import ImportOptions
+
+        unknown: Any = int(self.unknown) if self.unknown and self.unknown.isdecimal() else self.unknown
+        layers = tuple(name.strip() for one in self.layers or () for name in one.split(",") if name.strip())
+        drawn, directions = cast("Any", self.drawn), cast("Any", self.directions)
+        inside = (self.point,) if self.point else ()
+        return ImportOptions(
+            _units(self.units),
+            layers,
+            drawn,
+            self.thickness,
+            inside,
+            directions,
+            self.local_metres,
+            self.topic,
+            unknown,
+        )
 
     @property
     def fields(self) -> Fields:
@@ -111,9 +134,9 @@ def import_map(
         raise WrongUseError(
             "--log: not possible with --server; leave --server out, and store the map with linefix map put afterwards"
         )
-    answer = imported(file, said.fields, server)
+    answer = imported(file, said, server)
     if log is not None:
-        answer = beside_log(answer, file, said.fields, log)
+        answer = beside_log(answer, file, said, log)
     if out is not None:
         write_document(answer["map"], out)
     if picture is not None:
@@ -127,7 +150,7 @@ def import_map(
         print_rows([*report_rows(answer), *check_rows(answer["check"])])
 
 
-def imported(file: Path, fields: Fields, server: str | None) -> Json:
+def imported(file: Path, said: SaidOfFile, server: str | None) -> Json:
     """Return what ``/v1/maps:import`` answers to a file.
 
     Raises
@@ -137,39 +160,36 @@ def imported(file: Path, fields: Fields, server: str | None) -> Json:
     """
     if not file.exists():
         raise WrongUseError(f"{file}: there is no such file")
-    files = [file] if server is None else _with_what_it_names(file)
-    with answering(server) as service:
-        return service.import_map(files, fields)
+    if server is None:
+        with needing_formats(f"reading {file.name}"), refusing(Asked(files=(file.name,))):
+            options = said.options
+        return here.import_map(file, options)
+    with closing(server_at(server)) as remote:
+        return remote.import_map(_with_what_it_names(file), said.fields)
 
 
-def beside_log(answer: Json, file: Path, fields: Fields, log: Path) -> Json:
-    """Check what was imported beside some scans of a log, and import it again where walls are thicker than assumed.
+def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
+    """Check an imported map with some scans of a log; import it again where walls are thicker than assumed.
 
     Returns
     -------
     dict
-        As of `imported`; ``check`` tells of the scans too.
+        As of `imported`; ``check`` has the scans too.
     """
     scans = samples_of(log, None)
-    checked = _checked(answer["map"], scans)
+    checked = here.check(answer["map"], [], scans)
     thicker, line_map = checked["samples"]["wall_thickness"], answer["map"]
     drawn = float(line_map["meta"].get("thickness", 0.0)) if line_map["oriented"] else 0.0
     made_of_centres = "thickness" in line_map["meta"] or not line_map["oriented"]
-    said = "thickness" in fields or fields.get("drawn") == ["faces"]
-    if thicker is None or not made_of_centres or said:
+    if thicker is None or not made_of_centres or said.thickness is not None or said.drawn == "faces":
         return {**answer, "check": checked}
     thickness = f"{max(0.0, drawn + thicker):.2f}"
-    again = imported(file, {**fields, "drawn": ["centres"], "thickness": [thickness]}, None)
+    again = imported(file, replace(said, drawn="centres", thickness=float(thickness)), None)
     message = f"walls are {thickness} m thick, estimated from scans of {log.name}"
     kept = [note for note in again["report"]["assumed"] if note["code"] != "thickness_given"]
     found = {"code": "thickness_found", "message": message, "count": 0}
     again["report"]["assumed"] = [*kept, found]
-    return {**again, "check": _checked(again["map"], scans)}
-
-
-def _checked(line_map: Json, scans: list[Json]) -> Json:
-    with answering(None) as service:
-        return service.check(line_map, {"scans": scans})
+    return {**again, "check": here.check(again["map"], [], scans)}
 
 
 def _with_what_it_names(file: Path) -> list[Path]:
@@ -181,6 +201,14 @@ def _with_what_it_names(file: Path) -> list[Path]:
     named = IMAGE.search(file.read_text(encoding="utf-8-sig", errors="replace"))
     picture = file.with_name(named[1]) if named else file
     return [file, picture] if named and picture.is_file() else [file]
+
+
+def _units(text: str | None) -> str | float | None:
+    """Return metres per unit where the text is a number, else the name of a unit."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
 
 
 def report_rows(answer: Json) -> list[tuple[str, str]]:

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
+from ..asking import keeping
 from ..errors import WrongUseError
 from ..inputs import MAP_ID, read_map_file
-from ..keeping import keeping
 from ..options import AsJson, Server
 from ..printing import print_json, print_rows, print_table
-from .files import write_document
+from .drawing import write_document
 
 MapId = Annotated[str, typer.Argument(metavar="ID", help="Id of the map: 1 to 128 of A-Z a-z 0-9 . _ -")]
 

@@ -22,7 +22,7 @@ PAGES = {
     "vectorize": ("POST /v1/vectorize",),
     "maps": ("PUT /v1/maps/{map_id}", "GET /v1/maps/{map_id}", "DELETE /v1/maps/{map_id}", "GET /v1/maps"),
     "check": ("GET /v1/maps/{map_id}:check", "POST /v1/maps/{map_id}:check"),
-    "import": ("POST /v1/maps:import",),
+    "import": ("POST /v1/maps:import", "POST /v1/scans:import"),
     "analyze": ("POST /v1/maps/{map_id}:analyze", "POST /v1/analyze"),
     "operations": ("GET /v1/limits", "GET /version", "GET /livez", "GET /readyz", "GET /metrics"),
 }

@@ -1,4 +1,4 @@
-"""Start Linefix beside Nav2; on a machine with ROS 2: ``ros2 launch linefix.launch.py map:=/maps/hq.yaml``.
+"""Start Linefix next to Nav2; on a machine with ROS 2: ``ros2 launch linefix.launch.py map:=/maps/hq.yaml``.
 
 `linefix` has to be on the PATH, installed with ``linefix[formats,ros2]`` in an environment of its own: nothing of
 ROS is needed there. Every option of ``linefix ros2`` can stand in the file of parameters; the arguments below are

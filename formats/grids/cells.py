@@ -10,11 +10,13 @@ from scipy import ndimage
 
 from registration import RigidTransform
 
+from ..line_map import GridPicture
 from ..report import Notes
 from .tuning import BELIEVED, EDGE_REACH, LEVELS
 from .unknown import Counts, Flags, UnknownLevels, find_unknown_levels, free_end, given_levels
 
 FREE, OCCUPIED, UNKNOWN = 0, 1, -1
+UNKNOWN_GREY = 205  # as map_saver writes it
 
 Cells = NDArray[np.int8]
 
@@ -55,6 +57,15 @@ class Grid:
         if not self.greys:
             return f"occupancy {level / (LEVELS - 1):.2f}"
         return f"grey value {abs(self.greys[0] - level)}"
+
+
+def picture_of(grid: Grid) -> GridPicture:
+    """Return a grid as a picture."""
+    levels = np.where(
+        np.isnan(grid.occupancy), np.float32(1.0 - UNKNOWN_GREY / 255.0), np.clip(grid.occupancy, 0.0, 1.0)
+    )
+    pixels = np.rint(255.0 * (1.0 - levels[::-1])).astype(np.uint8)
+    return GridPicture(pixels, grid.origin, grid.resolution)
 
 
 def classify(grid: Grid, notes: Notes) -> Cells:

@@ -1,8 +1,7 @@
-"""What a robot would know at a place: a scan taken there, searched in the map that it was taken in."""
+"""Localization at a place: a scan is simulated there and searched in the map."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -18,22 +17,18 @@ from association import (
     Status,
     associate,
 )
-from registration import RigidTransform, Segments, wrap_angle
-from simulation import scan
-from vectorization import LaserScan, VectorizationOptions, vectorize
+from registration import RigidTransform, Segments
 
+from ..views import AnalysisError, Robot, is_elsewhere, is_same, look, similar_pose
 from .drive import STEP, seen_on_the_way, ways_from
-from .errors import AnalysisError
-from .robot import Robot
 from .standing import Standing, is_free, standing_places
 
 MOST_DRIVE = 30.0  # m
-SAME_PLACE, SAME_HEADING = 0.5, 0.5  # m, rad; nearer than that a pose is the one where the robot stood
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceVerdict:
-    """What a robot would know at a place.
+    """Result of localization at a place.
 
     Attributes
     ----------
@@ -200,7 +195,7 @@ class Analysis:
     def _knows_after(
         self, number: int, pose: RigidTransform, seen: Scan, deadline: Deadline | None
     ) -> Generator[None, None, float | None]:
-        """Return how far it drives until all that it has seen is told to be where it is by then; metres."""
+        """Return how far it drives until the scans so far give a usable answer that is right; metres."""
         ways = ways_from(self.segments, pose, self.drive, self.robot.range_max)
         seen_so_far = [[(pose, seen)] for _ in ways]
         for step in zip_longest(*ways):
@@ -212,38 +207,24 @@ class Analysis:
                 yield
                 views.append((there, self._scan(there, number, way, len(views))))
                 result = self._search(seen_on_the_way(views, np.random.default_rng((self.seed, number))), deadline)
-                if result.usable and result.pose is not None and _is_same(result.pose, there):
+                if result.usable and result.pose is not None and is_same(result.pose, there):
                     return STEP * (len(views) - 1)
         return None
 
     def _scan(self, pose: RigidTransform, *number: int) -> Scan:
         """Return what the robot would send from there; the noise of a place is the same whenever it is tried."""
-        scanner = self.robot.scanner
-        ranges = scan(self.segments, pose, scanner, np.random.default_rng((self.seed, *number))).ranges
-        laser = LaserScan(scanner.angle_min, scanner.angle_increment, ranges, 0.0, scanner.range_max)
-        found = vectorize(laser, VectorizationOptions(sigma=self.robot.sigma))
-        return Scan(found.measured, (0.0, 0.0), found.beams)
+        return look(self.segments, pose, self.robot, np.random.default_rng((self.seed, *number))).scan
 
 
 def _verdict(number: int, pose: RigidTransform, result: AssociationResult) -> PlaceVerdict:
-    codes = tuple(reason.code for reason in result.reasons)
-    other = None
-    mistaken = result.usable and result.pose is not None and not _is_same(result.pose, pose)
-    if mistaken or "similar_place" in codes:
-        poses = [result.pose, *(one.pose for one in result.alternatives)]
-        other = next((one for one in poses if one is not None and not _is_same(one, pose)), None)
+    mistaken = is_elsewhere(result, pose)
     return PlaceVerdict(
         number=number,
         pose=pose,
         status=Status.AMBIGUOUS if mistaken else result.status,
         usable=result.usable and not mistaken,
         probability=result.probability,
-        similar_pose=other,
+        similar_pose=similar_pose(result, pose),
         unobservable=result.unobservable,
-        reasons=("similar_place",) if mistaken else codes,
+        reasons=("similar_place",) if mistaken else tuple(reason.code for reason in result.reasons),
     )
-
-
-def _is_same(found: RigidTransform, pose: RigidTransform) -> bool:
-    away = math.hypot(found.x - pose.x, found.y - pose.y)
-    return away < SAME_PLACE and abs(wrap_angle(found.theta - pose.theta)) < SAME_HEADING

@@ -1,4 +1,4 @@
-"""Where a robot drives that does not know where it is, and what it sees on the way."""
+"""Drives of a robot that is not localized, and its scans on the way."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 def ways_from(
     segments: Segments, pose: RigidTransform, metres: float, reach: float
 ) -> tuple[Iterator[RigidTransform], Iterator[RigidTransform]]:
-    """Give the poses of two drives, a step apart, without the first; either ends early where there is no room to go.
+    """Yield the poses of two drives, a step apart, without the first; a drive ends early where there is no room.
 
     On one the robot sets out to where most room is, on the other to where most room is on the other side. It keeps
     straight on as long as it can, and then turns to where most room is.

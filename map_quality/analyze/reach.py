@@ -1,4 +1,4 @@
-"""What can be reached from a point without crossing a wall."""
+"""The cells that can be reached from a point without crossing a wall."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from registration import Segments
 
-from .errors import AnalysisError
+from ..views import AnalysisError
 
 CELL = 0.1  # m; fine enough for doors
 MOST_CELLS = 4_000_000
@@ -72,7 +72,7 @@ class Reach:
         return cls(low, cell, labels == label)
 
     def includes(self, places: Floats) -> NDArray[np.bool_]:
-        """Tell which of ``(n, 2)`` places on the map can be reached."""
+        """Return which of ``(n, 2)`` places on the map can be reached."""
         columns, rows = _cells(places, self.low, self.cell).T
         found: NDArray[np.bool_] = self.inside[columns, rows]
         return found

@@ -1,4 +1,4 @@
-"""Where on a map a robot can stand."""
+"""Poses on a map at which a robot can stand."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from numpy.typing import NDArray
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
 
-from .errors import AnalysisError
+from ..views import AnalysisError, Robot
 from .reach import Reach
-from .robot import Robot
 
 PLACES = 400  # over the map's box, where no spacing is asked for
 SPACINGS = (0.3, 100.0)  # m
 MOST = 50_000  # poses to try
 RAYS = 72  # that feel for what is about a place
 CLEARANCE = 0.2  # m; what a robot keeps from everything
-SEEN, SEEN_UNDIRECTED = 0.2, 0.5  # least share of the rays that meet anything; more where walls have no free side
-# Least share of these that meet a wall on its free side; in line maps made of logs 19 of 20 robots saw more.
+SEEN, SEEN_UNDIRECTED = 0.2, 0.5  # least fraction of the rays that meet anything; more where walls have no free side
+# Least fraction of these that meet a wall on its free side; in line maps made of logs 19 of 20 robots saw more.
 FREE_SIDES = 0.6
 ORDER = 20260301  # seeds the order in which places are tried
 
@@ -98,7 +97,7 @@ def standing_places(
 
 
 def is_free(segments: Segments, pose: RigidTransform, reach: float, *, oriented: bool) -> bool:
-    """Tell whether a robot could stand there.
+    """Return whether a robot can stand at a pose.
 
     Nothing is near, enough is seen, and where directions mean something nearly all of it from its free side.
 

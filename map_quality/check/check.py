@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from association.deadline import CancelledError, Deadline
-from association.index.map_index import MapIndex
+from association import CancelledError, Deadline, MapIndex
 
 from .likeness import find_look_alikes, likeness_findings
 from .pieces import drawing_findings, drawn_sigma, find_near_walls
@@ -49,7 +48,7 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
             break
     means_something = oriented and advice.oriented is not False
     likeness = find_look_alikes(index, until, oriented=means_something)
-    findings += likeness_findings(index, likeness)
+    findings += likeness_findings(likeness)
     if until.cancelled:
         raise CancelledError
     return MapCheck(size, tuple(findings), advice, likeness.places, likeness.viewpoints, not until.passed)

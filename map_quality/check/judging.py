@@ -1,4 +1,4 @@
-"""What sample scans say together: whether they would fit better if something about their map were changed."""
+"""Conclusions from all sample scans: whether they fit better if a property of the map is changed."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _undirected(count: int, usable: int, would_be: int) -> Finding:
 
 
 def _best_directions(samples: Sequence[Sample], present: Way) -> bool:
-    """Tell whether directions should mean something: as they do now, unless the scans fit clearly better otherwise."""
+    """Return whether directions should mean something: as now, unless the scans fit clearly better otherwise."""
 
     def worth(directed: bool) -> tuple[int, float]:
         ways = {way for one in samples for way in one.trials if way[0] == directed}
@@ -118,7 +118,7 @@ def _reversed(samples: Sequence[Sample]) -> Finding | None:
 
 
 def _scaled(samples: Sequence[Sample], least: float) -> Finding | None:
-    """Tell of one factor by which most scans fit better, where it is farther from one than `least`."""
+    """Return a finding if most scans fit better by one factor that is farther from one than `least`."""
     factors = np.array([one.factor for one in samples if one.factor is not None])
     telling = sum(one.factor is not None or one.result.usable for one in samples)
     if len(factors) < min(2, len(samples)):

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from association.deadline import Deadline
-from association.index.map_index import MapIndex
+from association import Deadline, MapIndex
 from association.tables import Grid
 from registration.layout import Floats, Records
 
-from .looking import segments_of
 from .result import Finding
 from .tuning import (
     DOUBLE,
@@ -42,7 +40,7 @@ Flags = NDArray[np.bool_]
 
 
 def drawing_findings(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterator[Finding]:
-    """Tell what is doubtful in how the lines of a directed map were drawn; `near` are its walls beside others."""
+    """Yield findings about how the lines of a directed map are drawn; `near` are its walls next to others."""
     yield from _short(index)
     yield from _doubled(index, near)
     yield from _overlapping(index, near, deadline)
@@ -94,7 +92,7 @@ def near_pairs(grid: Grid) -> Iterator[Indices]:
 
 
 def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
-    """Note how the second wall of each pair, (p, 2), runs beside the first."""
+    """Mark how the second wall of each pair, (p, 2), runs next to the first."""
     one, other = walls["dx"][pairs], walls["dy"][pairs]
     pairs = pairs[np.abs(one[:, 0] * other[:, 1] - other[:, 0] * one[:, 1]) < PARALLEL]
     a, b = walls[pairs[:, 0]], walls[pairs[:, 1]]
@@ -163,7 +161,7 @@ def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterat
 
 
 def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
-    """Tell where an end nearly meets another segment: at no other end, on no other line, and yet near one."""
+    """Yield a finding if ends nearly meet another segment: at no other end, on no other line, and yet near one."""
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
     # What is as near as this to its own begin is too short to tell.
     alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
@@ -186,7 +184,7 @@ def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
 
 
 def _alone(ends: Floats) -> Flags:
-    """Tell of each end, (n, 2) metres, whether no other is at the same place."""
+    """Return for each end, (n, 2) metres, whether no other is at the same place."""
     order = np.lexsort((ends[:, 1], ends[:, 0]))
     same = (np.diff(ends[order], axis=0) == 0.0).all(axis=1)
     alone = np.empty(len(ends), dtype=bool)
@@ -260,3 +258,11 @@ def drawn_sigma(index: MapIndex) -> float | None:
     step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
     # A caller copies what is advised: to a tenth of a millimetre.
     return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None
+
+
+def segments_of(index: MapIndex, walls: NDArray[np.bool_] | NDArray[np.intp]) -> tuple[int, ...]:
+    """Return the segments, as sent, that some walls consist of; `walls` are flags or indices."""
+    chosen = np.zeros(len(index.walls.rows), dtype=bool)
+    chosen[walls] = True
+    pieces = np.flatnonzero(chosen[index.wall_of_piece]) % index.directed
+    return tuple(np.unique(pieces).tolist())

@@ -1,4 +1,4 @@
-"""What a map check says."""
+"""Results of a map check."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """How much of it there is.
+    """Size of a map.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What the map's properties should be; None where nothing speaks for a value.
+    """Advised properties of the map; None where there is no evidence for a value.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class MapCheck:
-    """What is doubtful in a map.
+    """Result of the check of a map by itself.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class MapCheck:
 
 @dataclass(frozen=True, slots=True)
 class SampleReport:
-    """What sample scans say of a map.
+    """Result of all sample scans together.
 
     Attributes
     ----------
@@ -127,9 +127,12 @@ class SampleReport:
         Of the scans, as the map is.
     usable_as_advised : int
         With the advice taken.
+    wall_thickness : float or None
+        By how much walls are thicker than drawn, metres; None where nothing speaks for it.
     """
 
     findings: tuple[Finding, ...]
     advice: Advice
     usable: int
     usable_as_advised: int
+    wall_thickness: float | None = None

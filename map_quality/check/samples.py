@@ -7,17 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from association import AssociationOptions, AssociationResult, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
 from association.causes import Cause, Mistake, find_causes
 from association.consensus.scaling import scale_near_one
 from association.context import SearchContext
-from association.deadline import Deadline
-from association.errors import IndexingEndedError
 from association.explain import search_and_explain
-from association.index.map_index import MapIndex
-from association.options import AssociationOptions
 from association.report import report
-from association.result import AssociationResult
-from association.scan.scan import Scan, mirrored, scaled
+from association.scan.scan import scaled
 from association.to_scale import Explained, put_to_scale
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
@@ -25,12 +21,12 @@ from registration import RigidTransform
 from .tuning import BETTER_SCALED, LADDER, LADDER_SECONDS, LEAST_SHARE, SIGMAS
 
 Way = tuple[bool, float | None]
-"""How a map is taken: whether directions mean something, and the sigma of its lines, metres."""
+"""Assumptions about a map: whether directions mean something, and the sigma of its lines, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """How a scan fits a map that is taken in one way.
+    """Fit of a scan under one set of assumptions about the map.
 
     Attributes
     ----------
@@ -48,7 +44,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What came of one scan.
+    """Results for one scan.
 
     Attributes
     ----------
@@ -203,7 +199,7 @@ def _any_factor(context: SearchContext, known: float) -> float | None:
             return None
         if best is None or found.score > best.score:
             best, factor = found, rung * near
-    # Shrunk, a hall fits the next best room: what is told has to stand up as an answer.
+    # Shrunk, a hall fits the next best room: a factor is reported only if its answer is usable.
     if best is None or best.score <= BETTER_SCALED * known:
         return None
     if not judge(best.context, best.explanations, off_scale=best.off_scale).usable:

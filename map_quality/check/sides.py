@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from association.deadline import Deadline
-from association.index.map_index import MapIndex
-from association.layout import Flags
-from registration.layout import Floats
+from association import Deadline, MapIndex
+from association.consensus.kernels.sight import first_hit
+from association.layout import RAY, Flags
+from registration.layout import Floats, Records
 
-from .looking import Looker, segments_of
+from .pieces import segments_of
 from .result import Finding
 from .tuning import (
     CONTRADICTED,
@@ -36,8 +36,42 @@ from .tuning import (
 
 
 @dataclass(frozen=True, slots=True)
+class Looker:
+    """Follows single rays from places in the index frame, by the grid of the search: some 5 microseconds each.
+
+    `simulation.scan` takes time for every segment of the map, whatever a ray meets; this needs 24 rays from each wall.
+
+    Attributes
+    ----------
+    index : MapIndex
+    """
+
+    index: MapIndex
+    _ray: Records = field(default_factory=lambda: np.zeros(1, RAY), repr=False)
+
+    def first(self, x: float, y: float, angle: float, limit: float) -> tuple[float, int]:
+        """Return how far away the first wall is along an angle, metres, and which; ``(limit, -1)`` where none is."""
+        ray, place = self._ray[0], self.index.tables.place
+        ray["x"], ray["y"], ray["limit"] = x, y, limit
+        ray["dx"], ray["dy"] = math.cos(angle), math.sin(angle)
+        reach, wall = first_hit(ray, place.walls, place.grid.starts, place.grid.items, place.grid.shape[0])
+        return float(reach), int(wall)
+
+    def is_within(self, x: float, y: float) -> bool:
+        """Return whether a place lies in the box around the walls, as far as cells list them."""
+        shape = self.index.tables.place.grid.shape[0]
+        right, top = shape["columns"] * shape["cell"], shape["rows"] * shape["cell"]
+        return bool(0.0 <= x - shape["x0"] <= right and 0.0 <= y - shape["y0"] <= top)
+
+    def is_front(self, wall: int, angle: float) -> bool:
+        """Return whether a ray along an angle meets a wall on its left, where free space is."""
+        row = self.index.walls.rows[wall]
+        return bool(row["dx"] * math.sin(angle) < row["dy"] * math.cos(angle))
+
+
+@dataclass(frozen=True, slots=True)
 class Sides:
-    """What rays from walls meet.
+    """Hits of the rays from walls.
 
     Attributes
     ----------
@@ -62,7 +96,7 @@ class Sides:
 
     @property
     def contradiction(self) -> float:
-        """The share of rays that meet what they should not, by length and the mean of both sides, 0 to 1."""
+        """The fraction of rays that meet what they should not, by length and the mean of both sides, 0 to 1."""
         shares = []
         for counts, against in ((self.left, 1), (self.right, 0)):
             met = float((counts.sum(axis=1) * self.lengths).sum())

@@ -1,21 +1,20 @@
-"""How thick walls are, by scans: by how much nearer to free space their faces should stand than they are drawn."""
+"""Thickness of walls, estimated from scans, and the conclusion from all sample scans."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from association import AssociationOptions, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
 from association.context import SearchContext
-from association.deadline import Deadline
-from association.errors import IndexingEndedError
 from association.explain import search_and_explain
-from association.index.map_index import MapIndex
-from association.options import AssociationOptions
-from association.scan.scan import Scan, mirrored
 from registration import Segments
 
-from .result import Finding
+from .judging import judge_samples
+from .result import Finding, SampleReport
+from .samples import Sample
 from .tuning import (
     BETTER_THICKNESS,
     LEAST_THICKER,
@@ -26,8 +25,50 @@ from .tuning import (
     THICKNESS_SIGMA,
 )
 
+HIDES_THICKNESS = {"reversed", "scale"}  # codes of findings; the walls of such a map have no thickness to be found
 Scores = dict[float, float]
 """Of the scans together, nats, by how much thicker the walls were taken to be, metres."""
+
+
+def conclude(
+    index: MapIndex, scans: Sequence[Scan], samples: Sequence[Sample | None], deadline: Deadline, *, oriented: bool
+) -> SampleReport:
+    """Conclude from all samples together what would be better about their map, and how thick its walls are.
+
+    Parameters
+    ----------
+    index : MapIndex
+        Built with its directions, whatever they mean.
+    scans : sequence of Scan
+    samples : sequence of Sample or None
+        Of each scan, as of `try_sample`; None where there was no time for it.
+    deadline : Deadline
+    oriented : bool
+        Whether the map states that directions mean something.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    tried = [one for one in samples if one is not None]
+    report = judge_samples(tried, sigma=index.sigma, oriented=oriented)
+    codes = {one.code for one in report.findings}
+    if codes & HIDES_THICKNESS or deadline.passed:
+        return report
+    directed, some = (
+        report.advice.oriented is not False,
+        [scan for scan, one in zip(scans, samples, strict=True) if one is not None],
+    )
+    found = find_thickness(index, some, deadline, oriented=directed)
+    if found is None:
+        return report
+    findings = report.findings
+    # A scan that fits badly for the thickness of walls may fit a little better mirrored.
+    if "mirrored" in codes and directed and not fit_better_mirrored(index, some, deadline):
+        findings = tuple(one for one in findings if one.code != "mirrored")
+    findings = (thickness_finding(found, oriented=directed), *findings)
+    return replace(report, findings=findings, wall_thickness=found)
 
 
 def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> float | None:
@@ -81,7 +122,7 @@ def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, orien
 
 
 def fit_better_mirrored(index: MapIndex, scans: Sequence[Scan], deadline: Deadline) -> bool:
-    """Tell whether scans fit a map with directions better mirrored, however thick its walls are made for either."""
+    """Return whether scans fit a directed map better mirrored, each with the thickness of walls that fits best."""
     either = [_scores(index, some, deadline, oriented=True) for some in (scans, [mirrored(scan) for scan in scans])]
     as_they_are, other = (max(one.values(), default=0.0) for one in either)
     return other > as_they_are

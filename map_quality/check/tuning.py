@@ -46,7 +46,7 @@ PLACES = 12  # tables
 RAYS = 360
 REACH = 12.0  # m, tables; of the laser that is thought of
 CLEARANCE = 1.5  # m; how far from a wall it stands at most
-SHORTEST_SEEN = 0.15  # m, as the shortest segments of scans
+LEAST_ROOM = 0.6  # m, tables; in front of a wall, for a robot to stand there
 SIGMA = 0.01  # m
 
 # --- Size -------------------------------------------------------------------------------------------------------------

@@ -84,6 +84,7 @@ ROUTES = (
     Access("POST", "/v1/register", Role.ASSOCIATE, searches=True),
     Access("POST", "/v1/vectorize", Role.ASSOCIATE, searches=True),
     Access("POST", "/v1/maps:import", Role.ASSOCIATE, searches=True),
+    Access("POST", "/v1/scans:import", Role.ASSOCIATE, searches=True),
     Access("GET", "/v1/maps/{map_id}:check", Role.READ, searches=True),
     Access("POST", "/v1/maps/{map_id}:check", Role.ASSOCIATE, searches=True),
     Access("POST", "/v1/analyze", Role.ASSOCIATE, searches=True),

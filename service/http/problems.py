@@ -22,6 +22,7 @@ from ..parsing import errors as parsing
 from ..schemas.errors import BodyTooLargeError, Fault, InvalidRequestError, TooManyError, in_one_line
 from ..schemas.limits import MAX_FAULTS
 from ..schemas.replies import ProblemCode
+from ..work.inputs import fault_of
 from . import errors as http
 from .etags import etag
 
@@ -172,21 +173,13 @@ def problem_of(error: Exception) -> Problem | None:
                 kind, "the service is shutting down; send the request to another instance, or again after its restart"
             )
         case InputError():
-            return _of_library(kind, error)
+            fault = fault_of(error)
+            return Problem(kind, str(fault), (fault,))
         case InvalidRequestError():
             return Problem(kind, str(error), error.faults)
         case TooManyError(pointer=pointer) if pointer:
             return Problem(kind, str(error), (Fault(pointer, str(error)),))
     return Problem(kind, str(error), headers=headers_of(error))
-
-
-def _of_library(kind: Kind, error: InputError) -> Problem:
-    # The libraries name arguments as the contract does, with dots.
-    pointer = "/" + error.argument.replace(".", "/")
-    if error.index is not None:
-        pointer += f"/{error.index}"
-    wrong = InvalidRequestError([Fault(pointer, error.message)])
-    return Problem(kind, str(wrong), wrong.faults)
 
 
 def headers_of(error: Exception) -> Mapping[str, str]:

@@ -44,9 +44,31 @@ class ReadMap:
         A map file of our own, JSON; not checked yet.
     report : dict
         What was read, merged, dropped and assumed.
+    picture : dict or None
+        Of the grid that the map comes from.
     """
 
     map: bytes
+    report: dict[str, Any]
+    picture: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReadScans:
+    """Scans of a log.
+
+    Attributes
+    ----------
+    scans : bytes
+        JSON, an object with a list.
+    count : int
+        How many the log has.
+    report : dict
+        What was read, merged, dropped and assumed.
+    """
+
+    scans: bytes
+    count: int
     report: dict[str, Any]
 
 
@@ -69,7 +91,22 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
     CancelledError
         When nobody waits for it any longer.
     """
-    told = orjson.dumps({"bounds": asdict(bounds), "content_type": content_type}).decode()
+    head, line_map = _read(content, content_type, bounds, deadline, scans=False)
+    return ReadMap(line_map, head["report"], head["picture"])
+
+
+def read_scans_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline) -> ReadScans:
+    """Read the scans of the log in a form; otherwise as `read_apart`."""
+    head, scans = _read(content, content_type, bounds, deadline, scans=True)
+    return ReadScans(scans, int(head["count"]), head["report"])
+
+
+def _read(
+    content: bytearray, content_type: str, bounds: Bounds, deadline: Deadline, *, scans: bool
+) -> tuple[dict[str, Any], bytes]:
+    """Return the first line that the process prints, and the rest, which is not parsed."""
+    asked = {"bounds": asdict(bounds), "content_type": content_type, "scans": scans}
+    told = orjson.dumps(asked).decode()
     with _folder() as folder:
         status = _ended(command_of(READER, told, str(folder), str(os.getpid())), folder, content, deadline)
         with (folder / ANSWER).open("rb") as answer, (folder / FAILURE).open("rb") as failures:
@@ -87,14 +124,16 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
         raise InvalidRequestError(
             [Fault("/files", "the process that reads the file crashed: the file is damaged; export it again")]
         )
-    head, _, line_map = said.partition(b"\n")
-    return ReadMap(line_map, _report(orjson.loads(head)))
+    first, _, rest = said.partition(b"\n")
+    head = orjson.loads(first)
+    _require_report(head)
+    return head, rest
 
 
-def _report(told: dict[str, Any]) -> dict[str, Any]:
+def _require_report(told: dict[str, Any]) -> None:
     match told:
-        case {"report": dict(report)}:
-            return report
+        case {"report": dict()}:
+            return
         case {"missing": _}:
             raise FormatsMissingError
         case {"unknown": str(why)}:

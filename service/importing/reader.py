@@ -1,4 +1,4 @@
-"""What runs in the bounded process: a form on stdin to a map and a report on stdout.
+"""What runs in the bounded process: a form on stdin to a map, or scans, and a report on stdout.
 
 The files are those of strangers, and the libraries that read them are many and large. So this process has no more
 memory and time than it was given and no keys in its environment, and what it says is JSON, which is checked.
@@ -6,9 +6,11 @@ memory and time than it was given and no keys in its environment, and what it sa
 
 from __future__ import annotations
 
+import base64
 import errno
+import io
+import math
 import os
-import re
 import resource
 import shutil
 import sys
@@ -20,18 +22,17 @@ from typing import TYPE_CHECKING, Any
 import orjson
 
 from ..schemas.errors import Fault, InvalidRequestError
+from .own_files import METADATA, OwnFiles, fault_of, own_files
+from .scans import read_scans
 
 if TYPE_CHECKING:
-    from formats import FormatError, ImportedMap
+    from formats import GridPicture, ImportedMap
 
 MAPPED_BYTES = 1_000_000_000  # of address space beside the memory: libraries, and room that is never used
 MOST_OPEN = 64  # files
 NICE = 5  # searches go before it, at three times as much of a core that both want
 FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
-METADATA, BAG = "metadata.yaml", "bag"
-PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9 ._()+=@-]*")
-PLAIN_NAMES = "expected a file name of letters, digits, spaces and ._()+=@- for a file of a bag; rename the file"
-ENDING = re.compile(r"\.[a-z0-9]{1,8}")
+MOST_PIXELS = 2048  # of a picture, each way
 CPU_SECONDS = 20  # of a processor
 NO_ROOM = 3  # status of the process that reads where its files cannot be written
 OOM_SCORE = "1000"  # the first to go where the machine's memory ends
@@ -60,12 +61,16 @@ class Bounds:
 
 
 def main(told: str, folder: str) -> None:
-    """Read the form on stdin, its files put into a folder; print a report and a map, or why there are none."""
+    """Read the form on stdin, its files put into a folder; print a report and what was read, or why there is none."""
     asked = orjson.loads(told)
     bounds = Bounds(**asked["bounds"])
     _bind(bounds)
     try:
-        lines = read_files(sys.stdin.buffer.read(), asked["content_type"], Path(folder), bounds)
+        content, content_type = sys.stdin.buffer.read(), asked["content_type"]
+        if asked["scans"]:
+            lines = read_scans(content, content_type, Path(folder))
+        else:
+            lines = read_files(content, content_type, Path(folder), bounds)
     except InvalidRequestError as error:
         lines = [{"invalid": [asdict(fault) for fault in error.faults]}]
     except ModuleNotFoundError:
@@ -83,7 +88,7 @@ def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
     if len(printed) <= most:
         return printed
     return orjson.dumps(
-        {"too_large": f"expected a map and a report of at most {most} bytes, found more; simplify the file"},
+        {"too_large": f"expected an answer of at most {most} bytes, found more; send less"},
         option=option,
     )
 
@@ -134,7 +139,7 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
     except UnsupportedFormatError as error:
         return [{"unknown": error.message}]
     except FormatError as error:
-        raise InvalidRequestError([_fault(error, files)]) from None
+        raise InvalidRequestError([fault_of(error, files)]) from None
     if len(imported.map.segments) > bounds.segments:
         return [
             {
@@ -143,55 +148,6 @@ def read_files(content: bytes, content_type: str, folder: Path, bounds: Bounds) 
             }
         ]
     return _answer(imported, files)
-
-
-@dataclass(frozen=True, slots=True)
-class OwnFiles:
-    """Uploaded files under names of our own: no path is made of an uploaded name.
-
-    Attributes
-    ----------
-    map : Path
-        Of the file that is the map, or the folder of a bag of ROS 2.
-    paths : dict of str to Path
-        By the names that were sent.
-    """
-
-    map: Path
-    paths: dict[str, Path]
-
-    def number_of(self, own: str) -> int | None:
-        """Return which of the files has a name of our own; None where none has."""
-        return next((k for k, path in enumerate(self.paths.values()) if path.name == own), None)
-
-    def as_sent(self, own: str) -> str:
-        """Return the name that was sent of what has a name of our own, fit to be printed; anything else as it is."""
-        number = self.number_of(own)
-        return own if number is None else "".join(c if c.isprintable() else "?" for c in list(self.paths)[number])
-
-
-def own_files(names: list[str], map_name: str, folder: Path) -> OwnFiles:
-    """Return where files are put that were sent; of their names an ending stays.
-
-    A bag of several files names them in its metadata: these keep names that are letters, digits and a few signs.
-
-    Raises
-    ------
-    InvalidRequestError
-        When a file of such a bag has another name.
-    """
-    if map_name == METADATA:
-        bag = folder / BAG
-        bag.mkdir()
-        for number, name in enumerate(names):
-            if not PLAIN.fullmatch(name):
-                raise InvalidRequestError([Fault(f"/files/{number}", PLAIN_NAMES)])
-        return OwnFiles(bag, {name: bag / name for name in names})
-    paths = {}
-    for number, name in enumerate(names):
-        ending = PurePosixPath(name).suffix.lower()
-        paths[name] = folder / f"file-{number}{ending if ENDING.fullmatch(ending) else ''}"
-    return OwnFiles(paths[map_name], paths)
 
 
 def _map_among(names: list[str]) -> str:
@@ -225,22 +181,6 @@ def _map_among(names: list[str]) -> str:
     return maps[0]
 
 
-def _fault(error: FormatError, files: OwnFiles) -> Fault:
-    """Say where in the form something is wrong: a file by its number, for what was sent is not repeated."""
-    from formats import IncompleteFileError
-
-    from .fields import KNOWN, pointer_of
-
-    pointer, number = pointer_of(error.argument), files.number_of(error.argument)
-    if isinstance(error, IncompleteFileError) and number is None and pointer[1:] not in KNOWN:
-        return Fault("/files", "the map names a file that was not sent, such as its picture; send it, too")
-    if pointer[1:] not in KNOWN:
-        pointer = "/files" if number is None else f"/files/{number}"
-    elif error.index is not None:
-        pointer += f"/{error.index}"
-    return Fault(pointer, error.message)
-
-
 def _answer(imported: ImportedMap, files: OwnFiles) -> list[dict[str, Any]]:
     line_map, report = imported.map, asdict(imported.report)
     document = {
@@ -251,7 +191,35 @@ def _answer(imported: ImportedMap, files: OwnFiles) -> list[dict[str, Any]]:
         "meta": {key: files.as_sent(value) for key, value in line_map.meta.items()},
     }
     report["files"] = tuple(map(files.as_sent, report["files"]))
-    return [{"report": report}, document]
+    return [
+        {"report": report, "picture": None if imported.picture is None else picture_json(imported.picture)},
+        document,
+    ]
+
+
+def picture_json(picture: GridPicture) -> dict[str, Any]:
+    """Return the picture of a grid as PNG, of at most `MOST_PIXELS` pixels each way."""
+    from PIL import Image
+
+    image = Image.fromarray(picture.pixels)
+    factor = -(-max(image.size) // MOST_PIXELS)
+    rows = image.height
+    if factor > 1:
+        image = image.reduce(factor)
+    content = io.BytesIO()
+    image.save(content, "PNG")
+    # What the last row of a reduced picture has too much lies below the grid.
+    below = (image.height * factor - rows) * picture.resolution
+    pose = picture.pose
+    return {
+        "png": base64.b64encode(content.getvalue()).decode(),
+        "pose": {
+            "x": pose.x + below * math.sin(pose.theta),
+            "y": pose.y - below * math.cos(pose.theta),
+            "theta": pose.theta,
+        },
+        "resolution": factor * picture.resolution,
+    }
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
-from ..schemas.parts import InlineMap, MapDocument
+from ..schemas.parts import InlineMap, MapDocument, is_oriented
 from .cache import CachedMap, IndexCache
 from .errors import BusyStoreError
 from .records import MapOutline, MapRecord
@@ -149,11 +149,6 @@ class MapLookup:
         segments = Segments.from_array(asked.segments, argument="map.segments")
         index = MapIndex.build(segments, asked.sigma, oriented=oriented)
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
-
-
-def is_oriented(asked: bool | None, own: bool | None) -> bool:
-    """Return whether directions mean anything: as the request says, else as the map does, else yes."""
-    return next((said for said in (asked, own) if said is not None), True)
 
 
 def outline_of(document: MapDocument) -> MapOutline:

@@ -43,6 +43,17 @@ class MapOutline:
     sigma: float | None = None
     oriented: bool | None = None
 
+    def as_json(self, map_id: str, revision: int) -> dict[str, Any]:
+        """Return the summary of a stored map as the contract has it."""
+        return {
+            "map_id": map_id,
+            "revision": revision,
+            "segment_count": self.segments,
+            "bounds": self.bounds,
+            "sigma": self.sigma,
+            "oriented": self.oriented,
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class MapSummary:

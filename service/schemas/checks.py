@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from map_quality.check import FindingCode
+from map_quality import FindingCode
 
 from .replies import Index, MapReference, PoseAnswer, TimingAnswer
 from .strict import Answer

@@ -21,6 +21,7 @@ _MESSAGES: dict[str, str] = {
     "dict_type": "expected an object",
     "list_type": "expected an array",
     "float_type": "expected a number",
+    "finite_number": "expected a number",
     "int_type": "expected an integer",
     "int_from_float": "expected an integer",
     "bool_type": "expected true or false",

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from .checks import MapCheckAnswer
-from .replies import Index, Milliseconds, Row4
+from .replies import Index, Milliseconds, PoseAnswer, Row4
 from .strict import Answer
 
 
@@ -40,6 +40,16 @@ class ImportedMapAnswer(Answer):
     meta: Any
 
 
+class GridPictureAnswer(Answer):
+    """The grid that a map comes from, as a picture."""
+
+    png: str = Field(
+        description="PNG in base64: occupied cells are black, free ones white; at most 2048 pixels each way"
+    )
+    pose: PoseAnswer = Field(description="of the lower left corner, in the frame of the map")
+    resolution: float = Field(description="edge of a pixel, metres")
+
+
 class ImportTimingAnswer(Answer):
     """Duration of an import, milliseconds."""
 
@@ -53,10 +63,48 @@ class ImportAnswer(Answer):
 
     map: ImportedMapAnswer
     report: ReportAnswer
+    picture: GridPictureAnswer | None = Field(description="of a grid; null for a drawing")
     check: MapCheckAnswer
     request_id: str
     timing_ms: ImportTimingAnswer
 
+
+class ScansTimingAnswer(Answer):
+    """Duration of reading a log, milliseconds."""
+
+    read: Milliseconds = Field(description="reading the files, waiting for that included")
+    total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
+
+
+class ScansAnswer(Answer):
+    """Scans of a log."""
+
+    scans: list[Any] = Field(description="each as the `scan` of a request, in the frame of the robot where it is known")
+    count: Index = Field(description="scans in the log that can be used")
+    report: ReportAnswer
+    request_id: str
+    timing_ms: ScansTimingAnswer
+
+
+SCANS_FORM: dict[str, Any] = {
+    "type": "object",
+    "required": ["file"],
+    "additionalProperties": False,
+    "properties": {
+        "file": {
+            "type": "array",
+            "minItems": 1,
+            "items": {"type": "string", "format": "binary"},
+            "description": "a log: a bag of ROS 1 or ROS 2, an mcap, or a CARMEN log; a part with a filename is a file",
+        },
+        "topic": {"type": "string", "description": "of the scans; left out: the one with most of them"},
+        "max_scans": {
+            "type": "string",
+            "description": "greatest number of scans that are returned, 1 to 1000, by default 100, evenly spread",
+        },
+    },
+}
+"""The schema of the form with a log."""
 
 FORM: dict[str, Any] = {
     "type": "object",

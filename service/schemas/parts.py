@@ -62,6 +62,11 @@ class StoredMap(Strict):
     map_id: MapId = Field(description="id under which the map was stored")
 
 
+def is_oriented(asked: bool | None, own: bool | None) -> bool:
+    """Tell whether directions mean anything: as the request says, else as the map does, else yes."""
+    return next((said for said in (asked, own) if said is not None), True)
+
+
 def _map_kind(value: Any) -> str | None:
     if not isinstance(value, dict):
         return INLINE

@@ -139,6 +139,10 @@ class AlternativeAnswer(Answer):
     ambiguity: AmbiguityAnswer
     reliability: float = Field(description="reliability of this pose, as `diagnostics.reliability`")
     inlier_fraction: float = Field(description="fraction of the scan's length that is matched")
+    probability: float | None = Field(
+        description="that this pose is right, as `probability` of the answer; null where the answer has no "
+        "probability, or contradicts the prior"
+    )
 
 
 class CriticalWallAnswer(Answer):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 
-from association import CancelledError, Deadline, Status
-from map_quality.analyze import Analysis, PlaceVerdict, Robot
+from association import CancelledError, Deadline
+from linefix.answers import Json
+from linefix.map_answers import analysis_json
+from map_quality import Analysis, PlaceVerdict, Robot
 from registration import Segments
 
 from ..admission.errors import DeadlinePassedError
@@ -16,7 +17,7 @@ from ..maps import CachedMap
 from ..maps.lookup import FoundMap, MapLookup
 from ..schemas.analysis import AnalyzeRequest
 from ..schemas.parts import InlineMap
-from .answers import Json, direction_json, pose_json
+from .association import reference_to
 from .job import Done, Job
 
 TURN_SECONDS = 0.1  # of the gate, before others have theirs
@@ -49,11 +50,6 @@ class Tally:
     def done(self) -> bool:
         """Whether every pose was tried."""
         return len(self.found) == len(self.analysis.standing.order)
-
-
-def reference_to(on: InlineMap | FoundMap) -> Json | None:
-    """Return id and revision of a stored map."""
-    return {"map_id": on.record.map_id, "revision": on.record.revision} if isinstance(on, FoundMap) else None
 
 
 def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
@@ -135,55 +131,3 @@ def analysis_done(tally: Tally, asked: AnalyzeRequest, job: Job) -> Done:
     answer = analysis_json(tally.analysis, tally.found)
     sealed = {**answer, "map": tally.reference, "client_ref": asked.client_ref}
     return job.done(sealed, map=tally.reference, places=answer["summary"]["places"])
-
-
-def analysis_json(analysis: Analysis, found: dict[int, PlaceVerdict | None]) -> Json:
-    """Return what was found out, by the poses' numbers, as JSON."""
-    verdicts = [one for _, one in sorted(found.items()) if one is not None]
-    tried = len(analysis.standing.order)
-    return {
-        "places": [_place_json(one) for one in verdicts],
-        "summary": {
-            **_counts(verdicts),
-            "resolved_within": sum(one.resolved_after is not None for one in verdicts) if analysis.drive else None,
-            "usable_with_landmark": None
-            if analysis.landmark is None
-            else sum(one.with_landmark is not None and one.with_landmark.usable for one in verdicts),
-            "not_free": len(found) - len(verdicts),
-            "left_out": tried - len(found),
-        },
-        "spacing": analysis.standing.spacing,
-        "complete": len(found) == tried,
-    }
-
-
-def _counts(verdicts: Iterable[PlaceVerdict]) -> Json:
-    listed = list(verdicts)
-    by_status = Counter(one.status for one in listed)
-    return {
-        "places": len(listed),
-        "usable": sum(one.usable for one in listed),
-        **{str(status): by_status[status] for status in (Status.OK, Status.AMBIGUOUS, Status.DEGENERATE)},
-        str(Status.NO_MATCH): by_status[Status.NO_MATCH],
-        "similar_pose": sum(one.similar_pose is not None for one in listed),
-    }
-
-
-def _place_json(one: PlaceVerdict) -> Json:
-    return {
-        "pose": pose_json(one.pose),
-        "status": str(one.status),
-        "usable": one.usable,
-        "probability": one.probability,
-        "similar_pose": pose_json(one.similar_pose),
-        "unobservable": direction_json(one.unobservable),
-        "reasons": list(one.reasons),
-        "resolved_after": one.resolved_after,
-        "with_landmark": _with_landmark_json(one.with_landmark),
-    }
-
-
-def _with_landmark_json(one: PlaceVerdict | None) -> Json | None:
-    if one is None:
-        return None
-    return {"status": str(one.status), "usable": one.usable, "probability": one.probability}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import orjson
 
 from association import CancelledError, Deadline, associate
+from linefix.answers import Json, association_json
 
 from ..admission.errors import DeadlinePassedError
 from ..maps import CachedMap
@@ -19,8 +20,7 @@ from ..schemas.parts import InlineMap, SearchOptions
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
-from .answers import Json, association_json, segments_json
-from .inputs import association_options_of, prior_of, scanned_of
+from .inputs import association_options_of, included_of, prior_of, scanned_of
 from .job import Done, Job
 
 
@@ -97,9 +97,7 @@ class Associator:
         """
         with stage("index"):
             cached = ready or self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
-        if isinstance(on, FoundMap):
-            return Target(cached, {"map_id": on.record.map_id, "revision": on.record.revision})
-        return Target(cached, None)
+        return Target(cached, reference_to(on))
 
     def find(
         self, target: Target, sought: AssociateRequest | BatchItem, options: SearchOptions, deadline: Deadline
@@ -126,13 +124,7 @@ class Associator:
             result = associate(target.cached.index, scanned.scan, prior, how, deadline)
         seconds = time.perf_counter() - begun
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
-        answer = association_json(result, frozenset(options.include), scanned.starts)
-        answer["frame_id"] = target.cached.frame_id
-        answer["child_frame_id"] = sought.scan.told_frame_id
-        answer["stamp"] = sought.scan.told_stamp
-        if "segments" in options.include:
-            answer["segments"] = segments_json(scanned)
-        return answer
+        return association_json(result, included_of(sought.scan, options, scanned, target.cached.frame_id))
 
     def find_for_batch(
         self, target: Target, index: int, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
@@ -153,3 +145,8 @@ def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResul
     items = [orjson.Fragment(result.body) for result in results]
     answer = {"results": items, "map": target.reference, "client_ref": asked.client_ref}
     return job.done(answer, map=target.reference, verdicts=noted)
+
+
+def reference_to(on: InlineMap | FoundMap) -> Json | None:
+    """Return id and revision of a stored map."""
+    return {"map_id": on.record.map_id, "revision": on.record.revision} if isinstance(on, FoundMap) else None

@@ -7,13 +7,13 @@ from typing import Any
 import orjson
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
-from map_quality.check import check_map
+from linefix.map_answers import check_json
+from map_quality import check_map
 
 from ..admission.errors import DeadlinePassedError
-from ..importing.bounded import ReadMap
-from ..maps.lookup import MapLookup, is_oriented, outline_of
-from ..schemas.parts import InlineMap
-from .checking import check_json
+from ..importing.bounded import ReadMap, ReadScans
+from ..maps.lookup import MapLookup, outline_of
+from ..schemas.parts import InlineMap, is_oriented
 from .job import Done, Job
 
 
@@ -46,5 +46,18 @@ def answer_import(index: MapIndex, line_map: InlineMap, read: ReadMap, job: Job)
     """
     found = check_map(index, job.deadline, oriented=is_oriented(None, line_map.oriented))
     job.watch.lap("check")
-    answer: dict[str, Any] = {"map": orjson.Fragment(read.map), "report": read.report, "check": check_json(found)}
+    answer: dict[str, Any] = {
+        "map": orjson.Fragment(read.map),
+        "report": read.report,
+        "picture": read.picture,
+        "check": check_json(found),
+    }
     return job.done(answer, format=read.report["format"], findings=[one.code for one in found.findings])
+
+
+def answer_scans(read: ReadScans, job: Job) -> Done:
+    """Return scans that may be sent as they are, and what was done to read them."""
+    job.watch.lap("read")
+    scans = orjson.Fragment(read.scans.removeprefix(b'{"scans":').removesuffix(b"}\n"))
+    answer: dict[str, Any] = {"scans": scans, "count": read.count, "report": read.report}
+    return job.done(answer, format=read.report["format"])

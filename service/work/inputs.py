@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from association import PARTS, AssociationOptions, HardPrior, Prior, Scan, SoftPrior, View, assemble, mirrored
-from registration import InvalidArgumentError, MeasuredSegments, RegistrationOptions, RigidTransform, Segments
+from linefix.answers import Included
+from registration import (
+    InputError,
+    InvalidArgumentError,
+    MeasuredSegments,
+    RegistrationOptions,
+    RigidTransform,
+    Segments,
+)
 
-from ..maps.lookup import is_oriented
+from ..schemas.errors import Fault, InvalidRequestError
 from ..schemas.parts import (
     HardPriorFields,
     LaserScan,
@@ -20,8 +30,9 @@ from ..schemas.parts import (
     SearchOptions,
     SegmentScan,
     SoftPriorFields,
+    is_oriented,
 )
-from ..schemas.requests import RegisterRequest
+from ..schemas.requests import CheckRequest, RegisterRequest
 from ..schemas.strict import Pose
 from ..schemas.views import LaserView, PointView, SegmentView, ViewsScan
 from .scanning import Scanned, range_scan, scan_points, view_laser, viewpoint_of
@@ -128,6 +139,15 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
     )
 
 
+def included_of(
+    scan: SegmentScan | LaserScan | PointScan | ViewsScan, options: SearchOptions, scanned: Scanned, frame_id: str
+) -> Included:
+    """Return what the answer repeats of a request; `frame_id` is the map's."""
+    parts = frozenset[str](options.include)
+    segments = scanned.listed if "segments" in parts else None
+    return Included(parts, frame_id, scan.told_frame_id, scan.told_stamp, segments, scanned.starts)
+
+
 def registration_options_of(asked: RegisterRequest) -> RegistrationOptions:
     """Return how to register."""
     options = asked.options
@@ -158,3 +178,42 @@ def pairs_of(asked: RegisterRequest, map_count: int, scan_count: int) -> NDArray
             f"left out, though there are {scan_count} scan and {map_count} map segments", argument="correspondences"
         )
     return np.repeat(np.arange(map_count, dtype=np.intp)[:, None], 2, axis=1)
+
+
+def scans_of(asked: CheckRequest) -> list[Scan]:
+    """Return the sample scans of a request.
+
+    Raises
+    ------
+    InvalidRequestError
+        When one is not what the libraries take.
+    """
+    return [_scan_of(asked, number) for number in range(len(asked.scans))]
+
+
+def _scan_of(asked: CheckRequest, number: int) -> Scan:
+    with _placed(number):
+        # A motion that is not known would only loosen the fit.
+        return scanned_of(asked.scans[number], timed=False).scan
+
+
+@contextmanager
+def _placed(number: int) -> Iterator[None]:
+    """Say which of the samples it is in which the libraries refuse something."""
+    try:
+        yield
+    except InvalidRequestError as error:
+        faults = [Fault(_moved(fault.pointer, number), fault.message) for fault in error.faults]
+        raise InvalidRequestError(faults) from error
+    except InputError as error:
+        raise InvalidRequestError([Fault(_moved(fault_of(error).pointer, number), error.message)]) from error
+
+
+def _moved(pointer: str, number: int) -> str:
+    return f"/scans/{number}" + pointer.removeprefix("/scan")
+
+
+def fault_of(error: InputError) -> Fault:
+    """Return the place of a request that a library refuses; its arguments are named as fields, with dots."""
+    index = "" if error.index is None else f"/{error.index}"
+    return Fault("/" + error.argument.replace(".", "/") + index, error.message)

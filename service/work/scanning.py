@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,13 @@ class Scanned:
     segments: Floats | None
     parts: tuple[Floats | None, ...] | None = None
     starts: NDArray[np.intp] | None = None
+
+    @property
+    def listed(self) -> list[Any] | None:
+        """The segments that the caller did not send; of several views one list, or None, each."""
+        if self.parts is None:
+            return None if self.segments is None else self.segments.tolist()
+        return [None if part is None else part.tolist() for part in self.parts]
 
 
 def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = True) -> RangeScan:

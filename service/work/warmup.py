@@ -25,9 +25,8 @@ from association.context import SearchContext
 from association.explain import explain_at
 from association.verdict.null import symmetry_of
 from association.verdict.verdict import judge
-from map_quality.analyze import Analysis, Robot, standing_places
+from map_quality import Analysis, Robot, check_map, standing_places, try_sample
 from map_quality.analyze.standing import is_free
-from map_quality.check import check_map, try_sample
 from registration import (
     Beams,
     Correspondences,

@@ -144,6 +144,40 @@ def test_a_twin_is_as_ambiguous_as_the_best() -> None:
     assert twin.reliability == pytest.approx(best.reliability, rel=1e-3)
 
 
+@pytest.mark.parametrize(("rooms", "noise"), [(2, 0.0), (3, 0.02), (4, 0.02)])
+def test_equal_poses_share_the_probability(rooms: int, noise: float) -> None:
+    result = answer_of(index_of(equal_rooms(rooms)), scan_of(seen(ROOM, INSIDE, noise=noise, seed=1)[0]))
+    shares = [other.probability for other in result.alternatives]
+    assert result.probability is not None
+    assert shares == pytest.approx([result.probability] * (rooms - 1), rel=1e-3)
+    assert result.probability * rooms <= 1.0
+
+
+def test_a_pose_that_fits_worse_is_less_probable() -> None:
+    """Of two rooms the second lacks a wall."""
+    index = index_of(equal_rooms(2)[:-1])
+    result = answer_of(index, scan_of(seen(ROOM, INSIDE, noise=0.02, seed=1)[0]))
+    (other,) = result.alternatives
+    assert result.probability is not None
+    assert other.probability is not None
+    assert 0.0 <= other.probability < 0.5 * result.probability
+
+
+@pytest.mark.parametrize(
+    "verdict",
+    [
+        replace(SURE, status=Status.DEGENERATE, usable=False, probability=None, reasons=WHY),
+        replace(SURE, status=Status.AMBIGUOUS, usable=False, contradicted=True, reasons=WHY),
+        replace(SURE, status=Status.NO_MATCH, usable=False, probability=0.0, pose=None, reasons=WHY),
+    ],
+    ids=["degenerate", "contradicted", "no match"],
+)
+def test_without_a_probability_to_share_the_others_have_none(verdict: Verdict) -> None:
+    found = told(given_answer(), verdict).alternatives
+    assert found
+    assert [other.probability for other in found] == [None] * len(found)
+
+
 def test_what_is_not_usable_has_its_other_poses() -> None:
     """They are counted in the sentence, whatever is asked for."""
     result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())

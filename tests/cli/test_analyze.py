@@ -67,7 +67,7 @@ def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     assert features[0]["properties"]["status"] == "ok"
     with Image.open(folder / "a.png") as picture:
         colours = {colour: count for count, colour in picture.convert("RGB").getcolors(1 << 20) or []}
-    assert colours[(46, 125, 70)] > 0.2 * sum(colours.values())
+    assert colours[(0, 158, 115)] > 0.2 * sum(colours.values())
 
 
 def test_little_time(folder: Path, linefix: Linefix) -> None:

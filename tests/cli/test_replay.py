@@ -81,7 +81,7 @@ def test_a_stored_map_its_poses_and_a_picture(linefix: Linefix, folder: Path, tr
     for stamp, x, y, *_ in poses:
         assert math.hypot(x - by_stamp[stamp].x, y - by_stamp[stamp].y) < 0.1
     with Image.open(folder / "poses.png") as picture:
-        assert (200, 40, 40) in {colour for _, colour in picture.getcolors(1000) or []}
+        assert (0, 158, 115) in {colour for _, colour in picture.getcolors(1000) or []}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ import pytest
 
 from registration import RigidTransform, Segments
 from simulation import Scanner, scan
-from tests.formats.test_log_frames import SECOND, Robots
+from tests.formats.test_log_frames import Robots
+from tests.formats.test_logs import SECOND
 from tests.running import RunningService
 from vectorization import Motion
 
@@ -125,12 +126,12 @@ def test_a_server_answers_the_same(linefix: Linefix, folder: Path, service: Runn
 
 
 TWINS: list[list[float]] = [
-    *([x, 0, x + 5, 0] for x in (0, 12)),
-    *([x + 5, 0, x + 5, 4] for x in (0, 12)),
-    *([x + 5, 4, x + 2, 4] for x in (0, 12)),
-    *([x + 2, 4, x + 2, 3] for x in (0, 12)),
-    *([x + 2, 3, x, 3] for x in (0, 12)),
-    *([x, 3, x, 0] for x in (0, 12)),
+    *([x, 0, x + 5, 0] for x in (0.0, 12.0)),
+    *([x + 5, 0, x + 5, 4] for x in (0.0, 12.0)),
+    *([x + 5, 4, x + 2, 4] for x in (0.0, 12.0)),
+    *([x + 2, 4, x + 2, 3] for x in (0.0, 12.0)),
+    *([x + 2, 3, x, 3] for x in (0.0, 12.0)),
+    *([x, 3, x, 0] for x in (0.0, 12.0)),
     [-1, -1, -1, -9],
     [-1, -9, 9, -9],
 ]

@@ -17,6 +17,7 @@ from tests.faults.replicas import CONF
 DEPLOY = Path(__file__).parents[2] / "deploy"
 KUBERNETES = DEPLOY / "kubernetes"
 REPLICAS = DEPLOY / "replicas"
+SERVICE_BYTES = 661_000_000  # of all its processes, at most, while others send the largest maps and scans
 KIND_FILES = {
     "Deployment": "deployment.yaml",
     "Service": "service.yaml",
@@ -82,6 +83,16 @@ def test_a_pod_has_no_right_that_it_does_not_need() -> None:
         "readOnlyRootFilesystem": True,
         "capabilities": {"drop": ["ALL"]},
     }
+
+
+def test_a_pod_has_memory_for_an_import_next_to_the_service() -> None:
+    """Together beyond the limit, the system ends the pod with all its searches, and one client can have that again."""
+    container = manifest("Deployment")["spec"]["template"]["spec"]["containers"][0]
+    told = {one["name"]: one.get("value") for one in container["env"]}
+    reader = int(told.get("LINEFIX_MAX_IMPORT_BYTES") or Settings.model_fields["max_import_bytes"].default)
+    limit = container["resources"]["limits"]["memory"]
+    assert limit.endswith("Gi")
+    assert int(limit.removesuffix("Gi")) * 2**30 >= SERVICE_BYTES + reader
 
 
 def test_a_pod_has_time_to_end() -> None:

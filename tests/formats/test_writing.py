@@ -45,13 +45,18 @@ def test_a_picture_shows_walls_free_sides_and_poses(tmp_path: Path) -> None:
     room = Segments.from_array([[0, 0, 2, 0], [2, 0, 2, 2], [2, 2, 0, 2], [0, 2, 0, 0]])
     draw_map(LineMap(room), tmp_path / "a.png", [RigidTransform(1.0, 1.0, 0.0)])
     pixels = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
-    assert pixels.shape == (1600, 1600, 3)
-    green = (pixels[..., 1] > 100) & (pixels[..., 0] < 100)
-    rows, columns = np.nonzero(green)
+    assert pixels.shape == (1660, 1600, 3)
+    plan, strip = pixels[:1600], pixels[1600:]
+    rows, columns = np.nonzero((plan == (42, 160, 224)).all(axis=2))
     # Ticks point into the room, 20 pixels from the border; none lies outside of its walls.
     assert rows.min() >= 20
     assert rows.max() <= 1580
     assert ((np.abs(rows - 800) < 5) | (np.abs(columns - 800) < 5)).all()
-    assert tuple(pixels[800, 800]) == (200, 40, 40)
+    assert tuple(pixels[800, 800]) == (0, 158, 115)
+    # The legend names what is drawn; a bar of 20 cm is 156 pixels long.
+    for colour, there in (((0, 158, 115), True), ((42, 160, 224), True), ((142, 152, 163), False)):
+        assert (strip == colour).all(axis=2).any() == there
+    assert (strip[30] == (16, 20, 24)).all(axis=1)[20:176].all()
+    assert not (strip[30] == (16, 20, 24)).all(axis=1)[180]
     draw_map(LineMap(room, oriented=False), tmp_path / "b.png")
-    assert not (np.asarray(Image.open(tmp_path / "b.png"))[..., 1].astype(int) == 140).any()
+    assert not (np.asarray(Image.open(tmp_path / "b.png")) == (42, 160, 224)).all(axis=2).any()

@@ -11,14 +11,24 @@ from pathlib import Path
 import pytest
 
 import linefix
-from linefix import locating, mounted
+from linefix import checking, locating, mounted
 
 ROOT = Path(linefix.__file__).parent.parent
 
 
 def test_exports_are_sorted_and_complete() -> None:
     assert linefix.__all__ == sorted(linefix.__all__)
-    private = {"annotations", "importlib", "locating", "mounted", "Any", "TYPE_CHECKING"}
+    private = {
+        "annotations",
+        "answers",
+        "checking",
+        "importlib",
+        "locating",
+        "map_answers",
+        "mounted",
+        "Any",
+        "TYPE_CHECKING",
+    }
     public = {name for name in dir(linefix) if not name.startswith("_")}
     assert public - private == set(linefix.__all__)
     with pytest.raises(AttributeError, match="locate_all"):
@@ -33,7 +43,7 @@ def test_every_name_says_what_it_is(name: str) -> None:
     assert not described.startswith(f"{name}(")
 
 
-@pytest.mark.parametrize("module", [linefix, locating, mounted], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [linefix, checking, locating, mounted], ids=lambda module: module.__name__)
 def test_examples_give_what_they_show(module: object) -> None:
     failed, tried = doctest.testmod(module)  # type: ignore[arg-type]
     assert (failed, tried > 0) == (0, True)

@@ -11,12 +11,13 @@ import pytest
 
 import linefix
 from ros2 import messages
-from ros2.frames import Frames, Mount
+from ros2.frames import Frames
 from ros2.gathering import looks_of
 from ros2.locating import locate
 from ros2.looking import HERE, Look, look_of, motion_of
 from ros2.odometry import OdometryHistory, Speed
 from ros2.options import NodeOptions
+from ros2.transforms import Mount
 from ros2.wire import SENSOR, Publisher
 
 from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, Robot, bridge, is_at_truth, mount, running

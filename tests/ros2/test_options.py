@@ -10,7 +10,7 @@ from cli.entry import run
 from cli.errors import WrongUseError
 from cli.ros2 import parameters_of
 from ros2 import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
-from ros2.options import absolute_name
+from ros2.names import absolute_name
 
 
 @pytest.mark.parametrize(

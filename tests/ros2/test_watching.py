@@ -10,8 +10,9 @@ import pytest
 from registration import RigidTransform
 from ros2 import messages
 from ros2.agreement import Observation
-from ros2.frames import FrameError, Frames
+from ros2.frames import Frames
 from ros2.odometry import OdometryHistory
+from ros2.transforms import FrameError
 from ros2.watching import Watch
 
 from .robot import quaternion

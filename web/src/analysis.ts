@@ -1,4 +1,4 @@
-// Where the map will fail, as a heat map over the plan.
+// Where localization fails on the map: the analysis, which the plan shows as a heat map.
 
 import { analyze } from "./api";
 import { asStored, changed, kept, onChange, state, type Shown } from "./state";
@@ -7,14 +7,14 @@ import type { Analysis } from "./types";
 const value = (id: string) => document.querySelector<HTMLInputElement>(id)!.value;
 const button = document.querySelector<HTMLButtonElement>("#analyze")!;
 const clear = document.querySelector<HTMLButtonElement>("#clear")!;
-const told = document.querySelector<HTMLElement>("#analyzed")!;
+const text = document.querySelector<HTMLElement>("#analyzed")!;
 const show = document.querySelector<HTMLSelectElement>("#show")!;
 const TIME = 20_000; // ms
 const LONG_TIME = 30_000; // ms; a drive takes many searches
 
 button.addEventListener("click", async () => {
   if (!state.map) {
-    told.textContent = "There is no map yet. Open one, or choose an example.";
+    text.textContent = "There is no map yet. Open one, or choose an example.";
     return;
   }
   const { own, landmark } = kept();
@@ -26,20 +26,20 @@ button.addEventListener("click", async () => {
   };
   const spacing = value("#spacing") === "" ? null : Number(value("#spacing"));
   const drive = Number(value("#drive"));
-  // What was put up is told apart from the map: with it and without it.
+  // The analysis reports each place without the added boxes and with them.
   const stored = asStored() || (state.mapId !== null && own.length === state.own);
   const map = stored ? { map_id: state.mapId } : { ...state.map, segments: own };
   button.disabled = true;
-  told.textContent = drive || landmark.length ? "Analyzing, which may take half a minute ..." : "Analyzing ...";
+  text.textContent = drive || landmark.length ? "Analyzing, which may take half a minute ..." : "Analyzing ...";
   const of = state.walls;
   try {
     const found = await analyze({ map, laser, spacing, drive, landmark, deadline_ms: drive ? LONG_TIME : TIME });
     if (of !== state.walls) return; // another map is shown by now
     Object.assign(state, { analysis: found, pointed: null });
     state.show = landmark.length ? "landmark" : drive ? "driven" : "now";
-    told.textContent = summaryOf(found, drive);
+    text.textContent = summaryOf(found, drive);
   } catch (error) {
-    told.textContent = error instanceof Error ? error.message : String(error);
+    text.textContent = error instanceof Error ? error.message : String(error);
   } finally {
     button.disabled = false;
     changed();
@@ -67,7 +67,7 @@ clear.addEventListener("click", () => {
 });
 
 onChange(() => {
-  if (clear.disabled !== !state.analysis && !state.analysis && !button.disabled) told.textContent = "";
+  if (clear.disabled !== !state.analysis && !state.analysis && !button.disabled) text.textContent = "";
   clear.disabled = !state.analysis;
   const { resolved_within, usable_with_landmark } = state.analysis?.summary ?? { resolved_within: null, usable_with_landmark: null };
   const there: Record<Shown, boolean> = { now: true, driven: resolved_within !== null, landmark: usable_with_landmark !== null };

@@ -1,6 +1,6 @@
 // Requests to the service that this page comes from.
 
-import type { Analysis, Answer, Imported, MapDocument, Scan, StoredMap } from "./types";
+import type { Analysis, Answer, Imported, ImportedScans, MapDocument, Scan, StoredMap } from "./types";
 
 export class Problem extends Error {
   constructor(
@@ -42,10 +42,10 @@ async function call<T>(method: string, path: string, body?: BodyInit, type?: str
 }
 
 function problemOf(status: number, answer: unknown): Problem {
-  const { detail, code, errors } = answer as { detail?: string; code?: string; errors?: { pointer: string; message: string }[] };
-  const stated = errors?.length ? `${errors[0].pointer}: ${errors[0].message}` : (detail ?? `The service rejected the request with status ${status}.`);
-  const told = status === 401 ? "The service requires a key. Enter it under Key below." : status === 403 ? `${stated} (see Key below).` : stated;
-  return new Problem(told, status, code ?? "");
+  const { detail, code } = answer as { detail?: string; code?: string };
+  const stated = detail ?? `The service rejected the request with status ${status}.`;
+  const hint = status === 401 || status === 403 ? " (see Key below)." : "";
+  return new Problem(stated + hint, status, code ?? "");
 }
 
 const JSON_TYPE = "application/json";
@@ -70,23 +70,20 @@ export const deleteMap = (id: string) => call<void>("DELETE", pathOf(id));
 export const checkMap = (id: string) =>
   call<{ findings: { code: string; message: string; count: number }[] }>("GET", `${pathOf(id)}:check`);
 
-/** Have files of another tool read; nothing is stored. */
-export async function importMap(files: File[], units: string): Promise<Imported> {
+/** Convert files of another tool to a map; the service stores nothing. */
+export const importMap = (files: File[], units: string) => importing<Imported>("/v1/maps:import", files, units ? { units } : {});
+/** Read the scans of a log, at most so many, evenly spread. */
+export const importScans = (files: File[], most: number) => importing<ImportedScans>("/v1/scans:import", files, { max_scans: String(most) });
+
+async function importing<T>(path: string, files: File[], fields: Record<string, string>): Promise<T> {
   const form = new FormData();
-  for (const file of files) form.append("files", file, file.name);
-  if (units) form.append("units", units);
+  for (const file of files) form.append("file", file, file.name);
+  for (const [name, value] of Object.entries(fields)) form.append(name, value);
   try {
-    return await call<Imported>("POST", "/v1/maps:import", form);
+    return await call<T>("POST", path, form);
   } catch (error) {
-    if (error instanceof Problem && [404, 405, 415].includes(error.status))
-      throw new Problem("This service reads maps as JSON only. Install its extra formats for other files.", error.status, error.code);
-    if (error instanceof Problem) error.message = named(error.message, files);
+    // The service does not repeat names that were sent.
+    if (error instanceof Problem) error.message = error.message.replace(/^\/files\/(\d+)/, (whole, k: string) => files[Number(k)]?.name ?? whole);
     throw error;
   }
-}
-
-/** Say which file is wrong, and where its unit can be chosen. */
-function named(message: string, files: File[]): string {
-  const told = message.replace(/^\/files\/(\d+)/, (whole, k: string) => files[Number(k)]?.name ?? whole);
-  return told.includes("does not state its unit") ? `${told}. Choose it below.` : told;
 }

@@ -3,15 +3,18 @@
 import { associate, Problem, type Asked } from "./api";
 import { noisy, takeScan } from "./geometry";
 import { asStored, changed, forget, state } from "./state";
-import { tellProblem } from "./verdict";
+import type { Alternative, Answer } from "./types";
+import { showProblem, showWaiting } from "./verdict";
 
 const NEAR = { radius: 1, angle: Math.PI / 6 };
+const AS_WELL = 5; // nats, as in association/words.py: within them another pose fits about as well
+const AGAIN = 1000; // ms until a service is asked again that is not ready yet
 let running: AbortController | null = null;
 let due = 0;
 
 const checked = (id: string) => document.querySelector<HTMLInputElement>(id)!.checked;
 
-/** What would be sent now; null while there is no map or no scan. */
+/** The request for what is on the page; null without a map or without a scan. */
 export function request(): { asked: Asked; sentTo: number[] } | null {
   if (!state.map) return null;
   const scan = state.virtual
@@ -25,30 +28,42 @@ export function request(): { asked: Asked; sentTo: number[] } | null {
   return { asked, sentTo: kept };
 }
 
-/** Ask the service; an answer that comes after a later question is not shown. */
-export async function ask(): Promise<void> {
+/** The alternatives that the message counts; where it counts none, all of them. */
+function countedOf({ alternatives, diagnostics }: Answer): Alternative[] {
+  const least = (diagnostics?.score ?? Infinity) - AS_WELL;
+  const equal = alternatives.filter((one) => one.score >= least);
+  return equal.length ? equal : alternatives;
+}
+
+/** Send the request; an answer to an earlier request is dropped. Returns whether this one was answered. */
+export async function ask(): Promise<boolean> {
   clearTimeout(due);
   const made = request();
   if (!made) {
-    tellProblem(state.map ? "There is no scan yet. Open one, or switch on the virtual robot." : "There is no map yet. Open one, or choose an example.");
-    return;
+    showProblem(state.map ? "There is no scan yet. Open one, or simulate one." : "There is no map yet. Open one, or choose an example.");
+    return false;
   }
   running?.abort();
   const mine = (running = new AbortController());
   try {
     const answer = await associate(made.asked, mine.signal);
-    Object.assign(state, { answer, sent: made.asked, sentTo: made.sentTo, other: -1 });
+    answer.unmatched_scan = answer.unmatched_scan.map((one: number | { scan: number }) => (typeof one === "number" ? one : one.scan));
+    Object.assign(state, { answer, sent: made.asked, sentTo: made.sentTo, others: countedOf(answer), other: -1 });
   } catch (error) {
-    if (mine !== running || (error instanceof DOMException && error.name === "AbortError")) return;
+    if (mine !== running || (error instanceof DOMException && error.name === "AbortError")) return false;
     forget();
     changed();
-    tellProblem(error instanceof Problem ? error.message : String(error));
-    return;
+    if (error instanceof Problem && error.code === "not_ready") {
+      showWaiting(error.message);
+      due = window.setTimeout(() => void ask(), AGAIN);
+    } else showProblem(error instanceof Problem ? error.message : String(error));
+    return false;
   }
   changed();
+  return true;
 }
 
-/** Ask soon after a change, once for many; only where that is wanted. */
+/** Send the request soon after a change, once for many; only where this is switched on. */
 export function askSoon(): void {
   changed();
   if (!checked("#follow") || !request()) return;

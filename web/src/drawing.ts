@@ -1,22 +1,26 @@
 // Everything on the canvas, from the state alone.
 
-import { distance, place, placed, pointsOf, wrap } from "./geometry";
+import { place, placed, pointsOf } from "./geometry";
+import { drawGrid, drawPicture } from "./ground";
+import { drawHeat, kindOf } from "./heat";
 import { state } from "./state";
-import type { Answer, Place, Pose, Scan, Segment } from "./types";
-import { toMetres, toPixels, view } from "./view";
+import type { Answer, Pose, Scan, Segment } from "./types";
+import { toPixels, view } from "./view";
 import { drawWalls } from "./walls";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const context = canvas.getContext("2d")!;
-const NAMES = ["wall", "off", "before", "point", "unmatched", "missing", "ghost", "robot", "critical", "ok", "ambiguous", "degenerate", "no_match"];
-let colours: Record<string, string> = {};
+/** Everything that has a colour of its own, in the style sheet and in the legend. */
+const NAMES = ["grid", "wall", "off", "added", "robot", "scan", "matched", "unmatched", "missing", "critical", "estimate", "other"];
+export const KINDS = ["usable", "ambiguous", "degenerate", "no_match"];
+export let colours: Record<string, string> = {};
 let frame = 0;
 export const HANDLE = 46; // px from the robot to its handle
-const SMALLEST = 14; // px; an ellipse that is smaller is drawn larger, and says so
+const SMALLEST = 14; // px; a smaller ellipse is drawn larger, and the legend says so
 
 export function readColours(): void {
   const style = getComputedStyle(document.documentElement);
-  colours = Object.fromEntries(NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  colours = Object.fromEntries([...NAMES, ...KINDS].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
 export function resize(): void {
@@ -31,21 +35,12 @@ export function redraw(): void {
   if (!frame) frame = requestAnimationFrame(draw);
 }
 
-/** Which colour a pair has: neighbours differ. */
-export function pairColour(index: number): string {
-  return `hsl(${(index * 137.5) % 360} 70% var-l)`.replace("var-l", matchMedia("(prefers-color-scheme: dark)").matches ? "62%" : "42%");
-}
-
 /** The segments of the scan that was sent, in its own frame. */
 export function sentSegments(): Segment[] {
-  return state.answer?.segments ?? state.sent?.scan.segments ?? [];
-}
-
-/** The pose that is shown: the answer's, or that of another place. */
-export function shownPose(): Pose | null {
-  const { answer, other } = state;
-  if (!answer) return null;
-  return other >= 0 ? answer.alternatives[other].pose : answer.pose;
+  const { answer, sent } = state;
+  // A scan of one view is in the frame of the robot, and its segments are one list for each view.
+  const found = (answer?.segments ?? sent?.scan.segments ?? []) as Segment[] | Segment[][];
+  return Array.isArray(found[0]?.[0]) ? (found as Segment[][]).flat() : (found as Segment[]);
 }
 
 function draw(): void {
@@ -53,36 +48,30 @@ function draw(): void {
   context.setTransform(view.ratio, 0, 0, view.ratio, 0, 0);
   context.clearRect(0, 0, view.width, view.height);
   context.lineCap = "round";
-  if (state.analysis) drawAnalysis(state.analysis.places, state.analysis.spacing);
+  drawPicture(context);
+  drawHeat(context, colours);
+  drawGrid(context, colours.grid);
   drawWalls(context, colours.wall, redraw);
-  drawPutUp();
-  if (state.analysis && state.pointed?.similar_pose) drawLikeness(state.pointed.pose, state.pointed.similar_pose);
-  drawTakenOff();
+  for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.added, 3);
+  for (const k of state.off) line(state.walls[k], colours.off, 4, [3, 5]);
+  const { answer, sent, pointed } = state;
+  if (state.analysis && pointed?.similar_pose) drawSimilar(pointed.pose, pointed.similar_pose);
   if (state.log.length) drawLog();
-  const { answer, sent } = state;
   const scan = sent?.scan ?? state.scan;
-  if (scan && !state.virtual) drawScan(scan, state.robot, "before", 0.5);
+  if (scan && !state.virtual && !state.log.length) drawScan(scan, state.robot, "robot", 0.35);
   if (answer && sent) drawAnswer(answer, sent.scan);
-  if (scan || state.virtual) drawRobot(state.robot, "robot", true);
+  if ((scan && !state.log.length) || state.virtual) drawRobot(state.robot, "robot", true);
 }
 
-function drawPutUp(): void {
-  for (let k = state.own; k < state.walls.length; k++) line(state.walls[k], colours.robot, 3);
-}
-
-function drawTakenOff(): void {
-  context.setLineDash([3, 5]);
-  for (const k of state.off) line(state.walls[k], colours.off, 4);
-  context.setLineDash([]);
-}
-
-function line([x1, y1, x2, y2]: Segment, colour: string, width: number): void {
+function line([x1, y1, x2, y2]: Segment, colour: string, width: number, dashes: number[] = []): void {
+  context.setLineDash(dashes);
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.beginPath();
   context.moveTo(...toPixels(x1, y1));
   context.lineTo(...toPixels(x2, y2));
   context.stroke();
+  context.setLineDash([]);
 }
 
 function drawScan(scan: Scan, pose: Pose, name: string, alpha: number): void {
@@ -97,59 +86,42 @@ function drawScan(scan: Scan, pose: Pose, name: string, alpha: number): void {
 }
 
 function drawAnswer(answer: Answer, scan: Scan): void {
-  const pose = shownPose();
-  for (const k of answer.missing_map) {
-    context.setLineDash([8, 6]);
-    line(state.walls[state.sentTo[k]], colours.missing, 4);
-    context.setLineDash([]);
-  }
-  if (!pose) return;
   if (state.other >= 0) {
-    drawScan({ ...scan, segments: sentSegments() }, pose, "ghost", 0.9);
-    drawRobot(pose, "ghost", false);
+    const { pose } = state.others[state.other];
+    drawScan({ ...scan, segments: sentSegments() }, pose, "other", 0.9);
+    drawRobot(pose, "other", false);
     return;
   }
-  drawScan({ ...scan, segments: undefined }, pose, "point", 0.75);
+  for (const k of answer.missing_map) line(state.walls[state.sentTo[k]], colours.missing, 4, [8, 6]);
+  const { pose } = answer;
+  if (!pose) return;
   const segments = sentSegments();
-  for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[state.sentTo[k]], colours.critical, 11);
-  answer.correspondences.forEach((pair, index) => {
-    line(state.walls[state.sentTo[pair.map]], pairColour(index), 2.5);
-    line(placed(pose, segments[pair.scan]), pairColour(index), 5);
-  });
-  for (const k of answer.unmatched_scan) {
-    context.setLineDash([2, 6]);
-    line(placed(pose, segments[k]), colours.unmatched, 4);
-    context.setLineDash([]);
-  }
+  for (const k of answer.diagnostics?.critical_wall?.map ?? []) line(state.walls[state.sentTo[k]], colours.critical, 12);
+  drawScan({ ...scan, segments: undefined }, pose, "scan", 0.75);
+  for (const pair of answer.correspondences) line(placed(pose, segments[pair.scan]), colours.matched, 5);
+  for (const k of answer.unmatched_scan) line(placed(pose, segments[k]), colours.unmatched, 4, [2, 6]);
   drawUncertainty(answer, pose);
-  drawRobot(pose, answer.usable ? "ok" : answer.status, false);
+  drawRobot(pose, "estimate", false);
 }
 
 function drawUncertainty(answer: Answer, pose: Pose): void {
   const [px, py] = toPixels(pose.x, pose.y);
   if (answer.unobservable) {
-    const [dx, dy] = answer.unobservable;
-    context.strokeStyle = colours.degenerate;
-    context.lineWidth = 3;
-    context.setLineDash([10, 6]);
-    context.beginPath();
-    context.moveTo(px - 160 * dx, py + 160 * dy);
-    context.lineTo(px + 160 * dx, py - 160 * dy);
-    context.stroke();
-    context.setLineDash([]);
+    const [dx, dy] = answer.unobservable.map((part) => (160 / view.scale) * part);
+    line([pose.x - dx, pose.y - dy, pose.x + dx, pose.y + dy], colours.estimate, 3, [10, 6]);
   }
   const c = answer.covariance;
   if (!c) return;
   const mean = (c[0][0] + c[1][1]) / 2;
   const half = Math.hypot((c[0][0] - c[1][1]) / 2, c[0][1]);
   const turn = Math.atan2(2 * c[0][1], c[0][0] - c[1][1]) / 2;
-  const [long, short] = [mean + half, Math.max(0, mean - half)].map((v) => 3 * Math.sqrt(v) * view.scale);
-  const larger = Math.max(1, SMALLEST / Math.max(long, 1e-6));
+  const larger = enlarged()!;
+  const [long, short] = [mean + half, Math.max(0, mean - half)].map((v) => 3 * Math.sqrt(v) * view.scale * larger);
   const fan = Math.min(Math.PI, 3 * Math.sqrt(c[2][2]) * larger);
-  context.strokeStyle = context.fillStyle = colours.robot;
+  context.strokeStyle = context.fillStyle = colours.estimate;
   context.lineWidth = 1.5;
   context.beginPath();
-  context.ellipse(px, py, long * larger, Math.max(2, short * larger), -turn, 0, 2 * Math.PI);
+  context.ellipse(px, py, long, Math.max(2, short), -turn, 0, 2 * Math.PI);
   context.stroke();
   context.globalAlpha = 0.25;
   context.beginPath();
@@ -159,7 +131,7 @@ function drawUncertainty(answer: Answer, pose: Pose): void {
   context.globalAlpha = 1;
 }
 
-/** How many times larger than they are the ellipse and the fan are drawn; null where there are none. */
+/** The factor by which the ellipse and the sector of the heading are drawn larger; null where there are none. */
 export function enlarged(): number | null {
   const c = state.other < 0 ? state.answer?.covariance : null;
   if (!c) return null;
@@ -178,9 +150,8 @@ function drawRobot(pose: Pose, name: string, handle: boolean): void {
   context.lineTo(px - 8 * c - 8 * s, py - 8 * s + 8 * c);
   context.lineTo(px - 8 * c + 8 * s, py - 8 * s - 8 * c);
   context.closePath();
-  if (handle) context.stroke();
-  else context.fill();
-  if (!handle) return;
+  if (!handle) return context.fill();
+  context.stroke();
   context.beginPath();
   context.moveTo(px + 13 * c, py + 13 * s);
   context.lineTo(px + (HANDLE - 5) * c, py + (HANDLE - 5) * s);
@@ -190,49 +161,15 @@ function drawRobot(pose: Pose, name: string, handle: boolean): void {
   context.fill();
 }
 
-function drawAnalysis(places: Place[], spacing: number): void {
-  const side = Math.max(2, spacing * view.scale);
-  // One that does not see all round has a verdict for each direction that it looks in.
-  const directed = places.some((one) => one.pose.theta !== places[0].pose.theta);
-  context.globalAlpha = 0.55;
-  for (const one of places) {
-    const shown = shownOf(one);
-    if (!shown) continue;
-    const [px, py] = toPixels(one.pose.x, one.pose.y);
-    context.fillStyle = colours[kindOf(shown)];
-    if (directed) {
-      context.beginPath();
-      context.moveTo(px, py);
-      context.arc(px, py, side / 2, -one.pose.theta - Math.PI / 4, -one.pose.theta + Math.PI / 4);
-      context.fill();
-    } else context.fillRect(px - side / 2, py - side / 2, side, side);
-  }
-  context.globalAlpha = 1;
-}
-
-/** From a place to another that looks like it. */
-function drawLikeness(from: Pose, to: Pose): void {
-  context.setLineDash([6, 5]);
-  line([from.x, from.y, to.x, to.y], colours.ghost, 2);
-  context.setLineDash([]);
-  drawRobot(to, "ghost", false);
-}
-
-/** What is shown of a place: at once, after a drive, or with what was put up; null where no robot can stand then. */
-export function shownOf(one: Place): { status: Answer["status"]; usable: boolean; probability: number | null } | null {
-  if (state.show === "landmark") return one.with_landmark;
-  if (state.show === "driven" && one.resolved_after !== null) return { ...one, status: "ok", usable: true };
-  return one;
-}
-
-/** How a place is told; one that is ok but not usable is as good as ambiguous. */
-export function kindOf(one: { status: string; usable: boolean }): string {
-  return one.status === "ok" && !one.usable ? "ambiguous" : one.status;
+/** Draw a line from a place to one that is similar. */
+function drawSimilar(from: Pose, to: Pose): void {
+  line([from.x, from.y, to.x, to.y], colours.other, 2, [6, 5]);
+  drawRobot(to, "other", false);
 }
 
 function drawLog(): void {
   state.log.forEach((one, k) => {
-    if (!one.pose) return;
+    if (!one?.pose) return;
     const [px, py] = toPixels(one.pose.x, one.pose.y);
     context.fillStyle = colours[kindOf(one)];
     context.beginPath();
@@ -240,58 +177,5 @@ function drawLog(): void {
     context.fill();
   });
   const here = state.log[state.logAt];
-  if (here?.pose) drawRobot(here.pose, kindOf(here), false);
-}
-
-/** What is under the mouse, in words; empty where nothing is. */
-export function toldAt(px: number, py: number): string {
-  const [x, y] = toMetres(px, py);
-  const near = 8 / view.scale;
-  const { answer } = state;
-  const pose = answer?.pose;
-  if (answer && pose && state.other < 0) {
-    const segments = sentSegments();
-    for (const pair of answer.correspondences)
-      if (distance(x, y, placed(pose, segments[pair.scan])) < near)
-        return (
-          `scan ${pair.scan} on wall ${state.sentTo[pair.map]}: ${(1000 * pair.offset).toFixed(1)} mm off, ` +
-          `${((180 / Math.PI) * pair.angle).toFixed(2)}° turned, ${Math.round(100 * pair.overlap)} % on it`
-        );
-    for (const k of answer.unmatched_scan)
-      if (distance(x, y, placed(pose, segments[k])) < near) return `scan ${k}: on no wall of the map`;
-    for (const k of answer.missing_map)
-      if (distance(x, y, state.walls[state.sentTo[k]]) < near) return `wall ${state.sentTo[k]}: should have been seen, and was not`;
-  }
-  const place = placeAt(x, y);
-  if (place) return toldOf(place);
-  const wall = wallAt(x, y, near);
-  return wall < 0 ? "" : `wall ${wall}${wall >= state.own ? ", put up" : ""}${state.off.has(wall) ? ", taken off" : ""}`;
-}
-
-/** Which place of the analysis is there; of several headings that which looks there. */
-export function placeAt(x: number, y: number): Place | null {
-  const half = (state.analysis?.spacing ?? 0) / 2;
-  const here = (state.analysis?.places ?? []).filter((one) => Math.max(Math.abs(one.pose.x - x), Math.abs(one.pose.y - y)) < half);
-  const away = (one: Place) => Math.abs(wrap(Math.atan2(y - one.pose.y, x - one.pose.x) - one.pose.theta));
-  return here.length > 1 ? here.reduce((a, b) => (away(b) < away(a) ? b : a)) : (here[0] ?? null);
-}
-
-function toldOf(one: Place): string {
-  const at = ({ x, y }: Pose) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;
-  const told = ({ status, usable, probability }: { status: string; usable: boolean; probability: number | null }) =>
-    `${status.replace("_", " ")}, ${usable ? "" : "not "}usable${probability === null ? "" : `, ${(100 * probability).toFixed(1)} %`}`;
-  const like = one.similar_pose ? `, similar place at ${at(one.similar_pose)}` : "";
-  const drive = one.resolved_after ? `; resolved after ${one.resolved_after} m` : "";
-  const landmark = one.with_landmark ? `; with the boxes: ${told(one.with_landmark)}` : "";
-  return `${at(one.pose)}: ${told(one)}${like}${drive}${landmark}`;
-}
-
-/** Which wall is within some metres of a place, -1 for none. */
-export function wallAt(x: number, y: number, near: number): number {
-  let [found, least] = [-1, near];
-  state.walls.forEach((wall, k) => {
-    const away = distance(x, y, wall);
-    if (away < least) [found, least] = [k, away];
-  });
-  return found;
+  if (here?.pose && !state.answer) drawRobot(here.pose, kindOf(here), false);
 }

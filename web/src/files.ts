@@ -1,44 +1,73 @@
-// Files that a user opens; their content determines their kind.
+// Files that a user opens; their names and their content determine their kind.
 
-import { importMap } from "./api";
-import { tellImport } from "./imported";
+import { importMap, importScans } from "./api";
 import { askSoon } from "./asking";
-import { openLog } from "./log";
-import { changed, forget, setMap, state } from "./state";
+import { showImport, showScanImport } from "./imported";
+import { openLog, openScans } from "./log";
+import { isLatest, showAll, supersede } from "./scene";
+import { changed, forget, forgetMap, setMap, state } from "./state";
 import type { MapDocument, Scan } from "./types";
-import { showAll } from "./scene";
-import { tellProblem } from "./verdict";
 
 const about = document.querySelector<HTMLElement>("#about")!;
+const status = document.querySelector<HTMLElement>("#reading")!;
 const units = document.querySelector<HTMLSelectElement>("#units")!;
-let drawing: File[] = []; // as it was brought last
+const LOGS = /\.(bag|mcap|db3|log|clf|carmen)$/i;
+const MOST_SCANS = 200; // of a log that are searched here
+let drawing: File[] = []; // the last one, for another unit
 
 export async function open(files: File[]): Promise<void> {
+  const mine = supersede();
   const foreign: File[] = [];
+  let message = "";
   try {
     for (const file of files) {
       if (/\.(json|jsonl|ndjson)$/i.test(file.name)) take(file.name, await file.text());
       else foreign.push(file);
     }
-    if (foreign.length) await read(foreign);
+    if (foreign.length) {
+      status.textContent = `Reading ${foreign[0].name} ...`;
+      await (foreign.some((file) => LOGS.test(file.name)) ? readLog(foreign, mine) : readMap(foreign, mine));
+    }
   } catch (error) {
-    tellProblem(error instanceof Error ? error.message : String(error));
-    return;
+    message = error instanceof Error ? error.message : String(error);
   }
-  askSoon();
+  if (!isLatest(mine)) return; // other files were opened meanwhile
+  status.textContent = message;
+  if (!message) askSoon();
 }
 
-async function read(files: File[]): Promise<void> {
+async function readMap(files: File[], mine: number): Promise<void> {
   drawing = files;
-  const before = about.textContent;
-  about.textContent = "Reading the map ...";
+  const found = await importMap(files, units.value);
+  if (!isLatest(mine)) return;
+  takeMap(found.map);
+  if (found.picture) {
+    const image = new Image();
+    image.addEventListener("load", changed);
+    image.src = `data:image/png;base64,${found.picture.png}`;
+    state.picture = { image, pose: found.picture.pose, resolution: found.picture.resolution };
+  }
+  showImport(found);
+  changed();
+}
+
+/** Read the scans of a log; also its map, where it has no scans or no other map was opened. */
+async function readLog(files: File[], mine: number): Promise<void> {
+  let problem: unknown = null;
   try {
-    const found = await importMap(files, units.value);
-    takeMap(found.map);
-    tellImport(found);
+    const found = await importScans(files, MOST_SCANS);
+    if (!isLatest(mine)) return;
+    openScans(found);
+    showScanImport(found.report);
   } catch (error) {
-    about.textContent = before;
-    throw error;
+    problem = error;
+  }
+  if (!isLatest(mine) || !(problem || !state.map)) return;
+  try {
+    await readMap(files, mine);
+  } catch {
+    if (problem) throw problem;
+    if (!state.map) about.textContent = "The log has no map. Open the map, too.";
   }
 }
 
@@ -52,19 +81,19 @@ function take(name: string, text: string): void {
   }
   if (Array.isArray(content)) return takeMap({ segments: content } as MapDocument);
   if (typeof content !== "object" || content === null) throw new Error(`${name} is neither a map nor a scan. Expected a JSON object, or an array of segments.`);
-  const told = content as Record<string, unknown>;
-  if ("map" in told && "scan" in told) {
+  const fields = content as Record<string, unknown>;
+  if ("map" in fields && "scan" in fields) {
     // A request as it is sent.
-    const { map, scan } = told as { map: MapDocument; scan: Scan };
+    const { map, scan } = fields as { map: MapDocument; scan: Scan };
     if (!("segments" in map)) throw new Error(`${name} refers to a stored map. Open that map first, then a file with the scan.`);
     takeMap(map);
     takeScan(scan);
-  } else if ("ranges" in told) takeScan({ laser: told } as unknown as Scan);
-  else if ("laser" in told || "points" in told) takeScan(told as Scan);
-  else if ("segments" in told) {
-    // Both are lists of segments: a scan says so in its name, or by what only scans have.
-    if (/scan/i.test(name) || "viewpoint" in told || "stamp" in told || "points" in told) takeScan(told as Scan);
-    else takeMap(told as unknown as MapDocument);
+  } else if ("ranges" in fields) takeScan({ laser: fields } as unknown as Scan);
+  else if ("laser" in fields || "points" in fields) takeScan(fields as Scan);
+  else if ("segments" in fields) {
+    // Both are lists of segments: the name of a scan says so, or fields that only scans have.
+    if (/scan/i.test(name) || "viewpoint" in fields || "stamp" in fields || "points" in fields) takeScan(fields as Scan);
+    else takeMap(fields as unknown as MapDocument);
   } else throw new Error(`${name} is neither a map nor a scan. Expected segments, points, laser or ranges.`);
 }
 
@@ -77,10 +106,10 @@ function takeMap(map: MapDocument): void {
 }
 
 function takeScan(scan: Scan): void {
-  Object.assign(state, { scan, virtual: false });
+  if (state.example) forgetMap();
+  Object.assign(state, { scan, virtual: false, log: [], scans: [], logAt: 0 });
   forget();
   if (!state.map) about.textContent = "A scan from a file. Now open its map.";
-  document.querySelector<HTMLInputElement>("#virtual")!.checked = false;
   changed();
 }
 

@@ -1,6 +1,6 @@
-// Poses, and a scanner like the service's own: one range a beam to the nearest wall.
+// Poses, and a simulated scanner like the service's own: each beam returns its range to the nearest wall.
 
-import type { Example, Laser, Pose, Scan, Segment } from "./types";
+import type { Example, Laser, Pose, Scan, Segment, View } from "./types";
 
 export function wrap(angle: number): number {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
@@ -23,7 +23,7 @@ export function distance(x: number, y: number, [x1, y1, x2, y2]: Segment): numbe
   return Math.hypot(x - x1 - t * dx, y - y1 - t * dy);
 }
 
-/** Numbers that look like noise and are the same each time: a verdict must not flicker by itself. */
+/** Gaussian noise that is the same each time, so that a verdict does not flicker. */
 export function noise(seed: number): () => number {
   let a = seed | 0;
   const uniform = () => {
@@ -35,7 +35,7 @@ export function noise(seed: number): () => number {
   return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
 }
 
-/** Take a scan from a pose; what is too far is above `range_max`: nothing came back. */
+/** Simulate a scan from a pose; a range above `range_max` says that nothing came back. */
 export function takeScan(walls: Segment[], pose: Pose, laser: Example["laser"], sigma: number): Scan {
   const full = laser.fov > 2 * Math.PI - 0.01;
   const step = laser.fov / (full ? laser.beams : laser.beams - 1);
@@ -59,15 +59,16 @@ function cast(walls: Segment[], from: Pose, dx: number, dy: number): number {
     if (cross === 0) continue;
     const [bx, by] = [x1 - from.x, y1 - from.y];
     const range = (bx * ey - by * ex) / cross;
-    const share = (bx * dy - by * dx) / cross;
-    if (range > 0 && range < nearest && share >= -1e-9 && share <= 1 + 1e-9) nearest = range;
+    const fraction = (bx * dy - by * dx) / cross;
+    if (range > 0 && range < nearest && fraction >= -1e-9 && fraction <= 1 + 1e-9) nearest = range;
   }
   return nearest;
 }
 
-/** Return a scan with noise of the page's own on top. */
-export function noisy(scan: Scan, sigma: number): Scan {
+/** Return a scan with noise added. */
+export function noisy<T extends Scan>(scan: T, sigma: number): T {
   if (sigma === 0) return scan;
+  if (scan.views) return { ...scan, views: scan.views.map((one) => noisy(one, sigma)) };
   const gauss = noise(2);
   if (scan.laser) {
     const most = scan.laser.range_max ?? Infinity;
@@ -80,8 +81,14 @@ export function noisy(scan: Scan, sigma: number): Scan {
   return { ...scan, segments: (scan.segments ?? []).map((s) => moved(s) as Segment), sigma: Math.hypot(Number(scan.sigma ?? 0.02), sigma) };
 }
 
+/** Return a scan's points or segments from the frame of a view's sensor in that of the robot. */
+export function fromView({ pose, flipped }: View, x: number, y: number): [number, number] {
+  return place(pose, x, flipped ? -y : y);
+}
+
 /** The points of a scan in its own frame. */
 export function pointsOf(scan: Scan): [number, number][] {
+  if (scan.views) return scan.views.flatMap((one) => pointsOf({ ...one, views: undefined }).map(([x, y]) => fromView(one, x, y)));
   if (scan.points && Array.isArray(scan.points[0])) return scan.points;
   if (!scan.laser) return [];
   const { angle_min, angle_increment, ranges, range_min = 0, range_max = Infinity } = scan.laser;

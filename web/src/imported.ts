@@ -1,11 +1,11 @@
-// What was made of the files of another tool: read, merged, left out, assumed, and what is doubtful in it.
+// The report on an imported map or log: what was read, merged, omitted and assumed, and the findings of the check.
 
 import { onChange, state } from "./state";
-import type { Imported, MapDocument, Note } from "./types";
+import type { Imported, MapDocument, Note, Report } from "./types";
 import { list } from "./verdict";
 
 const box = document.querySelector<HTMLDetailsElement>("#imported")!;
-const told = document.querySelector<HTMLElement>("#report")!;
+const content = document.querySelector<HTMLElement>("#report")!;
 let of: MapDocument | null = null;
 
 function section(title: string, lines: string[]): HTMLElement[] {
@@ -16,11 +16,22 @@ function section(title: string, lines: string[]): HTMLElement[] {
   return [head, shown];
 }
 
-/** Show it beside the map that came of it, opened where somebody should look at it. */
-export function tellImport({ map, report, check }: Imported): void {
-  const { read, merged, dropped, assumed } = report;
-  const lines = (notes: Note[]) => notes.map(({ message, count }) => (count ? `${message}: ${count}` : message));
+/** Show the report on a map, open where it has findings, omissions or assumptions. */
+export function showImport({ map, report, check }: Imported): void {
   const doubts = check.findings.map((one) => one.message);
+  document.querySelector("#about")!.textContent = `${map.segments.length} walls from ${report.files.join(", ")} (${report.format}).`;
+  of = map;
+  showReport(report, doubts);
+}
+
+/** Show the report on the scans of a log. */
+export function showScanImport(report: Report): void {
+  of = state.map;
+  showReport(report, []);
+}
+
+function showReport({ read, merged, dropped, assumed }: Report, doubts: string[]): void {
+  const lines = (notes: Note[]) => notes.map(({ message, count }) => (count ? `${message}: ${count}` : message));
   const parts: [string, string[]][] = [
     ["Findings", doubts],
     ["Read", lines(read)],
@@ -28,10 +39,8 @@ export function tellImport({ map, report, check }: Imported): void {
     ["Omitted", lines(dropped)],
     ["Assumed", lines(assumed)],
   ];
-  of = map;
-  document.querySelector("#about")!.textContent = `${map.segments.length} walls, read of ${report.files.join(", ")} (${report.format}).`;
   document.querySelector("#imported summary")!.textContent = doubts.length ? `Import report: ${doubts.length} findings` : "Import report";
-  told.replaceChildren(...parts.flatMap(([title, lines]) => section(title, lines)));
+  content.replaceChildren(...parts.flatMap(([title, lines]) => section(title, lines)));
   box.hidden = false;
   box.open = doubts.length + dropped.length + assumed.length > 0;
 }

@@ -1,17 +1,19 @@
-// A log that was replayed: its poses and verdicts along the way.
+// A log: the verdicts of a replay, or scans that are searched here one after the other.
 
-import { changed, forget, onChange, state } from "./state";
-import type { LogLine } from "./types";
+import { ask } from "./asking";
+import { changed, forget, forgetMap, onChange, state } from "./state";
+import type { ImportedScans, LogLine } from "./types";
 
+const box = document.querySelector<HTMLElement>("#log")!;
 const play = document.querySelector<HTMLButtonElement>("#play")!;
 const at = document.querySelector<HTMLInputElement>("#at")!;
-const told = document.querySelector<HTMLElement>("#scan-of-log")!;
+const text = document.querySelector<HTMLElement>("#scan-of-log")!;
 const PACE = 120; // ms from scan to scan
-let timer = 0;
+let playing = false;
 
-/** Take a file for a log if every line of it is one of a replay; tell whether it is. */
-export function openLog(text: string): boolean {
-  const lines = text.split("\n").filter((line) => line.trim());
+/** Take a file for a log if every line of it is one of a replay; return whether it is. */
+export function openLog(content: string): boolean {
+  const lines = content.split("\n").filter((line) => line.trim());
   let found: LogLine[];
   try {
     found = lines.map((line) => JSON.parse(line) as LogLine);
@@ -20,48 +22,76 @@ export function openLog(text: string): boolean {
   }
   const is_one = (line: LogLine) => line !== null && typeof line === "object" && "status" in line && "stamp" in line && "pose" in line;
   if (!found.length || !found.every(is_one)) return false;
-  forget();
-  Object.assign(state, { log: found, logAt: 0, scan: null, virtual: false });
-  document.querySelector<HTMLDetailsElement>("#log")!.open = true;
-  changed();
+  show({ log: found, scans: [], scan: null });
   return true;
 }
 
-function stop(): void {
-  clearInterval(timer);
-  timer = 0;
+/** Show the scans of a log; the first one is searched as soon as there is a map. */
+export function openScans({ scans, count, report }: ImportedScans): void {
+  show({ log: scans.map(() => null), scans, scan: scans[0] });
+  document.querySelector("#about")!.textContent = `${scans.length} of the ${count} scans in ${report.files.join(", ")}. Now open its map.`;
+}
+
+function show(log: Partial<typeof state>): void {
+  playing = false;
+  if (state.example) forgetMap();
+  forget();
+  Object.assign(state, { ...log, logAt: 0, virtual: false });
+  changed();
+}
+
+/** Show a scan of the log; where it comes as a scan, search it. */
+async function goTo(index: number): Promise<void> {
+  state.logAt = index;
+  if (state.scans.length) {
+    state.scan = state.scans[index];
+    forget();
+    await ask();
+  }
+  changed();
+}
+
+async function run(): Promise<void> {
+  const of = state.log;
+  if (state.logAt === of.length - 1) state.logAt = -1;
+  while (playing && state.log === of && state.logAt < of.length - 1) {
+    await Promise.all([goTo(state.logAt + 1), new Promise((done) => setTimeout(done, PACE))]);
+    if (state.scans.length && !state.answer) break; // the verdict card says why
+  }
+  playing = false;
   changed();
 }
 
 play.addEventListener("click", () => {
-  if (timer) return stop();
-  if (state.logAt === state.log.length - 1) state.logAt = 0;
-  timer = window.setInterval(() => {
-    if (state.logAt >= state.log.length - 1) return stop();
-    state.logAt += 1;
-    changed();
-  }, PACE);
+  playing = !playing;
+  if (playing) void run();
   changed();
 });
-at.addEventListener("input", () => {
-  state.logAt = Number(at.value);
-  changed();
-});
+at.addEventListener("input", () => void goTo(Number(at.value)));
+
+/** Note the verdict on the scan that is shown, for the trail of poses. */
+function note(): void {
+  const { answer, log, logAt, scans } = state;
+  if (!answer || !scans.length) return;
+  const { status, usable, probability, pose, reasons } = answer;
+  log[logAt] = { stamp: scans[logAt].stamp, status, usable, probability, pose, reasons };
+}
 
 onChange(() => {
-  const count = state.log.length;
-  play.disabled = at.disabled = count === 0;
-  play.textContent = timer ? "Pause" : "Play";
+  note();
+  const { log, logAt } = state;
+  const count = log.length;
+  box.hidden = count === 0;
+  play.textContent = playing ? "Pause" : "Play";
   at.max = String(Math.max(0, count - 1));
-  at.value = String(state.logAt);
-  const line = state.log[state.logAt];
-  if (!line) {
-    told.textContent = "";
-    return;
-  }
-  const usable = state.log.filter((one) => one.usable).length;
-  const why = line.reasons.map((one) => (typeof one === "string" ? one : one.message)).join(" ");
-  told.textContent =
-    `Scan ${state.logAt + 1} of ${count}: ${line.status.replace("_", " ")}, ${line.usable ? "usable" : "not usable"}` +
-    `${line.probability === null ? "" : `, ${(100 * line.probability).toFixed(1)} %`}. ${why} (${usable} of ${count} are usable.)`;
+  at.value = String(logAt);
+  const line = log[logAt];
+  const usable = log.filter((one) => one?.usable).length;
+  const searched = log.filter((one) => one).length;
+  const verdict = line
+    ? `${line.status.replace("_", " ")}, ${line.usable ? "usable" : "not usable"}` +
+      `${line.probability === null ? "" : `, ${(100 * line.probability).toFixed(1)} %`}. ` +
+      line.reasons.map((one) => (typeof one === "string" ? one : one.message)).join(" ")
+    : "not searched yet.";
+  text.textContent = `Scan ${logAt + 1} of ${count}: ${verdict} (${usable} of ${searched} are usable.)`;
 });

@@ -3,7 +3,7 @@
 import "./analysis";
 import "./files";
 import "./imported";
-import "./inset";
+import "./legend";
 import "./log";
 import "./pointer";
 import "./share";
@@ -11,7 +11,8 @@ import "./stored";
 import "./trying";
 import { setKey } from "./api";
 import { readColours, redraw, resize } from "./drawing";
-import { choose } from "./scene";
+import { drawInset } from "./inset";
+import { choose, FIRST } from "./scene";
 import { onChange } from "./state";
 
 const key = document.querySelector<HTMLInputElement>("#key")!;
@@ -23,12 +24,10 @@ readColours();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   readColours();
   redraw();
+  drawInset();
 });
 new ResizeObserver(resize).observe(document.querySelector("#plan")!);
 resize();
 
-const named = new URLSearchParams(location.search).get("example");
-if (named && /^[a-z]+$/.test(named)) {
-  document.querySelector<HTMLSelectElement>("#example")!.value = named;
-  void choose(named);
-}
+const named = new URLSearchParams(location.search).get("example") ?? "";
+void choose(/^[a-z]+$/.test(named) ? named : FIRST);

@@ -1,53 +1,64 @@
 // Mouse, touch and keyboard on the plan.
 
 import { ask, askSoon } from "./asking";
-import { HANDLE, placeAt, redraw, toldAt, wallAt } from "./drawing";
+import { HANDLE, redraw } from "./drawing";
 import { wrap } from "./geometry";
-import { boundsOf, changed, putUp, state } from "./state";
-import { legend, step } from "./verdict";
+import { showLegend } from "./legend";
+import { describe, placeAt, wallAt } from "./pointed";
+import { addWalls, boundsOf, changed, state } from "./state";
+import { step } from "./verdict";
 import { fit, toMetres, toPixels, view, zoom } from "./view";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#plan")!;
 const hover = document.querySelector<HTMLElement>("#hover")!;
 const erase = document.querySelector<HTMLInputElement>("#erase")!;
 const build = document.querySelector<HTMLInputElement>("#build")!;
-const BOX = [1, 0.6]; // m; of a box that is put up
+const BOX = [1, 0.6]; // m; of a box that is added
 const GRIP = 18; // px about the robot
-let drag: { what: "plan" | "robot" | "turn"; x: number; y: number; moved: boolean } | null = null;
+const FINGER = 1.6; // times as much under a finger
+type Grip = "plan" | "robot" | "turn";
+let drag: { what: Grip; x: number; y: number; moved: boolean } | null = null;
+const fingers = new Map<number, [number, number]>();
 
-/** Put what is said beside the mouse, whole. */
+/** Put the text next to the mouse, inside the plan. */
 function besides(px: number, py: number): void {
   hover.style.translate = "0 0"; // at the edge it would be squeezed
   const [x, y] = [Math.min(px + 14, view.width - hover.offsetWidth - 8), Math.min(py + 14, view.height - hover.offsetHeight - 8)];
   hover.style.translate = `${Math.max(0, x)}px ${Math.max(0, y)}px`;
 }
 
-function whatAt(px: number, py: number): "plan" | "robot" | "turn" {
-  if (!state.scan && !state.virtual) return "plan";
+function whatAt(px: number, py: number, factor = 1): Grip {
+  if ((!state.scan && !state.virtual) || state.log.length) return "plan";
   const [rx, ry] = toPixels(state.robot.x, state.robot.y);
   const [hx, hy] = [rx + HANDLE * Math.cos(state.robot.theta), ry - HANDLE * Math.sin(state.robot.theta)];
-  if (Math.hypot(px - hx, py - hy) < GRIP / 1.5) return "turn";
-  return Math.hypot(px - rx, py - ry) < GRIP ? "robot" : "plan";
+  if (Math.hypot(px - hx, py - hy) < (factor * GRIP) / 1.5) return "turn";
+  return Math.hypot(px - rx, py - ry) < factor * GRIP ? "robot" : "plan";
 }
 
+// One finger beside the robot scrolls the page. One on the robot drags it, and two move and zoom the plan.
+canvas.addEventListener(
+  "touchstart",
+  (event) => {
+    const box = canvas.getBoundingClientRect();
+    const [first] = event.touches;
+    if (event.touches.length > 1 || whatAt(first.clientX - box.x, first.clientY - box.y, FINGER) !== "plan") event.preventDefault();
+  },
+  { passive: false },
+);
+
 canvas.addEventListener("pointerdown", (event) => {
+  const [px, py] = [event.offsetX, event.offsetY];
+  const touch = event.pointerType === "touch";
+  if (touch) fingers.set(event.pointerId, [px, py]);
   canvas.setPointerCapture(event.pointerId);
-  drag = { what: whatAt(event.offsetX, event.offsetY), x: event.offsetX, y: event.offsetY, moved: false };
+  drag = fingers.size > 1 ? null : { what: whatAt(px, py, touch ? FINGER : 1), x: px, y: py, moved: false };
 });
 
 canvas.addEventListener("pointermove", (event) => {
   const [px, py] = [event.offsetX, event.offsetY];
+  if (fingers.size > 1 && fingers.has(event.pointerId)) return pinch(event.pointerId, px, py);
   if (!drag) {
-    const told = toldAt(px, py);
-    const pointed = placeAt(...toMetres(px, py));
-    if (pointed !== state.pointed) {
-      state.pointed = pointed;
-      redraw();
-    }
-    hover.hidden = !told;
-    hover.textContent = told;
-    if (told) besides(px, py);
-    canvas.style.cursor = { plan: erase.checked || build.checked ? "crosshair" : "grab", robot: "move", turn: "alias" }[whatAt(px, py)];
+    if (event.pointerType !== "touch") point(px, py);
     return;
   }
   const [dx, dy] = [px - drag.x, py - drag.y];
@@ -55,6 +66,7 @@ canvas.addEventListener("pointermove", (event) => {
   if (!drag.moved) return;
   [drag.x, drag.y] = [px, py];
   if (drag.what === "plan") {
+    if (event.pointerType === "touch") return; // it scrolls
     view.x -= dx / view.scale;
     view.y += dy / view.scale;
     redraw();
@@ -68,12 +80,41 @@ canvas.addEventListener("pointermove", (event) => {
   askSoon();
 });
 
+/** Describe what the mouse points at. */
+function point(px: number, py: number): void {
+  const text = describe(px, py);
+  const pointed = placeAt(...toMetres(px, py));
+  if (pointed !== state.pointed) {
+    state.pointed = pointed;
+    looked();
+  }
+  hover.hidden = !text;
+  hover.textContent = text;
+  if (text) besides(px, py);
+  canvas.style.cursor = { plan: erase.checked || build.checked ? "crosshair" : "grab", robot: "move", turn: "alias" }[whatAt(px, py)];
+}
+
+/** Move and zoom the plan with two fingers, of which one has moved. */
+function pinch(id: number, px: number, py: number): void {
+  const [ox, oy] = fingers.get(id)!;
+  const [qx, qy] = [...fingers].find(([other]) => other !== id)![1];
+  fingers.set(id, [px, py]);
+  view.x -= (px - ox) / 2 / view.scale;
+  view.y += (py - oy) / 2 / view.scale;
+  zoom(Math.hypot(px - qx, py - qy) / Math.max(1, Math.hypot(ox - qx, oy - qy)), (px + qx) / 2, (py + qy) / 2);
+  looked();
+}
+
 canvas.addEventListener("pointerup", (event) => {
+  fingers.delete(event.pointerId);
   if (drag && !drag.moved && erase.checked) toggleWall(event.offsetX, event.offsetY);
   if (drag && !drag.moved && build.checked) putBox(...toMetres(event.offsetX, event.offsetY));
   drag = null;
 });
-canvas.addEventListener("pointercancel", () => (drag = null));
+canvas.addEventListener("pointercancel", (event) => {
+  fingers.delete(event.pointerId);
+  drag = null;
+});
 canvas.addEventListener("pointerleave", () => (hover.hidden = true));
 
 canvas.addEventListener(
@@ -94,12 +135,12 @@ function toggleWall(px: number, py: number): void {
   askSoon();
 }
 
-/** Put a box up about a place; its free side is outside. */
+/** Add a box about a place; its free side is outside. */
 function putBox(x: number, y: number): void {
   if (!state.map) return;
   const [w, h] = [BOX[0] / 2, BOX[1] / 2];
   const corners: [number, number][] = [[x - w, y - h], [x - w, y + h], [x + w, y + h], [x + w, y - h]];
-  putUp(corners.map((one, k) => [...one, ...corners[(k + 1) % 4]]));
+  addWalls(corners.map((one, k) => [...one, ...corners[(k + 1) % 4]]));
   askSoon();
 }
 
@@ -112,10 +153,10 @@ function fitPlan(): void {
   fit(boundsOf(state.walls));
 }
 
-/** Draw another part of the plan; the legend says how much larger than they are some things are drawn. */
+/** Draw another part of the plan, and what the legend says of it. */
 function looked(): void {
   redraw();
-  legend();
+  showLegend();
 }
 
 const SHIFTED = 10;

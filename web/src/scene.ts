@@ -1,24 +1,36 @@
-// Examples, and what to do when another map is shown.
+// Examples, and what happens when another map is shown.
 
 import { example } from "./api";
 import { askSoon } from "./asking";
 import { boundsOf, changed, onChange, setMap, state } from "./state";
 import type { Example } from "./types";
-import { tellProblem } from "./verdict";
+import { showProblem } from "./verdict";
 import { fit } from "./view";
 
 const NAMES: Record<string, string> = {
   flat: "A flat",
   office: "An office",
-  rooms: "Look-alike rooms",
+  rooms: "Three equal rooms",
   corridor: "A corridor",
   warehouse: "A warehouse",
 };
+export const FIRST = "rooms"; // which is shown when the page opens
 const chooser = document.querySelector<HTMLSelectElement>("#example")!;
 const virtual = document.querySelector<HTMLInputElement>("#virtual")!;
 
+let latest = 0;
+
+/** Begin to open something; what was being opened before is dropped. Returns its number. */
+export function supersede(): number {
+  document.querySelector("#reading")!.textContent = "";
+  return ++latest;
+}
+
+/** Return whether nothing else was opened since. */
+export const isLatest = (number: number) => number === latest;
+
 export function showAll(about: string, example = ""): void {
-  chooser.value = example;
+  chooser.value = state.example = example;
   document.querySelector("#about")!.textContent = about;
   for (const [id, value] of Object.entries({ "#fov": (180 / Math.PI) * state.laser.fov, "#beams": state.laser.beams, "#range": state.laser.range_max }))
     document.querySelector<HTMLInputElement>(id)!.value = String(Math.round(100 * value) / 100);
@@ -27,13 +39,16 @@ export function showAll(about: string, example = ""): void {
 }
 
 export async function choose(name: string): Promise<void> {
+  const mine = supersede();
   let found: Example;
   try {
     found = await example<Example>(name);
   } catch (error) {
-    tellProblem(error instanceof Error ? error.message : String(error));
+    showProblem(error instanceof Error ? error.message : String(error));
     return;
   }
+  if (mine !== latest) return;
+  state.scans = [];
   setMap(found.map);
   Object.assign(state, { boxes: found.boxes, robot: found.pose, laser: found.laser, virtual: true, scan: null });
   showAll(found.about, name);
@@ -45,7 +60,7 @@ chooser.addEventListener("change", () => {
   if (chooser.value) void choose(chooser.value);
 });
 virtual.addEventListener("change", () => {
-  state.virtual = virtual.checked; // it may be waiting for a map that is being read
+  state.virtual = virtual.checked; // also while a map is being read
   askSoon();
 });
 

@@ -2,11 +2,11 @@
 
 import { request } from "./asking";
 
-const told = document.querySelector<HTMLElement>("#copied")!;
+const text = document.querySelector<HTMLElement>("#copied")!;
 
 function body(): string | null {
   const made = request();
-  if (!made) told.textContent = "There is no request yet. Open a map and a scan.";
+  if (!made) text.textContent = "There is no request yet. Open a map and a scan.";
   return made ? JSON.stringify(made.asked) : null;
 }
 
@@ -44,9 +44,9 @@ function copying(id: string, form: (json: string) => string): void {
     if (json === null) return;
     try {
       await navigator.clipboard.writeText(form(json));
-      told.textContent = "Copied.";
+      text.textContent = "Copied.";
     } catch {
-      told.textContent = "The browser does not let this page copy; download the request instead.";
+      text.textContent = "The browser does not let this page copy; download the request instead.";
     }
   });
 }
@@ -62,5 +62,5 @@ document.querySelector("#download")!.addEventListener("click", () => {
   link.download = "linefix-request.json";
   link.click();
   URL.revokeObjectURL(link.href);
-  told.textContent = "Downloaded; it can be opened here again.";
+  text.textContent = "Downloaded; it can be opened here again.";
 });

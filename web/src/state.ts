@@ -1,28 +1,39 @@
-// What is on the page. Modules read it; `changed` says that something is to be drawn anew.
+// What is on the page. Modules read it; `changed` has the page drawn again.
 
-import type { Analysis, Answer, Example, LogLine, MapDocument, Place, Pose, Scan, Segment } from "./types";
+import type { Alternative, Analysis, Answer, Example, LogLine, MapDocument, Place, Pose, Scan, Segment } from "./types";
 
 export interface State {
   map: MapDocument | null;
-  mapId: string | null; // where the map is a stored one, as long as no wall was taken off
-  walls: Segment[]; // all walls of the map, those taken off too, and after them those that were put up
+  mapId: string | null; // of a stored map
+  picture: Picture | null; // of the grid that the map was imported from
+  example: string; // name of the example that is shown, empty for none
+  walls: Segment[]; // all walls of the map, also those that were removed, and after them the walls of added boxes
   own: number; // how many of them are the map's
-  off: Set<number>; // indices of walls that were taken off
-  boxes: Segment[]; // what a virtual robot sees and no map shows
-  scan: Scan | null; // as brought, without the page's noise
-  robot: Pose; // where the virtual robot stands, or where the scan was put
-  virtual: boolean;
+  off: Set<number>; // indices of walls that were removed
+  boxes: Segment[]; // what the simulated scan contains and the map does not
+  scan: Scan | null; // as opened, without the page's noise
+  robot: Pose; // the true pose of the simulated robot, or the initial pose of the scan
+  virtual: boolean; // whether the scan is simulated
   laser: Example["laser"];
   noise: number; // m
-  sent: { map: MapDocument | { map_id: string }; scan: Scan } | null; // what the answer is about
+  sent: { map: MapDocument | { map_id: string }; scan: Scan } | null; // the request that was answered
   answer: Answer | null;
   sentTo: number[]; // index of each wall that was sent, among all walls
-  other: number; // which other place is shown, -1 for none
+  others: Alternative[]; // the alternatives that are counted and shown
+  other: number; // index of the one that is shown, -1 for none
   analysis: Analysis | null;
   show: Shown; // of the analysis
-  pointed: Place | null; // at which place of the analysis the mouse is
-  log: LogLine[];
+  pointed: Place | null; // the place of the analysis under the mouse
+  log: (LogLine | null)[]; // null: not searched yet
+  scans: Scan[]; // of a log whose scans are searched here
   logAt: number;
+}
+
+/** The picture of a grid; `pose` is that of its lower left corner. */
+export interface Picture {
+  image: HTMLImageElement;
+  pose: Pose;
+  resolution: number; // m
 }
 
 export type Shown = "now" | "driven" | "landmark";
@@ -30,6 +41,8 @@ export type Shown = "now" | "driven" | "landmark";
 export const state: State = {
   map: null,
   mapId: null,
+  picture: null,
+  example: "",
   walls: [],
   own: 0,
   off: new Set(),
@@ -42,11 +55,13 @@ export const state: State = {
   sent: null,
   answer: null,
   sentTo: [],
+  others: [],
   other: -1,
   analysis: null,
   show: "now",
   pointed: null,
   log: [],
+  scans: [],
   logAt: 0,
 };
 
@@ -60,17 +75,25 @@ export function changed(): void {
   for (const listener of listeners) listener();
 }
 
-/** Put another map on the page; what was about the one before goes. */
+/** Show another map, and forget what belongs to the one before; a log stays. */
 export function setMap(map: MapDocument, mapId: string | null = null): void {
   const own = map.segments.length;
-  Object.assign(state, { map, mapId, walls: map.segments, own, off: new Set(), boxes: [], log: [], logAt: 0 });
+  Object.assign(state, { map, mapId, walls: map.segments, own, off: new Set(), boxes: [], picture: null, example: "" });
+  if (state.scans.length) state.log = state.scans.map(() => null);
+  else Object.assign(state, { log: [], logAt: 0 });
   forget();
   state.analysis = state.pointed = null;
   const box = boundsOf(map.segments);
   state.robot = { x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2, theta: 0 };
 }
 
-/** The walls that count, of the map's own and of those that were put up. */
+/** Show no map: an example's is not that of a scan which is opened. */
+export function forgetMap(): void {
+  setMap({ segments: [] });
+  state.map = null;
+}
+
+/** The walls that were not removed: the map's own, and those of added boxes. */
 export function kept(): { own: Segment[]; landmark: Segment[] } {
   const on = (_: Segment, k: number) => !state.off.has(k);
   const left = state.walls.filter(on);
@@ -83,12 +106,12 @@ export function asStored(): boolean {
   return state.mapId !== null && !state.off.size && state.walls.length === state.own;
 }
 
-/** Put up walls, in the building and on the map. */
-export function putUp(walls: Segment[]): void {
+/** Add walls, to the building and to the map. */
+export function addWalls(walls: Segment[]): void {
   state.walls = [...state.walls, ...walls];
 }
 
-/** Have the map as it came. */
+/** Restore the map as it was opened. */
 export function restore(): void {
   state.off = new Set();
   if (state.walls.length === state.own) return;
@@ -96,9 +119,9 @@ export function restore(): void {
   state.walls = state.walls.slice(0, state.own);
 }
 
-/** Forget the answer: it is about something else. */
+/** Forget the answer, which belongs to another request. */
 export function forget(): void {
-  Object.assign(state, { answer: null, sent: null, sentTo: [], other: -1 });
+  Object.assign(state, { answer: null, sent: null, sentTo: [], others: [], other: -1 });
 }
 
 export function boundsOf(segments: Segment[]): Segment {

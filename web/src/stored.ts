@@ -1,4 +1,4 @@
-// Maps that the service keeps.
+// Maps that the service stores.
 
 import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
 import { askSoon } from "./asking";
@@ -13,18 +13,18 @@ const findings = document.querySelector<HTMLElement>("#findings")!;
 const name = document.querySelector<HTMLInputElement>("#map-id")!;
 let cursor = "";
 
-function tell(...lines: string[]): void {
+function show(...lines: string[]): void {
   const shown = document.createElement("ul");
   list(shown, lines);
   findings.replaceChildren(shown);
 }
 
-/** Do something, and tell what goes wrong. */
+/** Do something, and show its error. */
 async function trying(action: () => Promise<void>): Promise<void> {
   try {
     await action();
   } catch (error) {
-    tell(error instanceof Error ? error.message : String(error));
+    show(error instanceof Error ? error.message : String(error));
   }
 }
 
@@ -68,9 +68,9 @@ async function use(id: string): Promise<void> {
 }
 
 async function check(id: string): Promise<void> {
-  tell(`Checking ${id} ...`);
+  show(`Checking ${id} ...`);
   const found = await checkMap(id);
-  tell(...(found.findings.length ? found.findings.map((one) => `${one.message} (${one.count} segments)`) : [`The check has no findings about ${id}.`]));
+  show(...(found.findings.length ? found.findings.map((one) => `${one.message} (${one.count} segments)`) : [`The check has no findings about ${id}.`]));
 }
 
 async function remove(id: string): Promise<void> {
@@ -78,16 +78,16 @@ async function remove(id: string): Promise<void> {
   await deleteMap(id);
   if (state.mapId === id) state.mapId = null;
   await load("");
-  tell(`${id} is deleted.`);
+  show(`${id} is deleted.`);
 }
 
 async function upload(): Promise<void> {
   if (!state.map) throw new Error("There is no map yet. Open one, or choose an example.");
   if (!name.value || !name.checkValidity()) throw new Error("The name is not valid. Use 1 to 128 letters, digits, dots, dashes and underscores.");
   const { own, landmark } = kept();
-  const told = await putMap(name.value, { ...state.map, segments: [...own, ...landmark] });
+  const stored = await putMap(name.value, { ...state.map, segments: [...own, ...landmark] });
   await load("");
-  tell(`${told.map_id} is stored, revision ${told.revision}.`);
+  show(`${stored.map_id} is stored, revision ${stored.revision}.`);
 }
 
 box.addEventListener("toggle", () => {

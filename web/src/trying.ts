@@ -1,10 +1,10 @@
-// What a user may change about the scan and the map.
+// Changes to the scan and the map.
 
 import { ask, askSoon } from "./asking";
 import { onChange, restore as restoreMap, state } from "./state";
 
 const noise = document.querySelector<HTMLInputElement>("#noise")!;
-const told = document.querySelector<HTMLOutputElement>("#noise-value")!;
+const shown = document.querySelector<HTMLOutputElement>("#noise-value")!;
 const restore = document.querySelector<HTMLButtonElement>("#restore")!;
 
 noise.addEventListener("input", () => {
@@ -23,6 +23,6 @@ document.querySelector("#near")!.addEventListener("change", askSoon);
 document.querySelector("#run")!.addEventListener("click", () => void ask());
 
 onChange(() => {
-  told.textContent = `${(100 * state.noise).toFixed(1)} cm`;
+  shown.textContent = `${(100 * state.noise).toFixed(1)} cm`;
   restore.disabled = state.off.size === 0 && state.walls.length === state.own;
 });

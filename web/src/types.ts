@@ -28,8 +28,15 @@ export interface Scan {
   laser?: Laser;
   segments?: Segment[];
   points?: [number, number][];
+  views?: View[];
   sigma?: number | null;
   [other: string]: unknown;
+}
+
+/** The scan of one sensor, and its pose on the robot. */
+export interface View extends Scan {
+  pose: Pose;
+  flipped?: boolean;
 }
 
 export interface Correspondence {
@@ -52,6 +59,12 @@ export interface Reason {
   message: string;
 }
 
+export interface Alternative {
+  pose: Pose;
+  score: number;
+  probability: number | null;
+}
+
 export interface Answer {
   status: "ok" | "ambiguous" | "degenerate" | "no_match";
   usable: boolean;
@@ -61,13 +74,13 @@ export interface Answer {
   covariance: number[][] | null;
   unobservable: [number, number] | null;
   correspondences: Correspondence[];
-  unmatched_scan: number[];
+  unmatched_scan: number[]; // of a scan of one view, as `ask` puts them
   missing_map: number[];
-  segments: Segment[] | null;
+  segments: Segment[] | Segment[][] | null;
   diagnostics: { critical_wall: CriticalWall | null; score: number } | null;
   reasons: Reason[];
   warnings: Reason[];
-  alternatives: { pose: Pose; score: number; inlier_fraction: number }[];
+  alternatives: Alternative[];
   timing_ms: Record<string, number>;
 }
 
@@ -113,7 +126,7 @@ export interface Note {
   count: number;
 }
 
-/** What was made of the files of another tool. */
+/** The report on the import of a map or of scans. */
 export interface Report {
   format: string;
   files: string[];
@@ -126,7 +139,14 @@ export interface Report {
 export interface Imported {
   map: MapDocument;
   report: Report;
+  picture: { png: string; pose: Pose; resolution: number } | null;
   check: { findings: { code: string; message: string; count: number }[] };
+}
+
+export interface ImportedScans {
+  scans: Scan[];
+  count: number;
+  report: Report;
 }
 
 export interface StoredMap {

@@ -1,28 +1,31 @@
-// The verdict in words and numbers, and the other poses.
+// The verdict in words and numbers, and the alternatives.
 
-import { enlarged } from "./drawing";
 import { changed, onChange, state } from "./state";
+import type { Pose } from "./types";
 
 const element = <T extends HTMLElement>(id: string) => document.querySelector<T>(id)!;
 const card = element("#verdict");
-let problem = "";
+let notice: { kind: "problem" | "waiting"; message: string } | null = null;
 
-export function tellProblem(message: string): void {
-  problem = message;
+export const showProblem = (message: string) => showNotice("problem", message);
+/** Show why the service cannot search yet; the page repeats its request. */
+export const showWaiting = (message: string) => showNotice("waiting", message);
+
+function showNotice(kind: "problem" | "waiting", message: string): void {
+  notice = { kind, message };
   show();
-  problem = "";
+  notice = null;
 }
 
 function show(): void {
-  const { answer } = state;
-  card.dataset.state = problem ? "problem" : answer ? (answer.usable ? "usable" : answer.status) : "none";
-  element("#verdict-title").textContent = problem ? "Error" : answer ? title() : "Verdict";
-  if (problem || answer) element("#message").textContent = problem || answer!.message;
+  const answer = notice ? null : state.answer;
+  card.dataset.state = notice ? notice.kind : answer ? (answer.usable ? "usable" : answer.status) : "none";
+  element("#verdict-title").textContent = notice ? (notice.kind === "problem" ? "Error" : "The service is starting") : answer ? title() : "Verdict";
+  if (notice || answer) element("#message").textContent = notice?.message ?? answer!.message;
   else if (state.map) element("#message").textContent = "No search yet.";
-  list(element("#reasons"), answer && !problem ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
+  list(element("#reasons"), answer ? [...answer.reasons, ...answer.warnings].map((one) => one.message) : []);
   numbers();
   others();
-  legend();
 }
 
 function title(): string {
@@ -41,18 +44,15 @@ export function list(into: HTMLElement, lines: string[]): void {
 }
 
 function numbers(): void {
-  const { answer } = state;
+  const answer = notice ? null : state.answer;
   const rows: [string, string][] = [];
-  if (answer && !problem) {
-    if (answer.probability !== null) rows.push(["probability", `${(100 * answer.probability).toFixed(2)} %`]);
-    if (answer.pose) {
-      const { x, y, theta } = answer.pose;
-      rows.push(["pose", `${x.toFixed(3)} m, ${y.toFixed(3)} m, ${degrees(theta).toFixed(2)}°`]);
-    }
+  if (answer) {
+    if (answer.probability !== null) rows.push(["probability", percent(answer.probability)]);
+    if (answer.pose) rows.push(["pose", poseText(answer.pose)]);
     const c = answer.covariance;
     if (c) {
       const [x, y, theta] = [0, 1, 2].map((k) => Math.sqrt(Math.max(0, c[k][k])));
-      rows.push(["deviation", `${(1000 * x).toFixed(1)} mm, ${(1000 * y).toFixed(1)} mm, ${degrees(theta).toFixed(3)}°`]);
+      rows.push(["standard deviation", `${(1000 * x).toFixed(1)} mm, ${(1000 * y).toFixed(1)} mm, ${degrees(theta).toFixed(3)}°`]);
     }
     const critical = answer.diagnostics?.critical_wall;
     if (critical) {
@@ -60,8 +60,9 @@ function numbers(): void {
       rows.push(["critical wall", `${walls}: without it the pose may move by ${critical.displacement.toFixed(2)} m`]);
     }
     const seen = answer.correspondences.length + answer.unmatched_scan.length;
-    rows.push(["matched", `${answer.correspondences.length} of ${seen} segments, ${answer.missing_map.length} walls missing`]);
-    rows.push(["took", `${answer.timing_ms.total.toFixed(1)} ms`]);
+    rows.push(["correspondences", `${answer.correspondences.length} of ${seen} scan segments`]);
+    rows.push(["missing map", `${answer.missing_map.length} walls`]);
+    rows.push(["time", `${answer.timing_ms.total.toFixed(1)} ms`]);
   }
   element("#numbers").replaceChildren(
     ...rows.flatMap(([name, value]) => {
@@ -74,20 +75,17 @@ function numbers(): void {
 }
 
 function others(): void {
-  const count = state.answer?.alternatives.length ?? 0;
-  element("#others").hidden = count === 0 || problem !== "";
-  element("#other").textContent =
-    state.other < 0 ? `${count} other ${count === 1 ? "pose" : "poses"}` : `other pose ${state.other + 1} of ${count}${share()}`;
+  const count = notice ? 0 : state.others.length;
+  const shown = state.others[state.other];
+  element("#others").hidden = count === 0;
+  element("#other").textContent = shown
+    ? `Alternative ${state.other + 1} of ${count}: ${shown.probability === null ? "" : `probability ${percent(shown.probability)}, `}pose ${poseText(shown.pose)}`
+    : `${count} ${count === 1 ? "alternative" : "alternatives"}`;
 }
 
-function share(): string {
-  const [best, one] = [state.answer?.diagnostics?.score, state.answer?.alternatives[state.other]];
-  return best && one ? `: score ${Math.round((100 * one.score) / best)} % of the best` : "";
-}
-
-/** Show the next of the other poses, and after the last the answer itself. */
+/** Show the next of the alternatives, and after the last the answer itself. */
 export function step(by: number): void {
-  const count = state.answer?.alternatives.length ?? 0;
+  const count = state.others.length;
   if (count) state.other = ((state.other + 1 + by + count + 1) % (count + 1)) - 1;
 }
 
@@ -97,32 +95,8 @@ for (const [id, by] of [["#before-other", -1], ["#next-other", 1]] as const)
     changed();
   });
 
-export function legend(): void {
-  const larger = enlarged();
-  const parts: [string, string][] = [];
-  if (state.answer?.pose) {
-    parts.push(["pair", "scan segment on a wall"]);
-    if (state.answer.unmatched_scan.length) parts.push(["unmatched", "scan segment on no wall"]);
-    if (state.answer.missing_map.length) parts.push(["missing", "wall missing in the scan"]);
-    if (state.answer.diagnostics?.critical_wall) parts.push(["critical", "critical wall: without it the pose may move"]);
-    parts.push([state.answer.usable ? "ok" : state.answer.status, "estimated pose"]);
-    parts.push(state.virtual ? ["robot", "true pose"] : ["before", "initial pose of the scan"]);
-    if (state.answer.unobservable) parts.push(["degenerate", "unobservable direction"]);
-    if (larger !== null) parts.push(["sigma", `3 sigma${larger > 1.05 ? `, drawn ${larger.toFixed(0)} times larger` : ""}`]);
-  }
-  if (state.other >= 0) parts.push(["ghost", "other pose"]);
-  if (state.analysis || state.log.length)
-    for (const kind of ["ok", "ambiguous", "degenerate", "no_match"]) parts.push([kind, kind.replace("_", " ")]);
-  element("#legend").replaceChildren(
-    ...parts.map(([kind, text]) => {
-      const item = document.createElement("span");
-      item.className = `key ${kind}`;
-      item.textContent = text;
-      return item;
-    }),
-  );
-}
-
 const degrees = (radians: number) => (180 / Math.PI) * radians;
+const percent = (probability: number) => `${(100 * probability).toFixed(2)} %`;
+const poseText = ({ x, y, theta }: Pose) => `${x.toFixed(3)} m, ${y.toFixed(3)} m, ${degrees(theta).toFixed(2)}°`;
 
 onChange(show);

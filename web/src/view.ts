@@ -1,4 +1,4 @@
-// Which part of the plane is shown: metres to pixels and back, y up.
+// The visible part of the plane: metres to pixels and back, y up.
 
 import type { Segment } from "./types";
 

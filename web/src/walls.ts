@@ -18,7 +18,7 @@ let path: { of: Segment[]; of_them: Path2D } | null = null;
 let drawn: Drawn | null = null;
 let timer = 0;
 
-/** Draw the walls; `again` is called when they are to be drawn once more. */
+/** Draw the walls; `again` is called when they have to be drawn again. */
 export function drawWalls(context: CanvasRenderingContext2D, colour: string, again: () => void): void {
   if (state.walls.length <= MANY) return stroke(context, colour);
   const same = drawn !== null && drawn.of === state.walls && drawn.colour === colour && drawn.view.ratio === view.ratio;

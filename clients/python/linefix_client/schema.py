@@ -631,6 +631,7 @@ class AlternativeAnswer(TypedDict):
     ambiguity: AmbiguityAnswer
     reliability: float
     inlier_fraction: float
+    probability: float | None
 
 
 class AnalyzedPlaceAnswer(TypedDict):
@@ -1021,6 +1022,37 @@ class BatchResult(TypedDict):
     problem: NotRequired[Problem | None]
 
 
+class GridPictureAnswer(TypedDict):
+    """
+    The grid that a map comes from, as a picture.
+    """
+
+    png: str
+    pose: PoseAnswer
+    resolution: float
+
+
+class ScansTimingAnswer(TypedDict):
+    """
+    Duration of reading a log, milliseconds.
+    """
+
+    read: float
+    total: float
+
+
+class ScansAnswer(TypedDict):
+    """
+    Scans of a log.
+    """
+
+    scans: list[Any]
+    count: int
+    report: ReportAnswer
+    request_id: str
+    timing_ms: ScansTimingAnswer
+
+
 class ImportAnswer(TypedDict):
     """
     A map of another tool.
@@ -1028,6 +1060,7 @@ class ImportAnswer(TypedDict):
 
     map: ImportedMapAnswer
     report: ReportAnswer
+    picture: GridPictureAnswer | None
     check: MapCheckAnswer
     request_id: str
     timing_ms: ImportTimingAnswer

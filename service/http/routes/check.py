@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from map_quality.check import Sample
+from map_quality import Sample
 
 from ...admission.errors import DeadlinePassedError
 from ...maps.lookup import FoundMap
@@ -76,16 +76,14 @@ async def _work(exchange: Exchange, map_id: str, asked: CheckRequest | None, job
         assert isinstance(on, FoundMap)  # what is stored is found, or else an exception
         await index_map(exchange, on, job.deadline, oriented=True)
         work = partial(check, lookup, on, asked, job)
-        checked = await in_slot(exchange, work, job.deadline, job.searching.is_set)
-    judged = None
-    if asked is not None:
-        calls = [partial(sample, checked, asked, number, job) for number in range(len(asked.scans))]
-        samples = await _try_all(exchange, calls, job)
-        try:
-            judged = await in_slot(exchange, partial(conclude, checked, samples, job), job.deadline)
-        except DeadlinePassedError:  # no slot is left: it then concludes from what it has, and searches nothing
-            judged = await exchange.services.parse_threads.run(partial(conclude, checked, samples, job))
-    return await exchange.services.parse_threads.run(partial(check_done, checked, judged, asked, job))
+        begun = await in_slot(exchange, work, job.deadline, job.searching.is_set)
+    calls = [] if asked is None else [partial(sample, begun, asked, number, job) for number in range(len(asked.scans))]
+    concluding = partial(conclude, begun, await _try_all(exchange, calls, job), job)
+    try:
+        checked = await in_slot(exchange, concluding, job.deadline) if calls else concluding()
+    except DeadlinePassedError:  # no slot is left: it then concludes from what it has, and searches nothing
+        checked = await exchange.services.parse_threads.run(concluding)
+    return await exchange.services.parse_threads.run(partial(check_done, begun, checked, asked, job))
 
 
 async def _try_all(exchange: Exchange, calls: Sequence[Callable[[], Sample | None]], job: Job) -> list[Sample | None]:

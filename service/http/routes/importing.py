@@ -1,18 +1,19 @@
-"""POST /v1/maps:import: the map of another tool, read and not stored."""
+"""POST /v1/maps:import and /v1/scans:import: files of other tools, read and not stored."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from ...importing.bounded import read_apart
+from ...importing.bounded import ReadScans, read_apart, read_scans_apart
 from ...parsing.reading import read_model
-from ...schemas.imports import FORM as SCHEMA
-from ...schemas.imports import ImportAnswer
+from ...schemas.imports import FORM as MAP_FORM
+from ...schemas.imports import SCANS_FORM, ImportAnswer, ScansAnswer
 from ...schemas.parts import InlineMap
-from ...work.importing import answer_import, index_import
+from ...work.importing import answer_import, answer_scans, index_import
 from ...work.job import Done, Job
 from ..bodies import FORM
 from ..exchange import Exchange, begin_search
@@ -22,21 +23,20 @@ from ..sending import answer
 from .declaring import EVERYWHERE, READS_BODY, SEARCHES, problems
 
 router = APIRouter(tags=["maps"])
-_TAKES: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "description": "A form with files. May be gzip (Content-Encoding).",
-        "content": {FORM: {"schema": SCHEMA}},
-    }
-}
+_PROBLEMS = problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES)
+
+
+def _takes(schema: dict[str, Any]) -> dict[str, Any]:
+    description = "A form with files. May be gzip (Content-Encoding)."
+    return {"requestBody": {"required": True, "description": description, "content": {FORM: {"schema": schema}}}}
 
 
 @router.post(
     "/v1/maps:import",
     operation_id="import_map",
     response_model=ImportAnswer,
-    responses=problems(*EVERYWHERE, *(code for code in READS_BODY if code != "invalid_json"), *SEARCHES),
-    openapi_extra=_TAKES,
+    responses=_PROBLEMS,
+    openapi_extra=_takes(MAP_FORM),
     summary="Read the map of another tool",
 )
 async def post_import(request: Request) -> Response:
@@ -61,3 +61,28 @@ async def _work(exchange: Exchange, content: bytearray, content_type: str, job: 
     indexing = partial(index_import, services.lookup, line_map, deadline)
     index = await in_slot_of(services.indexing, exchange, indexing, deadline)
     return await in_slot(exchange, partial(answer_import, index, line_map, read, job), deadline)
+
+
+@router.post(
+    "/v1/scans:import",
+    operation_id="import_scans",
+    response_model=ScansAnswer,
+    responses=_PROBLEMS,
+    openapi_extra=_takes(SCANS_FORM),
+    summary="Read scans of a log",
+)
+async def post_scans(request: Request) -> Response:
+    """Read some scans of a bag or another log, evenly spread; nothing is stored."""
+    exchange = begin_search(request)
+    async with receive(exchange, form=True) as content:
+        job = exchange.job()
+        content_type = request.headers.get("content-type", "")
+        reading = partial(read_scans_apart, content, content_type, exchange.services.import_bounds, job.deadline)
+        work = _scans(exchange, reading, job)
+        return await answer(exchange, work, job.deadline)
+
+
+async def _scans(exchange: Exchange, reading: Callable[[], ReadScans], job: Job) -> Done:
+    """Read scans in a slot of imports, and write them in one of searches."""
+    read = await in_slot_of(exchange.services.importing, exchange, reading, job.deadline)
+    return await in_slot(exchange, partial(answer_scans, read, job), job.deadline)

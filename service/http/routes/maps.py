@@ -13,7 +13,6 @@ from ...schemas import examples
 from ...schemas.encoding import encode
 from ...schemas.parts import MapDocument
 from ...schemas.replies import MapList, MapSummaryAnswer
-from ...work.answers import outline_json
 from ..etags import demands_of, etag, is_conditional, is_unchanged
 from ..exchange import begin
 from ..map_stage import ask_store
@@ -64,7 +63,7 @@ async def put_map(request: Request, map_id: MapIdPath) -> Response:
     revision, created = await ask_store(services, put)
     services.metrics.map_changes.labels("created" if created else "replaced").inc()
     exchange.note(map={"map_id": map_id, "revision": revision})
-    answer = encode(outline_json(map_id, revision, outline))
+    answer = encode(outline.as_json(map_id, revision))
     return json_response(answer, 201 if created else 200, {"ETag": etag(revision)})
 
 
@@ -107,7 +106,7 @@ async def list_maps(
     exchange = begin(request)
     services = exchange.services
     page = await ask_store(services, partial(services.store.list, limit, cursor, exchange.ticket.maps))
-    items = [outline_json(item.map_id, item.revision, item.outline) for item in page.maps]
+    items = [item.outline.as_json(item.map_id, item.revision) for item in page.maps]
     return json_response(encode({"maps": items, "corrupt": page.corrupt, "next": page.next}))
 
 

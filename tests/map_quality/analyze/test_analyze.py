@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex, Status
-from map_quality.analyze import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
-from map_quality.analyze.robot import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
+from map_quality import Analysis, AnalysisError, PlaceVerdict, Robot, standing_places
 from map_quality.analyze.standing import is_free
+from map_quality.views import LEAST_SIGMA, MOST_BEAMS, MOST_SIGMA
 from registration import Segments
 from simulation import corridor, l_room, rectangle_room
 from simulation.worlds import outline

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from association import Deadline, MapIndex, Scan, Status
-from map_quality.analyze import Analysis, PlaceVerdict, Robot, standing_places
+from map_quality import Analysis, PlaceVerdict, Robot, standing_places
 from map_quality.analyze.drive import CLEARANCE, STEP, seen_on_the_way, ways_from
 from registration import RigidTransform, Segments
 from registration.layout import Floats

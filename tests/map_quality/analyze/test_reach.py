@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from map_quality.analyze import AnalysisError
+from map_quality import AnalysisError
 from map_quality.analyze.reach import Reach
 from registration import Segments
 from registration.layout import Floats

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, IndexingEndedError, MapIndex
-from map_quality.check import check_map
+from map_quality import check_map
 from registration import Segments
 from registration.layout import Floats
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline
-from map_quality.check import MapCheck, check_map
-from map_quality.check.likeness import look_about
-from map_quality.check.looking import Looker
-from registration import RigidTransform
+from map_quality import MapCheck, check_map
+from map_quality.views import Robot, look
+from registration import RigidTransform, Segments
 from registration.layout import Floats
 from simulation import OfficePlan, offices
 
@@ -169,18 +168,16 @@ def test_what_looks_alike() -> None:
 
 
 def test_a_view_is_what_stands_there() -> None:
-    index = index_of(ROOM)
-    here = RigidTransform(4.0, 3.0, 0.7)
-    at = RigidTransform(here.x - index.origin[0], here.y - index.origin[1], here.theta)
-    view = look_about(Looker(index), at)
-    assert view is not None
-    assert len(view.segments) >= 7
-    back = here.apply(view.segments.reshape(-1, 2, 2)).reshape(-1, 4)
-    for seen, wall in zip(back, view.walls, strict=True):
-        row = index.walls.rows[wall]
-        n = np.array([-row["dy"], row["dx"]])
-        assert (seen.reshape(2, 2) - index.origin) @ n == pytest.approx([row["offset"]] * 2, abs=1e-6)
-        assert (seen[2:] - seen[:2]) @ np.array([row["dx"], row["dy"]]) > 0.0
+    here, segments = RigidTransform(4.0, 3.0, 0.7), Segments.from_array(ROOM)
+    seen = look(segments, here, Robot(beams=720, sigma=1e-4), np.random.default_rng(0))
+    assert set(seen.hits.tolist()) >= {0, 1, 2, 3, 4, 8}
+    back = here.apply(seen.scan.measured.segments.endpoints.reshape(-1, 2, 2))
+    assert len(back) >= 6
+    for ends in back:
+        off = [np.abs((ends - wall[:2]) @ normal).max() for wall, normal in zip(ROOM, segments.normals, strict=True)]
+        wall = int(np.argmin(off))
+        assert off[wall] < 0.01
+        assert (ends[1] - ends[0]) @ (ROOM[wall, 2:] - ROOM[wall, :2]) > 0.0
 
 
 def test_maps_far_out_and_of_one_segment() -> None:

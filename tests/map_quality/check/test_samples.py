@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, CancelledError, Deadline, associate
-from map_quality.check import Sample, SampleReport, judge_samples, try_sample
+from map_quality import Sample, SampleReport, judge_samples, try_sample
 from registration import RigidTransform
 from registration.layout import Floats
 

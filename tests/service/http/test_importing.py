@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
 import io
 import os
@@ -20,7 +21,7 @@ from PIL import Image
 from formats import read_map
 from service.schemas import examples
 from tests.running import RunningService, children_of, client_of, until
-from tests.service.importing.forms import TYPE, YAML, encoded, form, room_grid
+from tests.service.importing.forms import SQUARE, TYPE, YAML, encoded, form, room_grid
 
 URL = "/v1/maps:import"
 LAUGHS = (
@@ -149,3 +150,56 @@ def test_reading_files_takes_no_place_of_a_search(start_service: Callable[..., R
         for child in children_of(running.worker) - before:
             os.kill(child, signal.SIGKILL)
     importing.join()
+
+
+def scans_of(client: httpx.Client, files: dict[str, bytes], *fields: tuple[str, str]) -> httpx.Response:
+    return client.post("/v1/scans:import", content=bytes(form(files, *fields)), headers={"content-type": TYPE})
+
+
+def carmen(count: int) -> bytes:
+    """A log of a laser of three beams, whose ranges say which scan it is."""
+    return "".join(
+        f"FLASER 3 {1 + k}.0 2.0 3.0 0 0 0 0 0 0 {100 + k}.0 robot {100 + k}.0\n" for k in range(count)
+    ).encode()
+
+
+def test_scans_of_a_log_can_be_sent_as_they_are(client: httpx.Client) -> None:
+    found = scans_of(client, {"drive.log": carmen(9)}, ("max_scans", "4"))
+    assert found.status_code == 200, found.text
+    answer = found.json()
+    assert answer["count"] == 9
+    # Evenly spread, the first among them.
+    assert [scan["views"][0]["laser"]["ranges"][0] for scan in answer["scans"]] == [1.0, 5.0, 9.0]
+    assert answer["report"]["format"].startswith("carmen")
+    asked = {"map": examples.MAP, "scan": answer["scans"][0]}
+    assert client.post("/v1/associate", json=asked).json()["status"] in ("no_match", "ambiguous", "degenerate")
+
+
+@pytest.mark.parametrize(
+    ("files", "fields", "status", "said"),
+    [
+        ({"plan.dxf": b"0"}, (), 415, "found no log; expected a file that ends in one of .bag"),
+        ({"a.log": carmen(1), "b.log": carmen(1)}, (), 422, "expected one log"),
+        ({}, (), 422, "expected a file, found none"),
+        ({"a.bag": b"no bag"}, (), 422, "/files/0"),
+        ({"a.log": carmen(1)}, (("max_scans", "0"),), 422, "/max_scans: expected an integer from 1 to 1000"),
+        ({"a.log": carmen(1)}, (("units", "m"),), 422, "/units: unknown field"),
+        ({"a.log": carmen(1)}, (("topic", "a"), ("topic", "b")), 422, "/topic: expected this field once"),
+    ],
+    ids=["a map", "two", "none", "broken", "no scans", "a field of maps", "twice"],
+)
+def test_what_is_no_log_is_named(
+    client: httpx.Client, files: dict[str, bytes], fields: tuple[tuple[str, str], ...], status: int, said: str
+) -> None:
+    found = scans_of(client, files, *fields)
+    assert found.status_code == status, found.text
+    assert said in found.json()["detail"]
+
+
+def test_the_picture_of_a_grid_lies_where_the_grid_does(client: httpx.Client) -> None:
+    picture = send(client, room_grid()).json()["picture"]
+    image = Image.open(io.BytesIO(base64.b64decode(picture["png"])))
+    assert image.size == (200, 140)
+    assert [image.getpixel(at) for at in ((100, 30), (70, 60), (2, 2))] == [254, 0, 205]
+    assert (picture["pose"], picture["resolution"]) == ({"x": -1.0, "y": -2.0, "theta": 0.0}, 0.05)
+    assert send(client, {"a.csv": SQUARE}, ("units", "m")).json()["picture"] is None

@@ -13,7 +13,7 @@ import pytest
 
 from association import Status, WarningCode
 from association.verdict.reasons import SENTENCES
-from map_quality.check import FindingCode
+from map_quality import FindingCode
 from service.http.openapi import Contract
 from service.http.problems import KINDS
 from service.schemas import examples

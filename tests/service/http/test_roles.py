@@ -38,8 +38,9 @@ CALLS: dict[tuple[str, str], tuple[Role | None, Any]] = {
     ("POST", "/v1/maps/{map_id}:analyze"): (Role.ASSOCIATE, {"spacing": 4.0}),
     ("POST", "/v1/analyze"): (Role.ASSOCIATE, {"map": {"map_id": "{map_id}"}, "spacing": 4.0}),
     ("POST", "/v1/maps:import"): (Role.ASSOCIATE, {"room.json": examples.MAP}),
+    ("POST", "/v1/scans:import"): (Role.ASSOCIATE, {"drive.log": "no scan"}),
 }
-FORMS = frozenset({("POST", "/v1/maps:import")})  # their bodies are files by name
+FORMS = frozenset({("POST", "/v1/maps:import"), ("POST", "/v1/scans:import")})  # their bodies are files by name
 NAMES_A_MAP = {call for call, (_, body) in CALLS.items() if "{map_id}" in call[1] or "{map_id}" in str(body)}
 TOLD = [(method, path, role) for method, path in CALLS for role in Role]
 

@@ -16,17 +16,10 @@ from playwright.sync_api import Browser, Page, Route, expect
 from service.schemas import examples
 from tests.running import RunningService
 
+from .plan import shown, verdict
+
 SCAN = {"segments": examples.SEEN, "sigma": 0.02}
 PROBLEM = {"title": "t", "status": 503, "detail": "All places are taken", "code": "overloaded"}
-
-
-def verdict(page: Page, state: str) -> None:
-    expect(page.locator("#verdict")).to_have_attribute("data-state", state, timeout=30_000)
-
-
-def shown(page: Page, example: str, state: str) -> None:
-    page.goto(f"/?example={example}")
-    verdict(page, state)
 
 
 def press(page: Page, key: str, times: int) -> None:
@@ -39,7 +32,7 @@ def press(page: Page, key: str, times: int) -> None:
     [
         ("A flat", "usable", "The robot is at this pose"),
         ("An office", "usable", "The robot is at this pose"),
-        ("Look-alike rooms", "ambiguous", "2 other poses fit the scan about as well"),
+        ("Three equal rooms", "ambiguous", "2 other poses fit the scan about as well"),
         ("A corridor", "degenerate", "is unknown"),
         ("A warehouse", "usable", "The robot is at this pose"),
     ],
@@ -49,7 +42,7 @@ def test_every_example(page: Page, title: str, state: str, said: str) -> None:
     page.get_by_label("Example").select_option(label=title)
     verdict(page, state)
     expect(page.locator("#message")).to_contain_text(said)
-    expect(page.locator("#numbers")).to_contain_text("matched")
+    expect(page.locator("#numbers")).to_contain_text("correspondences")
 
 
 def test_the_keyboard_alone(page: Page) -> None:
@@ -61,7 +54,7 @@ def test_the_keyboard_alone(page: Page) -> None:
             break
     assert page.evaluate("document.activeElement.id") == "plan"
     press(page, "n", 1)
-    expect(page.locator("#other")).to_contain_text("other pose 1 of")
+    expect(page.locator("#other")).to_contain_text("Alternative 1 of 2")
     press(page, "Shift+ArrowLeft", 2)
     press(page, "Shift+ArrowDown", 3)
     press(page, "q", 3)
@@ -96,15 +89,15 @@ def test_noise_and_walls_that_are_missing(page: Page) -> None:
     expect(chance).not_to_have_text(before)
     page.get_by_label("Noise").fill("0")
     verdict(page, "usable")
-    expect(page.get_by_role("button", name="The map as it came")).to_be_disabled()
-    page.get_by_label("take walls off").check()
+    expect(page.get_by_role("button", name="Restore the map")).to_be_disabled()
+    page.get_by_label("remove walls").check()
     box = page.locator("#plan").bounding_box()
     assert box is not None
     for share in (0.2, 0.35, 0.5, 0.65, 0.8):
         for other in range(12):
             page.mouse.click(box["x"] + (0.1 + 0.066 * other) * box["width"], box["y"] + share * box["height"])
-    expect(page.get_by_role("button", name="The map as it came")).to_be_enabled()
-    page.get_by_role("button", name="The map as it came").click()
+    expect(page.get_by_role("button", name="Restore the map")).to_be_enabled()
+    page.get_by_role("button", name="Restore the map").click()
     verdict(page, "usable")
     expect(chance).to_have_text(before)
 
@@ -125,32 +118,34 @@ def test_files_of_a_user(page: Page, tmp_path: Path) -> None:
     expect(page.locator("#numbers")).to_contain_text("1.000 m, 0.500 m")
     (bad,) = files(tmp_path, bad={"rooms": 3})
     page.set_input_files("#files", [bad])
-    expect(page.locator("#message")).to_contain_text("neither a map nor a scan")
+    expect(page.locator("#reading")).to_contain_text("neither a map nor a scan")
     (short,) = files(tmp_path, short={"laser": {"angle_min": 0, "angle_increment": 9, "ranges": [1, 2]}})
     page.set_input_files("#files", [short])
     expect(page.locator("#message")).to_contain_text("/scan/laser/angle_increment")
 
 
 def test_a_service_without_the_formats(page: Page, tmp_path: Path) -> None:
-    page.route("**/v1/maps:import", lambda route: route.fulfill(status=415, json={**PROBLEM, "status": 415}))
+    detail = "the service cannot read files of other tools: it lacks the extra `formats`"
+    problem = {**PROBLEM, "status": 415, "detail": detail}
+    page.route("**/v1/maps:import", lambda route: route.fulfill(status=415, json=problem))
     page.goto("/")
     (tmp_path / "plan.dxf").write_text("0")
     page.set_input_files("#files", [tmp_path / "plan.dxf"])
-    expect(page.locator("#message")).to_contain_text("JSON only")
+    expect(page.locator("#reading")).to_have_text(detail)
 
 
 def test_a_refusal_and_a_lost_connection(page: Page) -> None:
     shown(page, "flat", "usable")
     page.route("**/v1/associate", lambda route: route.fulfill(status=503, json=PROBLEM))
-    page.get_by_role("button", name="Ask").click()
+    page.get_by_role("button", name="Search").click()
     verdict(page, "problem")
     expect(page.locator("#message")).to_have_text("All places are taken")
     page.unroute("**/v1/associate")
     page.route("**/v1/associate", lambda route: route.abort())
-    page.get_by_role("button", name="Ask").click()
+    page.get_by_role("button", name="Search").click()
     expect(page.locator("#message")).to_contain_text("does not respond")
     page.unroute("**/v1/associate")
-    page.get_by_role("button", name="Ask").click()
+    page.get_by_role("button", name="Search").click()
     verdict(page, "usable")
 
 
@@ -160,7 +155,7 @@ def test_a_key_without_a_role(page: Page) -> None:
     page.route(
         "**/v1/associate", lambda route: route.fulfill(status=403, json={**PROBLEM, "status": 403, "detail": detail})
     )
-    page.get_by_role("button", name="Ask").click()
+    page.get_by_role("button", name="Search").click()
     verdict(page, "problem")
     expect(page.locator("#message")).to_have_text(f"{detail} (see Key below).")
 
@@ -171,7 +166,7 @@ def test_a_service_with_keys(page: Page, guarded: RunningService) -> None:
     expect(page.locator("#message")).to_contain_text("Key")
     page.locator("#access summary").click()
     page.locator("#key").fill("sesame")
-    page.get_by_role("button", name="Ask").click()
+    page.get_by_role("button", name="Search").click()
     verdict(page, "usable")
 
 
@@ -207,9 +202,9 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     page.goto("/")
     page.locator("#stored summary").click()
     page.get_by_role("button", name="Open page-rectangle").click()
-    page.get_by_label("a virtual robot").check()
+    page.get_by_label("simulate the scan").check()
     verdict(page, "ambiguous")
-    page.get_by_label("put up a box").check()
+    page.get_by_label("add a box").check()
     box = page.locator("#plan").bounding_box()
     assert box is not None
     scale = 0.88 * box["width"] / 8
@@ -217,10 +212,10 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     page.mouse.click(middle[0] + 2.0 * scale, middle[1] - 1.0 * scale)
     verdict(page, "usable")
     page.mouse.move(middle[0] + 2.5 * scale, middle[1] - 1.0 * scale)
-    expect(page.locator("#hover")).to_have_text("wall 6, put up")  # 4 are the map's
+    expect(page.locator("#hover")).to_have_text("wall 6, added")  # 4 are the map's
     page.locator("#analysis summary").click()
     page.get_by_label("Spacing").fill("2")
-    page.get_by_label("It may drive").fill("2")
+    page.get_by_label("Drive up to").fill("2")
     page.get_by_role("button", name="Analyze").click()
     told = page.locator("#analyzed")
     expect(told).to_contain_text("Localization succeeds at 0 of 8 places", timeout=60_000)
@@ -230,7 +225,7 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     show = page.get_by_label("Show")
     expect(show).to_have_value("landmark")
     show.select_option("driven")
-    page.get_by_role("button", name="The map as it came").click()
+    page.get_by_role("button", name="Restore the map").click()
     verdict(page, "ambiguous")
     page.get_by_role("button", name="Clear").click()
     expect(show).to_be_disabled()
@@ -246,8 +241,8 @@ def test_a_virtual_robot_waits_for_its_map(page: Page, client: httpx.Client) -> 
     walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
     client.put("/v1/maps/page-late", json=walls).raise_for_status()
     page.goto("/")
-    robot = page.get_by_label("a virtual robot")
-    robot.check()
+    robot = page.get_by_label("simulate the scan")
+    verdict(page, "ambiguous")
     robot.uncheck()
     on_the_way: list[Route] = []
     page.route("**/v1/maps/page-late", lambda route: on_the_way.append(route))
@@ -271,11 +266,10 @@ def test_how_a_map_of_another_tool_was_read(page: Page, tmp_path: Path) -> None:
     shown(page, "flat", "usable")
     about = page.locator("#about").inner_text()
     page.set_input_files("#files", [tmp_path / "plan.svg"])
-    expect(page.locator("#message")).to_contain_text("plan.svg: does not state its unit", timeout=60_000)
-    expect(page.locator("#numbers")).to_be_empty()  # of an answer to something else
+    expect(page.locator("#reading")).to_contain_text("plan.svg: does not state its unit", timeout=60_000)
     expect(page.locator("#about")).to_have_text(about)
     page.get_by_label("Unit of a drawing").select_option("metres")
-    expect(page.locator("#about")).to_contain_text("read of plan.svg (svg)", timeout=60_000)
+    expect(page.locator("#about")).to_contain_text("walls from plan.svg (svg)", timeout=60_000)
     report = page.locator("#report")
     expect(report).to_be_visible()
     for title in ("Findings", "Read", "Omitted", "Assumed"):
@@ -295,12 +289,12 @@ def test_a_log_is_played(page: Page, tmp_path: Path) -> None:
     ]  # fmt: skip
     (tmp_path / "log.jsonl").write_text("\n".join(json.dumps(line) for line in lines))
     shown(page, "flat", "usable")  # with a virtual robot, which goes
-    expect(page.get_by_label("a virtual robot")).to_be_checked()
+    expect(page.get_by_label("simulate the scan")).to_be_checked()
     page.set_input_files("#files", [*files(tmp_path, room={"segments": examples.WALLS}), tmp_path / "log.jsonl"])
     told = page.locator("#scan-of-log")
     expect(told).to_contain_text("Scan 1 of 4: no match, not usable")
     page.get_by_role("button", name="Play").click()
-    expect(page.get_by_label("a virtual robot")).not_to_be_checked()
+    expect(page.get_by_label("simulate the scan")).not_to_be_checked()
     expect(told).to_contain_text("Scan 4 of 4: ok, usable")
     expect(told).to_contain_text("3 of 4 are usable")
     expect(page.get_by_role("button", name="Play")).to_be_enabled()
@@ -390,9 +384,9 @@ def test_accessible(browser: Browser, service: RunningService, scheme: str) -> N
     context = browser.new_context(base_url=service.url, bypass_csp=True, color_scheme=scheme)  # type: ignore[arg-type]
     page = context.new_page()
     shown(page, "office", "usable")
-    for name in ("analysis", "log", "stored", "share", "access"):
+    for name in ("analysis", "stored", "share", "access"):
         page.locator(f"#{name} summary").click()
-    page.get_by_role("button", name="Keys").click()
+    page.get_by_role("button", name="Help").click()
     found = Axe().run(page).response["violations"]
     context.close()
     assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found] == []

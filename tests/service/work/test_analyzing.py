@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, MapIndex
-from map_quality.analyze import Analysis, Robot, standing_places
+from map_quality import Analysis, Robot, standing_places
 from registration import Segments
 from service.work import analyzing
 from service.work.analyzing import Tally, take_looks

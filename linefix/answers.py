@@ -1,8 +1,8 @@
-"""Results of the libraries as the contract's JSON."""
+"""Results for one scan to the JSON documents of the API; the service and the command line answer with these."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,10 +20,6 @@ from association import (
 from association.warnings import NOT_IN_ORDER
 from registration import Ambiguity, RegistrationDiagnostics, RegistrationResult, RigidTransform
 from vectorization import Vectorization
-
-from ..maps import MapOutline
-from ..schemas.encoding import encode_list
-from .scanning import Scanned
 
 Json = dict[str, Any]
 Indices = NDArray[np.intp]
@@ -52,7 +48,7 @@ def ambiguity_json(ambiguity: Ambiguity | None) -> Json | None:
 
 
 def diagnostics_json(diagnostics: RegistrationDiagnostics) -> Json:
-    """Return the numbers beside a pose."""
+    """Return the diagnostics of a pose."""
     return {
         "ambiguity": ambiguity_json(diagnostics.ambiguity),
         "ambiguity_before": ambiguity_json(diagnostics.ambiguity_before),
@@ -68,8 +64,19 @@ def diagnostics_json(diagnostics: RegistrationDiagnostics) -> Json:
     }
 
 
-def registration_json(result: RegistrationResult, pairs: NDArray[np.intp]) -> Json:
-    """Return the answer of a registration."""
+def registration_json(
+    result: RegistrationResult, pairs: NDArray[np.intp], listed: Callable[[Iterable[Json]], Any] = list
+) -> Json:
+    """Return the answer of a registration.
+
+    Parameters
+    ----------
+    result : RegistrationResult
+    pairs : (k, 2)
+        Indices of scan and map segment of each correspondence.
+    listed : callable
+        Makes a list of the residuals, which are many; or what is written as a list.
+    """
     columns = (result.offsets.tolist(), result.angles.tolist(), result.weights.tolist())
     return {
         "status": "degenerate" if result.degenerate else "ok",
@@ -77,7 +84,7 @@ def registration_json(result: RegistrationResult, pairs: NDArray[np.intp]) -> Js
         "pose": pose_json(result.pose),
         "covariance": matrix_json(result.covariance),
         "unobservable": direction_json(result.unobservable),
-        "residuals": encode_list(
+        "residuals": listed(
             {"scan": scan, "map": on, "offset": offset, "angle": angle, "weight": weight}
             for (scan, on), offset, angle, weight in zip(pairs.tolist(), *columns, strict=True)
         ),
@@ -87,7 +94,7 @@ def registration_json(result: RegistrationResult, pairs: NDArray[np.intp]) -> Js
 
 @dataclass(frozen=True, slots=True)
 class _Names:
-    """What segments of a scan are called: by their index, and of several views by the view and the index in it."""
+    """Names of the segments of a scan: the index, or of several views the view and the index in it."""
 
     starts: Indices | None
 
@@ -123,6 +130,7 @@ def alternative_json(other: Alternative) -> Json:
         "ambiguity": ambiguity_json(other.ambiguity),
         "reliability": other.reliability,
         "inlier_fraction": other.inlier_fraction,
+        "probability": other.probability,
     }
 
 
@@ -138,19 +146,36 @@ def critical_wall_json(wall: CriticalWall | None, named: _Names) -> Json | None:
     }
 
 
-def segments_json(scanned: Scanned) -> list[Any] | None:
-    """Return the segments that the caller did not send; of several views one list each."""
-    if scanned.parts is None:
-        return None if scanned.segments is None else scanned.segments.tolist()
-    return [None if part is None else part.tolist() for part in scanned.parts]
+@dataclass(frozen=True, slots=True)
+class Included:
+    """Fields of an answer that come from the request and its map.
 
-
-def association_json(result: AssociationResult, include: frozenset[str], starts: Indices | None = None) -> Json:
-    """Return the answer of a search, without the parts that were not asked for.
-
-    Of several views `starts` says which segment is the first of each; segments are then named by view and index.
+    Attributes
+    ----------
+    parts : frozenset of str
+        Names of the parts that are asked for, as in ``include``.
+    frame_id, child_frame_id : str
+        Of the map and of the scan.
+    stamp : JSON
+        Of the scan, as sent.
+    segments : list or None
+        Of the scan, where the caller sent ranges or points: rows of four numbers, metres; of several views one list or
+        None each.
+    starts : (v,) or None
+        Index of the first segment of each view; segments are then named by view and index. None: a single view.
     """
-    named = _Names(starts)
+
+    parts: frozenset[str]
+    frame_id: str
+    child_frame_id: str
+    stamp: Any = None
+    segments: list[Any] | None = None
+    starts: Indices | None = None
+
+
+def association_json(result: AssociationResult, included: Included) -> Json:
+    """Return the answer of a search, without the parts that are not asked for."""
+    named, parts = _Names(included.starts), included.parts
     diagnostics = result.diagnostics
     search = result.search
     answer: Json = {
@@ -187,12 +212,17 @@ def association_json(result: AssociationResult, include: frozenset[str], starts:
         },
         "warnings": warnings_json(result.warnings),
     }
-    if "correspondences" in include:
+    if "correspondences" in parts:
         answer["correspondences"] = [correspondence_json(pair, named) for pair in result.correspondences]
-    if "alternatives" in include:
+    if "alternatives" in parts:
         answer["alternatives"] = [alternative_json(other) for other in result.alternatives]
-    if "missing_map" in include:
+    if "missing_map" in parts:
         answer["missing_map"] = list(result.missing_map)
+    answer["frame_id"] = included.frame_id
+    answer["child_frame_id"] = included.child_frame_id
+    answer["stamp"] = included.stamp
+    if "segments" in parts:
+        answer["segments"] = included.segments
     return answer
 
 
@@ -214,16 +244,4 @@ def vectorization_json(found: Vectorization, moving: AssociationWarning | None =
         "sigmas": measured.sigma.tolist(),
         "rms": found.rms.tolist(),
         "warnings": warnings_json(one for one in (unordered, moving) if one is not None),
-    }
-
-
-def outline_json(map_id: str, revision: int, outline: MapOutline) -> Json:
-    """Return what is told of a stored map without its content."""
-    return {
-        "map_id": map_id,
-        "revision": revision,
-        "segment_count": outline.segments,
-        "bounds": outline.bounds,
-        "sigma": outline.sigma,
-        "oriented": outline.oriented,
     }

@@ -1,0 +1,158 @@
+"""Answers of this process, by `linefix`, as the JSON documents that the routes of the API answer with."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import linefix
+from linefix.answers import association_json, registration_json
+from linefix.map_answers import checked_json, import_json, map_json
+from map_quality import check_map
+from service.contract import (
+    AssociateRequest,
+    CheckRequest,
+    InlineMap,
+    KnownPairs,
+    RegisterRequest,
+    Stopwatch,
+    VectorizeRequest,
+    association_options_of,
+    included_of,
+    is_oriented,
+    prior_of,
+    scanned_of,
+    scans_of,
+    validate,
+    vectorization_of,
+)
+
+from .compiling import compile_first
+from .contract import Json, Question, id_of
+from .errors import Asked, NoServerError
+from .inputs import needing_formats, refusing
+from .stored import map_here, require_storable, settings_here
+
+if TYPE_CHECKING:
+    from formats import ImportOptions, LoggedScan
+
+
+def associate(body: Json) -> Json:
+    """Return the answer of ``POST /v1/associate``."""
+    settings, watch = settings_here(), Stopwatch()
+    asked = validate(AssociateRequest, body, settings.limits())
+    options, deadline = asked.options, watch.deadline(asked.options.deadline_ms, settings.max_deadline_ms)
+    found = map_here(body["map"])
+    directed = is_oriented(options.oriented, found.document.get("oriented"))
+    index = linefix.index_map({**found.document, "oriented": directed})
+    watch.lap("decode")
+    scanned, search = scanned_of(asked.scan), association_options_of(options, oriented=directed)
+    require_time(deadline)
+    result = linefix.associate(index, scanned.scan, prior_of(asked.prior), search, deadline)
+    watch.lap("search")
+    included = included_of(asked.scan, options, scanned, found.document.get("frame_id", "map"))
+    return _sealed({**association_json(result, included), "map": found.reference, "client_ref": None}, watch)
+
+
+def register(body: Json) -> Json:
+    """Return the answer of ``POST /v1/register``."""
+    watch = Stopwatch()
+    known = KnownPairs.of(validate(RegisterRequest, body, settings_here().limits()))
+    watch.lap("decode")
+    result = known.register()
+    watch.lap("search")
+    return _sealed(registration_json(result, known.pairs), watch)
+
+
+def vectorize(body: Json) -> Json:
+    """Return the answer of ``POST /v1/vectorize``."""
+    watch = Stopwatch()
+    asked = validate(VectorizeRequest, body, settings_here().limits())
+    watch.lap("decode")
+    answer = vectorization_of(asked)
+    watch.lap("search")
+    return _sealed(answer, watch)
+
+
+_ANSWERS: Mapping[Question, Callable[[Json], Json]] = {
+    "associate": associate,
+    "register": register,
+    "vectorize": vectorize,
+}
+
+
+def answer(question: Question, body: Json) -> Json:
+    """Return the answer of ``POST /v1/<question>``.
+
+    Raises
+    ------
+    RefusedError
+        When a part of the request is not taken.
+    """
+    compile_first()
+    with refusing(Asked(id_of(body.get("map")))):
+        return _ANSWERS[question](body)
+
+
+def check(on: Json, documents: Sequence[Json], logged: Sequence[LoggedScan] = ()) -> Json:
+    """Return the answer of ``/v1/maps/{map_id}:check``, also for a map that is not stored.
+
+    Parameters
+    ----------
+    on : dict
+        The map of a request.
+    documents : sequence of dict
+        Sample scans, each as in a request.
+    logged : sequence of LoggedScan
+        Further ones, of a log.
+    """
+    compile_first()
+    with refusing(Asked(map_id=id_of(on))):
+        settings, watch = settings_here(), Stopwatch()
+        limits, deadline = settings.limits(), watch.deadline(None, settings.max_deadline_ms)
+        asked = validate(CheckRequest, {"scans": list(documents)}, limits) if documents else None
+        if id_of(on) is None:
+            validate(InlineMap, on, limits)
+        found = map_here(on)
+        index = linefix.index_map({**found.document, "oriented": True})
+        # Neither the mount nor a motion that is not known matters to the map.
+        scans = [linefix.scan_of(replace(one, mount=None, time_increment=0.0)) for one in logged]
+        scans = [*scans_of(asked), *scans] if asked is not None else scans
+        watch.lap("decode")
+        require_time(deadline)
+        oriented = is_oriented(None, found.document.get("oriented"))
+        checked = linefix.check(index, scans, deadline=deadline, oriented=oriented)
+        watch.lap("search")
+        return _sealed({**checked_json(checked), "map": found.reference, "client_ref": None}, watch)
+
+
+def import_map(file: Path, options: ImportOptions) -> Json:
+    """Return the answer of ``POST /v1/maps:import`` for a file of this machine."""
+    compile_first()
+    with refusing(Asked(files=(file.name,))), needing_formats(f"reading {file.name}"):
+        settings, watch = settings_here(), Stopwatch()
+        imported, deadline = linefix.read_map(file, options), watch.deadline(None, settings.max_deadline_ms)
+        watch.lap("read")
+        document = map_json(imported.map)
+        require_storable(validate(InlineMap, document, settings.limits()))
+        index = linefix.index_map({**document, "oriented": True})
+        require_time(deadline)
+        found = check_map(index, deadline, oriented=imported.map.oriented)
+        watch.lap("check")
+        return _sealed(import_json(imported, found), watch)
+
+
+def require_time(deadline: linefix.Deadline) -> None:
+    """Raise `NoServerError` where the deadline has passed before the search."""
+    if deadline.passed:
+        raise NoServerError(
+            "the deadline passed before the search started; extend deadline_ms, or send the request again later"
+        )
+
+
+def _sealed(answer: Json, watch: Stopwatch) -> Json:
+    """Return an answer with an id and its times."""
+    return {**answer, "request_id": secrets.token_hex(16), "timing_ms": watch.timing_ms()}

@@ -1,0 +1,180 @@
+"""From the results of scans to what is published of the robot's pose: ``initialpose``, agreed poses, the transform."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import linefix
+
+from .agreement import Agreement, Event, Observation
+from .correcting import MapToOdom
+from .deciding import InitialPose
+from .frames import Frames
+from .health import Health, State, current_time
+from .locating import Located
+from .messages import PoseWithCovarianceStamped, Time
+from .odometry import OdometryHistory, nanoseconds
+from .options import NodeOptions
+from .reporting import at_least, stamped_pose, transform_of
+from .requests import Requests
+from .topics import Topics
+from .transforms import NS, planar
+from .tuning import SETTLE_SECONDS, TRANSFORM_PERIOD_NS, TRANSFORM_TOLERANCE_NS
+from .watching import Watch
+
+
+class Localization:
+    """Follows the pose that scans agree on, and publishes it.
+
+    Parameters
+    ----------
+    options : NodeOptions
+    topics : Topics
+    health : Health
+    frames : Frames
+    odometry : OdometryHistory
+        Both are kept by the node.
+
+    Attributes
+    ----------
+    map_frame : str
+    """
+
+    def __init__(
+        self, options: NodeOptions, topics: Topics, health: Health, frames: Frames, odometry: OdometryHistory
+    ) -> None:
+        self.map_frame = "map"
+        self._options, self._topics, self._health = options, topics, health
+        self._frames, self._odometry = frames, odometry
+        self._agreement, self._initial = Agreement(options.agree), InitialPose(options.when)
+        self._watch, self._correction = Watch(), MapToOdom()
+        self._requests = Requests(topics.named_requests, topics.results)
+        self._pending: tuple[Time, Observation, str] | None = None
+        self._settled = 0.0  # when the subscribers of initialpose are connected in both directions
+        self._transformed = 0  # the time of the last transform that was published, nanoseconds
+
+    @property
+    def odom_frame(self) -> str:
+        """The odometry frame: as odometry names it, else that of the options."""
+        return self._options.frame(self._odometry.frame or self._options.odom_frame)
+
+    def begin_again(self) -> None:
+        """Forget the pose: the robot was carried, or the map has changed."""
+        self._agreement.reset()
+        self._correction.reset()
+        self._watch.reset()
+        self._initial.want()
+        self._pending = None
+
+    def take_requests(self) -> None:
+        """Take requests for a pose, and new subscribers, which want one, too."""
+        if self._topics.requests.take() or self._requests.take():
+            self.begin_again()
+        if self._topics.initial.joined():
+            self._initial.want()
+            self._settled = max(self._settled, time.monotonic() + SETTLE_SECONDS)
+        self._requests.expire()
+
+    def take_localizer(self, pose: PoseWithCovarianceStamped) -> None:
+        """Take the pose of the robot's localizer.
+
+        Raises
+        ------
+        FrameError
+            When it is no pose.
+        """
+        self._watch.take(pose)
+
+    def take(self, located: Located) -> None:
+        """Take the result of a scan."""
+        stamp = nanoseconds(located.stamp) or time.time_ns()
+        scan = located.observation(self._odometry_at(stamp), stamp)
+        event = self._agreement.take(scan)
+        self._correction.take(event, scan)
+        if event is Event.CONTRADICTED:
+            self._pending = None
+            self._health.note("the agreed pose is contradicted by a scan")
+        if event not in (Event.AGREED, Event.CONFIRMED):
+            return
+        names = self.map_frame, self.odom_frame
+        agrees = self._watch.compare(scan, names, self._frames, self._odometry)
+        reason = self._initial.decide(event, localizer_agrees=agrees, lost=self._watch.lost, now=time.monotonic())
+        self._publish_agreed(located.stamp, scan, reason)
+
+    def _publish_agreed(self, stamp: Time, scan: Observation, reason: str | None) -> None:
+        if scan.pose is None or scan.covariance is None:
+            return
+        agreed = stamped_pose(stamp, scan.pose, scan.covariance, self.map_frame)
+        self._topics.agreed.publish(agreed)
+        self._requests.answer(agreed)
+        if reason is not None:
+            self._pending = stamp, scan, reason
+            self.publish_initial()
+
+    def publish_initial(self) -> None:
+        """Publish the pose that waits to be, unless a subscriber has come that would not receive it yet."""
+        if self._pending is None or time.monotonic() < self._settled:
+            return
+        (stamp, scan, reason), self._pending = self._pending, None
+        if scan.pose is None or scan.covariance is None:
+            return
+        if reason == "lost":
+            self._health.beat(State.LOST, current_time(), self.values)
+        widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
+        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self.map_frame))
+        subscribed = self._topics.initial.subscribed
+        self._initial.published(subscribed=subscribed, now=time.monotonic())
+        self._watch.reset()
+        x, y, degrees = scan.pose.x, scan.pose.y, math.degrees(scan.pose.theta)
+        note = "" if subscribed else ", which has no subscriber"
+        self._health.note(
+            f"published {self._topics.initial.name}{note} ({reason}): x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
+        )
+
+    def _odometry_at(self, stamp: int) -> linefix.RigidTransform | None:
+        """Return odom_from_base, by odometry or else by transforms."""
+        found = self._odometry.at(stamp)
+        if found is not None:
+            return found
+        base = self._options.base_of(self.odom_frame)
+        matrix = self._frames.lookup(self.odom_frame, base, stamp)
+        return None if matrix is None else planar(matrix)[0]
+
+    def publish_transform(self) -> None:
+        """Publish the transform from the map to the odometry frame, if that is wanted and it is time."""
+        newest = self._odometry.newest
+        if self._topics.tf is None or newest is None:
+            return
+        stamp, odometry = newest
+        if 0 <= stamp - self._transformed < TRANSFORM_PERIOD_NS:
+            return
+        map_from_odom = self._correction.advance(stamp, odometry)
+        if map_from_odom is None:
+            return
+        self._transformed = stamp
+        ahead = stamp + TRANSFORM_TOLERANCE_NS
+        frames = self.map_frame, self.odom_frame
+        self._topics.tf.publish(transform_of(Time(ahead // NS, ahead % NS), frames, map_from_odom))
+
+    def state(self, *, searched: bool) -> State:
+        """Return what is known of the pose; `searched` is whether the last scans could be searched."""
+        if self._agreement.latest is None:
+            return State.SEARCHING if searched else State.NO_SCAN
+        if self._agreement.contradicted:
+            return State.CONTRADICTED
+        return State.LOST if self._watch.lost else State.AGREED
+
+    @property
+    def values(self) -> dict[str, str]:
+        """The state as keys and values, for diagnostics."""
+        agreeing, moved, turned = self._agreement.progress
+        latest = self._agreement.latest
+        values = {
+            "scans that agree": f"{agreeing} of {self._options.agree}",
+            "moved": f"{moved:.2f} m, {math.degrees(turned):.0f} degrees",
+        }
+        if latest is not None and latest.pose is not None:
+            values["pose"] = f"{latest.pose.x:.3f} {latest.pose.y:.3f} {latest.pose.theta:.4f}"
+            values["stamp"] = f"{latest.stamp / 1e9:.3f}"
+        return values

@@ -1,0 +1,131 @@
+"""How the page opens, and what may be opened on it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, Route, expect
+
+from examples.sample import OfficePlan, offices, way_through, with_furniture, write_drive, write_grid
+from tests.running import RunningService, running
+from tests.service.importing.forms import SQUARE
+
+from .plan import shown, verdict
+
+NOT_READY = {
+    "title": "The service is not ready", "status": 503, "code": "not_ready",
+    "detail": "the kernels are being compiled, 40% so far; send the request again later",
+}  # fmt: skip
+
+
+def test_it_opens_with_an_example(page: Page) -> None:
+    page.goto("/")
+    verdict(page, "ambiguous")
+    expect(page.get_by_label("Example")).to_have_value("rooms")
+    expect(page.locator("#hint")).to_be_hidden()
+
+
+def test_a_service_that_compiles_says_so(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A real one, whose kernels are not there yet."""
+    monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path / "kernels"))
+    with running(tmp_path, probe="/livez") as service:
+        page.goto(service.url)
+        verdict(page, "waiting")
+        expect(page.locator("#verdict-title")).to_have_text("The service is starting")
+        expect(page.locator("#message")).to_contain_text("the kernels are being")
+        page.goto("about:blank")
+
+
+def test_it_searches_as_soon_as_the_service_is_ready(page: Page) -> None:
+    page.route("**/v1/associate", lambda route: route.fulfill(status=503, json=NOT_READY))
+    page.goto("/")
+    verdict(page, "waiting")
+    expect(page.locator("#message")).to_have_text(NOT_READY["detail"])
+    page.unroute("**/v1/associate")
+    verdict(page, "ambiguous")
+
+
+def test_reading_ends(page: Page, tmp_path: Path) -> None:
+    """Also where two files are read at a time, and neither is a map."""
+    (tmp_path / "a.dxf").write_text("0")
+    (tmp_path / "b.dxf").write_text("0")
+    shown(page, "flat", "usable")
+    about = page.locator("#about").inner_text()
+    waiting: list[Route] = []
+    page.route("**/v1/maps:import", lambda route: waiting.append(route))
+    for name in ("a.dxf", "b.dxf"):
+        with page.expect_request("**/v1/maps:import"):
+            page.set_input_files("#files", [tmp_path / name])
+    expect(page.locator("#reading")).to_have_text("Reading b.dxf ...")
+    for route in reversed(waiting):
+        with page.expect_response("**/v1/maps:import"):
+            route.continue_()
+    expect(page.locator("#reading")).to_contain_text("b.dxf: ", timeout=60_000)
+    expect(page.locator("body")).not_to_contain_text("Reading")
+    expect(page.locator("#about")).to_have_text(about)
+
+
+def test_an_example_that_is_chosen_meanwhile_stays(page: Page, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(SQUARE)
+    shown(page, "rooms", "ambiguous")
+    waiting: list[Route] = []
+    page.route("**/v1/maps:import", lambda route: waiting.append(route))
+    with page.expect_request("**/v1/maps:import"):
+        page.set_input_files("#files", [tmp_path / "a.csv"])
+    page.get_by_label("Example").select_option(label="A flat")
+    verdict(page, "usable")
+    with page.expect_response("**/v1/maps:import"):
+        waiting[0].continue_()
+    expect(page.locator("#reading")).to_be_empty()
+    expect(page.get_by_label("Example")).to_have_value("flat")
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A grid, and the bag of a short drive in it."""
+    folder, rng = tmp_path_factory.mktemp("sample"), np.random.default_rng(11)
+    floor = offices(rng, OfficePlan(rooms=4, corridors=1))
+    way = way_through(floor)
+    write_grid(folder, floor.segments, way[0])
+    write_drive(folder / "drive.mcap", with_furniture(floor, rng), way[:24:2], rng)
+    return folder
+
+
+def test_a_bag_is_opened_and_its_scans_are_searched(page: Page, sample: Path) -> None:
+    shown(page, "rooms", "ambiguous")
+    page.set_input_files("#files", [sample / "drive.mcap"])
+    expect(page.locator("#about")).to_have_text("The log has no map. Open the map, too.", timeout=60_000)
+    expect(page.locator("#scan-of-log")).to_contain_text("Scan 1 of 12: not searched yet.")
+    page.set_input_files("#files", [sample / "hq.yaml", sample / "hq.pgm"])
+    expect(page.locator("#about")).to_contain_text("(map_server)", timeout=60_000)
+    expect(page.locator("#scan-of-log")).to_contain_text(re.compile("Scan 1 of 12: (ok|ambiguous)"), timeout=30_000)
+    page.get_by_role("button", name="Play").click()
+    expect(page.locator("#scan-of-log")).to_contain_text("Scan 12 of 12: ok, usable", timeout=60_000)
+    expect(page.get_by_role("button", name="Play")).to_be_enabled()
+    expect(page.locator("#scan-of-log")).to_contain_text(re.compile(r"\((9|10|11|12) of 12 are usable"))
+    expect(page.locator("#numbers")).to_contain_text("correspondences")
+    expect(page.locator("#legend")).to_contain_text("usable")
+
+
+def test_a_bag_is_dropped(page: Page, sample: Path, service: RunningService) -> None:
+    """On the page, as from a file manager."""
+    shown(page, "rooms", "ambiguous")
+    content = list((sample / "drive.mcap").read_bytes())
+    data = page.evaluate_handle(
+        """content => { const data = new DataTransfer();
+           data.items.add(new File([new Uint8Array(content)], "drive.mcap")); return data; }""",
+        content,
+    )
+    page.dispatch_event("#plan", "drop", {"dataTransfer": data})
+    expect(page.locator("#scan-of-log")).to_contain_text("Scan 1 of 12", timeout=60_000)
+
+
+def test_a_broken_bag_is_named(page: Page, tmp_path: Path) -> None:
+    (tmp_path / "drive.bag").write_bytes(b"no bag")
+    shown(page, "rooms", "ambiguous")
+    page.set_input_files("#files", [tmp_path / "drive.bag"])
+    expect(page.locator("#reading")).to_contain_text(re.compile("^drive.bag: "), timeout=60_000)
+    verdict(page, "ambiguous")

@@ -1,0 +1,55 @@
+// The legend below the plan: only what is drawn there now.
+
+import { enlarged, KINDS } from "./drawing";
+import { kindOf, shownOf } from "./heat";
+import { onChange, state } from "./state";
+
+const box = document.querySelector<HTMLElement>("#legend")!;
+
+function entries(): [string, string][] {
+  const { answer, walls, own, off, log } = state;
+  const parts: [string, string][] = [];
+  if (state.picture) parts.push(["picture", "imported grid"]);
+  if (walls.length) parts.push(["wall", "wall"]);
+  if (walls.length > own) parts.push(["added", "added wall"]);
+  if (off.size) parts.push(["off", "removed wall"]);
+  if (state.virtual) parts.push(["robot", "true pose"]);
+  else if (state.scan && !log.length) parts.push(["robot", "initial pose of the scan"]);
+  if (state.other >= 0 || (state.analysis && state.pointed?.similar_pose)) parts.push(["other", state.other >= 0 ? "alternative" : "similar place"]);
+  if (answer && state.other < 0) {
+    if (answer.missing_map.length) parts.push(["missing", "wall that the scan lacks"]);
+    if (answer.pose) parts.push(...ofAnswer());
+  }
+  const kinds = new Set([
+    ...(state.analysis?.places ?? []).map(shownOf).flatMap((one) => (one ? [kindOf(one)] : [])),
+    ...log.flatMap((one) => (one?.pose ? [kindOf(one)] : [])),
+  ]);
+  for (const kind of KINDS) if (kinds.has(kind)) parts.push([kind, kind.replace("_", " ")]);
+  return parts;
+}
+
+function ofAnswer(): [string, string][] {
+  const answer = state.answer!;
+  const parts: [string, string][] = [];
+  if (state.sent?.scan.segments === undefined) parts.push(["scan", "measured point"]);
+  if (answer.correspondences.length) parts.push(["matched", "scan segment on a wall"]);
+  if (answer.unmatched_scan.length) parts.push(["unmatched", "scan segment on no wall"]);
+  if (answer.diagnostics?.critical_wall) parts.push(["critical", "critical wall"]);
+  const larger = enlarged();
+  const drawn = larger === null ? "" : ` with 3 sigma${larger > 1.05 ? `, drawn ${larger.toFixed(0)} times larger` : ""}`;
+  parts.push(["estimate", `estimated pose${drawn}${answer.unobservable ? " with the unobservable direction" : ""}`]);
+  return parts;
+}
+
+export function showLegend(): void {
+  box.replaceChildren(
+    ...entries().map(([kind, text]) => {
+      const item = document.createElement("span");
+      item.className = `key ${kind}`;
+      item.textContent = text;
+      return item;
+    }),
+  );
+}
+
+onChange(showLegend);
