@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, AssociationResult, CancelledError, Deadline, MapIndex, Scan, associate
+from association.layout import Integers
 
 from .scenes import INSIDE, equal_rooms, index_of, scan_of, seen
 
 EXHAUSTIVE = AssociationOptions(exhaustive=True)
+BUILDING, MANY = index_of(equal_rooms(6)), 10**9
 MOST_SECONDS = 60.0  # s, that a test waits for what has to happen
 
 
@@ -28,7 +30,7 @@ def long_search() -> tuple[MapIndex, Scan]:
     return index, scan_of(np.vstack([np.stack([begin, at, length, at], 1), np.stack([at, begin, at, length], 1)]))
 
 
-def is_set(flag: np.ndarray[tuple[int], np.dtype[np.uint8]]) -> bool:
+def is_set(flag: Integers) -> bool:
     """Return whether a flag is set before this test has waited too long."""
     until = time.monotonic() + MOST_SECONDS
     while not flag[0] and time.monotonic() < until:
@@ -134,9 +136,6 @@ class Looks(Deadline):
     def passed(self) -> bool:
         self.left -= 1
         return self.left < 0
-
-
-BUILDING, MANY = index_of(equal_rooms(6)), 10**9
 
 
 @pytest.mark.parametrize("viewpoint", [(0.0, 0.0), None])

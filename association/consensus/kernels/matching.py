@@ -293,7 +293,7 @@ def may_score(
 ) -> None:
     """Tell of poses whether the scan may score there: no segment counts where no wall of its direction is near.
 
-    Of the first `count` of `posed`, (k,) of `POSED`, against the ``floor`` of each. Writes to `near` (n, k) which
+    Of the first `count` of `posed`, (k,) of `HYPOTHESIS`, against the ``floor`` of each. Writes to `near` (n, k) which
     segments may lie on a wall, as far as it takes to tell.
 
     Never wrong when it says no, as long as half of a segment at least has to lie on walls, so that its midpoint does or

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from association import AssociationOptions
 from association.consensus.kernels import matching
-from association.layout import FIGURE, MATCH, POSED, record
+from association.layout import FIGURE, HYPOTHESIS, MATCH, record
 from association.scan.scan_lines import gates
 from association.tables import Raster
 from registration import RigidTransform
@@ -106,7 +106,7 @@ def may_score(
     raster: Raster,
 ) -> tuple[list[bool], Floats]:
     """Return of each pose whether the scan may come to its floor there, and what each line can add."""
-    posed, near = np.zeros(len(poses) + 1, POSED), np.zeros((len(scan), len(poses) + 1), np.uint8)
+    posed, near = np.zeros(len(poses) + 1, HYPOTHESIS), np.zeros((len(scan), len(poses) + 1), np.uint8)
     later = np.array([scan["gain"][i + 1 :][shifts[i + 1 :] >= 0].sum() for i in range(len(scan))])
     for one, at, floor in zip(posed, poses, floors, strict=False):
         one["x"], one["y"], one["theta"], one["floor"] = at.x, at.y, at.theta, floor
