@@ -6,13 +6,7 @@ from .associating import associate
 from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .index.map_index import MapIndex
-from .options import (
-    PARTS,
-    AssociationOptions,
-    HardPrior,
-    Prior,
-    SoftPrior,
-)
+from .options import PARTS, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
     Alternative,
     AssociationDiagnostics,

@@ -2,78 +2,33 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal
 
-import numpy as np
-
 from registration import Segments
-from registration.layout import Floats
-from registration.limits import MAX_LENGTH, MIN_LENGTH
 
-from .consensus.scaling import scale_near_one
 from .context import SearchContext
 from .explain import search_and_explain
 from .explanations import Explanations
 from .index.map_index import MapIndex
-from .scan.extents import inner_extent
-from .scan.scan import Scan, mirrored, scaled, turned_round
+from .scan.scan import Scan, mirrored, turned_round
 from .search.candidates import Effort, allowed_by
+from .to_scale import at_scale, estimate_factor
 from .tuning import (
     CAUSE_CONFIDENCE,
     CAUSE_GAP,
     CAUSE_KEPT,
     CAUSE_RATIO,
     CAUSE_SHARE,
-    EXCEEDING,
-    GREATEST_EXTENT,
-    GREATEST_SAME_GATES,
     LEAST_TIME_FOR_CAUSES,
-    MOST_FOR_UNITS,
     RIVAL_SHARE,
     TIMES_FOR_CAUSES,
-    USUAL_EXTENT,
-    USUAL_PART,
 )
+from .units import likely_map_units, likely_units
 from .verdict.verdict import Verdict, judge
-
-LEAST_EXTENT = 1.5  # m; what is seen of any room
-# What a scan has to be multiplied with where the map's lengths are of one unit and are taken for another, which is the
-# greater one; and the reverse.
-TAKEN_FOR: Mapping[float, tuple[str, str]] = {
-    10.0: ("decimetres", "metres"),
-    100.0: ("centimetres", "metres"),
-    1000.0: ("millimetres", "metres"),
-    1.0 / 0.0254: ("inches", "metres"),
-    1.0 / 0.3048: ("feet", "metres"),
-    25.4: ("millimetres", "inches"),
-    304.8: ("millimetres", "feet"),
-    2.54: ("centimetres", "inches"),
-    30.48: ("centimetres", "feet"),
-    12.0: ("inches", "feet"),
-}
-UNITS = (*TAKEN_FOR, *(1.0 / factor for factor in TAKEN_FOR))
-SAME_UNIT = 0.003  # of a factor; nearer to one of units it is that
-
-
-def unit_mistake(factor: float) -> str | None:
-    """Return which unit of a map was taken for which other, such as ``millimetres taken for inches``.
-
-    Parameters
-    ----------
-    factor : float
-        Lengths of the map, in units of those of a scan.
-    """
-    for known, (unit, other) in TAKEN_FOR.items():
-        if abs(factor / known - 1.0) < SAME_UNIT:
-            return f"{unit} taken for {other}"
-        if abs(factor * known - 1.0) < SAME_UNIT:
-            return f"{other} taken for {unit}"
-    return None
 
 
 class Mistake(StrEnum):
@@ -118,7 +73,7 @@ def find_causes(
 ) -> tuple[Cause, ...]:
     """Undo one mistake after the other and search again, for at most twice the time that the answer took.
 
-    An answer may take no time where nothing fits: then 20 ms. What the time does not suffice for is not told.
+    An answer may take no time where nothing fits: then 20 ms. Mistakes that the time does not suffice for are left out.
 
     Parameters
     ----------
@@ -162,7 +117,7 @@ def find_causes(
 
 
 def _known(explanations: Explanations, scan: Scan) -> float:
-    """Return what the scan as sent is worth by what counts of the changed one, nats."""
+    """Return the score of the scan as sent, by what counts in the changed one, nats."""
     alone = scan.viewpoint is None
     scores = (one.by_segments + one.blocked if alone else one.score for one in explanations.ranked)
     return max(scores, default=0.0)
@@ -174,13 +129,13 @@ def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, SearchCont
     if context.options.oriented:
         yield Mistake.REVERSED, 1.0, _with_scan(context, turned_round(scan))
     yield Mistake.MIRRORED, 1.0, _with_scan(context, mirrored(scan))
-    for factor in _likely_map_units(context):
+    for factor in likely_map_units(context):
         yield Mistake.UNIT_SCALE, factor, _with_smaller_map(context, factor)
-    for factor in _likely_units(context):
-        yield Mistake.UNIT_SCALE, factor, _with_scan(context, scaled(scan, factor))
-    near = scale_near_one(context)
+    for factor in likely_units(context):
+        yield Mistake.UNIT_SCALE, factor, at_scale(context, factor)
+    near = estimate_factor(context)
     if near is not None:
-        yield Mistake.UNIT_SCALE, near, _with_scan(context, scaled(scan, near))
+        yield Mistake.UNIT_SCALE, near, at_scale(context, near)
 
 
 def _with_scan(context: SearchContext, scan: Scan) -> SearchContext:
@@ -203,52 +158,5 @@ def _tried(changed: SearchContext, mistake: Mistake, factor: float, known: float
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None
     best, verdict = explanations.answer.best, judge(changed, explanations)
-    better = best.score > max(known + CAUSE_GAP, CAUSE_RATIO * known) and best.share >= CAUSE_SHARE
+    better = best.score > max(known + CAUSE_GAP, CAUSE_RATIO * known) and best.fraction >= CAUSE_SHARE
     return Cause(mistake, factor, best.score, verdict.usable) if verdict.usable or better else None
-
-
-def _likely_map_units(context: SearchContext) -> list[float]:
-    """Return the factors by which the map's unit may be wrong where the scan is as large as scans are.
-
-    Scan lines are parts of walls: in the same unit their usual length is a quarter of that of walls to all of it.
-    """
-    index, scan = context.index, context.scan.measured.segments
-    extent = inner_extent(scan)
-    if not LEAST_EXTENT <= extent <= GREATEST_EXTENT or index.directed > MOST_FOR_UNITS:
-        return []
-    # In a map that is too small all lines are near one another, and are merged to walls that are none.
-    seen, walls, pieces = _usual(scan.lengths), _usual(index.walls.longest), _usual(index.segments.lengths)
-    off = {factor: factor * seen / (walls if factor > 1.0 else pieces) for factor in UNITS}
-    likely = [
-        factor
-        for factor in UNITS
-        if abs(math.log(factor)) > math.log(GREATEST_SAME_GATES)
-        and USUAL_PART[0] <= off[factor] <= USUAL_PART[1]
-        and extent * factor <= EXCEEDING * index.diagonal
-        and float(index.segments.lengths.min()) / factor >= MIN_LENGTH
-        and float(index.segments.lengths.max()) / factor <= MAX_LENGTH
-    ]
-    return sorted(likely, key=lambda factor: abs(math.log(off[factor])))
-
-
-def _usual(lengths: Floats) -> float:
-    """Return the length such that half of all length is in longer lines, metres."""
-    ordered = np.sort(lengths)
-    return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
-
-
-def _likely_units(context: SearchContext) -> list[float]:
-    """Return the factors that make the scan as large as what lasers see on such a map, the usual size first."""
-    segments = context.scan.measured.segments
-    extent = inner_extent(segments)
-    if extent <= 0.0:
-        return []
-    shortest, longest = float(segments.lengths.min()), float(segments.lengths.max())
-    likely = [
-        factor
-        for factor in UNITS
-        if LEAST_EXTENT <= extent * factor <= EXCEEDING * context.index.diagonal
-        and shortest * factor >= MIN_LENGTH
-        and longest * factor <= MAX_LENGTH
-    ]
-    return sorted(likely, key=lambda factor: abs(math.log(extent * factor / USUAL_EXTENT)))

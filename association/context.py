@@ -34,17 +34,7 @@ from .scan.alignment import aligned
 from .scan.scan import Scan
 from .scan.scan_lines import ScanLines, gates
 from .tables import KnownWalls, Question, Sights, Workspace
-from .tuning import (
-    COMPARED_BEAMS,
-    EMPTY_CELL,
-    FAR,
-    FARTHER,
-    LATE_CROWD,
-    MAX_RAYS,
-    MOST_LOOKED_AT,
-    RAY_SPACING,
-    RAYS,
-)
+from .tuning import COMPARED_BEAMS, EMPTY_CELL, FAR, FARTHER, LATE_CROWD, MAX_RAYS, MOST_LOOKED_AT, RAY_SPACING, RAYS
 
 NOTHING_KNOWN = record(PRIOR, kind=NO_PRIOR)
 NOTHING_KEPT = record(RULES)

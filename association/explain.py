@@ -1,4 +1,4 @@
-"""From the poses that a search found to explanations, and the best of them worked out: all that the verdict weighs."""
+"""From the poses of a search to explanations: ranked as consensus sets, the best of them estimated."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from dataclasses import replace
 from registration import RigidTransform
 
 from .consensus.acceptance import accept, register_accepted
-from .consensus.ranking import Ranked, rank_candidates
-from .consensus.settling import settle
+from .consensus.consensus_set import ConsensusSet
+from .consensus.estimation import estimate_poses
+from .consensus.kernels.matching import score_of_matches
+from .consensus.ranking import rank_candidates
 from .consensus.sight import agreement, compare_beams
 from .context import SearchContext
 from .explanations import Answer, Explanations
@@ -16,8 +18,7 @@ from .layout import FOUND, record
 from .result import SearchReport
 from .scan.views import corrected
 from .search.candidates import Candidates, Effort, find_candidates
-from .verdict.kernels.chance import worth_of
-from .verdict.significance import significance
+from .verdict.chance import significance
 
 NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 
@@ -46,7 +47,7 @@ def explain_at(context: SearchContext, pose: RigidTransform) -> Explanations:
 
 
 def explain(context: SearchContext, candidates: Candidates) -> Explanations:
-    """Rank the poses that a search found, and work out the best of them.
+    """Rank the poses of a search as consensus sets, and estimate the pose of the best one.
 
     Raises
     ------
@@ -59,21 +60,28 @@ def explain(context: SearchContext, candidates: Candidates) -> Explanations:
 
 
 def _as_far_as(context: SearchContext, candidates: Candidates) -> SearchReport:
-    """Return how the search went; what the deadline left unranked, or rays speak against, may have been worse."""
+    """Return how the search went; not complete where poses were left unranked, or rays not followed."""
     as_far = context.can_look and not context.deadline.passed
     return candidates.report if as_far else candidates.report.cut_short()
 
 
-def _answer(context: SearchContext, best: Ranked) -> Answer | None:
+def _answer(context: SearchContext, best: ConsensusSet) -> Answer | None:
+    """Estimate the pose of the best explanation, and compare the scan with the map there; None without pairs.
+
+    1. Accept correspondences with the map's own segments.
+    2. Estimate the pose with the error of the walls, and the leverage of each wall.
+    3. Register the scan by these correspondences: that pose is the answer.
+    4. Compare what is seen with what the map shows: directions, beams, chance.
+    """
     accepted = accept(context, best)
-    (settled,) = settle(context, [best], hinges=True)
-    if settled.views is not None:
-        # What is told of it holds where the views are found to have been.
-        context = replace(context, scan=corrected(context.scan, settled.views.found, settled.views.spread))
-    found = register_accepted(context, best, accepted, settled)
+    (estimated,) = estimate_poses(context, [best], leverages=True)
+    if estimated.views is not None:
+        # All of the following holds where the views are estimated to have been.
+        context = replace(context, scan=corrected(context.scan, estimated.views.found, estimated.views.spread))
+    found = register_accepted(context, best, accepted, estimated)
     if found is None:
         return None
-    registered, settled = found
-    chance = significance(context, worth_of(best.matches))
-    beams = compare_beams(context, settled)
-    return Answer(best, accepted, settled, registered, agreement(context, best), beams, chance)
+    registered, estimated = found
+    probability = significance(context, score_of_matches(best.matches))
+    beams = compare_beams(context, estimated)
+    return Answer(best, accepted, estimated, registered, agreement(context, best), beams, probability)

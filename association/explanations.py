@@ -1,73 +1,96 @@
-"""What a search found, worked out as far as the verdict weighs it."""
+"""The explanations of a scan: ranked consensus sets, the best of them estimated. This is what the verdict judges."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from registration import RegistrationResult
+from registration import RegistrationResult, wrap_angle
 from registration.values import value
 
 from .consensus.acceptance import Accepted
-from .consensus.ranking import Ranked
-from .consensus.settling import Settled
-from .consensus.sight import BeamShares
+from .consensus.consensus_set import ConsensusSet
+from .consensus.estimation import EstimatedPose
+from .consensus.sight import BeamFractions
 from .result import SearchReport
+from .tuning import DISTINCT_ANGLE, SAME_PLACE
 
 
 @value(frozen=True, slots=True)
 class Answer:
-    """The best explanation, worked out.
+    """The best explanation, with all that the verdict needs of it.
 
     Attributes
     ----------
-    best : Ranked
+    best : ConsensusSet
     accepted : Accepted
         Its consensus set in the map's own segments.
-    settled : Settled
-        Its pose, and what that hinges on.
+    estimated : EstimatedPose
+        Its pose, and the leverage of each wall on it.
     registered : RegistrationResult
         That pose on the map's own segments.
     agreement : float
-        Share of directions in which the scan shows what the map does, 0 to 1.
-    beams : BeamShares
+        Fraction of directions in which the scan shows what the map does, 0 to 1.
+    beams : BeamFractions
         How many of the beams do not read what the map shows.
     significance : float
         Probability that chance scores as high.
     """
 
-    best: Ranked
+    best: ConsensusSet
     accepted: Accepted
-    settled: Settled
+    estimated: EstimatedPose
     registered: RegistrationResult
     agreement: float
-    beams: BeamShares
+    beams: BeamFractions
     significance: float
 
 
 @value(frozen=True, slots=True)
 class Explanations:
-    """What a search found.
+    """The explanations of a scan, and how the search for them went.
 
     Attributes
     ----------
-    ranked : tuple of Ranked
+    ranked : tuple of ConsensusSet
         Distinct; those within a hard prior's window first, the best first.
     answer : Answer or None
         The first within the window; None where there is none.
     search : SearchReport
     """
 
-    ranked: tuple[Ranked, ...]
+    ranked: tuple[ConsensusSet, ...]
     answer: Answer | None
     search: SearchReport
 
     @property
-    def rivals(self) -> Iterator[Ranked]:
+    def alternatives(self) -> Iterator[ConsensusSet]:
         """The other explanations within the window, best first."""
         return (one for one in self.others if one.inside)
 
     @property
-    def others(self) -> Iterator[Ranked]:
+    def others(self) -> Iterator[ConsensusSet]:
         """All explanations but that of the answer, in their order."""
         best = None if self.answer is None else self.answer.best
         return (one for one in self.ranked if one is not best)
+
+
+def add_alternatives(explanations: Explanations, alternatives: Sequence[ConsensusSet]) -> Explanations:
+    """Add alternatives that fit at other scales to explanations, none of them above the answer."""
+    if explanations.answer is None:
+        return explanations
+    best, ranked = explanations.answer.best, list(explanations.ranked)
+    for other in alternatives:
+        one = replace(other, score=min(other.score, best.score), posterior=min(other.posterior, best.posterior))
+        place = next((k for k, there in enumerate(ranked) if _same_place(one, there)), len(ranked))
+        if place == len(ranked) or ranked[place].posterior < one.posterior:
+            ranked[place : place + 1] = [one]
+    ranked.sort(key=lambda one: (not one.inside, -one.posterior))
+    return replace(explanations, ranked=tuple(ranked))
+
+
+def _same_place(one: ConsensusSet, other: ConsensusSet) -> bool:
+    """Tell whether two poses are of one place, at whatever scales."""
+    a, b = one.pose, other.pose
+    return math.hypot(a.x - b.x, a.y - b.y) <= SAME_PLACE and abs(wrap_angle(a.theta - b.theta)) <= DISTINCT_ANGLE

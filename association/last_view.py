@@ -17,11 +17,10 @@ from registration import Beams, MeasuredSegments, RigidTransform, Segments, wrap
 from registration.values import value
 
 from .context import SearchContext
-from .explain import search_and_explain
 from .report import report
 from .result import AssociationResult, AssociationWarning
 from .scan.scan import Indices, Scan, Views
-from .to_scale import put_to_scale
+from .to_scale import search_to_scale
 from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
 from .verdict.verdict import Verdict, judge
 from .warnings import warnings_of_scan
@@ -84,7 +83,7 @@ def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     if context.deadline.passed:
         return LastView(None, complete=False)
     alone = SearchContext.of(context.index, scan, context.prior, context.options, context.deadline)
-    found = put_to_scale(alone, search_and_explain(alone))
+    found = search_to_scale(alone)
     judged = judge(found.context, found.explanations, off_scale=found.off_scale)
     if not judged.usable or not _agree(judged.pose, verdict.pose):
         return LastView(None, complete=judged.complete)

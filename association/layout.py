@@ -60,27 +60,30 @@ LINE_PARTS = fields(
 SIGHTING = fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid_y spread variance"))
 
 # Where a scan line lies: the wall or -1; offset from the line under it, which tied walls make up together; sine of the
-# angle to the wall; share of the length on walls; by how much that line is beside the wall's own (m), and the mean
-# square by which the walls under it are off it (m^2); what the match gains, and what it is worth with its cost, nats.
-MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift uneven gain worth"))
+# angle to the wall; fraction of the length on walls; by how much that line is beside the wall's own (m), and the mean
+# square by which the walls under it are off it (m^2); what the match gains, and its score, which is
+# the gain less half of the chi-square that goes with it, nats.
+MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift uneven gain score"))
 
 # A pose with its covariance, of additive x, y, theta.
 ESTIMATE = np.dtype(POSE.descr + SYMMETRIC3.descr)
 
-# What a consensus set is worth, nats: the gains of its pairs; its joint cost, walls' own errors out; the logarithm of
-# the freedom that it takes from the pose. The score is gain - cost / 2 - freedom.
-VALUE = fields((_F, "gain cost freedom"))
+# The terms of a score, nats: the gains of the pairs; their chi-square, walls' own errors taken out; the log-determinant
+# of what they fix of the pose. The score is gain - chi_square / 2 - log_determinant.
+SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
-# What an estimate is worth: its score; the joint cost in it; what the same sums cost at the paper's estimate; length of
-# the matched segments; its share of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
-# sigmas alone expect; what lines of sight speak against it, nats; the shares of the beams that read the wall they
+# A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
+# matched segments; its fraction of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
+# sigmas alone expect; what lines of sight speak against it, nats; the fractions of the beams that read the wall they
 # should, and that passed through one, 0 without beams; how many rows are matched.
-MERIT = fields((_F, "score cost one_step_cost length share reliability misfit blocked read passed count"))
+SET_SCORE = fields(
+    (_F, "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed count"),
+)
 
 # What one wall has in the sums: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of
 # its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs. What is known of the wall's error but
 # by these pairs: weight (1/m^2), and weight times the error (1/m) at a pose. Whether it is listed.
-WALL_SHARE = fields((_F, "c s x y one weight count other_weight other_sum"), (_I, "listed"))
+WALL_SUMS = fields((_F, "c s x y one weight count other_weight other_sum"), (_I, "listed"))
 
 # A pose among the best: score and prior together; the score alone.
 FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
@@ -89,11 +92,11 @@ FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
 GRID_SHAPE = fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 
 # What a match has to pass: gates in standard deviations, and the least and greatest offset and angle that they may
-# come to; the least share of the length on walls.
+# come to; the least fraction of the length on walls.
 GATES = fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
 
-# What a consensus set is judged by: variance of a wall's own error, m^2; how far a pose is free before it is fixed, as
-# standard deviations of position (m) and heading (rad).
+# The model that scores a consensus set: variance of a wall's own error, m^2; how far a pose is free before it is fixed,
+# as standard deviations of position (m) and heading (rad).
 MODEL = fields((_F, "wall_variance free_distance free_angle"))
 
 # Which poses are kept: share of the best value that is needed; distance and angle of distinct poses; share of the best
@@ -133,18 +136,18 @@ HYPOTHESIS = np.dtype(
     ]
 )
 
-# A pose worked out with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
+# An estimated pose, with the walls' own error estimated: the pose with its covariance; the variance of a wall's error,
 # m^2; if walls were off by centimetres, the position's deviation along its weakest direction, m, and that unit
 # direction; whether all walls are parallel within three standard deviations of their angles.
-SETTLED = np.dtype([("pose", ESTIMATE), *fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
+ESTIMATED = np.dtype([("pose", ESTIMATE), *fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
 
 # A pose among walls of which each is off by itself, with that standard deviation, m.
 POSE_AMONG_WALLS = fields((_F, "theta x y wall_sigma"))
 
 # What a pose would be without one wall, and what is tied to it: the wall; by how much it would move, m; the position's
 # deviation along its weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed;
-# how far the wall counts as one of its own, beside those that it is tied to, 0 to 1.
-HINGE = np.dtype([("wall", _I), *fields((_F, "moves deviation dx dy own")).descr])
+# how far the wall counts as one of its own, next to those that it is tied to, 0 to 1.
+LEVERAGE = np.dtype([("wall", _I), *fields((_F, "displacement deviation dx dy own")).descr])
 
 # What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
 # together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
@@ -161,49 +164,44 @@ BEAM = fields((_F, "x y dx dy range"))
 # line, and how many at most from any view.
 BLOCKER = fields((_I, "to_matched to_clutter row sensor here most"))
 
-# What single beams say of a pose: the shares that read the wall they should, and that passed through one.
+# Evidence of single beams at a pose: the fractions that read the wall they should, and that passed through one.
 BEAM_EVIDENCE = fields((_F, "read passed"))
 
+# An explanation as it is compared with others: score and prior together, nats; the chi-square in the score; how many
+# rows are matched. And of an alternative: by how much its evidence is greater than that of the best, nats, with walls
+# as far off as they may be; how far it counts, 0 to 1: fully where the search cannot have missed one as good.
+COMPARED = fields((_F, "posterior chi_square count"))
+ALTERNATIVE = fields((_F, "gap counted"))
 
-# What an explanation is worth beside others: its value, nats; the joint cost in it; how many rows are matched. And of
-# one that is not the best: by how much it is worth more, nats, with the walls as far off as they may be; how far it
-# counts, 0 to 1: fully where the search cannot have missed one as good.
-RIVAL = fields((_F, "value cost count"))
-WEIGHED = fields((_F, "gap counted"))
-
-# What is known of an answer besides its merits: the position's deviation along its weakest direction, and by how much
-# it would move without one wall and its deviation then, m; how many walls hold a match; share of directions in which
-# the scan shows what the map does; shares of the beams that read farther, and nearer, than the map shows; probability
-# that chance scores as high; length of the longest segment that is not matched, and of all of these, m.
-FACTS = fields((_F, "weakest moves hinge_deviation walls agreement farther nearer significance longest unmatched"))
-
-# The numbers of an answer that the verdict goes by: see `association.verdict.features.Features`.
-FEATURES = fields(
+# What is known of an answer besides its score: the position's deviation along its weakest direction, and by how much
+# it would move without one wall and its deviation then, m; how many walls hold a match; fraction of directions in which
+# the scan shows what the map does; fractions of the beams that read farther, and nearer, than the map shows;
+# probability that chance scores as high; length of the longest segment that is not matched, and of all of these, m.
+FACTS = fields(
     (
         _F,
-        "constant lead solitude share root_count root_length deviation misfit inverse_count longest_unmatched "
-        "agreement read passed root_farther root_nearer hinge_moves hinge_deviation chance null null_gap null_better "
-        "root_score blocked walls misfit_of_many beyond_nearly_all root_unmatched squared_solitude",
-    ),
+        "weakest critical_displacement critical_deviation walls agreement farther nearer significance longest "
+        "unmatched",
+    )
 )
 
 # A scan segment of a consensus set in the map's own pieces: the piece that it lies on most, -1 where it is none of the
-# set, and how many others are named; the share of its length that lies on any.
-PAIR = fields((_I, "piece rivals"), (_F, "overlap"))
+# set, and how many others are named; the fraction of its length that lies on any.
+PAIR = fields((_I, "piece others"), (_F, "overlap"))
 
 # What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
 # it below the first of them. From `start` on the slope is more by `more`.
 CURVE = fields((_I, "feature begin end"), (_F, "slope"))
 BEND = fields((_F, "start more"))
 
-# What it adds for two features together: which; 1 where the lesser share counts, 0 for the greater; nats; for each the
-# value from which it speaks for the answer, and that at which it does in full.
+# What it adds for two features together: which; 1 where the lesser fraction counts, 0 for the greater; nats; for each
+# the value from which it speaks for the answer, and that at which it does in full.
 TWO_FEATURES = fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
 # What kernels write to while they look at one pose: the pose; the information of its consensus set; its sums, without
-# the walls' errors and with them; a line; what is known of the error of walls that are tied; what the set is worth; the
-# end of a beam; a ray; what the beams say; what the search of a base goes by. A record that a kernel
-# takes from an array of its own would outlive the array, whose last use ends it: hence these come from outside.
+# the walls' errors and with them; a line; what is known of the error of walls that are tied; the terms of its score;
+# the end of a beam; a ray; the evidence of the beams; what the search of a base goes by. A record that a kernel takes
+# from an array of its own would outlive the array, whose last use ends it: hence these come from outside.
 SCRATCH = np.dtype(
     [
         ("estimate", ESTIMATE),
@@ -211,8 +209,8 @@ SCRATCH = np.dtype(
         ("sums", JOINT_SUMS),
         ("plain", JOINT_SUMS),
         ("line", WALL),
-        ("common", WALL_SHARE),
-        ("value", VALUE),
+        ("common", WALL_SUMS),
+        ("terms", SCORE_TERMS),
         ("point", SEEN),
         ("ray", RAY),
         ("evidence", BEAM_EVIDENCE),

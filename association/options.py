@@ -1,4 +1,4 @@
-"""What a caller can ask of a search, and what is known before it."""
+"""Options of a search, priors, and the deadline."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class AssociationOptions:
     max_alternatives : int
         How many other poses to report at most.
     confidence : float
-        The chance wanted of not having missed a better consensus set, below 1.
+        Wanted probability of not having missed a better consensus set, below 1.
     exhaustive : bool
         Go through all bases whatever the confidence.
     sampling : "ordered" or "random"
@@ -105,11 +105,11 @@ class AssociationOptions:
         Share of a scan segment's length that must lie on the map, 0 to 1.
     parts : tuple of str
         Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
-        them a usable answer has no alternatives; any other has, for `message_of` tells how many there are.
+        them a usable answer has no alternatives; any other has, because `message_of` returns their number.
     causes : bool
         Whether to look for a mistake of the caller's where the answer is not usable, for twice the time at most.
     estimator, rotation : str
-        Of the final pose, as in `registration.RegistrationOptions`; the estimator also of the scores that are told.
+        Of the final pose, as in `registration.RegistrationOptions`; the estimator also of the returned scores.
 
     Raises
     ------

@@ -13,24 +13,19 @@ from registration import Ambiguity
 
 from .causes import Cause
 from .consensus.acceptance import correspondences, overlaps_at
+from .consensus.consensus_set import ConsensusSet, matches_of
+from .consensus.estimation import EstimatedPose, estimate_poses, slices_between_looks
 from .consensus.kernels.measures import paper_measures
-from .consensus.ranking import Ranked, matches_of, with_lines_of_sight
-from .consensus.settling import Settled, settle, slices_between_looks
+from .consensus.ranking import with_lines_of_sight
 from .consensus.sight import missing_segments
 from .context import SearchContext
 from .explanations import Answer, Explanations
 from .layout import POSE_AMONG_WALLS
-from .result import (
-    Alternative,
-    AssociationDiagnostics,
-    AssociationResult,
-    Correspondence,
-    CriticalWall,
-    Status,
-)
+from .result import Alternative, AssociationDiagnostics, AssociationResult, Correspondence, CriticalWall, Status
 from .to_scale import Factor
-from .tuning import HINGES, TWIN_TEMPERATURE
-from .verdict.features import weigh
+from .tuning import CRITICAL_DISPLACEMENT
+from .verdict.alternatives import compare_alternatives
+from .verdict.tuning import ALTERNATIVE_TEMPERATURE
 from .verdict.verdict import Verdict
 from .warnings import warnings_of, warnings_of_causes
 
@@ -59,8 +54,8 @@ def report(
         usable=verdict.usable,
         probability=verdict.probability,
         pose=verdict.pose,
-        covariance=None if degenerate or context.options.estimator == "one_step" else answer.settled.covariance,
-        unobservable=answer.settled.direction if degenerate else None,
+        covariance=None if degenerate or context.options.estimator == "one_step" else answer.estimated.covariance,
+        unobservable=answer.estimated.direction if degenerate else None,
         correspondences=_correspondences(context, answer, verdict) if "correspondences" in parts else (),
         unmatched_scan=tuple(i for i in range(len(context.scan.measured)) if i not in matched),
         missing_map=tuple(i for i in missing if i not in on_map),
@@ -109,22 +104,22 @@ def _no_match(
 def _diagnostics(context: SearchContext, answer: Answer, verdict: Verdict) -> AssociationDiagnostics:
     return AssociationDiagnostics(
         registration=answer.registered.diagnostics,
-        inlier_fraction=answer.best.share,
+        inlier_fraction=answer.best.fraction,
         score=answer.best.score_by(context.options.estimator),
         runner_up=verdict.runner_up,
         margin=verdict.margin,
         significance=answer.significance,
-        critical_wall=_hinge(context, answer),
+        critical_wall=_critical_wall(context, answer),
     )
 
 
-def _hinge(context: SearchContext, answer: Answer) -> CriticalWall | None:
+def _critical_wall(context: SearchContext, answer: Answer) -> CriticalWall | None:
     """Return the wall without which the pose would move most or be free; None where it would hardly move."""
     moves, wall, direction = 0.0, -1, (0.0, 0.0)
-    for w, moved, deviation, dx, dy, _ in answer.settled.hinges.tolist():
+    for w, moved, deviation, dx, dy, _ in answer.estimated.leverages.tolist():
         if max(moved, deviation) > moves:
             moves, wall, direction = max(moved, deviation), w, (dx, dy)
-    if moves < HINGES:
+    if moves < CRITICAL_DISPLACEMENT:
         return None
     walls = answer.best.matches["wall"][context.lines.row_of[answer.accepted.pairs[:, 0]]]
     on_it = context.index.is_one_wall(walls, wall)
@@ -138,54 +133,60 @@ def _missing_map(context: SearchContext, answer: Answer) -> tuple[int, ...]:
 
 
 def _alternatives(
-    context: SearchContext, explanations: Explanations, others: Iterable[Ranked], verdict: Verdict
+    context: SearchContext, explanations: Explanations, others: Iterable[ConsensusSet], verdict: Verdict
 ) -> tuple[Alternative, ...]:
     if verdict.usable and "alternatives" not in context.options.parts:
         return ()
     shown = tuple(islice(with_lines_of_sight(context, explanations.ranked, others), context.options.max_alternatives))
     if not shown:
         return ()
-    settled, probabilities = settle(context, shown), _probabilities(explanations.answer, verdict, shown)
+    estimated, probabilities = estimate_poses(context, shown), _probabilities(explanations.answer, verdict, shown)
     found: list[Alternative] = []
-    for some in slices_between_looks(context, len(settled)):
-        measures = _measures(context, shown[some], settled[some])
-        found += map(partial(_alternative, context), shown[some], settled[some], measures, probabilities[some])
+    for some in slices_between_looks(context, len(estimated)):
+        measures = _measures(context, shown[some], estimated[some])
+        found += map(partial(_alternative, context), shown[some], estimated[some], measures, probabilities[some])
     return tuple(found)
 
 
-def _measures(context: SearchContext, shown: Sequence[Ranked], settled: Sequence[Settled]) -> list[list[float]]:
-    """Return the paper's measures of explanations at their settled poses, of which there may be fewer."""
-    poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in settled], POSE_AMONG_WALLS)
+def _measures(
+    context: SearchContext, shown: Sequence[ConsensusSet], estimated: Sequence[EstimatedPose]
+) -> list[list[float]]:
+    """Return the paper's measures of consensus sets at their estimated poses, of which there may be fewer."""
+    poses = np.array([(one.pose.theta, one.pose.x, one.pose.y, one.wall_sigma) for one in estimated], POSE_AMONG_WALLS)
     measures: list[list[float]] = paper_measures(
-        context.lines.rows, matches_of(shown[: len(settled)]), context.known_walls, poses
+        context.lines.rows, matches_of(shown[: len(estimated)]), context.known_walls, poses
     ).tolist()
     return measures
 
 
-def _probabilities(answer: Answer | None, verdict: Verdict, others: Sequence[Ranked]) -> list[float | None]:
+def _probabilities(answer: Answer | None, verdict: Verdict, others: Sequence[ConsensusSet]) -> list[float | None]:
     """Return the probability that each of some other poses is right, 0 to 1; None where the verdict has none to share.
 
-    They share it as in `twin_share`: the best explanation weighs 1, another one what it is counted, reduced by its gap.
+    As in `probability_among`: the best explanation weighs 1, another one what it is counted, reduced by its gap.
     """
     if answer is None or verdict.status is Status.NO_MATCH or verdict.probability is None or verdict.contradicted:
         return [None] * len(others)
-    weighed = weigh(answer.best, others)
-    parts = weighed["counted"] * np.exp(np.minimum(0.0, weighed["gap"]) / TWIN_TEMPERATURE)
+    alternatives = compare_alternatives(answer.best, others)
+    parts = alternatives["counted"] * np.exp(np.minimum(0.0, alternatives["gap"]) / ALTERNATIVE_TEMPERATURE)
     inside = [one.inside for one in others]  # a hard prior excludes the others
     found: list[float | None] = (verdict.probability * parts * inside).tolist()
     return found
 
 
 def _alternative(
-    context: SearchContext, other: Ranked, settled: Settled, measures: list[float], probability: float | None
+    context: SearchContext,
+    other: ConsensusSet,
+    estimated: EstimatedPose,
+    measures: list[float],
+    probability: float | None,
 ) -> Alternative:
     translation, mitsuta, wahba, reliability = measures
     return Alternative(
-        pose=context.in_map(settled.pose),
-        covariance=None if settled.degenerate else settled.covariance,
+        pose=context.in_map(estimated.pose),
+        covariance=None if estimated.degenerate else estimated.covariance,
         score=other.score_by(context.options.estimator),
         ambiguity=Ambiguity(translation, wahba if context.options.rotation == "wahba" else mitsuta),
         reliability=reliability,
-        inlier_fraction=other.share,
+        inlier_fraction=other.fraction,
         probability=probability,
     )

@@ -1,4 +1,4 @@
-"""What a search answers."""
+"""The result of `associate`."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Correspondence:
     scan, map : int
         Indices as sent.
     overlap : float
-        Share of the scan segment's length that lies on the map, 0 to 1.
+        Fraction of the scan segment's length that lies on the map, 0 to 1.
     offset : float
         Metres, signed: ``n_map . (R m_scan + t) - p_map`` at the midpoint of the scan segment.
     angle : float
@@ -101,7 +101,7 @@ class CriticalWall:
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why an answer is not usable: a stable code and a plain sentence."""
+    """Why an answer is not usable: a stable code and a message."""
 
     code: ReasonCode
     message: str
@@ -109,17 +109,17 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class AssociationDiagnostics:
-    """Numbers beside the pose.
+    """Numbers next to the pose.
 
     Attributes
     ----------
     registration : RegistrationDiagnostics
         Of the accepted pairs at the answered pose.
     inlier_fraction : float
-        Share of the scan's length that is matched.
+        Fraction of the scan's length that is matched.
     score : float
-        Log-likelihood over that of a scan that is all clutter, nats, by the sums at the estimator's pose. What judges
-        and orders is that of the joint estimator, from which `runner_up` and `margin` come.
+        Log-likelihood over that of a scan that is all clutter, nats, by the sums at the estimator's pose. The verdict
+        and the order use that of the joint estimator, from which `runner_up` and `margin` come.
     runner_up : float or None
         Score of the best other pose over that of the best, never below 0; None where no other pose was found, that is
         none above `SearchReport.complete_above` of the score.
@@ -128,7 +128,7 @@ class AssociationDiagnostics:
     significance : float
         Probability that chance scores as high; small is good.
     critical_wall : CriticalWall or None
-        None where the pose stays within `HINGES` metres without any one wall.
+        None where the pose stays within `CRITICAL_DISPLACEMENT` metres without any one wall.
     """
 
     registration: RegistrationDiagnostics
@@ -172,14 +172,14 @@ class SearchReport:
     exhaustive : bool
         Whether every base was gone through, and the search is complete.
     confidence : float
-        Reached chance of not having missed a better consensus set among the bases; below what was asked where a scan of
-        many segments has few that tell enough together.
+        Reached probability of not having missed a better consensus set among the bases; below the requested one where a
+        scan of many segments has few that together fix a pose well.
     bases, hypotheses, verified : int
         Bases drawn, poses they gave, poses that were scored to the end.
     seed : int
     sampling : "ordered" or "random"
     complete_above : float
-        Share of the best score, by segments, above which no other pose was missed, with that confidence; 1 where the
+        Fraction of the best score, by segments, above which no other pose was missed, with that confidence; 1 where the
         search is not complete. Of poses whose matches agree with one another within their tolerances: one at which they
         do not, and which is a compromise between them, may be missed.
     """
@@ -201,7 +201,7 @@ class SearchReport:
 
 @dataclass(frozen=True, slots=True)
 class AssociationWarning:
-    """Something that the caller should know, as a stable code and a sentence."""
+    """A warning to the caller: a stable code and a message."""
 
     code: WarningCode
     message: str

@@ -12,7 +12,7 @@ import numpy as np
 
 from registration.layout import Floats, Records
 
-from .layout import HYPOTHESIS, MATCH, SCRATCH, WALL_SHARE, Indices, Integers, record
+from .layout import HYPOTHESIS, MATCH, SCRATCH, WALL_SUMS, Indices, Integers, record
 from .tuning import AT_ONCE
 
 
@@ -357,7 +357,7 @@ class Workspace(NamedTuple):
     shifts_held : (n,) by how much the line that is in the sums is beside that wall, m
     weights_held : (n,) with what weight it is
     listed : (n,) walls, for now
-    shares : (m,) of `WALL_SHARE`, by wall; all 0 between two poses
+    wall_sums : (m,) of `WALL_SUMS`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`
     """
 
@@ -372,7 +372,7 @@ class Workspace(NamedTuple):
     shifts_held: Floats
     weights_held: Floats
     listed: Integers
-    shares: Records
+    wall_sums: Records
     scratch: Records
 
     @classmethod
@@ -383,7 +383,7 @@ class Workspace(NamedTuple):
         shifts_held, weights_held = np.zeros((2, count))
         held.fill(-1)
         hypotheses, near = np.empty(AT_ONCE, HYPOTHESIS), np.empty((count, AT_ONCE), np.uint8)
-        matches, shares, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SHARE), record(SCRATCH)
+        matches, wall_sums, scratch = np.zeros(count, MATCH), np.zeros(walls, WALL_SUMS), record(SCRATCH)
         return cls(
             matches,
             spreads,
@@ -396,6 +396,6 @@ class Workspace(NamedTuple):
             shifts_held,
             weights_held,
             listed,
-            shares,
+            wall_sums,
             scratch,
         )

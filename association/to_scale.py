@@ -1,44 +1,49 @@
-"""A search where scan and map differ by a factor near one, as with a drawing that was scaled by hand.
+"""Search where scan and map differ by a factor: the one place that searches scaled scans.
 
-Such a map puts far walls off by much and near ones by little. A pose makes up for part of it: the place is found, some
-decimetres off, and a covariance that takes walls to be off one by one says centimetres. The sums of what matched know
-the factor, if they are not held to one; with the scan's lengths multiplied by it the search finds what it missed.
+A map that is off by a factor near one, as a drawing that was scaled by hand, puts far walls off by much and near ones
+by little. A pose makes up for part of it: the place is found, some decimetres off, and a covariance that takes walls to
+be off one by one says centimetres. The sums of the matches determine the factor, if they are not held to one. With the
+scan's lengths multiplied by it the search finds what it missed.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from registration import wrap_angle
 from registration.values import value
 
 from .consensus.acceptance import register_accepted
-from .consensus.ranking import Ranked, rank_candidates
-from .consensus.similarity import Similarity, fit_similarity
+from .consensus.consensus_set import ConsensusSet
+from .consensus.ranking import rank_candidates
+from .consensus.similarity import Similarity, fit_similarity, fit_trimmed_similarity
 from .context import SearchContext
 from .explain import search_and_explain
-from .explanations import Explanations
-from .scan.scan import scaled
-from .search.candidates import Candidates, find_candidates
+from .explanations import Explanations, add_alternatives
+from .options import AssociationOptions
+from .scan.scan import Scan, scaled
+from .search.candidates import Candidates, Effort, allowed_by, find_candidates
 from .tuning import (
-    DISTINCT_ANGLE,
+    ALTERNATIVE_FACTOR,
+    ALTERNATIVE_SCALES,
     DOUBTING_DEVIATIONS,
     DOUBTING_WALLS,
     FACTOR_DEVIATIONS,
     FACTOR_GAP,
     FACTOR_ROUNDS,
     FACTOR_WALLS,
+    GREATEST_STRETCH,
     LEAST_AS_SENT,
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
-    LOOSE_RIVALS,
+    LEAST_STRETCH,
     MOST_FACTOR,
-    RIVAL_FACTOR,
-    RIVAL_SCALES,
-    SAME_PLACE,
+    REACH,
+    SCALE_KEPT,
+    SCALE_LENGTH,
+    SCALE_SHARE,
 )
+from .verdict.tuning import LOOSE_ALTERNATIVES
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +62,8 @@ class Factor:
 
 
 @value(frozen=True, slots=True)
-class Explained:
-    """What a search found, and what it searched.
+class ScaledSearch:
+    """What a search found, and the scan that it searched.
 
     Attributes
     ----------
@@ -70,7 +75,7 @@ class Explained:
     factor : Factor or None
         By which the scan was put to scale; None where it is as it was sent.
     off_scale : bool
-        Whether it is as it was sent, and what matched says that it is off by more than a scan is put to scale.
+        Whether it is as it was sent, and its consensus set is off by more than `MOST_FACTOR`.
     """
 
     context: SearchContext
@@ -85,8 +90,24 @@ class Explained:
         return 0.0 if self.explanations.answer is None else self.explanations.answer.best.score
 
 
-def put_to_scale(context: SearchContext, as_sent: Explanations) -> Explained:
-    """Search a scan again to scale, where its best explanation says that it is not, and keep what fits much better.
+def search_to_scale(context: SearchContext) -> ScaledSearch:
+    """Search a scan, and again to scale where that fits much better.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    return put_to_scale(context, search_and_explain(context))
+
+
+def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
+    """Search a scan again to scale where its best explanation is off by a factor near one; keep what fits much better.
+
+    1. Estimate the factor by a similarity that is fitted to the best consensus set.
+    2. Search the scan at that factor, until the factor is right.
+    3. Search for alternatives at other scales, each at the one that fits it best.
+    4. Add to the pose's covariance what is not known of the factor.
 
     Parameters
     ----------
@@ -99,30 +120,30 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> Explained:
     CancelledError
         When the deadline was cancelled.
     """
-    first = Explained(context, as_sent, as_sent)
+    first = ScaledSearch(context, as_sent, as_sent)
     if not _may_be_off(first):
         return first
     similarity = _similarity(first)
-    found = _search_to_scale(first, similarity)
+    found = _search_with_factor(first, similarity)
     if found.factor is None:
         return replace(first, off_scale=similarity is not None and is_far_off(similarity))
-    rivals = beside(found.explanations, _at_their_scales(first, found))
-    return _with_what_is_not_known(replace(found, explanations=rivals))
+    explanations = add_alternatives(found.explanations, _alternatives_at_other_scales(first, found))
+    return _with_uncertain_factor(replace(found, explanations=explanations))
 
 
-def _may_be_off(first: Explained) -> bool:
+def _may_be_off(first: ScaledSearch) -> bool:
     """Tell whether a factor may matter, and nothing but the pose was solved for, and all that was.
 
     What is off its walls by millimetres leaves nothing to a factor; nor does a map of which the caller says how good
     it is.
     """
     context, answer = first.context, first.explanations.answer
-    if answer is None or answer.settled.views is not None or context.options.estimator != "joint":
+    if answer is None or answer.estimated.views is not None or context.options.estimator != "joint":
         return False
-    return context.index.sigma is None and answer.settled.wall_sigma >= LEAST_OFF_WALLS
+    return context.index.sigma is None and answer.estimated.wall_sigma >= LEAST_OFF_WALLS
 
 
-def _search_to_scale(first: Explained, similarity: Similarity | None) -> Explained:
+def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> ScaledSearch:
     """Search again with the factor of a similarity, until it is right; what fits no better is left as it was."""
     found, factor = first, 1.0
     for _ in range(FACTOR_ROUNDS):
@@ -131,9 +152,9 @@ def _search_to_scale(first: Explained, similarity: Similarity | None) -> Explain
         factor *= similarity.factor
         if not abs(factor - 1.0) <= MOST_FACTOR:
             break
-        again = _at_scale(first.context, factor)
+        again = at_scale(first.context, factor)
         explanations = search_and_explain(again)
-        stretched = Explained(again, explanations, first.explanations, Factor(factor, similarity.deviation))
+        stretched = ScaledSearch(again, explanations, first.explanations, Factor(factor, similarity.deviation))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.
         if fitted is None or fitted.more < FACTOR_WALLS or stretched.score <= found.score + FACTOR_GAP:
@@ -142,24 +163,32 @@ def _search_to_scale(first: Explained, similarity: Similarity | None) -> Explain
     return found
 
 
-def _at_scale(context: SearchContext, factor: float) -> SearchContext:
-    """Prepare the search of a stretched scan; the origin of its frame, whose pose is asked, stays where it is."""
+def at_scale(context: SearchContext, factor: float, options: AssociationOptions | None = None) -> SearchContext:
+    """Prepare the search of a scan with its lengths times a factor; the origin of its frame stays.
+
+    Parameters
+    ----------
+    context : SearchContext
+    factor : float
+    options : AssociationOptions or None
+        None: those of the context.
+    """
     scan = scaled(context.scan, factor)
-    return SearchContext.of(context.index, scan, context.prior, context.options, context.deadline)
+    return SearchContext.of(context.index, scan, context.prior, options or context.options, context.deadline)
 
 
-def _similarity(found: Explained) -> Similarity | None:
+def _similarity(found: ScaledSearch) -> Similarity | None:
     answer = found.explanations.answer
     return None if answer is None else fit_similarity(found.context, answer.best)
 
 
 def is_off(similarity: Similarity) -> bool:
-    """Tell whether a similarity says that the scan is not to scale."""
+    """Tell whether a similarity differs from a rigid motion by its factor."""
     return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
 
 
 def is_far_off(similarity: Similarity) -> bool:
-    """Tell whether a similarity says that the scan is off by more than what is put to scale.
+    """Tell whether the factor of a similarity is greater than those that a scan is searched with.
 
     Then its pose is off by decimetres, or it is in another room of the same shape.
     """
@@ -168,63 +197,88 @@ def is_far_off(similarity: Similarity) -> bool:
     return is_off(similarity) and off > MOST_FACTOR and shown
 
 
-def _at_their_scales(first: Explained, found: Explained) -> list[Ranked]:
+def _alternatives_at_other_scales(first: ScaledSearch, found: ScaledSearch) -> list[ConsensusSet]:
     """Return what explains the scan at other scales, each at the one that fits it best.
 
     Of two rooms that differ by a factor the one fits with a map too large, the other with one too small.
     """
-    rivals: list[Ranked] = []
-    for scale in RIVAL_SCALES:
-        context = first.context if scale == 1.0 else _at_scale(first.context, scale)
-        if len(context.lines.rows) != len(found.context.lines.rows):
-            continue
-        ranked = first.explanations.ranked
-        if scale != 1.0:
-            ranked = tuple(rank_candidates(context, find_candidates(context)))
-        near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
-        rivals += [_at_its_scale(first, context, scale, one) for one in near[:LOOSE_RIVALS]]
-    return rivals
+    alternatives: list[ConsensusSet] = []
+    for scale in ALTERNATIVE_SCALES:
+        context = first.context if scale == 1.0 else at_scale(first.context, scale)
+        if len(context.lines.rows) == len(found.context.lines.rows):
+            ranked = first.explanations.ranked
+            if scale != 1.0:
+                ranked = tuple(rank_candidates(context, find_candidates(context)))
+            near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
+            alternatives += [_at_best_scale(first, context, scale, one) for one in near[:LOOSE_ALTERNATIVES]]
+    return alternatives
 
 
-def _at_its_scale(first: Explained, context: SearchContext, scale: float, one: Ranked) -> Ranked:
+def _at_best_scale(first: ScaledSearch, context: SearchContext, scale: float, one: ConsensusSet) -> ConsensusSet:
+    """Return a consensus set of a scaled scan at the scale that fits it best; itself where that is too far from one."""
     similarity = fit_similarity(context, one)
-    if similarity is None or not abs(scale * similarity.factor - 1.0) <= RIVAL_FACTOR:
+    if similarity is None or not abs(scale * similarity.factor - 1.0) <= ALTERNATIVE_FACTOR:
         return one
-    again = _at_scale(first.context, scale * similarity.factor)
+    again = at_scale(first.context, scale * similarity.factor)
     if len(again.lines.rows) != len(one.matches):
         return one
     found = rank_candidates(again, Candidates(one.estimate, first.explanations.search))
     return found[0] if found else one
 
 
-def beside(explanations: Explanations, rivals: Sequence[Ranked]) -> Explanations:
-    """Return explanations with rivals that fit at other scales among them, none of them above the answer."""
-    if explanations.answer is None:
-        return explanations
-    best, ranked = explanations.answer.best, list(explanations.ranked)
-    for rival in rivals:
-        one = replace(rival, score=min(rival.score, best.score), value=min(rival.value, best.value))
-        place = next((k for k, other in enumerate(ranked) if _same_place(one, other)), len(ranked))
-        if place == len(ranked) or ranked[place].value < one.value:
-            ranked[place : place + 1] = [one]
-    ranked.sort(key=lambda one: (not one.inside, -one.value))
-    return replace(explanations, ranked=tuple(ranked))
-
-
-def _same_place(one: Ranked, other: Ranked) -> bool:
-    """Tell whether two poses are of one place, at whatever scales."""
-    a, b = one.pose, other.pose
-    return math.hypot(a.x - b.x, a.y - b.y) <= SAME_PLACE and abs(wrap_angle(a.theta - b.theta)) <= DISTINCT_ANGLE
-
-
-def _with_what_is_not_known(found: Explained) -> Explained:
+def _with_uncertain_factor(found: ScaledSearch) -> ScaledSearch:
     """Return what was put to scale with the pose of a similarity, and the covariance that comes with its factor."""
     answer, factor, similarity = found.explanations.answer, found.factor, _similarity(found)
     if answer is None or factor is None or similarity is None:
         return found
-    settled = replace(answer.settled, pose=similarity.pose, covariance=similarity.covariance)
-    at_scale = register_accepted(found.context, answer.best, answer.accepted, settled, fitted=False)
-    assert at_scale is not None  # of pairs that it was registered of before
-    answer = replace(answer, settled=settled, registered=at_scale[0])
+    estimated = replace(answer.estimated, pose=similarity.pose, covariance=similarity.covariance)
+    registered = register_accepted(found.context, answer.best, answer.accepted, estimated, fitted=False)
+    assert registered is not None  # of pairs that it was registered of before
+    answer = replace(answer, estimated=estimated, registered=registered[0])
     factor = Factor(factor.value * similarity.factor, similarity.deviation)
     return replace(found, explanations=replace(found.explanations, answer=answer), factor=factor)
+
+
+def estimate_factor(context: SearchContext, rung: float = 1.0) -> float | None:
+    """Estimate what a scan has to be multiplied with, where that is within `GREATEST_STRETCH` of a `rung`.
+
+    The scan is searched with the widest gate on offsets. At a place in the scan's frame a factor of ``1 + e`` puts a
+    wall off by e times its distance, so that the walls near the sensor are found all the same; a similarity fitted to
+    the matches of each of the best poses has the factor.
+
+    Returns
+    -------
+    float or None
+        The factor, over the rung, of the pose whose matches agree best with one; None where it is one.
+    """
+    options = replace(context.options, offset_tolerance=REACH)
+    scan = scaled(context.scan, rung)
+    lax = SearchContext.of(context.index, Scan(scan.measured, None, None), None, options, context.deadline)
+    effort = Effort(SCALE_KEPT, SCALE_SHARE, SCALE_SHARE, allowed_by(options))
+    best: tuple[float, float] | None = None
+    for one in rank_candidates(lax, find_candidates(lax, effort))[:SCALE_KEPT]:
+        fitted = fit_trimmed_similarity(lax, one) if one.fraction >= SCALE_LENGTH else None
+        if fitted is None:
+            continue
+        factor, left = fitted[0].factor, fitted[1]
+        if LEAST_STRETCH <= abs(factor - 1.0) <= GREATEST_STRETCH and (best is None or left < best[0]):
+            best = left, factor
+    return None if best is None else best[1]
+
+
+def search_rungs(
+    context: SearchContext, rungs: Sequence[float], options: AssociationOptions
+) -> tuple[ScaledSearch, float] | None:
+    """Search a scan at the factor near each of some rungs; return the best search and its factor.
+
+    None where the deadline passes before all are searched.
+    """
+    best: tuple[ScaledSearch, float] | None = None
+    for rung in rungs:
+        factor = rung * (estimate_factor(context, rung) or 1.0)
+        found = search_to_scale(at_scale(context, factor, options))
+        if context.deadline.passed:
+            return None
+        if best is None or found.score > best[0].score:
+            best = found, factor
+    return best

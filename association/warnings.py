@@ -8,7 +8,7 @@ import numpy as np
 
 from registration import Beams
 
-from .causes import Cause, Mistake, unit_mistake
+from .causes import Cause, Mistake
 from .context import SearchContext
 from .layout import POINT, as_records
 from .result import AssociationWarning, SearchReport, WarningCode
@@ -16,17 +16,9 @@ from .scan.extents import extent, inner_extent
 from .scan.kernels.extents import facing_away
 from .to_scale import Factor
 from .tuning import EXCEEDING, FACING, LEAST_STUCK, STUCK_SHARE
+from .units import UNIT_NAMES, unit_mistake
 from .verdict.verdict import Verdict
 
-# The factor from each unit to metres.
-UNITS = {
-    0.001: "millimetres",
-    0.01: "centimetres",
-    0.1: "decimetres",
-    1000.0: "kilometres",
-    0.3048: "feet",
-    0.0254: "inches",
-}
 SENTENCES: Mapping[Mistake, str] = {
     Mistake.MIRRORED: "The scan fits much better with left and right exchanged. The laser may be mounted upside down, "
     "or its angles may increase clockwise. Reverse the order of its ranges, or negate every y and exchange begin and "
@@ -85,7 +77,7 @@ def _listed(found: Mapping[WarningCode, str | None]) -> tuple[AssociationWarning
 def _mistaken(cause: Cause) -> str:
     if cause.mistake is not Mistake.UNIT_SCALE:
         return SENTENCES[cause.mistake]
-    unit, taken = None if cause.of_map else UNITS.get(cause.factor), unit_mistake(cause.factor)
+    unit, taken = None if cause.of_map else UNIT_NAMES.get(cause.factor), unit_mistake(cause.factor)
     what = "the scan or the map is not to scale"
     if unit is not None:
         what = f"the scan seems to be in {unit}"

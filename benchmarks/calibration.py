@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 import association
-from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
 from association.verdict.features import Features
 from association.verdict.models import FILE, FITTED_ON, MODELS, USUAL, Model, as_document
+from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
 
 from .curves import Fitted, Task, fit, log_loss, tellable
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
@@ -44,16 +44,17 @@ BEAMS = ("read", "passed", "root_farther", "root_nearer")
 # Chosen one after the other by what each takes off the cross-validated log-loss, until none takes off 0.0002 more.
 LIKELY = (
     "constant", "deviation", "lead", "blocked", "agreement", "root_length", "inverse_count", "longest_unmatched",
-    "chance",
+    "log_significance",
 )  # fmt: skip
 LIKELY_WITH_BEAMS = ("constant", "solitude", "deviation", "agreement", "root_unmatched", "read", "root_count")
 CAREFUL = (
-    "constant", "null", "null_better", "longest_unmatched", "lead", "blocked", "root_unmatched", "share",
-    "misfit_of_many", "root_length", "deviation", "solitude", "hinge_deviation", "hinge_moves",
+    "constant", "null", "null_better", "longest_unmatched", "lead", "blocked", "root_unmatched", "inlier_fraction",
+    "misfit_of_many", "root_length", "deviation", "solitude", "critical_deviation", "critical_displacement",
 )  # fmt: skip
 CAREFUL_WITH_BEAMS = (
-    "constant", "null_gap", "longest_unmatched", "root_length", "passed", "share", "deviation", "null", "null_better",
-    "read", "solitude", "lead", "root_unmatched", "agreement", "misfit_of_many", "hinge_deviation", "hinge_moves",
+    "constant", "null_gap", "longest_unmatched", "root_length", "passed", "inlier_fraction", "deviation", "null",
+    "null_better", "read", "solitude", "lead", "root_unmatched", "agreement", "misfit_of_many", "critical_deviation",
+    "critical_displacement",
     "root_farther", "root_nearer",
 )  # fmt: skip
 # Chosen likewise, each of the 45 pairs that promised most tried in both kinds, until none takes off 0.0003 more.
@@ -63,7 +64,8 @@ PAIRS = (
     ("least", "-blocked", "-misfit_of_many"), ("most", "-null", "-root_length"), ("most", "+lead", "+root_length"),
 )  # fmt: skip
 PAIRS_WITH_BEAMS = (
-    ("least", "+misfit", "+root_count"), ("most", "+agreement", "+share"), ("most", "+root_length", "+solitude"),
+    ("least", "+misfit", "+root_count"), ("most", "+agreement", "+inlier_fraction"),
+    ("most", "+root_length", "+solitude"),
     ("least", "-misfit", "+misfit_of_many"), ("least", "-null", "+solitude"), ("most", "-root_farther", "-root_nearer"),
 )  # fmt: skip
 BENDS = (0.2, 0.5, 0.8)  # quantiles of a feature at which its curve may bend
@@ -151,20 +153,20 @@ def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dic
     print_table("Temperature of similar places, cross-validated log-loss", ("nats", *(t.name for t in tasks)), cells)
     own = np.array([not e.stranger for e in examples])
     right = np.array([e.right for e in examples])
-    tried = [cross_validated(examples, t, TWIN_TEMPERATURE) for t in tasks]
-    present = [Fitted(t.current, TWIN_TEMPERATURE).probabilities(examples) for t in tasks]
+    tried = [cross_validated(examples, t, ALTERNATIVE_TEMPERATURE) for t in tasks]
+    present = [Fitted(t.current, ALTERNATIVE_TEMPERATURE).probabilities(examples) for t in tasks]
     for title, found in (("cross-validated", tried), ("present", present)):
         told = (f"{t.name} {told_loss(p, examples, t):.4f}" for t, p in zip(tasks, found, strict=True))
         print(f"\nLog-loss, {title}: {', '.join(told)}")
         print_bins(f"Scans as {form} in their own map, {title}", found[0][own], right[own])
         print_thresholds(f"Usable share of scans as {form}, {title}", found[0], found[-1], examples)
     print_changes(present[-1], tried[-1], examples)
-    return {t.name: fit(examples, t, TWIN_TEMPERATURE).model for t in tasks}
+    return {t.name: fit(examples, t, ALTERNATIVE_TEMPERATURE).model for t in tasks}
 
 
 def write(models: dict[str, Model], fitted_on: dict[str, str], usual: Features) -> Path:
     """Write the file that `association.verdict.models` reads; return where it is."""
-    path = Path(association.__file__).with_name(FILE)
+    path = Path(association.__file__).parent / "verdict" / FILE
     document = {
         "fitted_on": fitted_on,
         "usual": {name: float(f"{value:.4g}") for name, value in usual._asdict().items()},

@@ -28,14 +28,22 @@ LEAST_BESIDE = 0.03  # share of the examples that lies on either side of a bend,
 LEAST_PIECE = 0.02  # and of what the values come to in all that lies between two
 # A scan of a real plan or log counts as that many of drawn buildings, of which there are as many as one cares to draw.
 REAL = 3.0
-FOR = ("lead", "solitude", "share", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
+FOR = ("lead", "solitude", "inlier_fraction", "root_count", "agreement", "read", "null_gap", "walls", "root_score")
 AGAINST = (
-    "inverse_count", "longest_unmatched", "passed", "root_nearer", "chance", "null", "null_better", "blocked",
+    "inverse_count", "longest_unmatched", "passed", "root_nearer", "log_significance", "null", "null_better", "blocked",
     "root_unmatched",
 )  # fmt: skip
 # These say as much of how far the walls are off as of the place: a rough map is no sign of being elsewhere. And
 # what is matched in all goes, next to the share that is, with what is not.
-EITHER = ("deviation", "misfit", "misfit_of_many", "hinge_moves", "hinge_deviation", "root_farther", "root_length")
+EITHER = (
+    "deviation",
+    "misfit",
+    "misfit_of_many",
+    "critical_displacement",
+    "critical_deviation",
+    "root_farther",
+    "root_length",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +63,7 @@ class Task:
     bends : tuple of float
         Quantiles of each at which its curve may bend.
     pairs : tuple of (str, str, str)
-        The kind and both names, each behind the sign by which it speaks for an answer: ("least", "+share", "-null").
+        The kind and both names, each behind the sign by which it speaks for an answer: ("least", "+misfit", "-null").
     """
 
     name: str

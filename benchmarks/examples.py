@@ -11,10 +11,10 @@ import numpy as np
 
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
-from association.explain import search_and_explain
-from association.to_scale import put_to_scale
-from association.verdict.features import Features, features_of, weigh, with_null
-from association.verdict.null import null_of
+from association.to_scale import search_to_scale
+from association.verdict.alternatives import compare_alternatives
+from association.verdict.chance import find_null_score
+from association.verdict.features import Features, features_of, with_null_score
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES
 from simulation import Case as DrawnCase
@@ -106,12 +106,12 @@ class Case:
     def example(self) -> Example | None:
         """Search up to where the verdict is due; None where there is no explanation."""
         searched = SearchContext.of(self.index, self.scan, None, OPTIONS, Deadline())
-        to_scale = put_to_scale(searched, search_and_explain(searched))
+        to_scale = search_to_scale(searched)
         context, found = to_scale.context, to_scale.explanations
         if found.answer is None:
             return None
-        best, rivals, pose = found.answer.best, tuple(found.rivals), found.answer.registered.pose
-        weighed, right = weigh(best, rivals), False
+        best, rivals, pose = found.answer.best, tuple(found.alternatives), found.answer.registered.pose
+        weighed, right = compare_alternatives(best, rivals), False
         if self.truth is not None and pose is not None:
             distance, angle = offset(pose, self.truth)
             right = distance < self.distance and angle < self.angle
@@ -120,11 +120,11 @@ class Case:
             group=self.group,
             condition=self.condition,
             fold=self.fold,
-            features=with_null(features_of(context, found.answer, weighed), best, null_of(context, best)),
+            features=with_null_score(features_of(context, found.answer, weighed), best, find_null_score(context, best)),
             gaps=np.minimum(0.0, weighed["gap"]),
             counted=weighed["counted"],
             right=right,
-            degenerate=found.answer.settled.degenerate,
+            degenerate=found.answer.estimated.degenerate,
             told=not right and (self.told is None or pose is None or self.told(pose)),
         )
 

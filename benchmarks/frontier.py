@@ -15,8 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from association.tuning import TWIN_TEMPERATURE, USABLE_CAUTIOUS, USABLE_CAUTIOUS_WITH_BEAMS, USABLE_PROBABILITY
 from association.verdict.models import MODELS
+from association.verdict.tuning import (
+    ALTERNATIVE_TEMPERATURE,
+    USABLE_CAUTIOUS,
+    USABLE_CAUTIOUS_WITH_BEAMS,
+    USABLE_PROBABILITY,
+)
 
 from .calibration import TASKS
 from .curves import Fitted
@@ -54,7 +59,9 @@ class Point:
 
 def frontier(form: str, examples: Sequence[Example], bars: Sequence[float] = BARS) -> list[Point]:
     """Return a point for each bar, of examples of one form."""
-    likely, careful = (Fitted(MODELS[task.name], TWIN_TEMPERATURE).probabilities(examples) for task in TASKS[form])
+    likely, careful = (
+        Fitted(MODELS[task.name], ALTERNATIVE_TEMPERATURE).probabilities(examples) for task in TASKS[form]
+    )
     open_to = (likely >= USABLE_PROBABILITY) & ~np.array([e.degenerate for e in examples])
     right, told = np.array([e.right for e in examples]), np.array([e.told for e in examples])
     here = ~np.array([e.stranger for e in examples])

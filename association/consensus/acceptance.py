@@ -19,10 +19,10 @@ from ..index.map_index import MapIndex
 from ..options import Estimator, Rotation
 from ..result import Correspondence
 from ..tables import Lines
-from ..tuning import LEAST_KNOWN_VARIANCE, PAIRS_COMPARED
+from .consensus_set import ConsensusSet
+from .estimation import EstimatedPose
 from .kernels.acceptance import accept_matches
-from .ranking import Ranked
-from .settling import Settled
+from .tuning import LEAST_KNOWN_VARIANCE, PAIRS_COMPARED
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -35,14 +35,14 @@ class Accepted:
     Attributes
     ----------
     pairs : (n, 2) scan index and index of the map piece, by scan index
-    overlaps : (n,) share of each scan segment's length that lies on pieces of its wall, or run where it is long
-    rivals, rival_starts : pair k lies also on the pieces ``rivals[rival_starts[k]:rival_starts[k + 1]]``
+    overlaps : (n,) fraction of each scan segment's length that lies on pieces of its wall, or chain where it is long
+    others, other_starts : pair k lies also on the pieces ``others[other_starts[k]:other_starts[k + 1]]``
     """
 
     pairs: Indices
     overlaps: Floats
-    rivals: Indices
-    rival_starts: Indices
+    others: Indices
+    other_starts: Indices
 
     @property
     def scan_indices(self) -> list[int]:
@@ -56,7 +56,7 @@ class Accepted:
         return indices
 
 
-def accept(context: SearchContext, best: Ranked) -> Accepted:
+def accept(context: SearchContext, best: ConsensusSet) -> Accepted:
     """Pick for every matched scan segment the piece of its wall that it lies on most; ties by index."""
     index, ends = context.index, context.ends
     lines = Lines(context.lines.rows, context.lines.row_of, float(context.gates["least_overlap"][0]))
@@ -64,56 +64,56 @@ def accept(context: SearchContext, best: Ranked) -> Accepted:
     return Accepted(*found)
 
 
-def overlaps_at(context: SearchContext, best: Ranked, accepted: Accepted, pose: RigidTransform) -> Floats:
-    """Return the share of each accepted segment's length that lies on its wall, or run, at a pose in the map, (n,)."""
+def overlaps_at(context: SearchContext, best: ConsensusSet, accepted: Accepted, pose: RigidTransform) -> Floats:
+    """Return the fraction of each accepted segment that lies on its wall, or chain, at a pose in the map, (n,)."""
     index, ends = context.index, context.ends
     at = best.estimate.copy()
     at["x"], at["y"], at["theta"] = pose.x - index.origin[0], pose.y - index.origin[1], pose.theta
     every = Lines(context.lines.rows, context.lines.row_of, 0.0)  # however little of a segment lies there
     pairs, overlaps, _, _ = accept_matches(best.matches, every, ends, at, index.walls.rows, index.pieces)
-    shares: Floats = overlaps[np.searchsorted(pairs[:, 0], accepted.pairs[:, 0])]
-    return shares
+    fractions: Floats = overlaps[np.searchsorted(pairs[:, 0], accepted.pairs[:, 0])]
+    return fractions
 
 
 def register_accepted(
-    context: SearchContext, best: Ranked, accepted: Accepted, settled: Settled, *, fitted: bool = True
-) -> tuple[RegistrationResult, Settled] | None:
-    """Register the scan by the pairs, walls off as they were settled, and settle there; None without pairs.
+    context: SearchContext, best: ConsensusSet, accepted: Accepted, estimated: EstimatedPose, *, fitted: bool = True
+) -> tuple[RegistrationResult, EstimatedPose] | None:
+    """Register the scan by the pairs, with the estimated error of walls, and take that pose; None without pairs.
 
     So a caller who registers by the same pairs and weights gets the same pose. Where that is not fixed, where the views
-    are not exact, or unless it is to be `fitted`, the settled pose is evaluated on the pairs instead, and by the
+    are not exact, or unless it is to be `fitted`, the estimated pose is evaluated on the pairs instead, and by the
     paper's estimator a pose of its own is fitted.
     """
     if not len(accepted.pairs):
         return None
     index, options, measured = context.index, context.options, context.scan.measured
-    sigma = settled.wall_sigma if index.sigma is None else index.sigma
+    sigma = estimated.wall_sigma if index.sigma is None else index.sigma
     weights = _weights(context, best, accepted, sigma)
-    how = _how(options.estimator, options.rotation)
+    fit = _options(options.estimator, options.rotation)
     if weights is not None:
-        how = replace(how, weights=weights)
+        fit = replace(fit, weights=weights)
     elif index.sigma == 0.0 and not measured.sigma[accepted.pairs[:, 0]].all():
-        sigma = settled.wall_sigma  # nothing at all is known to be off, and pairs need a weight
+        sigma = estimated.wall_sigma  # nothing at all is known to be off, and pairs need a weight
     if options.estimator == "one_step":
-        return register(index.segments, measured, accepted.pairs, sigma, how), settled
-    if fitted and settled.views is None and not settled.free and not settled.degenerate:
-        found = register(index.segments, measured, accepted.pairs, sigma, how)
+        return register(index.segments, measured, accepted.pairs, sigma, fit), estimated
+    if fitted and estimated.views is None and not estimated.free and not estimated.degenerate:
+        found = register(index.segments, measured, accepted.pairs, sigma, fit)
         if found.covariance is not None and found.pose is not None:
-            return found, replace(settled, pose=context.in_index(found.pose), covariance=found.covariance)
-    at = context.in_map(settled.pose)
-    return register(index.segments, measured, accepted.pairs, sigma, how, at), settled
+            return found, replace(estimated, pose=context.in_index(found.pose), covariance=found.covariance)
+    at = context.in_map(estimated.pose)
+    return register(index.segments, measured, accepted.pairs, sigma, fit, at), estimated
 
 
 @lru_cache
-def _how(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
+def _options(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
     return RegistrationOptions(estimator=estimator, rotation=rotation)
 
 
-def _weights(context: SearchContext, best: Ranked, accepted: Accepted, wall_sigma: float) -> Floats | None:
+def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float) -> Floats | None:
     """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have.
 
     What several segments show of one line counts once, and so does the error of a wall that several pairs lie on: of
-    the variance of the wall each has a share. Alone on its wall a pair has ``1 / (sigma^2 / points + wall_sigma^2)``.
+    the variance of the wall each takes a part. Alone on its wall a pair has ``1 / (sigma^2 / points + wall_sigma^2)``.
     """
     rows = context.lines.row_of[accepted.pairs[:, 0]]
     walls = best.matches["wall"][rows]
@@ -127,7 +127,7 @@ def _weights(context: SearchContext, best: Ranked, accepted: Accepted, wall_sigm
 
 
 def _known_together(alone: Floats, walls: NDArray[np.int32], ties: Floats) -> Floats:
-    """Return what all pairs know of each pair's wall, (n,) 1/m^2; those on other walls as far as these are one with it.
+    """Return the information of all pairs on each pair's wall, (n,) 1/m^2; as far as their own walls are one with it.
 
     Some pairs at a time are compared with all, so that the memory grows with their number, not with its square.
     """
@@ -142,8 +142,8 @@ def _known_together(alone: Floats, walls: NDArray[np.int32], ties: Floats) -> Fl
 
 
 def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
-    """Return the share of each scan segment that no longer one of its line covers, (n,), of equal ones the first."""
-    shares = np.ones(len(rows))
+    """Return the fraction of each scan segment that no longer one of its line covers, (n,), of equal ones the first."""
+    fractions = np.ones(len(rows))
     for row in np.flatnonzero(np.bincount(rows) > 1):
         members = np.flatnonzero(rows == row)
         members = members[np.argsort(-given.lengths[members], kind="stable")]
@@ -152,8 +152,8 @@ def _not_shown_before(given: Correspondences, rows: Indices) -> Floats:
         reach = 0.5 * given.lengths[members]
         covered = _Intervals()
         for member, low, high in zip(members.tolist(), middles - reach, middles + reach, strict=True):
-            shares[member] = max(0.0, 1.0 - covered.add(float(low), float(high)) / float(high - low))
-    return shares
+            fractions[member] = max(0.0, 1.0 - covered.add(float(low), float(high)) / float(high - low))
+    return fractions
 
 
 class _Intervals:
@@ -181,9 +181,9 @@ class _Intervals:
 def correspondences(
     index: MapIndex, accepted: Accepted, overlaps: Floats, registered: RegistrationResult
 ) -> tuple[Correspondence, ...]:
-    """Report the consensus set by scan index, with the overlaps that are told of it, (n,)."""
-    rivals, starts = (accepted.rivals % index.directed).tolist(), accepted.rival_starts.tolist()
+    """Report the consensus set by scan index, with its reported overlaps, (n,)."""
+    others, starts = (accepted.others % index.directed).tolist(), accepted.other_starts.tolist()
     columns = (overlaps, registered.offsets, registered.angles, registered.weights)
-    alternatives = (tuple(rivals[begin:end]) for begin, end in pairwise(starts))
+    alternatives = (tuple(others[begin:end]) for begin, end in pairwise(starts))
     values = (column.tolist() for column in columns)
     return tuple(map(Correspondence, accepted.scan_indices, accepted.map_indices(index), *values, alternatives))

@@ -11,19 +11,21 @@ from registration.values import value
 
 from ..context import SearchContext
 from ..layout import ESTIMATE, record
-from ..tuning import COMPARED_BEAMS, NEUTRAL
+from ..tuning import COMPARED_BEAMS
+from .beams import beam_evidence_at, rays_of
+from .consensus_set import ConsensusSet
+from .estimation import EstimatedPose
 from .kernels import agreement as agreement_kernels
 from .kernels.acceptance import missing_pieces
-from .kernels.beams import beam_shares
-from .ranking import Ranked, beam_evidence_at, rays_of
-from .settling import Settled
+from .kernels.beams import beam_fractions
+from .tuning import NEUTRAL
 
 
 @value(frozen=True, slots=True)
-class BeamShares:
+class BeamFractions:
     """How far the beams do not read what the map shows.
 
-    Shares of them all; both 0 without beams.
+    Fractions of them all; both 0 without beams.
 
     Attributes
     ----------
@@ -41,12 +43,10 @@ class BeamShares:
     in_step: float = 1.0
 
 
-NO_BEAMS = BeamShares()
-
-_agreement = agreement_kernels.agreement
+NO_BEAMS = BeamFractions()
 
 
-def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
+def missing_segments(context: SearchContext, best: ConsensusSet) -> tuple[int, ...]:
     """List the map segments of walls that rays to the consensus set pass through.
 
     None without a viewpoint, where rays cannot be followed, and where the deadline has passed and that would take long.
@@ -60,25 +60,25 @@ def missing_segments(context: SearchContext, best: Ranked) -> tuple[int, ...]:
     return tuple(sorted(set((pieces % index.directed).tolist())))
 
 
-def agreement(context: SearchContext, best: Ranked) -> float:
-    """Return the share of directions in which the scan shows what the map does, 0 to 1.
+def agreement(context: SearchContext, best: ConsensusSet) -> float:
+    """Return the fraction of directions in which the scan shows what the map does, 0 to 1.
 
     `NEUTRAL` without a viewpoint, and where rays cannot be followed.
     """
     if context.scan.viewpoint is None or not context.can_look:
         return NEUTRAL
     pose, place = best.estimate, context.index.tables.place
-    return float(_agreement(context.sights, pose, place, context.workspace))
+    return float(agreement_kernels.agreement(context.sights, pose, place, context.workspace))
 
 
-def compare_beams(context: SearchContext, settled: Settled) -> BeamShares:
-    """Return how many beams do not read what the map shows from the settled pose."""
+def compare_beams(context: SearchContext, estimated: EstimatedPose) -> BeamFractions:
+    """Return how many beams do not read what the map shows from the estimated pose."""
     if not context.with_beams or not context.can_look:
         return NO_BEAMS
-    pose, place = settled.pose, context.index.tables.place
+    pose, place = estimated.pose, context.index.tables.place
     at = record(ESTIMATE, x=pose.x, y=pose.y, theta=pose.theta)
-    farther, nearer = beam_shares(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)
-    return BeamShares(farther, nearer, _in_step(context, at))
+    farther, nearer = beam_fractions(rays_of(context, COMPARED_BEAMS), at, place, context.workspace)
+    return BeamFractions(farther, nearer, _in_step(context, at))
 
 
 def _in_step(context: SearchContext, at: Records) -> float:

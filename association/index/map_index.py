@@ -18,15 +18,7 @@ from ..layout import ENDS, Integers, as_records
 from ..tables import Crossings, Grid, MapTables, Pieces, Place, Raster, Sweep, WallLengths, Walls
 from ..tuning import WHOLE_GAP
 from .grids import crossing_chains, directions_near, near_walls, swept_chains
-from .tuning import (
-    BLENDED_SIGMAS,
-    BLENDED_STEP,
-    LEAST_ONE_LINE,
-    MAX_EXTENT,
-    MAX_MAP_SIGMA,
-    ONE_LINE,
-    ONE_LINE_SHARE,
-)
+from .tuning import BLENDED_SIGMAS, BLENDED_STEP, LEAST_ONE_LINE, MAX_EXTENT, MAX_MAP_SIGMA, ONE_LINE, ONE_LINE_SHARE
 from .walls import blended, both_ways, chains_of, merge, tie
 
 Floats = NDArray[np.float64]

@@ -20,15 +20,7 @@ from ..layout import ENDS, POINT, WALL, Integers, as_records
 from ..tables import JoinGates, Walls
 from ..tuning import APART_STEP, BASE_SLACK, BASE_SLACK_SHARE, DIRECTION_BINS
 from .kernels.walls import blend_walls, join_collinear, label_groups, list_begins, tie_walls
-from .tuning import (
-    BEGIN_CELL,
-    CHAIN_GAP,
-    LINK_GAP,
-    MERGE_ANGLE,
-    MERGE_GAP,
-    MERGE_LATERAL,
-    PIECES_A_LOOK,
-)
+from .tuning import BEGIN_CELL, CHAIN_GAP, LINK_GAP, MERGE_ANGLE, MERGE_GAP, MERGE_LATERAL, PIECES_A_LOOK
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 Where it is told apart from its neighbours by more than odometry may be off, a wall that two views show moves these
 views. What moves them is in the gates of the search from then on, and nothing else: the answer's own pose and
-covariance go back to what odometry said (`association.consensus.view_settling`).
+covariance go back to what odometry said (`association.consensus.view_estimation`).
 """
 
 from __future__ import annotations

@@ -1,22 +1,25 @@
-"""What the verdict's probabilities depend on, by name."""
+"""The features that the verdict's probabilities depend on.
+
+A new feature is a field of `Features` with its meaning, and its computation in `kernels.features.describe`. Give it a
+reason in `reasons.FEATURES_OF`, name it in the lists of ``benchmarks.calibration``, and fit the models again.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from registration.layout import Records
 
-from ..consensus.ranking import Ranked
+from ..consensus.consensus_set import ConsensusSet
 from ..context import SearchContext
 from ..explanations import Answer
-from ..layout import FACTS, FEATURES, MERIT, RIVAL, WEIGHED, record
-from ..tuning import LONGEST_UNMATCHED
+from ..layout import FACTS, SET_SCORE, record
+from .chance import NullScore
 from .kernels import features as kernels
-from .kernels import odds
-from .null import Null
+from .kernels.null_features import write_null_features
+from .tuning import LONGEST_UNMATCHED
 
 
 class Features(NamedTuple):
@@ -27,7 +30,7 @@ class Features(NamedTuple):
     constant : 1
     lead : over the best other explanation, nats
     solitude : minus the log of the others' tempered evidence, of what may have been missed the less
-    share : of the scan's length that is matched
+    inlier_fraction : of the scan's length that is matched
     root_count : square root of the number of matched segments
     root_length : square root of their length, sqrt(m)
     deviation : standard deviation of the position along its weakest direction, m, up to `MOST_DEVIATION`
@@ -35,21 +38,21 @@ class Features(NamedTuple):
     inverse_count : one over the number of matched segments
     longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`; of a drive
         the mean over its views
-    agreement : share of directions in which the scan shows what the map does
-    read, passed : shares of the beams that read the wall they should, and that passed through one; 0 without beams
-    root_farther, root_nearer : roots of the shares of the beams that read farther, and nearer, than the map shows
-    hinge_moves : by how much the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
-    hinge_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
-    chance : log10 of the significance, from `LEAST_CHANCE_FEATURE`
-    null : score of the mirrored scan over the answer's, from `NULL_SHARE` to `MOST_NULL`; as good as none where the map
+    agreement : fraction of directions in which the scan shows what the map does
+    read, passed : fractions of the beams that read the wall they should, and that passed through one; 0 without beams
+    root_farther, root_nearer : roots of the fractions of the beams that read farther, and nearer, than the map shows
+    critical_displacement : how far the position would move at most without one of its walls, m, up to `MOST_DEVIATION`
+    critical_deviation : its deviation along the weakest direction then, m, up to `MOST_DEVIATION`
+    log_significance : log10 of the significance, from `LEAST_LOG_SIGNIFICANCE`
+    null : score of the mirrored scan over the answer's, from `NULL_FRACTION` to `MOST_NULL`; the least where the map
         is symmetric about the place
     null_gap : root of what the answer's score has over the mirrored scan's, in nats, up to that of `MAX_GAP`; likewise
-    null_better : by how much the mirrored scan's share of the score is over 1, symmetric or not, up to `MOST_NULL`
+    null_better : by how much the mirrored scan's score over the answer's is above 1, symmetric or not, at most
     root_score : root of the score by segments, nats
     blocked : root of what lines of sight speak against the answer, nats
     walls : root of the number of walls that hold a match
     misfit_of_many : misfit times the number of matched segments over `MANY`
-    beyond_nearly_all : share of the length beyond `NEARLY_ALL`
+    beyond_nearly_all : fraction of the length beyond `NEARLY_ALL`
     root_unmatched : square root of the length that is not matched, sqrt(m), up to that of `MOST_UNMATCHED`; of a drive
         that of the mean over its views
     squared_solitude : square of `solitude`
@@ -58,7 +61,7 @@ class Features(NamedTuple):
     constant: float
     lead: float
     solitude: float
-    share: float
+    inlier_fraction: float
     root_count: float
     root_length: float
     deviation: float
@@ -70,9 +73,9 @@ class Features(NamedTuple):
     passed: float
     root_farther: float
     root_nearer: float
-    hinge_moves: float
-    hinge_deviation: float
-    chance: float
+    critical_displacement: float
+    critical_deviation: float
+    log_significance: float
     null: float
     null_gap: float
     null_better: float
@@ -85,77 +88,64 @@ class Features(NamedTuple):
     squared_solitude: float
 
 
-_describe = kernels.describe
-_weigh = kernels.weigh
-_see_hinges = kernels.see_hinges
-_see_unmatched = kernels.see_unmatched
-_is_thin = kernels.is_thin
-_take_null = odds.take_null
-twin_share = kernels.twin_share
+FEATURES = np.dtype([(name, np.float64) for name in Features._fields])
+"""The same as a record, for the kernels."""
 
 
 def facts_of(context: SearchContext, answer: Answer) -> Records:
-    """Return what is known of an answer besides its merits, (1,) of `FACTS`."""
+    """Return what is known of an answer next to its score, (1,) of `FACTS`."""
     facts = record(
         FACTS,
-        weakest=answer.settled.weakest,
+        weakest=answer.estimated.weakest,
         agreement=answer.agreement,
         farther=answer.beams.farther,
         nearer=answer.beams.nearer,
         significance=answer.significance,
     )
-    _see_hinges(answer.settled.hinges, facts)
+    kernels.measure_leverages(answer.estimated.leverages, facts)
     views = context.scan.views
     if views is None or not views.uncertain:
-        _see_unmatched(context.lines.rows, answer.best.matches, facts)
+        kernels.measure_unmatched(context.lines.rows, answer.best.matches, facts)
         return facts
-    # The models know scans from one place: each view of a drive adds to what no map shows as it adds to what is
-    # matched.
+    # The models were fitted to scans from one place: each view of a drive adds to what no map shows as it adds to
+    # what is matched.
     seen = context.lines.sightings
     seen = seen[~answer.best.matched[seen["row"]]]
     longest, sums = np.zeros((2, len(views)))
     np.maximum.at(longest, seen["sensor"], np.minimum(seen["length"], LONGEST_UNMATCHED))
     np.add.at(sums, seen["sensor"], seen["length"])
-    share = views.weights / views.weights.sum()
-    facts["longest"], facts["unmatched"] = longest @ share, sums @ share
+    fractions = views.weights / views.weights.sum()
+    facts["longest"], facts["unmatched"] = longest @ fractions, sums @ fractions
     return facts
 
 
-def is_thin(context: SearchContext, answer: Answer, facts: Records) -> bool:
+def depends_on_one_wall(context: SearchContext, answer: Answer, facts: Records) -> bool:
     """Tell whether so few walls fix the pose that one alone decides; `facts` (1,) are those of the answer."""
-    return bool(_is_thin(facts, answer.best.matches, context.with_beams))
+    return bool(kernels.depends_on_one_wall(facts, answer.best.matches, context.with_beams))
 
 
-def describe(best: Ranked, facts: Records, weighed: Records) -> Records:
-    """Return the features of an answer beside its rivals, with the least null there is, (1,) of `FEATURES`.
+def describe(best: ConsensusSet, facts: Records, alternatives: Records) -> Records:
+    """Return the features of an answer among its alternatives, with the least null score there is, (1,) of `FEATURES`.
 
-    `facts` (1,) of `FACTS`, `weighed` (k,) of `WEIGHED`.
+    `facts` (1,) of `FACTS`, `alternatives` (k,) of `ALTERNATIVE`.
     """
-    features, merits = np.zeros(1, FEATURES), np.array([best.merit], MERIT)
-    _describe(merits, best.value, facts, weighed, features)
+    features, scores = np.zeros(1, FEATURES), np.array([best.scores], SET_SCORE)
+    kernels.describe(scores, best.posterior, facts, alternatives, features)
     return features
 
 
-def features_of(context: SearchContext, answer: Answer, weighed: Records) -> Features:
+def features_of(context: SearchContext, answer: Answer, alternatives: Records) -> Features:
     """Return the same by name."""
-    return Features(*describe(answer.best, facts_of(context, answer), weighed).item())
+    return Features(*describe(answer.best, facts_of(context, answer), alternatives).item())
 
 
-def with_null(features: Features, best: Ranked, null: Null) -> Features:
-    """Return the features with what the mirrored scan comes to."""
+def with_null_score(features: Features, best: ConsensusSet, null: NullScore) -> Features:
+    """Return the features with those of the null score."""
     described = np.array([features], FEATURES)
-    take_null(described, best, null)
+    add_null_score(described, best, null)
     return Features(*described.item())
 
 
-def take_null(features: Records, best: Ranked, null: Null) -> None:
-    """Write what the mirrored scan comes to into the features, (1,) of `FEATURES`."""
-    _take_null(best.score, null.score, null.symmetry, features)
-
-
-def weigh(best: Ranked, rivals: Sequence[Ranked]) -> Records:
-    """Weigh the rivals of the best explanation, (k,) of `WEIGHED`."""
-    explanations = np.array([(one.value, one.cost, one.count) for one in (best, *rivals)], RIVAL)
-    weighed = np.zeros(len(rivals), WEIGHED)
-    _weigh(explanations, weighed)
-    return weighed
+def add_null_score(features: Records, best: ConsensusSet, null: NullScore) -> None:
+    """Write those of the null score into the features, (1,) of `FEATURES`."""
+    write_null_features(best.score, null.score, null.symmetry, features)

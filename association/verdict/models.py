@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """What one feature adds to the logarithm of the odds: a line that bends at some values.
+    """The contribution of one feature to the logarithm of the odds: a line that bends at some values.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """What two features add together: the one counts as far as the other lets it.
+    """The joint contribution of two features: the one counts as far as the other lets it.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Model:
     pairs: tuple[Pair, ...] = ()
 
     def logit(self, features: Features | Floats) -> float:
-        """Return the logarithm of the odds; several models are sooner asked with an array (n,) of the features."""
+        """Return the logarithm of the odds; for several models an array (n,) of the features is faster."""
         return float(log_odds(self.odds, np.asarray(features)))
 
     @cached_property
@@ -132,6 +132,6 @@ def _read() -> tuple[dict[str, Model], dict[str, str], Features]:
     return models, document["fitted_on"], Features(**document["usual"])
 
 
-# "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are reckoned
-# with; each also "_with_beams". What each was fitted on, and the medians of the features of right answers.
+# "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are
+# included; each also "_with_beams". What each was fitted on, and the medians of the features of right answers.
 MODELS, FITTED_ON, USUAL = _read()

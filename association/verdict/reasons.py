@@ -8,26 +8,26 @@ from typing import Literal
 from registration.values import value
 
 from ..result import Reason, ReasonCode, Status
-from ..tuning import NO_TWIN, TELLING_REASON
 from .features import Features
 from .models import USUAL, Model
+from .tuning import NO_ALTERNATIVE, TELLING_REASON
 
 
 @value(frozen=True, slots=True)
-class Standing:
-    """What the verdict is, beside its probabilities.
+class Doubts:
+    """What speaks against an answer, but for its features.
 
     Attributes
     ----------
     status : Status
     complete, contradicted : bool
         Whether the search was, and whether the prior speaks against the answer.
-    elsewhere : bool
+    not_on_map : bool
         Whether little speaks for this map at all.
-    thin : bool
+    few_walls : bool
         Whether few walls fix the pose, and one of them alone decides.
-    twin : bool
-        Whether another explanation alone makes the answer too uncertain.
+    similar_place : bool
+        Whether alternatives alone make the answer too uncertain.
     alone : bool
         Whether no other explanation was found where the prior lets one be.
     mirrored : bool
@@ -41,9 +41,9 @@ class Standing:
     status: Status
     complete: bool
     contradicted: bool
-    elsewhere: bool
-    thin: bool = False
-    twin: bool = False
+    not_on_map: bool
+    few_walls: bool = False
+    similar_place: bool = False
     alone: bool = False
     mirrored: bool = False
     out_of_step: bool = False
@@ -77,48 +77,48 @@ OFF_SCALE = (
     "and that this is the right map."
 )
 
-# What each reason is told by. What a feature takes from the odds of a usual right answer is laid to its reason.
+# The features of each reason. What a feature takes from the odds of a usual right answer is laid to its reason.
 FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
     "similar_place": ("lead", "solitude", "squared_solitude"),
-    "single_wall": ("hinge_moves", "hinge_deviation", "deviation"),
+    "single_wall": ("critical_displacement", "critical_deviation", "deviation"),
     "map_mismatch": (
-        "share", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
+        "inlier_fraction", "beyond_nearly_all", "longest_unmatched", "root_unmatched", "agreement", "read", "passed",
         "root_farther", "root_nearer", "misfit", "misfit_of_many", "blocked",
     ),
-    "insufficient_evidence": ("root_count", "inverse_count", "root_length", "chance", "root_score", "walls"),
+    "insufficient_evidence": ("root_count", "inverse_count", "root_length", "log_significance", "root_score", "walls"),
     "not_on_map": ("null", "null_gap", "null_better"),
 }  # fmt: skip
 
 
-def reasons_of(standing: Standing, features: Features | None, cautious: Model | None) -> tuple[Reason, ...]:
+def reasons_of(doubts: Doubts, features: Features | None, cautious: Model | None) -> tuple[Reason, ...]:
     """List why an answer is not usable, the weightiest first.
 
     Parameters
     ----------
-    standing : Standing
+    doubts : Doubts
     features : Features or None
         Of the best explanation; None where there is none.
     cautious : Model or None
         Whose odds fall short.
     """
     codes: list[ReasonCode] = []
-    if standing.contradicted:
+    if doubts.contradicted:
         codes.append("prior_contradicted")
-    if not standing.complete:
+    if not doubts.complete:
         codes.append(INCOMPLETE)
-    if standing.elsewhere or (standing.mirrored and standing.status is Status.AMBIGUOUS):
+    if doubts.not_on_map or (doubts.mirrored and doubts.status is Status.AMBIGUOUS):
         codes.append("not_on_map")
-    if standing.status is Status.DEGENERATE:
+    if doubts.status is Status.DEGENERATE:
         codes.append("unobservable_direction")
-    elif standing.status is Status.AMBIGUOUS and features is not None and cautious is not None:
-        codes += ["insufficient_evidence", "single_wall"] if standing.thin else []
-        codes += ["map_mismatch"] if standing.out_of_step or standing.off_scale else []
-        codes += ["similar_place"] if standing.twin else []
-        codes += [code for code in _weighed(features, cautious, alone=standing.alone) if code not in codes]
+    elif doubts.status is Status.AMBIGUOUS and features is not None and cautious is not None:
+        codes += ["insufficient_evidence", "single_wall"] if doubts.few_walls else []
+        codes += ["map_mismatch"] if doubts.out_of_step or doubts.off_scale else []
+        codes += ["similar_place"] if doubts.similar_place else []
+        codes += [code for code in _weighed(features, cautious, alone=doubts.alone) if code not in codes]
     sentences = dict(SENTENCES)
-    if standing.mirrored:
+    if doubts.mirrored:
         sentences["not_on_map"] = MIRRORED
-    if standing.off_scale:
+    if doubts.off_scale:
         sentences["map_mismatch"] = OFF_SCALE
     return tuple(Reason(code, sentences[code]) for code in codes)
 
@@ -129,7 +129,7 @@ def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[Reason
     `alone`: whether there is no other explanation; then the lead is the answer's own score.
     """
     lacking = {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
-    if alone or features.lead > NO_TWIN:
+    if alone or features.lead > NO_ALTERNATIVE:
         # Many places explain a little of the scan, and none explains it about as well.
         lacking["insufficient_evidence"] += max(0.0, lacking.pop("similar_place"))
     ordered = sorted(lacking, key=lambda code: -lacking[code])
@@ -140,7 +140,7 @@ def _taken(features: Features, cautious: Model, names: tuple[str, ...]) -> float
     """Return what some features take from the logarithm of the odds, nats.
 
     That is the mean of what it loses when these become, of a usual right answer, what they are here, and of what it
-    gains when they become here what they usually are: what pairs of features add is shared between both by that.
+    gains when they become here what they usually are: what pairs of features add is split between both by that.
     """
     here = {name: getattr(features, name) for name in names}
     usual = {name: getattr(USUAL, name) for name in names}

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from association.causes import Mistake, unit_mistake
+from association.causes import Mistake
+from association.units import unit_mistake
 from registration import wrap_angle
 
 from .result import Advice, Finding, SampleReport

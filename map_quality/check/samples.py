@@ -9,12 +9,10 @@ from dataclasses import dataclass, replace
 
 from association import AssociationOptions, AssociationResult, Deadline, IndexingEndedError, MapIndex, Scan, mirrored
 from association.causes import Cause, Mistake, find_causes
-from association.consensus.scaling import scale_near_one
 from association.context import SearchContext
-from association.explain import search_and_explain
 from association.report import report
 from association.scan.scan import scaled
-from association.to_scale import Explained, put_to_scale
+from association.to_scale import ScaledSearch, estimate_factor, search_rungs, search_to_scale
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
 
@@ -101,7 +99,7 @@ def try_sample(
         index.undirected_by(deadline)  # the search takes it from there
     began, present = time.monotonic(), (oriented, index.sigma)
     context = SearchContext.of(index, scan, None, AssociationOptions(oriented=oriented, causes=True), deadline)
-    found = _searched(context)
+    found = search_to_scale(context)
     result, trial, verdict = _judged(context, found)
     trials = {present: trial}
     for way in _other_ways(present):
@@ -136,14 +134,10 @@ def _tried(index: MapIndex, scan: Scan, way: Way, deadline: Deadline) -> Trial:
     directed, sigma = way
     place = replace(index if directed else index.undirected_by(deadline), sigma=sigma)
     context = SearchContext.of(place, scan, None, AssociationOptions(oriented=directed), deadline)
-    return _judged(context, _searched(context))[1]
+    return _judged(context, search_to_scale(context))[1]
 
 
-def _searched(context: SearchContext) -> Explained:
-    return put_to_scale(context, search_and_explain(context))
-
-
-def _judged(context: SearchContext, found: Explained) -> tuple[AssociationResult, Trial, Verdict]:
+def _judged(context: SearchContext, found: ScaledSearch) -> tuple[AssociationResult, Trial, Verdict]:
     """Return the answer, and the trial and the verdict of the scan as it was sent.
 
     By these ways are compared: any may be made up for by a factor. Usable is in each what its answer is.
@@ -177,7 +171,7 @@ def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> fl
         return told.factor if told.score > least else None
     if not len(context.scan.measured) or context.deadline.passed:
         return None
-    near = scale_near_one(context)
+    near = estimate_factor(context)
     if near is None or context.deadline.passed:
         return None
     way = context.options.oriented, context.index.sigma
@@ -190,25 +184,12 @@ def _any_factor(context: SearchContext, known: float) -> float | None:
 
     A grid whose resolution is wrong is off by two as likely as by a hundredth.
     """
-    best: Explained | None = None
-    factor = 1.0
-    for rung in LADDER:
-        near = scale_near_one(replace(context, scan=scaled(context.scan, rung))) or 1.0
-        found = _at_scale(context, rung * near)
-        if context.deadline.passed:
-            return None
-        if best is None or found.score > best.score:
-            best, factor = found, rung * near
+    options = AssociationOptions(oriented=context.options.oriented)
+    found = search_rungs(context, LADDER, options)
     # Shrunk, a hall fits the next best room: a factor is reported only if its answer is usable.
-    if best is None or best.score <= BETTER_SCALED * known:
+    if found is None or found[0].score <= BETTER_SCALED * known:
         return None
+    best, factor = found
     if not judge(best.context, best.explanations, off_scale=best.off_scale).usable:
         return None
     return factor if best.factor is None else factor * best.factor.value
-
-
-def _at_scale(context: SearchContext, factor: float) -> Explained:
-    """Search the scan with its lengths times a factor."""
-    options = AssociationOptions(oriented=context.options.oriented)
-    scan = scaled(context.scan, factor)
-    return _searched(SearchContext.of(context.index, scan, None, options, context.deadline))

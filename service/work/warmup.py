@@ -23,7 +23,7 @@ from association.consensus.sight import missing_segments
 from association.consensus.similarity import fit_similarity
 from association.context import SearchContext
 from association.explain import explain_at
-from association.verdict.null import symmetry_of
+from association.verdict.chance import symmetry_of
 from association.verdict.verdict import judge
 from map_quality import Analysis, Robot, check_map, standing_places, try_sample
 from map_quality.analyze.standing import is_free

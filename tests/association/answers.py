@@ -11,12 +11,12 @@ import numpy as np
 
 from association import Prior, SearchReport
 from association.consensus.acceptance import Accepted
-from association.consensus.ranking import Ranked
-from association.consensus.settling import Settled
-from association.consensus.sight import BeamShares
+from association.consensus.consensus_set import ConsensusSet
+from association.consensus.estimation import EstimatedPose
+from association.consensus.sight import BeamFractions
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
-from association.layout import HINGE, MATCH
+from association.layout import LEVERAGE, MATCH
 from registration import MeasuredSegments, RegistrationResult, RigidTransform, Segments, register
 from registration.layout import Floats, Records
 
@@ -26,7 +26,7 @@ from .scenes import CORRIDOR, INSIDE, ROOM, beams_of, context_of, index_of, loca
 ROOM_INDEX = index_of(ROOM)
 SCAN = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
 SHARP = np.diag([1e-4, 1e-4, 1e-6])
-NOTHING_AMISS = BeamShares()
+NOTHING_AMISS = BeamFractions()
 NO_PAIRS = Accepted(np.zeros((0, 2), np.intp), np.zeros(0), np.zeros(0, np.intp), np.zeros(1, np.intp))
 
 
@@ -45,7 +45,7 @@ def matches_of(walls: Sequence[int]) -> Records:
     """Return matches with these walls, or -1."""
     matches = np.zeros(len(walls), MATCH)
     matches["wall"] = walls
-    matches["worth"] = np.where(matches["wall"] >= 0, 10.0, 0.0)
+    matches["score"] = np.where(matches["wall"] >= 0, 10.0, 0.0)
     return matches
 
 
@@ -56,15 +56,15 @@ def ranked(
     matched: int = 8,
     at: RigidTransform | None = None,
     covariance: Floats = SHARP,
-    **merits: Any,
-) -> Ranked:
+    **scores: Any,
+) -> ConsensusSet:
     """Return an explanation of a scan of 8 segments; `at` in the index frame, `prior` what one says of it."""
     usual = {
         "inside": True,
-        "cost": 6.0,
-        "one_step_cost": 9.0,
+        "chi_square": 6.0,
+        "one_step_chi_square": 9.0,
         "length": 30.0,
-        "share": 0.9,
+        "fraction": 0.9,
         "reliability": 0.8,
         "misfit": 1.0,
         "blocked": 0.0,
@@ -72,10 +72,10 @@ def ranked(
         "passed": 0.0,
         "count": matched,
     }
-    named: dict[str, Any] = {**usual, **merits}
+    named: dict[str, Any] = {**usual, **scores}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
     matches = matches_of([k if k < matched else -1 for k in range(8)])
-    return Ranked(estimate_of(found, covariance), score, score + prior, matches=matches, **named)
+    return ConsensusSet(estimate_of(found, covariance), score, score + prior, matches=matches, **named)
 
 
 @cache
@@ -93,26 +93,26 @@ def registered_corridor() -> RegistrationResult:
     return register(segments, MeasuredSegments.from_segments(Segments.from_array(ends)), [[0, 0], [1, 1]])
 
 
-def hinges_of(*each: tuple[int, float, float]) -> Records:
+def leverages_of(*each: tuple[int, float, float]) -> Records:
     """Return what a pose would be without some walls: the wall, by how much it moves, and its deviation then."""
-    hinges = np.zeros(len(each), HINGE)
-    for one, (wall, moves, deviation) in zip(hinges, each, strict=True):
-        one["wall"], one["moves"], one["deviation"], one["dx"], one["dy"] = wall, moves, deviation, 0.6, 0.8
+    leverages = np.zeros(len(each), LEVERAGE)
+    for one, (wall, moves, deviation) in zip(leverages, each, strict=True):
+        one["wall"], one["displacement"], one["deviation"], one["dx"], one["dy"] = wall, moves, deviation, 0.6, 0.8
         one["own"] = 1.0
-    return hinges
+    return leverages
 
 
-def settled_of(
+def estimated_of(
     registered: RegistrationResult,
-    hinges: Records | None = None,
+    leverages: Records | None = None,
     weakest: float | None = None,
     wall_sigma: float = 0.015,
-) -> Settled:
-    """Return a pose as registration has it, worked out with the error of walls; it hinges on none, or on these."""
+) -> EstimatedPose:
+    """Return a pose as registration has it, worked out with the error of walls; it leverages on none, or on these."""
     covariance = SHARP if registered.covariance is None else registered.covariance
     values, vectors = np.linalg.eigh(covariance[:2, :2])
     along = vectors[:, 1] * (1.0 if vectors[0, 1] >= 0.0 else -1.0)
-    return Settled(
+    return EstimatedPose(
         pose=local(ROOM_INDEX, registered.pose or INSIDE),
         covariance=covariance,
         wall_sigma=wall_sigma,
@@ -120,26 +120,26 @@ def settled_of(
         direction=registered.unobservable or (float(along[0]), float(along[1])),
         free=registered.degenerate,
         parallel=registered.degenerate,
-        hinges=hinges_of() if hinges is None else hinges,
+        leverages=leverages_of() if leverages is None else leverages,
     )
 
 
 def answer_with(
-    best: Ranked,
+    best: ConsensusSet,
     registered: RegistrationResult | None = None,
     *,
-    settled: Settled | None = None,
+    estimated: EstimatedPose | None = None,
     agreement: float = 0.95,
-    beams: BeamShares = NOTHING_AMISS,
+    beams: BeamFractions = NOTHING_AMISS,
     significance: float = 1e-9,
     accepted: Accepted = NO_PAIRS,
 ) -> Answer:
     given = registered or registered_room()
-    return Answer(best, accepted, settled or settled_of(given), given, agreement, beams, significance)
+    return Answer(best, accepted, estimated or estimated_of(given), given, agreement, beams, significance)
 
 
-def explanations_of(answer: Answer | None, *others: Ranked, complete: bool = True) -> Explanations:
+def explanations_of(answer: Answer | None, *others: ConsensusSet, complete: bool = True) -> Explanations:
     """Return an answer beside other explanations; those within the window first, the best first."""
     own = () if answer is None else (answer.best,)
-    listed = sorted((*own, *others), key=lambda one: (not one.inside, -one.value))
+    listed = sorted((*own, *others), key=lambda one: (not one.inside, -one.posterior))
     return Explanations(tuple(listed), answer, SearchReport(complete, False, 0.9999, 12, 34, 5, 0, "ordered", 0.75))

@@ -14,19 +14,19 @@ from association import HardPrior, SoftPrior
 from association.context import SearchContext
 from association.explanations import Explanations
 from association.options import Prior
-from association.verdict import loosening, reasons, verdict
+from association.verdict import alternatives, probabilities, reasons, verdict
 from association.verdict.models import USUAL, as_model
 from association.verdict.verdict import Verdict, judge
 
 from .answers import (
     answer_with,
+    estimated_of,
     explanations_of,
-    hinges_of,
+    leverages_of,
     ranked,
     registered_corridor,
     registered_room,
     room,
-    settled_of,
 )
 from .reference import verdict as twin
 from .scenes import INSIDE, pose
@@ -39,19 +39,22 @@ USUAL_DEVIATION = 0.03
 # Of every kind of feature some; of one answer each of the four says something else.
 PLAIN: dict[str, dict[str, list[float]]] = {
     "probability": {
-        "constant": [-5.0], "lead": [0.25, 20.0, -0.15], "solitude": [0.1], "share": [4.0], "agreement": [3.0],
+        "constant": [-5.0], "lead": [0.25, 20.0, -0.15], "solitude": [0.1], "inlier_fraction": [4.0],
+        "agreement": [3.0],
         "deviation": [-6.0], "misfit": [-0.5, 1.0, -1.0],
     },
     "cautious": {
-        "constant": [-6.0], "lead": [0.1], "share": [5.0, 0.85, -4.0], "root_count": [0.6], "agreement": [3.5],
-        "deviation": [-7.0], "misfit": [-0.7], "chance": [-0.1], "hinge_moves": [-1.0], "null": [-1.0, 0.8, -6.0],
+        "constant": [-6.0], "lead": [0.1], "inlier_fraction": [5.0, 0.85, -4.0], "root_count": [0.6],
+        "agreement": [3.5], "deviation": [-7.0], "misfit": [-0.7], "log_significance": [-0.1],
+        "critical_displacement": [-1.0], "null": [-1.0, 0.8, -6.0],
         "null_gap": [0.05], "null_better": [-3.0],
     },
     "probability_with_beams": {
-        "constant": [-2.0], "lead": [0.2], "share": [3.0], "deviation": [-4.0], "read": [2.0], "passed": [-20.0],
+        "constant": [-2.0], "lead": [0.2], "inlier_fraction": [3.0], "deviation": [-4.0], "read": [2.0],
+        "passed": [-20.0],
     },
     "cautious_with_beams": {
-        "constant": [-6.0], "lead": [0.1, 30.0, -0.1], "share": [6.0], "root_score": [0.3], "read": [6.0],
+        "constant": [-6.0], "lead": [0.1, 30.0, -0.1], "inlier_fraction": [6.0], "root_score": [0.3], "read": [6.0],
         "passed": [-30.0], "deviation": [-4.0], "misfit": [-0.4], "null": [-2.0, 0.9, -9.0],
     },
 }  # fmt: skip
@@ -65,12 +68,13 @@ def judged_by(models: dict[str, dict[str, list[float]]], **bars: float) -> Itera
     """
     usual = USUAL._replace(deviation=USUAL_DEVIATION)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(verdict, "MODELS", {name: as_model(curves) for name, curves in models.items()})
-        for module in (verdict, reasons):
+        patch.setattr(probabilities, "MODELS", {name: as_model(curves) for name, curves in models.items()})
+        for module in (probabilities, reasons):
             patch.setattr(module, "USUAL", usual)
-        patch.setattr(loosening, "LOOSE_RIVALS", 0)
+        patch.setattr(alternatives, "LOOSE_ALTERNATIVES", 0)
         for name, value in bars.items():
-            patch.setattr(verdict, name, value)
+            for module in (probabilities, verdict):
+                patch.setattr(module, name, value, raising=module is verdict and not hasattr(probabilities, name))
         yield
 
 
@@ -141,20 +145,22 @@ class Drawn:
             n.score,
             self.prior,
             matched=self.matched,
-            share=n.share,
+            fraction=n.share,
             misfit=n.misfit,
             read=n.read,
             passed=n.passed,
         )
         registered = registered_corridor() if self.degenerate else registered_room()
-        hinges = hinges_of((0, n.moves, 0.01), (3, 0.001, 1.0 if self.thin else 0.02))
-        settled = settled_of(registered, hinges, n.deviation, n.wall_error)
+        leverages = leverages_of((0, n.moves, 0.01), (3, 0.001, 1.0 if self.thin else 0.02))
+        estimated = estimated_of(registered, leverages, n.deviation, n.wall_error)
         chance = 10.0**n.chance
-        answer = answer_with(best, registered, settled=settled, agreement=n.agreement, significance=chance)
+        answer = answer_with(best, registered, estimated=estimated, agreement=n.agreement, significance=chance)
         scores = [(n.rival, True), *((n.rival + more, inside) for more, inside in self.beyond)]
         # Within the window the best has the greatest value, whatever the prior says of a rival.
         others = [
-            ranked(s, min(0.0, best.value - s) if inside else 0.0, inside=inside, cost=best.cost + n.cost)
+            ranked(
+                s, min(0.0, best.posterior - s) if inside else 0.0, inside=inside, chi_square=best.chi_square + n.cost
+            )
             for s, inside in scores
         ]
         return explanations_of(answer, *others, complete=self.complete)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from association.consensus.ranking import beam_rows
+from association.consensus.beams import beam_rows
 from association.layout import ESTIMATE, POINT, SIGHTING, record
 from association.tables import Rays, Sights
 from registration import RigidTransform

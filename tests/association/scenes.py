@@ -8,16 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from association import (
-    AssociationOptions,
-    AssociationResult,
-    Beams,
-    Deadline,
-    MapIndex,
-    Prior,
-    Scan,
-    associate,
-)
+from association import AssociationOptions, AssociationResult, Beams, Deadline, MapIndex, Prior, Scan, associate
 from association.context import SearchContext
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats

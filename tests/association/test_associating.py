@@ -14,19 +14,7 @@ from hypothesis import strategies as st
 from association import AssociationOptions, Deadline, HardPrior, Status, associate
 from registration import RigidTransform
 
-from .scenes import (
-    INSIDE,
-    ROOM,
-    answer_of,
-    equal_rooms,
-    index_of,
-    maze,
-    pose,
-    pose_in,
-    same_pose,
-    scan_of,
-    seen,
-)
+from .scenes import INSIDE, ROOM, answer_of, equal_rooms, index_of, maze, pose, pose_in, same_pose, scan_of, seen
 
 ROOM_INDEX = index_of(ROOM)
 MAZE_INDEX = index_of(maze(1))

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from association import AssociationOptions, Beams, CancelledError, Deadline, MapIndex, Scan, associate
-from association.causes import UNITS, find_causes
-from association.consensus.scaling import scale_near_one
+from association.causes import find_causes
 from association.explain import search_and_explain
 from association.scan.scan import mirrored, scaled, turned_round
+from association.to_scale import estimate_factor
+from association.units import UNITS
 from association.verdict.verdict import judge
 from association.warnings import warnings_of_causes
 
@@ -78,8 +79,8 @@ def test_a_map_that_is_not_to_scale(factor: float) -> None:
     walls = maze(5)
     near = scan_of(seen(walls, pose(15.0, 15.0, 0.4), radius=9.0, noise=0.005)[0])
     context = context_of(index_of(walls), scaled(near, factor))
-    assert scale_near_one(context) == pytest.approx(1.0 / factor, abs=0.01)
-    assert scale_near_one(context_of(index_of(walls), near)) is None
+    assert estimate_factor(context) == pytest.approx(1.0 / factor, abs=0.01)
+    assert estimate_factor(context_of(index_of(walls), near)) is None
 
 
 def test_nothing_is_made_up_of_scans_of_other_places() -> None:

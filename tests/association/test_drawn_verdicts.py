@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association import Status, tuning
+from association import Status
+from association.verdict import tuning
 
 from .judged import PLAIN, Drawn, drawn, judged_by
 from .kernels.drawn import SEEDS

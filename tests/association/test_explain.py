@@ -1,4 +1,4 @@
-"""Explanations: which of them is the answer, which are its rivals, and what is worked out of it."""
+"""Explanations: which of them is the answer, which are its alternatives, and what is estimated of it."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 
 from association import Deadline, HardPrior
-from association.consensus.settling import settle
+from association.consensus.estimation import estimate_poses
 from association.consensus.sight import agreement
 from association.explain import explain_at, search_and_explain
-from association.verdict.significance import significance
+from association.verdict.chance import significance
 
 from .answers import ROOM_INDEX, SCAN, answer_with, explanations_of, ranked
 from .scenes import INSIDE, ROOM, context_of, equal_rooms, index_of, pose, same_pose, scan_of
 
 
-def test_rivals_lie_within_the_window_and_others_anywhere() -> None:
+def test_alternatives_lie_within_the_window_and_others_anywhere() -> None:
     best, second, third = ranked(90.0), ranked(80.0), ranked(70.0)
     outside = ranked(95.0, inside=False)
     explanations = explanations_of(answer_with(best), third, outside, second)
     assert explanations.ranked == (best, second, third, outside)
-    assert list(explanations.rivals) == [second, third]
+    assert list(explanations.alternatives) == [second, third]
     assert list(explanations.others) == [second, third, outside]
     nothing = explanations_of(None, outside)
-    assert list(nothing.rivals) == []
+    assert list(nothing.alternatives) == []
     assert list(nothing.others) == [outside]
 
 
@@ -48,24 +48,24 @@ def test_nothing_within_the_window_is_no_answer() -> None:
 
 
 def test_what_is_worked_out_of_the_answer() -> None:
-    """Chance is asked for the worth of the matches alone, not for what lines of sight speak against them."""
+    """Significance is that of the score of the matches alone, not for what lines of sight speak against them."""
     context = context_of(index_of(np.vstack([ROOM, [[4.5, 0.5, 4.5, 3.5]]])), SCAN)
     explanations = search_and_explain(context)
     answer = explanations.answer
     assert answer is not None
-    worth = float(answer.best.matches["worth"].sum())
-    assert worth > answer.best.score + 3.0
-    assert answer.significance == pytest.approx(significance(context, worth))
+    score = float(answer.best.matches["score"].sum())
+    assert score > answer.best.score + 3.0
+    assert answer.significance == pytest.approx(significance(context, score))
     assert answer.significance < significance(context, answer.best.score)
     assert answer.agreement == agreement(context, answer.best) < 1.0
-    settled, again = settle(context, [answer.best, answer.best], hinges=True)
-    assert same_pose(settled.pose, answer.settled.pose, 1e-9, 1e-9)
-    assert settled.weakest == answer.settled.weakest
-    assert (again.pose, len(again.hinges)) == (settled.pose, 0)
-    assert len(settled.hinges) == len(answer.settled.hinges) > 4
+    estimated, again = estimate_poses(context, [answer.best, answer.best], leverages=True)
+    assert same_pose(estimated.pose, answer.estimated.pose, 1e-9, 1e-9)
+    assert estimated.weakest == answer.estimated.weakest
+    assert (again.pose, len(again.leverages)) == (estimated.pose, 0)
+    assert len(estimated.leverages) == len(answer.estimated.leverages) > 4
     found = answer.registered.pose
     assert found is not None
-    assert same_pose(found, context.in_map(settled.pose), 1e-12, 1e-12)
+    assert same_pose(found, context.in_map(estimated.pose), 1e-12, 1e-12)
     assert len(answer.accepted.pairs) == int(answer.best.matched.sum()) == 8
     assert explanations.search.complete
 
@@ -83,7 +83,7 @@ def test_a_pose_that_is_given_is_explained_as_one_that_was_found() -> None:
     )
     assert found is not None
     assert given.answer is not None
-    assert list(given.rivals) == []
+    assert list(given.alternatives) == []
     assert not given.search.complete
     assert given.answer.best.score == pytest.approx(found.best.score, abs=1e-6)
-    assert same_pose(given.answer.settled.pose, found.settled.pose, 1e-6, 1e-6)
+    assert same_pose(given.answer.estimated.pose, found.estimated.pose, 1e-6, 1e-6)

@@ -16,19 +16,7 @@ from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
 
-from .scenes import (
-    INSIDE,
-    ROOM,
-    answer_of,
-    beams_of,
-    context_of,
-    index_of,
-    pose,
-    pose_in,
-    same_pose,
-    scan_of,
-    seen,
-)
+from .scenes import INSIDE, ROOM, answer_of, beams_of, context_of, index_of, pose, pose_in, same_pose, scan_of, seen
 
 INDEX = index_of(ROOM)
 STEP = np.diag([0.02**2, 0.02**2, 0.02**2])

@@ -21,12 +21,12 @@ from .answers import (
     ROOM_INDEX,
     SCAN,
     answer_with,
+    estimated_of,
     explanations_of,
-    hinges_of,
+    leverages_of,
     ranked,
     registered_room,
     room,
-    settled_of,
 )
 from .scenes import (
     CORRIDOR,
@@ -54,7 +54,7 @@ def given_answer() -> Answer:
     accepted = Accepted(pairs, overlaps, np.array([6, 7, 15]), np.array([0, 2, 2, 3]))
     offsets, angles, weights = np.array([0.01, 0.02, 0.03]), np.array([0.1, 0.2, 0.3]), np.array([5.0, 6.0, 7.0])
     registered = replace(registered_room(), offsets=offsets, angles=angles, weights=weights)
-    return answer_with(ranked(80.0, -2.0, share=0.6), registered, accepted=accepted, significance=1e-5)
+    return answer_with(ranked(80.0, -2.0, fraction=0.6), registered, accepted=accepted, significance=1e-5)
 
 
 def told(answer: Answer | None, verdict: Verdict = SURE, **options: Any) -> AssociationResult:
@@ -67,7 +67,7 @@ def test_what_is_found_and_concluded_is_told() -> None:
     result, registered = told(given_answer()), registered_room()
     assert (result.status, result.usable, result.probability, result.pose) == (Status.OK, True, 0.97, SURE.pose)
     assert result.unobservable is None
-    np.testing.assert_array_equal(result.covariance, given_answer().settled.covariance)
+    np.testing.assert_array_equal(result.covariance, given_answer().estimated.covariance)
     assert result.reasons == ()
     assert result.search == explanations_of(None).search
     diagnostics = result.diagnostics
@@ -250,8 +250,8 @@ def test_a_free_alternative_has_no_covariance() -> None:
 
 
 def test_no_wall_is_critical_where_the_pose_stays_without_any() -> None:
-    for hinges in (hinges_of(), hinges_of((1, 0.09, 0.02), (2, 0.01, 0.099))):
-        answer = replace(given_answer(), settled=settled_of(registered_room(), hinges))
+    for leverages in (leverages_of(), leverages_of((1, 0.09, 0.02), (2, 0.01, 0.099))):
+        answer = replace(given_answer(), estimated=estimated_of(registered_room(), leverages))
         diagnostics = told(answer).diagnostics
         assert diagnostics is not None
         assert diagnostics.critical_wall is None
@@ -262,8 +262,8 @@ def test_the_critical_wall_is_that_without_which_the_pose_moves_most_or_is_free(
     moves: float, deviation: float, least: float
 ) -> None:
     """By the indices that were sent: scan segments of row 2 lie on wall 2, which is that piece of the map."""
-    hinges = hinges_of((1, 0.2, 0.02), (2, moves, deviation), (0, 0.25, 0.1))
-    answer = replace(given_answer(), settled=settled_of(registered_room(), hinges))
+    leverages = leverages_of((1, 0.2, 0.02), (2, moves, deviation), (0, 0.25, 0.1))
+    answer = replace(given_answer(), estimated=estimated_of(registered_room(), leverages))
     diagnostics = told(answer).diagnostics
     assert diagnostics is not None
     wall = diagnostics.critical_wall
@@ -289,7 +289,7 @@ def test_at_a_corridors_end_that_wall_is_critical() -> None:
 
 
 def test_where_a_direction_is_free_it_is_named_instead_of_a_covariance() -> None:
-    answer = replace(given_answer(), settled=replace(given_answer().settled, direction=(0.6, 0.8)))
+    answer = replace(given_answer(), estimated=replace(given_answer().estimated, direction=(0.6, 0.8)))
     result = told(answer, replace(SURE, status=Status.DEGENERATE, usable=False, reasons=WHY))
     assert result.covariance is None
     assert result.unobservable == (0.6, 0.8)

@@ -19,12 +19,12 @@ from association import (
     associate,
     to_scale,
 )
-from association.consensus.ranking import Ranked
+from association.consensus.consensus_set import ConsensusSet
 from association.consensus.similarity import Similarity, fit_similarity
 from association.context import SearchContext
 from association.explain import search_and_explain
-from association.explanations import Explanations
-from association.to_scale import put_to_scale
+from association.explanations import Explanations, add_alternatives
+from association.to_scale import search_to_scale
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 from registration.options import Estimator
@@ -34,7 +34,7 @@ from vectorization import LaserScan, vectorize
 from ..map_quality.check.drawn import faces, sampled
 from ..map_quality.check.drawn import index_of as index_of_floor
 from .answers import answer_with, explanations_of, ranked
-from .consensus.test_settling import off_by
+from .consensus.test_estimation import off_by
 from .scenes import (
     INSIDE,
     ROOM,
@@ -92,14 +92,14 @@ def test_the_pose_is_where_the_map_has_it(factor: float) -> None:
 def test_pose_and_covariance_are_those_of_the_similarity() -> None:
     """What is not known of the factor is in the covariance, and the residuals are those at that pose."""
     context = context_of(index_of(1.02 * WALLS), SCAN)
-    found = put_to_scale(context, search_and_explain(context))
+    found = search_to_scale(context)
     one = found.explanations.answer
     assert one is not None
     similarity = fit_similarity(found.context, one.best)
     assert similarity is not None
-    assert one.settled.pose == similarity.pose
+    assert one.estimated.pose == similarity.pose
     assert one.registered.pose == found.context.in_map(similarity.pose)
-    np.testing.assert_array_equal(one.settled.covariance, similarity.covariance)
+    np.testing.assert_array_equal(one.estimated.covariance, similarity.covariance)
 
 
 @pytest.mark.parametrize(
@@ -277,12 +277,12 @@ def test_rivals_at_other_scales_are_put_beside_the_answer() -> None:
     """One of a place that is known counts if it is better, once; none is above the answer or is it again."""
     best, one, other = ranked(100.0), ranked(80.0, at=pose(9.0, 9.0)), ranked(60.0, at=pose(-9.0, 0.0), inside=False)
     known = explanations_of(answer_with(best), one, other)
-    assert to_scale.beside(explanations_of(None, one), [best]) == explanations_of(None, one)
+    assert add_alternatives(explanations_of(None, one), [best]) == explanations_of(None, one)
 
-    def beside(*rivals: Ranked) -> list[tuple[float, float]]:
-        found = to_scale.beside(known, rivals).ranked
+    def beside(*others: ConsensusSet) -> list[tuple[float, float]]:
+        found = add_alternatives(known, others).ranked
         assert found[0] is best
-        return [(each.pose.x, each.value) for each in found[1:]]
+        return [(each.pose.x, each.posterior) for each in found[1:]]
 
     as_they_are = [(9.0, 80.0), (-9.0, 60.0)]
     assert beside() == as_they_are
@@ -301,7 +301,7 @@ def test_what_fits_to_millimetres_is_not_deciding_place_a_factor(
 ) -> None:
     calls: list[SearchContext] = []
 
-    def counted(context: SearchContext, best: Ranked) -> Similarity | None:
+    def counted(context: SearchContext, best: ConsensusSet) -> Similarity | None:
         calls.append(context)
         return fit_similarity(context, best)
 

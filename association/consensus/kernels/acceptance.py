@@ -1,4 +1,4 @@
-"""Compiled report of a consensus set in the map's own pieces."""
+"""Pick the map's own segments, the pieces of walls, for a consensus set."""
 
 import math
 
@@ -9,7 +9,7 @@ from registration.layout import Floats, Record, Records
 
 from ...layout import BLOCKER, PAIR, Indices
 from ...tables import Blockers, Lines, Pieces, PiecesAlong, Place, Sights, Workspace
-from ...tuning import BLOCKING_RAYS, MAX_RIVALS, MIN_EXTENT, MOST_UNDER
+from ..tuning import BLOCKING_RAYS, MAX_OTHERS, MIN_EXTENT, MOST_UNDER
 from .ordering import ascending
 from .sight import count_blockers
 
@@ -82,7 +82,7 @@ def pieces_under(along: PiecesAlong, low: float, high: float, own: int, named: I
     """Find the pieces between two abscissae, and the one of them with the greatest overlap, of equal ones the first.
 
     One of the wall `own` on which more than half lies comes before those of others. Writes the first of them to `named`
-    (`MAX_RIVALS` + 1,). Returns the place of the one with the greatest overlap, or of the nearest one where none
+    (`MAX_OTHERS` + 1,). Returns the place of the one with the greatest overlap, or of the nearest one where none
     overlaps, and how many are named. At most `MOST_UNDER` pieces are compared, and of those that begin before always
     the one that reaches farthest.
     """
@@ -145,9 +145,10 @@ def accept_matches(
     """Pick for every matched scan segment the piece of its wall that it lies on most, of equal ones the first.
 
     Or of the walls of its chain that it lies on. `pose` (1,). Of a line of several segments those count of which enough
-    lies on the wall. Returns, by scan index, pairs (k, 2) of scan index and piece; the share of each segment that lies
-    on pieces of these walls (k,); and the other pieces that it lies on: of pair i
-    ``rivals[rival_starts[i]:rival_starts[i + 1]]``.
+    lies on the wall.
+
+    Returns, by scan index, pairs (k, 2) of scan index and piece; the fraction of each segment that lies on pieces of
+    these walls (k,); and the other pieces that it lies on: of pair i ``others[other_starts[i]:other_starts[i + 1]]``.
 
     The pieces of each wall are ordered once, so that the time grows with their number and that of the segments, not
     with the product of both.
@@ -156,7 +157,7 @@ def accept_matches(
     n = len(row_of)
     members = np.zeros(len(matches), np.int64)
     found = np.empty(n, PAIR)
-    rivals_of = np.empty((n, MAX_RIVALS), np.intp)
+    others_of = np.empty((n, MAX_OTHERS), np.intp)
     for i in range(n):
         members[row_of[i]] += 1
         found[i].piece = -1
@@ -171,16 +172,16 @@ def accept_matches(
         while k < n and keys[order[k]] == first:
             i = order[k]
             found[i].piece = matches[row_of[i]].wall
-            lay_on(scan_ends[i], pose[0], walls[first], along, found[i], rivals_of[i])
+            lay_on(scan_ends[i], pose[0], walls[first], along, found[i], others_of[i])
             if found[i].overlap < lines.least_overlap and members[row_of[i]] > 1:
                 found[i].piece = -1
             k += 1
-    return by_scan_index(found, rivals_of)
+    return by_scan_index(found, others_of)
 
 
 @kernel
-def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out: Record, rivals: Indices) -> None:
-    """Write to `out`, of `PAIR`, and `rivals` (`MAX_RIVALS`,) on which pieces a scan segment lies at a pose.
+def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out: Record, others: Indices) -> None:
+    """Write to `out`, of `PAIR`, and `others` (`MAX_OTHERS`,) on which pieces a scan segment lies at a pose.
 
     The piece of `out` comes as the wall that is matched, of the chain whose first wall is `wall`.
     """
@@ -192,33 +193,33 @@ def lay_on(segment: Record, pose: Record, wall: Record, along: PiecesAlong, out:
     end += (s * segment.x2 + c * segment.y2 + pose.y) * wall.dy
     low = min(begin, end)
     high = max(begin, end)
-    named = np.empty(MAX_RIVALS + 1, np.intp)
+    named = np.empty(MAX_OTHERS + 1, np.intp)
     most, count = pieces_under(along, low, high, out.piece, named)
     out.piece = along.piece[most]
     out.overlap = 0.0
     if min(along.high[most], high) > max(along.low[most], low):
         bare = bare_up_to(along, high) - bare_up_to(along, low)
         out.overlap = max(0.0, 1.0 - bare / max(high - low, MIN_EXTENT))
-    out.rivals = 0
+    out.others = 0
     for k in range(count):
-        if named[k] != most and out.rivals < MAX_RIVALS:
-            rivals[out.rivals] = along.piece[named[k]]
-            out.rivals += 1
+        if named[k] != most and out.others < MAX_OTHERS:
+            others[out.others] = along.piece[named[k]]
+            out.others += 1
 
 
 @kernel
-def by_scan_index(found: Records, rivals_of: Indices) -> tuple[Indices, Floats, Indices, Indices]:
+def by_scan_index(found: Records, others_of: Indices) -> tuple[Indices, Floats, Indices, Indices]:
     """Put pairs (n,) of `PAIR`, with the other pieces of each, into arrays, as `accept_matches` returns them."""
     count = 0
-    others = 0
+    total = 0
     for i in range(len(found)):
         if found[i].piece >= 0:
             count += 1
-            others += found[i].rivals
+            total += found[i].others
     pairs = np.empty((count, 2), np.intp)
     overlaps = np.empty(count, np.float64)
-    rivals = np.empty(others, np.intp)
-    rival_starts = np.zeros(count + 1, np.intp)
+    others = np.empty(total, np.intp)
+    other_starts = np.zeros(count + 1, np.intp)
     pair = 0
     for i in range(len(found)):
         one = found[i]
@@ -226,11 +227,11 @@ def by_scan_index(found: Records, rivals_of: Indices) -> tuple[Indices, Floats, 
             pairs[pair, 0] = i
             pairs[pair, 1] = one.piece
             overlaps[pair] = one.overlap
-            for k in range(one.rivals):
-                rivals[rival_starts[pair] + k] = rivals_of[i, k]
-            rival_starts[pair + 1] = rival_starts[pair] + one.rivals
+            for k in range(one.others):
+                others[other_starts[pair] + k] = others_of[i, k]
+            other_starts[pair + 1] = other_starts[pair] + one.others
             pair += 1
-    return pairs, overlaps, rivals, rival_starts
+    return pairs, overlaps, others, other_starts
 
 
 @kernel

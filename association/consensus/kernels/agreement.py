@@ -1,26 +1,16 @@
-"""Compiled comparison of what is seen with what the map says should be seen."""
+"""Compare what is seen with what the map shows."""
 
 import math
 
 import numpy as np
 
 from compiled import kernel
-from registration.layout import Floats, Records
+from registration.layout import Floats, Record, Records
 
 from ...layout import Flags
 from ...tables import Place, Sights, Workspace
-from ...tuning import (
-    AGREEING,
-    AGREEING_SHARE,
-    BLIND_SHARE,
-    FAR,
-    FARTHER,
-    MISSING_LENGTH,
-    MISSING_RANGE,
-    MISSING_SINE,
-    NEUTRAL,
-    RAYS,
-)
+from ...tuning import FAR, FARTHER, RAYS
+from ..tuning import AGREEING, AGREEING_FRACTION, BLIND_FRACTION, MISSING_LENGTH, MISSING_RANGE, MISSING_SINE, NEUTRAL
 from .sight import first_hit
 
 
@@ -54,7 +44,7 @@ def scan_distances(scan: Records, x: float, y: float, distances: Floats) -> floa
 
 @kernel
 def in_view(distances: Floats, view: Flags) -> None:
-    """Tell of each ray whether the sensor looked there: all but the widest gap without segments, if that is wide."""
+    """Write for each ray whether the sensor looked there: all but the widest gap without segments, if that is wide."""
     rays = len(distances)
     view[:] = True
     last = -1
@@ -74,18 +64,18 @@ def in_view(distances: Floats, view: Flags) -> None:
                 widest = k - before
                 after = before
             before = k
-    if widest > BLIND_SHARE * rays:
+    if widest > BLIND_FRACTION * rays:
         for step in range(1, widest):
             view[(after + step) % rays] = False
 
 
 @kernel
 def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> float:
-    """Return of the directions that tell something the share in which the scan shows what the map does, 0 to 1.
+    """Return of the directions with evidence the fraction in which the scan shows what the map does, 0 to 1.
 
     Rays from the sensor of each view. For: the first segment and the first wall are as far away. Against: the wall is
-    before the segment, or there is none where the wall should have left one. What stands before a wall tells nothing.
-    Each view counts with its weight.
+    before the segment, or there is none where the wall should have left one. What stands before a wall counts
+    for neither. Each view counts with its weight.
     `pose` (1,).
     """
     walls = place.walls
@@ -121,15 +111,19 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
             if w < 0:
                 continue
             if distances[k] < math.inf:
-                tolerance = AGREEING + AGREEING_SHARE * distances[k]
+                tolerance = AGREEING + AGREEING_FRACTION * distances[k]
                 if abs(distances[k] - reach) < tolerance:
                     agree += weight
                 elif reach < distances[k]:
                     against += weight
-            elif (
-                reach < min(farthest, MISSING_RANGE)
-                and walls[w].end - walls[w].begin > MISSING_LENGTH
-                and abs(walls[w].dx * dy - walls[w].dy * dx) > MISSING_SINE
-            ):
+            elif reach < farthest and leaves_segment(walls[w], reach, dx, dy):
                 against += weight
     return agree / (agree + against) if agree + against > 0.0 else NEUTRAL
+
+
+@kernel
+def leaves_segment(wall: Record, reach: float, dx: float, dy: float) -> bool:
+    """Tell whether a wall that a ray meets should leave a segment: near, long, and not seen at a grazing angle."""
+    if reach >= MISSING_RANGE or wall.end - wall.begin <= MISSING_LENGTH:
+        return False
+    return abs(wall.dx * dy - wall.dy * dx) > MISSING_SINE

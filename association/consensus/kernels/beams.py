@@ -1,4 +1,4 @@
-"""Compiled evidence of single beams: what a laser should read at a pose, and what it did."""
+"""Weigh single beams: what a laser should read at a pose, and what it did."""
 
 import math
 
@@ -8,7 +8,7 @@ from registration.layout import Record, Records
 
 from ...layout import Integers
 from ...tables import Place, Rays, Workspace
-from ...tuning import (
+from ..tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
@@ -21,7 +21,8 @@ from ...tuning import (
     SURE_LENGTH,
     WALL_BEHIND,
 )
-from .consensus import clear, hold
+from .pair_sums import clear_sums
+from .scoring import add_spring
 from .sight import first_hit
 
 
@@ -50,7 +51,7 @@ def put_beam(ray: Record, beam: Record, c: float, s: float, pose: Record) -> Non
 
 @kernel
 def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence: Record) -> None:
-    """Write the shares of the beams that read the wall they should, and that passed through one, to `evidence`.
+    """Write the fractions of the beams that read the wall they should, and that passed through one, to `evidence`.
 
     A beam that ends before the wall proves nothing: people and boxes stand in front of walls. One without a return
     proves little, black or mirror walls give none.
@@ -81,8 +82,8 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
 
 
 @kernel
-def beam_shares(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
-    """Return the shares of the beams that read farther, and nearer, than the map shows from the first pose.
+def beam_fractions(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
+    """Return the fractions of the beams that read farther, and nearer, than the map shows from the first pose.
 
     Where the map shows nothing, and where nothing came back, nothing is compared. `poses` (1,).
     """
@@ -127,7 +128,7 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
     shape = place.grid.shape[0]
     sums = work.scratch[0].sums
     point = work.scratch[0].point
-    clear(sums)
+    clear_sums(sums)
     c = math.cos(pose.theta)
     s = math.sin(pose.theta)
     for i in range(len(beams)):
@@ -157,7 +158,7 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
             joint_add(sums, walls[nearest], point, 1.0, 1.0)
     if sums.count < LEAST_POINTS:
         return
-    hold(sums, pose.x, pose.y, 1.0)
+    add_spring(sums, pose.x, pose.y, 1.0)
     theta, tx, ty, _, _ = joint_solve(sums, pose.theta, False)
     pose.theta = theta
     pose.x = tx
@@ -166,7 +167,7 @@ def refine_by_beams(rays: Rays, pose: Record, place: Place, gate: float, work: W
 
 @kernel
 def weigh_beams(rays: Rays, poses: Records, place: Place, refined: int, work: Workspace, out: Records) -> None:
-    """Write what the beams say of each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.
+    """Write the evidence of the beams at each of the poses (k,) to `out` (k,) of `BEAM_EVIDENCE`.
 
     The first `refined` poses are moved to where the beams fit best, if they fit better there.
     """

@@ -1,4 +1,4 @@
-"""Compiled measures of the paper of a consensus set on walls: ambiguity and reliability."""
+"""Compute the paper's measures of a consensus set: ambiguity and reliability."""
 
 import math
 
@@ -9,12 +9,12 @@ from registration.kernels import keep_alive, one_step_add
 from registration.layout import ONE_STEP_SUMS, Floats, Record, Records
 
 from ...tables import KnownWalls
-from .settling import registered_weights
+from .wall_variance import registered_weights
 
 
 @kernel
 def paper_measures(scan: Records, matches: Records, known_walls: KnownWalls, poses: Records) -> Floats:
-    """Return what the one-step sums of consensus sets cost at poses, and what they say of the reliability, (k, 4).
+    """Return the one-step costs of consensus sets at poses, and their reliability, (k, 4).
 
     The translation's cost, ``sum w r^2``, the rotation's by Mitsuta, ``sum w a^2``, and by Wahba,
     ``2 sum w (1 - cos a)``, and Eq. (28). `matches` (k, n); `poses` (k,) of `POSE_AMONG_WALLS`.

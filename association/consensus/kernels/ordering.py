@@ -1,4 +1,4 @@
-"""Compiled orders. Numba compiles its sorting anew for each way in which it is called: here it is called in one."""
+"""Sort numbers. Numba compiles its sorting again for each signature: here it has one."""
 
 import numpy as np
 

@@ -7,7 +7,7 @@ from registration.layout import Floats, Record, Records
 
 from ...layout import HARD_PRIOR, NO_PRIOR
 from ...tuning import INSIDE, SOFT_FLOOR
-from .matching import wrap
+from .geometry import wrap
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Compiled lines of sight: which wall a ray from a pose meets first, and what passes through walls."""
+"""Follow lines of sight: which wall a ray from a pose meets first, and what passes through walls."""
 
 import math
 
@@ -7,16 +7,8 @@ from registration.layout import Record, Records
 
 from ...layout import Integers
 from ...tables import Blockers, Place, Sights
-from ...tuning import (
-    BLOCKED,
-    BLOCKED_CLUTTER,
-    BLOCKING_LENGTH,
-    BLOCKING_RAYS,
-    END_MARGIN,
-    MAX_RAYS,
-    RAY_SPACING,
-    SIGHT_TOLERANCE,
-)
+from ...tuning import MAX_RAYS, RAY_SPACING
+from ..tuning import BLOCKED, BLOCKED_CLUTTER, BLOCKING_LENGTH, BLOCKING_RAYS, END_MARGIN, SIGHT_TOLERANCE
 
 
 @kernel
@@ -129,11 +121,17 @@ def count_blockers(
                         touched[count] = w
                         count += 1
                     if is_another(counts[w], seen[i]):
-                        if matches[seen[i].row].wall >= 0:
-                            counts[w].to_matched += 1
-                        else:
-                            counts[w].to_clutter += 1
+                        count_ray(counts[w], matches[seen[i].row])
     return count
+
+
+@kernel
+def count_ray(blocker: Record, match: Record) -> None:
+    """Count a ray through a wall, to a line with this match."""
+    if match.wall >= 0:
+        blocker.to_matched += 1
+    else:
+        blocker.to_clutter += 1
 
 
 @kernel
@@ -155,7 +153,7 @@ def is_another(blocker: Record, sighting: Record) -> bool:
 
 @kernel
 def sight_penalty(blockers: Blockers, count: int, walls: Records) -> float:
-    """Return what the walls that should have blocked the view speak against a pose, nats, at least 0; clear the counts.
+    """Return the penalty for walls that should have blocked the view, nats, at least 0; clear the counts.
 
     A wall counts once, however many rays pass, and by its length: short ones on a map made by a robot are often people
     and carts that have gone since. Rays to clutter prove less than rays to the consensus set, yet many walls between

@@ -1,4 +1,4 @@
-"""Compiled fit of a similarity to an answer's pairs: its pose where the map is off by a factor.
+"""Fit a similarity to the pairs of a consensus set: its pose where the map is off by a factor.
 
 With ``a = f cos theta`` and ``b = f sin theta`` the sums of a set are ``x' Q x`` of ``x = [a, b, t_x, t_y, 1]``, as of
 a pose, but without its ``a^2 + b^2 = 1``, so that they cost least at the solution of linear equations.
@@ -11,8 +11,8 @@ from registration.layout import Floats, Record, Records
 
 from ...layout import Integers
 from ...tables import KnownWalls, Question, Workspace
-from ...tuning import LEAST_WALL_ERROR, SETTLING_ROUNDS, UNSEEN_ERROR, USUAL_WALL_ERROR, USUAL_WALLS
-from .settling import add_all, walls_of
+from ..tuning import ESTIMATION_ROUNDS, LEAST_WALL_ERROR, UNSEEN_ERROR, USUAL_WALL_ERROR, USUAL_WALLS
+from .wall_variance import distinct_walls, sum_pairs
 
 LEAST_FIXED = 1e-9  # determinant over squared trace, rounding
 
@@ -69,31 +69,31 @@ def solve_similarity(sums: Record, solution: Floats, covariance: Floats) -> bool
 def variance_left(
     solution: Floats, covariance: Floats, of_wall: Integers, own: Floats, wall_variance: float, work: Workspace
 ) -> tuple[float, float]:
-    """Return the variance of the walls' own errors that their residuals show, as `estimated_variance` does of a pose.
+    """Return the variance of the walls' own errors that their residuals show, as `wall_variance_shown` does of a pose.
 
     Walls were off by `wall_variance` where the similarity was solved. Returns how many walls are left to show it, too.
     """
-    shares = work.shares
+    wall_sums = work.wall_sums
     found = USUAL_WALLS * USUAL_WALL_ERROR**2
     count = USUAL_WALLS
     for k in range(len(of_wall)):
-        share = shares[of_wall[k]]
-        g = (share.c / share.weight, share.s / share.weight, share.x / share.weight, share.y / share.weight)
-        mean = share.one / share.weight
+        one = wall_sums[of_wall[k]]
+        g = (one.c / one.weight, one.s / one.weight, one.x / one.weight, one.y / one.weight)
+        mean = one.one / one.weight
         spread = 0.0
         for i in range(4):
             mean += g[i] * solution[i]
             for j in range(4):
                 spread += g[i] * g[j] * covariance[i, j]
-        free = max(0.0, 1.0 - spread / (wall_variance + 1.0 / share.weight))
-        found += own[k] * (mean * mean - free / share.weight)
+        free = max(0.0, 1.0 - spread / (wall_variance + 1.0 / one.weight))
+        found += own[k] * (mean * mean - free / one.weight)
         count += own[k] * free
     unsure = UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0))
     return unsure * max(found / count, LEAST_WALL_ERROR**2), count - USUAL_WALLS
 
 
 @kernel
-def settle_similarity(
+def estimate_similarity(
     question: Question, known_walls: KnownWalls, matches: Records, solution: Floats, covariance: Floats, work: Workspace
 ) -> tuple[float, float]:
     """Fit a similarity to a consensus set, walls off as their residuals show it.
@@ -103,12 +103,12 @@ def settle_similarity(
     """
     scan = question.scan
     sums = work.scratch[0].sums
-    of_wall, own = walls_of(scan, matches, known_walls.ties)
+    of_wall, own = distinct_walls(scan, matches, known_walls.ties)
     wall_variance = USUAL_WALL_ERROR**2
     used = wall_variance
     more = 0.0
-    for _ in range(SETTLING_ROUNDS + 1):
-        add_all(scan, matches, known_walls, wall_variance, work)
+    for _ in range(ESTIMATION_ROUNDS + 1):
+        sum_pairs(scan, matches, known_walls, wall_variance, work)
         if not solve_similarity(sums, solution, covariance):
             return -1.0, 0.0
         used = wall_variance

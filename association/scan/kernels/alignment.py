@@ -9,15 +9,7 @@ from registration.layout import Floats, Record, Records
 
 from ...layout import Integers
 from ...tuning import MODEL_ANGLE, ROUGHNESS
-from ..tuning import (
-    ALIGNED_VIEWS,
-    GATE_SIGMAS,
-    LEAST_ALIGNED,
-    LEAST_SPREAD,
-    MOST_APART,
-    MOST_TURNED,
-    SAME_LINE,
-)
+from ..tuning import ALIGNED_VIEWS, GATE_SIGMAS, LEAST_ALIGNED, LEAST_SPREAD, MOST_APART, MOST_TURNED, SAME_LINE
 
 
 @kernel

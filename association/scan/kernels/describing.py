@@ -8,7 +8,7 @@ from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import INFORMATION, Record, Records
 
-from ...consensus.kernels.consensus import freedom_taken
+from ...consensus.kernels.scoring import log_determinant
 from ...layout import SCAN_LINE, SIGHTING, Indices, Integers
 from ...tables import Measured
 from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
@@ -27,7 +27,7 @@ def freedom_alone(line: Record, model: Record, information: Record) -> float:
     information.yy = 0.0
     information.yt = 0.0
     information.tt = weight * lever * lever + line.weight * line.spread
-    return freedom_taken(information, model)
+    return log_determinant(information, model)
 
 
 @kernel

@@ -6,7 +6,7 @@ from compiled import kernel
 from registration.kernels import keep_alive
 from registration.layout import Record, Records
 
-from ...consensus.kernels.matching import wrap
+from ...consensus.kernels.geometry import wrap
 from ...consensus.kernels.ordering import ascending
 from ...consensus.kernels.priors import prior_value
 from ...layout import FOUND, HARD_PRIOR

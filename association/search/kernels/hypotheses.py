@@ -7,7 +7,8 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Record, Records
 
-from ...consensus.kernels.matching import gates_about, wrap
+from ...consensus.kernels.geometry import wrap
+from ...consensus.kernels.raster import gates_about
 from ...layout import HARD_PRIOR
 from ...tables import MapTables, Question, Workspace
 from ...tuning import AT_ONCE

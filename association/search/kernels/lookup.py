@@ -7,7 +7,7 @@ import numpy as np
 from compiled import kernel
 from registration.layout import Record, Records
 
-from ...consensus.kernels.matching import GATE_MARGIN
+from ...consensus.kernels.geometry import GATE_MARGIN
 from ...index.kernels.crossings import PER_HALF_TURN, cell_of, code_of, crossing_of
 from ...layout import Integers
 from ...tables import Crossings

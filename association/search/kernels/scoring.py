@@ -5,9 +5,12 @@ import math
 from compiled import kernel
 from registration.layout import Record, Records
 
-from ...consensus.kernels.consensus import refine, turning
-from ...consensus.kernels.matching import match_scan, may_score, wrap
+from ...consensus.kernels.geometry import wrap
+from ...consensus.kernels.matching import match_scan
 from ...consensus.kernels.priors import prior_value
+from ...consensus.kernels.raster import may_score
+from ...consensus.kernels.refinement import refine
+from ...consensus.kernels.scoring import covariance_about
 from ...layout import HARD_PRIOR
 from ...tables import MapTables, Place, Question, Workspace
 from ..tables import SearchState
@@ -84,7 +87,7 @@ def score_hypothesis(question: Question, place: Place, k: int, state: SearchStat
     pose.theta = one.theta
     pose.x = one.x
     pose.y = one.y
-    turning(one.angle_variance, one.lever_x, one.lever_y, pose)
+    covariance_about(one.angle_variance, one.lever_x, one.lever_y, pose)
     # An earlier hypothesis may have scored more than what was known when the floors were set.
     floor = floor_of(rules, best, one.bonus) + best.least_freedom
     if most_possible(scan, k, work) < floor:

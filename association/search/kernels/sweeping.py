@@ -8,7 +8,8 @@ import math
 from compiled import kernel
 from registration.layout import Floats, Record, Records
 
-from ...consensus.kernels.matching import PER_RADIAN, sectors_about, wrap
+from ...consensus.kernels.geometry import wrap
+from ...consensus.kernels.raster import PER_RADIAN, sectors_about
 from ...layout import HARD_PRIOR, Integers
 from ...tables import Grid
 from ...tuning import BASE_SLACK, BASE_SLACK_SHARE, MIN_CROSSING, SECTOR_BITS, SECTORS

@@ -1,4 +1,4 @@
-"""Compiled bound on what chance scores; see `association.verdict.significance`."""
+"""Bound what chance scores; see `association.verdict.chance`."""
 
 import math
 
@@ -8,7 +8,7 @@ from compiled import kernel
 from registration.layout import Floats, Records
 
 from ...tables import WallLengths
-from ...tuning import LEAST_CHANCE, LEAST_SIGNIFICANCE, MOST_CHANCE
+from ..tuning import LEAST_CHANCE, LEAST_SIGNIFICANCE, MOST_CHANCE
 
 
 @kernel
@@ -67,17 +67,8 @@ def log_tail(scan: Records, chances: Floats, score: float, exponents: Floats) ->
 
 
 @kernel
-def worth_of(matches: Records) -> float:
-    """Return what the matches of a scan, (n,), are worth together, nats."""
-    total = 0.0
-    for i in range(len(matches)):
-        total += matches[i].worth
-    return total
-
-
-@kernel
 def significance(scan: Records, walls: WallLengths, gates: Records, exponents: Floats, score: float) -> float:
-    """Return a bound on the chance that some pose of the map scores that, nats: see `association.verdict.significance`.
+    """Return a bound on the chance that some pose of the map scores that, nats: see `association.verdict.chance`.
 
     `gates` (1,), `exponents` (k,) of Chernoff's bound, ascending.
     """

@@ -1,4 +1,4 @@
-"""Compiled test of a map for mirror symmetry: what it shows at one pose, mirrored, at another."""
+"""Test a map for mirror symmetry: what it shows at one pose, mirrored, at another."""
 
 import math
 
@@ -11,7 +11,8 @@ from ...consensus.kernels.matching import allow_all, match_scan
 from ...consensus.kernels.sight import first_hit
 from ...layout import MATCH, SCAN_LINE
 from ...tables import Place, Workspace
-from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, MODEL_OFFSET, RAYS, SHORTEST_SHOWN
+from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, MODEL_OFFSET, RAYS
+from ..tuning import SHORTEST_SHOWN
 
 
 @kernel
@@ -89,13 +90,13 @@ def reach_of(places: Records, seen: Records) -> float:
 
 
 @kernel
-def mirrored_share(
+def mirrored_fraction(
     views: Records, seen: Records, pose: Records, null: Records, gates: Records, place: Place, work: Workspace
 ) -> float:
     """Return how much of what the map shows from `pose` it shows mirrored from `null`, 0 to 1; both (1,).
 
-    From the places (v,) of `views` together, as far as what was `seen`, (k,) of `SIGHTING`: the share of the gains of
-    the walls that are seen, each matched as a scan line would be.
+    From the places (v,) of `views` together, as far as what was `seen`, (k,) of `SIGHTING`: the fraction of the gains
+    of the walls that are seen, each matched as a scan line would be.
     """
     lows = np.full(len(place.walls), math.inf)
     highs = np.full(len(place.walls), -math.inf)

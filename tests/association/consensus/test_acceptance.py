@@ -14,7 +14,7 @@ from association.explain import search_and_explain
 from association.tables import Lines
 from registration import MeasuredSegments, RegistrationOptions, Segments, register
 
-from ..answers import NO_PAIRS, SCAN, ranked, registered_room, settled_of
+from ..answers import NO_PAIRS, SCAN, estimated_of, ranked, registered_room
 from ..kernels.drawn import in_pieces
 from ..reference import acceptance as twin
 from ..reference.consensus import matches_on
@@ -44,7 +44,7 @@ def test_the_pieces_that_scan_segments_lie_on() -> None:
     assert got.map_indices(index) == got.pairs[:, 1].tolist() == [pair[1] for pair in expected]
     np.testing.assert_allclose(got.overlaps, [pair[2] for pair in expected], atol=4e-4)
     for k, pair in enumerate(expected):
-        assert got.rivals[got.rival_starts[k] : got.rival_starts[k + 1]].tolist() == pair[3]
+        assert got.others[got.other_starts[k] : got.other_starts[k + 1]].tolist() == pair[3]
 
 
 def test_map_indices_are_those_that_were_sent() -> None:
@@ -62,7 +62,7 @@ def test_map_indices_are_those_that_were_sent() -> None:
 @pytest.mark.parametrize("rotation", ["wahba", "mitsuta"])
 @pytest.mark.parametrize("fixed", [True, False])
 def test_the_pose_is_that_of_registration(estimator: Any, rotation: Any, fixed: bool) -> None:
-    """Of the pairs, with the error of the walls; where that is not fixed the settled one, by the joint estimator."""
+    """Of the pairs, with the error of the walls; where that is not fixed the estimated one, by the joint estimator."""
     index = index_of(ROOM, 0.03)
     ends = SCAN.measured.segments.endpoints + np.random.default_rng(0).normal(size=(8, 4)) * 0.02
     measured = MeasuredSegments.from_segments(Segments.from_array(ends), 0.05)
@@ -70,11 +70,11 @@ def test_the_pose_is_that_of_registration(estimator: Any, rotation: Any, fixed: 
     truth = seen(ROOM, INSIDE)[1]
     pairs = np.stack([np.arange(8), truth], axis=1)
     at = pose(3.01, 2.52, 0.71)
-    settled = replace(settled_of(registered_room()), pose=local(index, at), wall_sigma=0.04, free=not fixed)
+    estimated = replace(estimated_of(registered_room()), pose=local(index, at), wall_sigma=0.04, free=not fixed)
     walls = np.zeros(8, int)
     walls[context.lines.row_of] = index.wall_of_piece[truth]
     best = replace(ranked(), matches=matches_on(walls))
-    found = register_accepted(context, best, replace(NO_PAIRS, pairs=pairs, overlaps=np.ones(8)), settled)
+    found = register_accepted(context, best, replace(NO_PAIRS, pairs=pairs, overlaps=np.ones(8)), estimated)
     options = RegistrationOptions(estimator=estimator, rotation=rotation)
     own = at if estimator == "joint" and not fixed else None
     expected = register(Segments.from_array(ROOM), measured, pairs, 0.03, options, own)
@@ -106,5 +106,5 @@ def test_the_ways_to_register_differ() -> None:
 
 
 def test_without_pairs_there_is_no_pose() -> None:
-    settled = settled_of(registered_room())
-    assert register_accepted(context_of(index_of(ROOM), SCAN), ranked(), NO_PAIRS, settled) is None
+    estimated = estimated_of(registered_room())
+    assert register_accepted(context_of(index_of(ROOM), SCAN), ranked(), NO_PAIRS, estimated) is None

@@ -12,16 +12,26 @@ import pytest
 
 from association import Beams, CancelledError, Deadline, HardPrior, MapIndex, Prior, SoftPrior, associate
 from association import explain as explaining
+from association.consensus import beams as single_beams
 from association.consensus import ranking
+from association.consensus.beams import beam_evidence_at
+from association.consensus.consensus_set import ConsensusSet
 from association.consensus.kernels.beams import weigh_beams
-from association.consensus.ranking import Ranked, beam_evidence_at, rank_candidates
+from association.consensus.ranking import rank_candidates
 from association.consensus.sight import missing_segments
+from association.consensus.tuning import (
+    BEAM_FINALISTS,
+    BEAMS_PASSED,
+    BEAMS_READ,
+    LATE_FINALISTS,
+    LEAST_DISTINCT,
+    MOST_BEAMS,
+)
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.layout import ESTIMATE, FOUND, record
 from association.search.candidates import Candidates, find_candidates
 from association.tables import Place, Rays
-from association.tuning import BEAM_FINALISTS, BEAMS_PASSED, BEAMS_READ, LATE_FINALISTS, LEAST_DISTINCT, MOST_BEAMS
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -64,11 +74,11 @@ def candidates_of(index: MapIndex, poses: list[RigidTransform]) -> Candidates:
     return Candidates(found, explanations_of(None).search)
 
 
-def ranked_at(context: SearchContext, *poses: RigidTransform) -> list[Ranked]:
+def ranked_at(context: SearchContext, *poses: RigidTransform) -> list[ConsensusSet]:
     return rank_candidates(context, candidates_of(context.index, list(poses)))
 
 
-def places(context: SearchContext, found: list[Ranked]) -> list[RigidTransform]:
+def places(context: SearchContext, found: list[ConsensusSet]) -> list[RigidTransform]:
     return [context.in_map(one.pose) for one in found]
 
 
@@ -91,17 +101,17 @@ def test_the_best_comes_first_with_what_belongs_to_it() -> None:
     ] * 3
     here = [local(context.index, room(k)) for k in (1, 0, 2)]
     expected = twin.rank(context.lines.rows, here, None, context.index.tables.place, context.gates, context.lines.model)
-    for one, (at, covariance, merit, matches) in zip(found, expected, strict=True):
+    for one, (at, covariance, scored, matches) in zip(found, expected, strict=True):
         assert same_pose(one.pose, at, 1e-6, 1e-6)
         np.testing.assert_allclose(one.covariance, covariance, rtol=1e-4, atol=1e-9)
-        score, cost, one_step_cost, length, share, reliability, misfit, _, read, passed, count = merit[0].item()
-        assert (one.score, one.value, one.length) == pytest.approx((score, score, length))
-        assert (one.cost, one.one_step_cost) == pytest.approx((cost, one_step_cost), rel=1e-5, abs=1e-6)
-        assert (one.share, one.reliability, one.misfit) == pytest.approx((share, reliability, misfit), abs=1e-6)
+        score, chi_square, one_step, length, fraction, reliability, misfit, _, read, passed, count = scored[0].item()
+        assert (one.score, one.posterior, one.length) == pytest.approx((score, score, length))
+        assert (one.chi_square, one.one_step_chi_square) == pytest.approx((chi_square, one_step), rel=1e-5, abs=1e-6)
+        assert (one.fraction, one.reliability, one.misfit) == pytest.approx((fraction, reliability, misfit), abs=1e-6)
         assert (one.read, one.passed, one.count) == (read, passed, count) == (0.0, 0.0, one.matched.sum())
         np.testing.assert_array_equal(one.matches["wall"], matches["wall"])
         assert one.inside
-    assert [round(one.share, 3) for one in found] == [1.0, round(26.5 / 32.0, 3), round(17.5 / 32.0, 3)]
+    assert [round(one.fraction, 3) for one in found] == [1.0, round(26.5 / 32.0, 3), round(17.5 / 32.0, 3)]
 
 
 def test_lines_of_sight_count_where_there_are_no_beams() -> None:
@@ -142,7 +152,7 @@ def test_a_soft_prior_counts_in_the_order() -> None:
     found = ranked_at(context, room(0), room(1), room(2))
     for one, k in zip(found, (2, 1, 0), strict=True):
         assert same_pose(context.in_map(one.pose), room(k), 1e-6, 1e-6)
-        assert one.value - one.score == pytest.approx(prior_value(prior, room(k)), abs=1e-5)
+        assert one.posterior - one.score == pytest.approx(prior_value(prior, room(k)), abs=1e-5)
         assert one.inside
 
 
@@ -153,7 +163,7 @@ def test_poses_within_a_window_come_first() -> None:
     found = ranked_at(context, room(0), room(1))
     assert [one.inside for one in found] == [True, False]
     assert found[0].score < found[1].score - 10.0
-    assert all(one.value == one.score for one in found)
+    assert all(one.posterior == one.score for one in found)
     assert same_pose(context.in_map(found[0].pose), room(1), 1e-6, 1e-6)
 
 
@@ -176,8 +186,8 @@ def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
     rays = rays_of(beams.angles[known][::step], beams.ranges[known][::step])
     place, here = index.tables.place, local(index, INSIDE)
     moved, (reading, passed), _ = beams_twin.weigh_beams(rays, here, place)
-    ((_, _, merit, _),) = twin.rank(context.lines.rows, [moved], None, place, context.gates, context.lines.model)
-    expected = merit["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
+    ((_, _, scored, _),) = twin.rank(context.lines.rows, [moved], None, place, context.gates, context.lines.model)
+    expected = scored["score"][0] + BEAMS_READ * reading - BEAMS_PASSED * passed
     assert (found.read, found.passed) == pytest.approx((reading, passed), abs=1e-4)
     assert found.score == pytest.approx(expected, abs=0.01)
 
@@ -199,7 +209,7 @@ def test_what_beams_speak_against_altogether_is_none() -> None:
     assert ranked_at(context, INSIDE) == []
 
 
-def crowded(prior: Prior | None, at: float | None = None) -> list[Ranked]:
+def crowded(prior: Prior | None, at: float | None = None) -> list[ConsensusSet]:
     """Rank 40 equal rooms and one that lacks walls, all of them candidates."""
     poor = ROOM[3:] + np.tile([0.0, 50.0], 2)
     index = index_of(np.vstack([equal_rooms(40), poor]))
@@ -326,8 +336,8 @@ def test_the_clock_is_looked_at_between_the_beams_of_some_poses(monkeypatch: pyt
         calls.append(len(some))
         weigh_beams(rays, some, place, refined, *rest)
 
-    monkeypatch.setattr(ranking, "weigh_beams", counted)
-    monkeypatch.setattr(ranking, "MOST_LOOKED_AT", 1.5 * context.looks)
+    monkeypatch.setattr(single_beams, "weigh_beams", counted)
+    monkeypatch.setattr(single_beams, "MOST_LOOKED_AT", 1.5 * context.looks)
     np.testing.assert_array_equal(beam_evidence_at(context, poses.copy(), 60, 2), whole)
     assert calls == [1, 1, 1]
     late = replace(context, deadline=Deadline(at=0.0))
@@ -353,7 +363,7 @@ def test_alternatives_have_their_lines_of_sight_however_far_behind(lacking: int)
     alone = rank_candidates(context, candidates_of(index, places[1:]))[0]
     (other,) = ranking.with_lines_of_sight(context, both, both[1:])
     assert other.score == pytest.approx(alone.score, abs=1e-6)
-    assert other.value == pytest.approx(alone.value, abs=1e-6)
+    assert other.posterior == pytest.approx(alone.posterior, abs=1e-6)
     assert (other.score < both[1].score - 1.0) is (lacking > 0)
 
 
@@ -363,11 +373,11 @@ def test_alternatives_stay_in_order_when_lines_of_sight_are_counted(monkeypatch:
     far = [ranked(70.0, at=pose(1.0)), ranked(60.0, at=pose(2.0)), ranked(5.0, at=pose(3.0))]
     outside = [ranked(74.0, inside=False, at=pose(4.0)), ranked(8.0, inside=False, at=pose(5.0))]
 
-    def charged(_: SearchContext, one: Ranked) -> Ranked:
+    def charged(_: SearchContext, one: ConsensusSet) -> ConsensusSet:
         blocked = {1.0: 20.0, 3.0: 6.0, 4.0: 70.0}.get(one.pose.x, 0.0)
-        return replace(one, score=one.score - blocked, value=one.value - blocked, blocked=blocked)
+        return replace(one, score=one.score - blocked, posterior=one.posterior - blocked, blocked=blocked)
 
-    monkeypatch.setattr(ranking, "_charged", charged)
+    monkeypatch.setattr(ranking, "charge_for_sight", charged)
     context = context_of(index_of(ROOM), scan_of(ENDPOINTS, viewpoint=(0.0, 0.0)))
     others = [near, *far, *outside]
     found = list(ranking.with_lines_of_sight(context, [best, *others], others))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from association.consensus.sight import BeamShares, agreement, compare_beams, missing_segments
+from association.consensus.sight import BeamFractions, agreement, compare_beams, missing_segments
+from association.consensus.tuning import NEUTRAL
 from association.explain import search_and_explain
-from association.tuning import NEUTRAL
 
 from ..answers import SCAN, room
 from ..reference import acceptance as missing_twin
@@ -50,8 +50,8 @@ def test_beams_are_compared_at_the_settled_pose() -> None:
     context = room(with_beams=True)
     explained = search_and_explain(context).answer
     assert explained is not None
-    assert explained.beams == compare_beams(context, explained.settled) == BeamShares(0.0, 0.0)
+    assert explained.beams == compare_beams(context, explained.estimated) == BeamFractions(0.0, 0.0)
     screened = replace(context, index=index_of(SCREENED))
-    passed = compare_beams(screened, explained.settled).farther
+    passed = compare_beams(screened, explained.estimated).farther
     assert 0.05 < passed < 0.5
-    assert compare_beams(room(), explained.settled) == BeamShares()
+    assert compare_beams(room(), explained.estimated) == BeamFractions()

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from association.consensus.tuning import BLOCKING_RAYS, MAX_OTHERS
 from association.tables import Lines, Pieces
-from association.tuning import BLOCKING_RAYS, MAX_RIVALS
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -53,7 +53,7 @@ def accept_matches(
         others = [p for p in spans if p != most and lies_on[p] > 0.0]
         # A line as a whole lies on its wall; one of several segments may be the one that does not.
         if on_any.mean() >= lines.least_overlap or (lines.row_of == row).sum() == 1:
-            found.append((i, most, float(on_any.mean()), others[:MAX_RIVALS]))
+            found.append((i, most, float(on_any.mean()), others[:MAX_OTHERS]))
     return found
 
 

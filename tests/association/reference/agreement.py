@@ -7,19 +7,17 @@ import math
 
 import numpy as np
 
-from association.layout import WALL
-from association.tuning import (
+from association.consensus.tuning import (
     AGREEING,
-    AGREEING_SHARE,
-    BLIND_SHARE,
-    FAR,
-    FARTHER,
+    AGREEING_FRACTION,
+    BLIND_FRACTION,
     MISSING_LENGTH,
     MISSING_RANGE,
     MISSING_SINE,
     NEUTRAL,
-    RAYS,
 )
+from association.layout import WALL
+from association.tuning import FAR, FARTHER, RAYS
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -50,7 +48,7 @@ def in_view(distances: Floats) -> list[bool]:
         return [True] * rays
     gaps = [(looked[-1], looked[0] + rays), *itertools.pairwise(looked)]
     before, after = max(gaps, key=lambda gap: gap[1] - gap[0])
-    blind = {k % rays for k in range(before + 1, after)} if after - before > BLIND_SHARE * rays else set()
+    blind = {k % rays for k in range(before + 1, after)} if after - before > BLIND_FRACTION * rays else set()
     return [k not in blind for k in range(rays)]
 
 
@@ -63,7 +61,7 @@ def agreement(scan: Records, viewpoint: Vector, pose: RigidTransform, walls: Rec
         reach, w = first_hit(pose.apply(viewpoint), towards, max(FAR, FARTHER * farthest), walls)
         if not looked or w < 0:
             continue
-        tolerance = AGREEING + AGREEING_SHARE * distance
+        tolerance = AGREEING + AGREEING_FRACTION * distance
         if distance < math.inf:
             agree += bool(abs(distance - reach) < tolerance)
             against += bool(distance - reach >= tolerance)

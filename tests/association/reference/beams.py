@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from association.tables import Place, Rays
-from association.tuning import (
+from association.consensus.tuning import (
     BEAM_GATES,
     BEHIND,
     CERTAIN,
@@ -21,6 +20,7 @@ from association.tuning import (
     SURE_LENGTH,
     WALL_BEHIND,
 )
+from association.tables import Place, Rays
 from registration import RigidTransform
 from registration.layout import SEEN, Floats
 
@@ -64,7 +64,7 @@ def beam_evidence(rays: Rays, pose: RigidTransform, place: Place) -> Evidence:
     return read / max(1, len(rays.beams)), passed / max(1, len(rays.beams))
 
 
-def beam_shares(rays: Rays, pose: RigidTransform, place: Place) -> tuple[float, float]:
+def beam_fractions(rays: Rays, pose: RigidTransform, place: Place) -> tuple[float, float]:
     """Count the beams that read farther than the map shows, and nearer."""
     across = np.array([offset for offset, _ in offsets(rays, pose, place, WALL_BEHIND)])
     n = max(1, len(rays.beams))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from association.tuning import LEAST_CHANCE, MOST_CHANCE
+from association.verdict.tuning import LEAST_CHANCE, MOST_CHANCE
 from registration.layout import Floats, Records
 
 

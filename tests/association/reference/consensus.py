@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from association.consensus.tuning import MAX_STEP, MAX_TURN, SAME_SHIFT, SPRING
 from association.layout import MATCH, MODEL, Integers
 from association.tables import Place
-from association.tuning import MAX_STEP, MAX_TURN, SAME_SHIFT, SPRING
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 
@@ -140,28 +140,28 @@ def solve(pairs: Pairs, start: RigidTransform, held: float = SPRING) -> Solved:
     return Solved(RigidTransform(*found.x.tolist()), j.T @ j, 2.0 * float(found.cost))
 
 
-def freedom_taken(information: Floats, model: Record) -> float:
+def log_determinant(information: Floats, model: Record) -> float:
     """Return half of the logarithm of ``det(1 + F S)``."""
     s = np.diag([model["free_distance"] ** 2, model["free_distance"] ** 2, model["free_angle"] ** 2])
     return 0.5 * float(np.log(np.linalg.det(np.eye(3) + information @ s)))
 
 
-def value_pairs(scan: Records, at: RigidTransform, place: Place, wall_variance: float, matches: Records) -> float:
-    """Give each match what the set loses without it at this pose; what is worth nothing is no match."""
+def score_pairs(scan: Records, at: RigidTransform, place: Place, wall_variance: float, matches: Records) -> float:
+    """Give each match what the set loses without it at this pose; what is score nothing is no match."""
     held = matches["wall"].copy()
 
     def cost(held: Integers) -> float:
         return Pairs.of(scan, held, place.walls, wall_variance, place.ties, matches["shift"]).cost(at)
 
     whole = cost(held)
-    matches["worth"] = 0.0
+    matches["score"] = 0.0
     total = 0.0
     for i in np.nonzero(held >= 0)[0]:
         others = np.where(np.arange(len(held)) == i, -1, held)
         gain = float(matches["gain"][i])
-        worth = gain - 0.5 * (whole - cost(others))
-        if worth > 0.0:
-            matches["worth"][i] = worth
+        score = gain - 0.5 * (whole - cost(others))
+        if score > 0.0:
+            matches["score"][i] = score
             total += gain
         else:
             matches["wall"][i] = -1
@@ -230,13 +230,13 @@ def refine(
     matches = matched()
     before, grown = held, matches["wall"].copy()
     shifts = matches["shift"].copy()
-    gain = value_pairs(scan, pose, place, variance, matches)
+    gain = score_pairs(scan, pose, place, variance, matches)
     held = matches["wall"].copy()
     if not (held >= 0).any():
         return Refined(0.0, pose, covariance, matches, free=free)
-    if (grown != before).any() or (held != grown).any():  # those that come and are worth nothing count as a change
+    if (grown != before).any() or (held != grown).any():  # those that come and are score nothing count as a change
         moved()
-    score = gain - 0.5 * cost - freedom_taken(information, model[0])
+    score = gain - 0.5 * cost - log_determinant(information, model[0])
     return Refined(max(0.0, score), pose, covariance, matches, cost if score > 0.0 else 0.0, free)
 
 

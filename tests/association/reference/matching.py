@@ -7,20 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from association.consensus.tuning import FLAT_GATE, FLAT_STEP, LONG_BRIDGE, OVERLAP_TAPER, SHORT_BRIDGE
 from association.layout import MATCH, Integers
 from association.tables import Place, Raster
-from association.tuning import (
-    APART_GAP,
-    APART_STEP,
-    FLAT_GATE,
-    FLAT_STEP,
-    LONG_BRIDGE,
-    NARROW_REACH,
-    OVERLAP_TAPER,
-    SECTORS,
-    SHORT_BRIDGE,
-    WHOLE_GAP,
-)
+from association.tuning import APART_GAP, APART_STEP, NARROW_REACH, SECTORS, WHOLE_GAP
 from registration import RigidTransform
 from registration.layout import Floats, Record, Records
 

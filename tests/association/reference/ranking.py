@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from association.layout import MERIT
+from association.consensus.tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
+from association.layout import SET_SCORE
 from association.tables import Place
-from association.tuning import FAR_BEHIND, ROUNDS, START_ANGLE_VARIANCE, START_VARIANCE
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -18,7 +18,7 @@ from .geometry import Vector, wrap
 from .sight import count_blockers, sight_penalty
 
 START = np.diag([START_VARIANCE, START_VARIANCE, START_ANGLE_VARIANCE])
-Ranked = tuple[RigidTransform, Floats, Records, Records]  # pose, covariance, merit (1,), matches
+Ranked = tuple[RigidTransform, Floats, Records, Records]  # pose, covariance, (1,) of `SET_SCORE`, matches
 
 
 def rank(
@@ -35,22 +35,22 @@ def rank(
     for at in poses:
         found = refine(scan, at, START, place, gates, model, ROUNDS)
         score, matches, on = found.score, found.matches, found.matches["wall"] >= 0
-        merit = np.zeros(1, MERIT)
-        merit["cost"] = found.cost
-        merit["length"] = scan["length"][on].sum()
-        merit["share"] = scan["length"][on].sum() / scan["length"].sum()
+        scored = np.zeros(1, SET_SCORE)
+        scored["chi_square"] = found.cost
+        scored["length"] = scan["length"][on].sum()
+        scored["fraction"] = scan["length"][on].sum() / scan["length"].sum()
         pairs = Pairs.of(scan, matches["wall"], place.walls, float(model["wall_variance"][0]))
         if score > 0.0:
-            merit["one_step_cost"] = pairs.one_step_cost(found.pose)
-        merit["reliability"] = reliability(pairs.information(found.pose.theta)[:2, :2])
-        merit["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
-        merit["count"] = on.sum()
+            scored["one_step_chi_square"] = pairs.one_step_cost(found.pose)
+        scored["reliability"] = reliability(pairs.information(found.pose.theta)[:2, :2])
+        scored["misfit"] = (matches["offset"][on] ** 2 / scan["plain_variance"][on]).mean() if on.any() else 0.0
+        scored["count"] = on.sum()
         if viewpoint is not None and score > best - FAR_BEHIND:
-            merit["blocked"] = sight_penalty(count_blockers(scan, on, viewpoint, found.pose, place.walls), place.walls)
-            score -= float(merit["blocked"][0])
+            scored["blocked"] = sight_penalty(count_blockers(scan, on, viewpoint, found.pose, place.walls), place.walls)
+            score -= float(scored["blocked"][0])
             best = max(best, score)
-        merit["score"] = score
-        ranked.append((found.pose, found.covariance, merit, matches))
+        scored["score"] = score
+        ranked.append((found.pose, found.covariance, scored, matches))
     return ranked
 
 

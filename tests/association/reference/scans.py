@@ -13,7 +13,7 @@ from association.tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, M
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import LEAST_POINTS, Floats, Record, Records
 
-from .consensus import Pairs, freedom_taken
+from .consensus import Pairs, log_determinant
 from .geometry import TURN
 
 
@@ -124,7 +124,7 @@ def freedom_alone(line: Record, model: Record) -> float:
     wall = np.zeros(1, [("dx", float), ("dy", float), ("offset", float)])
     wall["dx"], wall["dy"] = line["dx"], line["dy"]
     alone = Pairs.of(np.array([line], SCAN_LINE), np.zeros(1, int), wall, float(model["wall_variance"]))
-    return freedom_taken(alone.information(RigidTransform(0.0, 0.0, 0.0).theta), model)
+    return log_determinant(alone.information(RigidTransform(0.0, 0.0, 0.0).theta), model)
 
 
 def describe_lines(lines: Records, variances: Record, model: Record) -> tuple[list[int], Records]:

@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from association.tuning import (
+from association.consensus.tuning import (
     BLOCKED,
     BLOCKED_CLUTTER,
     BLOCKING_LENGTH,
     BLOCKING_RAYS,
     END_MARGIN,
-    MAX_RAYS,
-    RAY_SPACING,
     SIGHT_TOLERANCE,
 )
+from association.tuning import MAX_RAYS, RAY_SPACING
 from registration import RigidTransform
 from registration.layout import Record, Records
 

@@ -8,12 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from association import HardPrior, Status, tuning
-from association.consensus.ranking import Ranked
+from association import HardPrior, Status
+from association.consensus.consensus_set import ConsensusSet
+from association.consensus.tuning import BEAMS_PASSED, BEAMS_READ, CONTRADICTION, USUAL_WALLS
 from association.context import SearchContext
 from association.explanations import Answer, Explanations
-from association.verdict.loosening import loose_twin_share
-from association.verdict.null import Null, null_of
+from association.tuning import RIVAL_SHARE
+from association.verdict import tuning
+from association.verdict.alternatives import probability_with_loose_walls
+from association.verdict.chance import NullScore, find_null_score
 from registration.observability import MAX_DEVIATION
 
 Numbers = dict[str, float]
@@ -23,26 +26,26 @@ LOG_RATIOS = np.linspace(-60.0, 60.0, 2_401)  # of variances; ten times as many 
 INVERSES = np.exp(-LOG_RATIOS)
 
 
-def worth(one: Ranked) -> float:
+def worth(one: ConsensusSet) -> float:
     """Return the value of an explanation with its residuals' likelihood averaged over how far the walls may be off.
 
     Their variance over the supposed one is a scaled inverse chi-square of so many degrees of freedom; the sum goes over
     its logarithm.
     """
-    n, k = int((one.matches["wall"] >= 0).sum()), tuning.USUAL_WALLS
+    n, k = int((one.matches["wall"] >= 0).sum()), USUAL_WALLS
     density = 0.5 * k * (math.log(0.5 * k) - LOG_RATIOS - INVERSES) - math.lgamma(0.5 * k)
-    logs = density - 0.5 * n * LOG_RATIOS - 0.5 * one.cost * INVERSES
+    logs = density - 0.5 * n * LOG_RATIOS - 0.5 * one.chi_square * INVERSES
     step = LOG_RATIOS[1] - LOG_RATIOS[0]
-    return one.value + 0.5 * one.cost + float(logs.max() + np.log(np.exp(logs - logs.max()).sum() * step))
+    return one.posterior + 0.5 * one.chi_square + float(logs.max() + np.log(np.exp(logs - logs.max()).sum() * step))
 
 
-def evidence(answer: Answer, rivals: list[Ranked], temperature: float) -> float:
+def evidence(answer: Answer, rivals: list[ConsensusSet], temperature: float) -> float:
     """Sum what the rivals weigh beside the best, at most one each."""
     least = worth(answer.best)
     total = 0.0
     for rival in rivals:
-        share = rival.value / answer.best.value
-        counted = np.interp(share, [tuning.UNCOUNTED_SHARE, tuning.RIVAL_SHARE], [0.0, 1.0])
+        share = rival.posterior / answer.best.posterior
+        counted = np.interp(share, [tuning.UNCOUNTED_FRACTION, RIVAL_SHARE], [0.0, 1.0])
         total += float(counted) * min(1.0, math.exp((worth(rival) - least) / temperature))
     return total
 
@@ -52,31 +55,33 @@ def root(x: float) -> float:
     return -math.sqrt(-x) if x < 0.0 else math.sqrt(x)
 
 
-def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null: Null | None = None) -> Numbers:
+def features(
+    context: SearchContext, answer: Answer, rivals: list[ConsensusSet], null: NullScore | None = None
+) -> Numbers:
     """Return the features by name; without a null those of the least there is."""
-    best, hinges = answer.best, answer.settled.hinges.tolist()
+    best, leverages = answer.best, answer.estimated.leverages.tolist()
     matched = [wall >= 0 for wall in best.matches["wall"]]
     clutter = [length for length, on in zip(context.lines.rows["length"], matched, strict=True) if not on]
     count = sum(matched)
     nearest = max((worth(rival) for rival in rivals), default=-math.inf)
     crowd = evidence(answer, rivals, tuning.CROWD_TEMPERATURE) + math.exp(tuning.LEAST_CROWD)
     misfit = math.log(sorted((tuning.LEAST_MISFIT, best.misfit, tuning.MOST_MISFIT))[1])
-    by_segments = best.score - tuning.BEAMS_READ * best.read + tuning.BEAMS_PASSED * best.passed
+    by_segments = best.score - BEAMS_READ * best.read + BEAMS_PASSED * best.passed
     share, counts = 0.0, 1.0
     if null is not None:
         share = min(tuning.MOST_NULL, null.score / best.score)
         alike = (null.symmetry - tuning.UNLIKE_SYMMETRY) / (tuning.SYMMETRIC - tuning.UNLIKE_SYMMETRY)
         counts = 1.0 - sorted((0.0, alike, 1.0))[1]
-    counted = tuning.NULL_SHARE + counts * max(0.0, share - tuning.NULL_SHARE)
+    counted = tuning.NULL_FRACTION + counts * max(0.0, share - tuning.NULL_FRACTION)
     gap = min(tuning.MAX_GAP, max(-tuning.MAX_GAP, (1.0 - counted) * best.score))
     return {
         "constant": 1.0,
-        "lead": min(tuning.MAX_LEAD, worth(best) - nearest if rivals else best.value),
+        "lead": min(tuning.MAX_LEAD, worth(best) - nearest if rivals else best.posterior),
         "solitude": -math.log(crowd),
-        "share": best.share,
+        "inlier_fraction": best.fraction,
         "root_count": count**0.5,
         "root_length": best.length**0.5,
-        "deviation": min(answer.settled.weakest, tuning.MOST_DEVIATION),
+        "deviation": min(answer.estimated.weakest, tuning.MOST_DEVIATION),
         "misfit": misfit,
         "inverse_count": 1.0 / count if count else 1.0,
         "longest_unmatched": min(max([0.0, *clutter]), tuning.LONGEST_UNMATCHED),
@@ -85,17 +90,17 @@ def features(context: SearchContext, answer: Answer, rivals: list[Ranked], null:
         "passed": best.passed,
         "root_farther": answer.beams.farther**0.5,
         "root_nearer": answer.beams.nearer**0.5,
-        "hinge_moves": min(max([0.0, *(one[1] for one in hinges)]), tuning.MOST_DEVIATION),
-        "hinge_deviation": min(max([0.0, *(one[2] for one in hinges)]), tuning.MOST_DEVIATION),
-        "chance": max(tuning.LEAST_CHANCE_FEATURE, math.log10(answer.significance)),
+        "critical_displacement": min(max([0.0, *(one[1] for one in leverages)]), tuning.MOST_DEVIATION),
+        "critical_deviation": min(max([0.0, *(one[2] for one in leverages)]), tuning.MOST_DEVIATION),
+        "log_significance": max(tuning.LEAST_LOG_SIGNIFICANCE, math.log10(answer.significance)),
         "null": counted,
         "null_gap": root(gap),
         "null_better": max(0.0, share - 1.0),
         "root_score": root(max(0.0, by_segments)),
         "blocked": best.blocked**0.5,
-        "walls": len(hinges) ** 0.5,
+        "walls": len(leverages) ** 0.5,
         "misfit_of_many": misfit * min(1.0, count / tuning.MANY),
-        "beyond_nearly_all": max(0.0, best.share - tuning.NEARLY_ALL),
+        "beyond_nearly_all": max(0.0, best.fraction - tuning.NEARLY_ALL),
         "root_unmatched": min(sum(clutter), tuning.MOST_UNMATCHED) ** 0.5,
         "squared_solitude": math.log(crowd) ** 2,
     }
@@ -159,25 +164,25 @@ def judge(
     best = answer.best
     others = [one for one in explanations.ranked if one is not best]
     rivals = [one for one in others if one.inside]
-    elsewhere = max((other.score for other in others), default=-math.inf) > best.score + tuning.CONTRADICTION
-    free = answer.settled.parallel or answer.settled.weakest > MAX_DEVIATION
-    hinges = answer.settled.hinges
-    thin = len(hinges) <= tuning.FEW_WALLS and max(hinges["deviation"], default=0.0) > MAX_DEVIATION
+    elsewhere = max((other.score for other in others), default=-math.inf) > best.score + CONTRADICTION
+    free = answer.estimated.parallel or answer.estimated.weakest > MAX_DEVIATION
+    leverages = answer.estimated.leverages
+    thin = len(leverages) <= tuning.FEW_WALLS and max(leverages["deviation"], default=0.0) > MAX_DEVIATION
     off = [float(match["offset"]) for match in best.matches if match["wall"] >= 0]
     if (
         not context.with_beams
-        and len(hinges) == tuning.FEW_WALLS
+        and len(leverages) == tuning.FEW_WALLS
         and math.sqrt(np.mean(np.square(off))) <= tuning.OFFSET_OF_FEW
     ):
         thin = False
     chances = _chances(context, explanations, models, usual_deviation)
     likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
-        share = 1.0 / (1.0 + evidence(answer, rivals, tuning.TWIN_TEMPERATURE))
-        less = min(1.0, loose_twin_share(context, answer, rivals) / share)
+        share = 1.0 / (1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE))
+        less = min(1.0, probability_with_loose_walls(context, answer, rivals) / share)
         chances = replace(chances, right=less * chances.right, careful=less * chances.careful)
         if chances.careful >= bar_of(context):
-            numbers = features(context, answer, rivals, null_of(context, best))
+            numbers = features(context, answer, rivals, find_null_score(context, best))
             careful = logistic(logit(cautious_of(context, models), numbers))
             better = numbers["null_better"] >= tuning.MIRRORED_BETTER
             chances = replace(chances, careful=less * share * careful, asked=True, mirrored=better)
@@ -188,7 +193,7 @@ def judge(
     if chances.explained < tuning.NO_MATCH_PROBABILITY:
         status = Status.NO_MATCH
     window, pose = context.prior, answer.registered.pose
-    contradicted = elsewhere or best.value < best.score + tuning.FAR_FROM_PRIOR
+    contradicted = elsewhere or best.posterior < best.score + tuning.FAR_FROM_PRIOR
     if isinstance(window, HardPrior) and status is not Status.NO_MATCH and pose is not None:
         contradicted = contradicted or not window.contains(pose)
     return replace(
@@ -201,8 +206,8 @@ def judge(
         if contradicted
         else chances.right,
         contradicted=contradicted,
-        margin=best.value - rivals[0].value if rivals else None,
-        runner_up=max(0.0, rivals[0].value / best.value) if rivals and best.value > 0.0 else None,
+        margin=best.posterior - rivals[0].posterior if rivals else None,
+        runner_up=max(0.0, rivals[0].posterior / best.posterior) if rivals and best.posterior > 0.0 else None,
     )
 
 
@@ -219,7 +224,7 @@ def _chances(
     rivals = [one for one in explanations.ranked if one is not answer.best and one.inside]
     numbers, cautious = features(context, answer, rivals), cautious_of(context, models)
     usual = models["probability" if context.scan.beams is None else "probability_with_beams"]
-    twins = 1.0 + evidence(answer, rivals, tuning.TWIN_TEMPERATURE)
+    twins = 1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE)
     return Judged(
         Status.NO_MATCH,
         False,

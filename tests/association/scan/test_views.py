@@ -1,4 +1,4 @@
-"""Several views of one question: put together, laid on one another, and settled with their errors."""
+"""Several views of one question: put together, laid on one another, and estimated with their errors."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from association import Deadline, InvalidSearchError, Scan, Status, View, assemble, mirrored
-from association.consensus.view_settling import SeenOnWalls
+from association.consensus.tuning import ROUGH_FRACTION, SPRING
+from association.consensus.view_estimation import SeenOnWalls
 from association.explain import search_and_explain
 from association.layout import SIGHTING, WALL
 from association.scan.alignment import aligned
 from association.scan.scan import Views, scaled
 from association.scan.scan_lines import parts_of
 from association.scan.views import corrected
-from association.tuning import LEAST_IN_STEP, ROUGH_SHARE, SPRING
-from association.verdict.features import features_of, weigh
+from association.verdict.alternatives import compare_alternatives
+from association.verdict.features import features_of
+from association.verdict.tuning import LEAST_IN_STEP
 from association.verdict.verdict import judge
 from registration import RigidTransform
 from registration.layout import Floats
@@ -181,8 +183,8 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
     together = assemble(views).views
     assert together is not None
     shown, variance = on_walls(rng, together), 0.02**2
-    settled = shown.settle(pose(), variance, Deadline())
-    assert same_pose(settled.pose, pose(), 1e-9, 1e-9)
+    estimated = shown.estimate_poses(pose(), variance, Deadline())
+    assert same_pose(estimated.pose, pose(), 1e-9, 1e-9)
     rows, by_pose, by_views, noise = [], [], [], []
     for one, wall in zip(shown.seen, shown.walls, strict=True):
         n, c = np.array([-wall["dy"], wall["dx"]]), np.array([one["centroid_x"], one["centroid_y"]])
@@ -192,7 +194,7 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
         own = np.zeros(3 * len(together))
         own[3 * one["sensor"] : 3 * one["sensor"] + 3] = [n[0], n[1], lever - n @ [-at.y, at.x]]
         by_views.append(own)
-        noise.append(one["variance"] + ROUGH_SHARE * variance)
+        noise.append(one["variance"] + ROUGH_FRACTION * variance)
         turn = np.zeros(3 * len(together))
         turn[3 * one["sensor"] + 2] = 1.0
         rows.append((turn, noise[-1] / one["spread"]))
@@ -202,7 +204,7 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
     same = shown.number[:, None] == shown.number[None]
     together_covariance[: len(noise), : len(noise)] += variance * same
     information = jacobian.T @ np.linalg.solve(together_covariance, jacobian) + np.diag([SPRING, SPRING, 0.0])
-    np.testing.assert_allclose(settled.covariance, np.linalg.inv(information), rtol=1e-6)
+    np.testing.assert_allclose(estimated.covariance, np.linalg.inv(information), rtol=1e-6)
 
 
 def test_what_is_not_known_of_a_view_is_not_known_of_its_lines() -> None:
@@ -235,10 +237,10 @@ def test_walls_are_as_far_off_as_one_view_shows_them_to_be() -> None:
     one, other = (search_and_explain(context_of(INDEX, assemble(views))).answer for views in (exact, nearly))
     assert one is not None
     assert other is not None
-    assert one.settled.views is None
-    assert other.settled.views is not None
-    assert one.settled.wall_sigma > 0.021
-    assert other.settled.wall_sigma == pytest.approx(one.settled.wall_sigma, rel=1e-3)
+    assert one.estimated.views is None
+    assert other.estimated.views is not None
+    assert one.estimated.wall_sigma > 0.021
+    assert other.estimated.wall_sigma == pytest.approx(one.estimated.wall_sigma, rel=1e-3)
 
 
 def test_views_are_laid_on_one_another_where_their_walls_are_one() -> None:
@@ -263,8 +265,8 @@ def test_the_errors_of_views_are_found_beside_the_pose() -> None:
     assert max(abs(pair.offset) for pair in result.correspondences) < 0.03
     answer = search_and_explain(context_of(INDEX, scan)).answer
     assert answer is not None
-    assert answer.settled.views is not None
-    views = corrected(aligned(scan, Deadline()), answer.settled.views.found, answer.settled.views.spread).views
+    assert answer.estimated.views is not None
+    views = corrected(aligned(scan, Deadline()), answer.estimated.views.found, answer.estimated.views.spread).views
     assert views is not None
     assert same_pose(views.poses[1], true, 0.02, 0.005)
 
@@ -334,6 +336,6 @@ def test_what_is_on_no_wall_counts_by_view_of_a_drive(
     context = context_of(INDEX, assemble(views))
     answer = search_and_explain(context).answer
     assert answer is not None
-    features = features_of(context, answer, weigh(answer.best, []))
+    features = features_of(context, answer, compare_alternatives(answer.best, []))
     assert features.longest_unmatched == pytest.approx(longest, abs=0.01)
     assert features.root_unmatched**2 == pytest.approx(together, abs=0.02)

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from association import CancelledError, Deadline, HardPrior, MapIndex, Scan, SearchReport
+from association.consensus.tuning import ROUNDS
 from association.search.candidates import Candidates, find_candidates
 from association.search.kernels.bases import pair_up
 from association.search.tuning import BASE_SEGMENTS, KEPT_SHARE, KEPT_SHARE_FOR_BEAMS, REUSE, TELLING_SEGMENTS
-from association.tuning import RIVAL_SHARE, ROUNDS
+from association.tuning import RIVAL_SHARE
 from registration import RigidTransform
 from registration.layout import Records
 

@@ -11,15 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from association import tuning
-from association.consensus.ranking import Ranked
-from association.consensus.sight import BeamShares
+from association.consensus.consensus_set import ConsensusSet
+from association.consensus.sight import BeamFractions
 from association.explanations import Answer
-from association.verdict.features import Features, facts_of, features_of, is_thin, twin_share, weigh, with_null
-from association.verdict.null import Null
+from association.verdict import tuning
+from association.verdict.alternatives import compare_alternatives, probability_among
+from association.verdict.chance import NullScore
+from association.verdict.features import Features, depends_on_one_wall, facts_of, features_of, with_null_score
 from registration.layout import Records
 
-from ..answers import answer_with, hinges_of, ranked, registered_room, room, settled_of
+from ..answers import answer_with, estimated_of, leverages_of, ranked, registered_room, room
 from ..reference import verdict as twin
 
 CONTEXT = room()
@@ -28,12 +29,12 @@ LENGTHS = CONTEXT.lines.rows["length"].tolist()  # 9, 5.5, 4, 4, 3, 3, 2, 1.5: t
 SCORES = st.floats(1.0, 150.0)
 
 
-def features_beside(answer: Answer, rivals: Sequence[Ranked]) -> Features:
-    return features_of(CONTEXT, answer, weigh(answer.best, rivals))
+def features_beside(answer: Answer, rivals: Sequence[ConsensusSet]) -> Features:
+    return features_of(CONTEXT, answer, compare_alternatives(answer.best, rivals))
 
 
-def hinging(hinges: Records | None = None, weakest: float = 0.01, score: float = 100.0, **merits: Any) -> Answer:
-    return answer_with(ranked(score, **merits), settled=settled_of(registered_room(), hinges, weakest))
+def hinging(leverages: Records | None = None, weakest: float = 0.01, score: float = 100.0, **scores: Any) -> Answer:
+    return answer_with(ranked(score, **scores), estimated=estimated_of(registered_room(), leverages, weakest))
 
 
 def test_features_of_an_answer_beside_two_rivals() -> None:
@@ -44,7 +45,7 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         constant=1.0,
         lead=4.0,
         solitude=-math.log(crowd),
-        share=0.9,
+        inlier_fraction=0.9,
         root_count=math.sqrt(5.0),
         root_length=5.0,
         deviation=0.3,
@@ -56,9 +57,9 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         passed=0.04,
         root_farther=0.3,
         root_nearer=0.4,
-        hinge_moves=0.25,
-        hinge_deviation=0.4,
-        chance=-9.0,
+        critical_displacement=0.25,
+        critical_deviation=0.4,
+        log_significance=-9.0,
         null=0.7,
         null_gap=math.sqrt(0.3 * 80.0),
         null_better=0.0,
@@ -70,8 +71,10 @@ def test_features_of_an_answer_beside_two_rivals() -> None:
         root_unmatched=math.sqrt(6.5),
         squared_solitude=math.log(crowd) ** 2,
     )
-    settled = settled_of(registered_room(), hinges_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
-    got = features_beside(answer_with(best, settled=settled, agreement=0.85, beams=BeamShares(0.09, 0.16)), rivals)
+    estimated = estimated_of(registered_room(), leverages_of((1, 0.25, 0.1), (4, 0.05, 0.4), (5, 0.0, 0.0)), 0.3)
+    got = features_beside(
+        answer_with(best, estimated=estimated, agreement=0.85, beams=BeamFractions(0.09, 0.16)), rivals
+    )
     assert got._asdict() == pytest.approx(expected._asdict())
 
 
@@ -83,17 +86,17 @@ def test_features_say_no_more_beyond_their_limits() -> None:
     assert features_beside(answer_with(ranked(90.0)), [ranked(30.0)]).lead == tuning.MAX_LEAD
     worse = features_beside(answer_with(ranked(30.0)), [ranked(50.0)])
     assert (worse.lead, worse.solitude) == pytest.approx((-20.0, 0.0), abs=1e-5)
-    nothing = features_beside(answer_with(ranked(matched=0, share=0.0, misfit=0.0), significance=1e-300), [])
+    nothing = features_beside(answer_with(ranked(matched=0, fraction=0.0, misfit=0.0), significance=1e-300), [])
     assert (nothing.root_count, nothing.inverse_count, nothing.beyond_nearly_all) == (0.0, 1.0, 0.0)
     assert nothing.misfit == math.log(tuning.LEAST_MISFIT)
     assert (nothing.longest_unmatched, nothing.root_unmatched) == (tuning.LONGEST_UNMATCHED, 4.0)
-    assert nothing.chance == tuning.LEAST_CHANCE_FEATURE
-    assert (nothing.hinge_moves, nothing.hinge_deviation, nothing.walls) == (0.0, 0.0, 0.0)
-    whole = features_beside(answer_with(ranked(share=1.0, misfit=1e9)), [])
+    assert nothing.log_significance == tuning.LEAST_LOG_SIGNIFICANCE
+    assert (nothing.critical_displacement, nothing.critical_deviation, nothing.walls) == (0.0, 0.0, 0.0)
+    whole = features_beside(answer_with(ranked(fraction=1.0, misfit=1e9)), [])
     assert (whole.longest_unmatched, whole.root_unmatched) == (0.0, 0.0)
     assert whole.misfit == whole.misfit_of_many == math.log(tuning.MOST_MISFIT)
-    loose = features_beside(hinging(hinges_of((0, 3.0, 0.0), (1, 0.0, 10.0)), 2.0), [])
-    assert (loose.deviation, loose.hinge_moves, loose.hinge_deviation) == (tuning.MOST_DEVIATION,) * 3
+    loose = features_beside(hinging(leverages_of((0, 3.0, 0.0), (1, 0.0, 10.0)), 2.0), [])
+    assert (loose.deviation, loose.critical_displacement, loose.critical_deviation) == (tuning.MOST_DEVIATION,) * 3
     by_beams = features_beside(hinging(score=40.0, read=0.9), [])
     assert by_beams.root_score == 0.0
 
@@ -110,15 +113,16 @@ def test_features_say_no_more_beyond_their_limits() -> None:
 def test_features_are_those_of_the_twin(
     scores: list[float], matched: int, share: float, misfit: float, agreement: float, null: tuple[float, float]
 ) -> None:
-    parts: dict[str, Any] = {"share": share, "misfit": misfit}
+    parts: dict[str, Any] = {"fraction": share, "misfit": misfit}
     best, *rivals = (
-        ranked(score, matched=max(0, matched - k), cost=5.0 * abs(k - 2), **parts) for k, score in enumerate(scores)
+        ranked(score, matched=max(0, matched - k), chi_square=5.0 * abs(k - 2), **parts)
+        for k, score in enumerate(scores)
     )
     answer = answer_with(best, agreement=agreement)
     got = features_beside(answer, rivals)
     assert got._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals), abs=1e-9)
-    mirrored = with_null(got, best, Null(*null))
-    assert mirrored._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals, Null(*null)), abs=1e-9)
+    mirrored = with_null_score(got, best, NullScore(*null))
+    assert mirrored._asdict() == pytest.approx(twin.features(CONTEXT, answer, rivals, NullScore(*null)), abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +144,7 @@ def test_the_mirrored_scan_says_less_the_more_the_map_is_symmetric(
 ) -> None:
     """Of an answer with 100 nats: from 70 on, and up to 120; but for what it scores more than the answer."""
     before = features_beside(answer_with(ranked(100.0)), [])
-    got = with_null(before, ranked(100.0), Null(score, symmetry))
+    got = with_null_score(before, ranked(100.0), NullScore(score, symmetry))
     assert (got.null, got.null_better) == pytest.approx((null, better))
     assert math.copysign(got.null_gap**2, got.null_gap) == pytest.approx(100.0 * gap)
     unmoved = {name: value for name, value in got._asdict().items() if not name.startswith("null")}
@@ -151,19 +155,19 @@ def test_the_gap_to_the_mirrored_scan_has_an_end_and_an_answer_without_score_non
     strong = ranked(300.0)
     assert features_beside(answer_with(strong), []).null_gap ** 2 == pytest.approx(tuning.MAX_GAP)
     none = ranked(0.0)
-    assert with_null(features_beside(answer_with(none), []), none, Null(5.0, 0.0)).null == tuning.MOST_NULL
+    assert with_null_score(features_beside(answer_with(none), []), none, NullScore(5.0, 0.0)).null == tuning.MOST_NULL
 
 
 def test_twins_share_the_chance() -> None:
     """One that scores 1.5 nats less is one to e as likely; one that scores more is as likely and no more."""
     best = ranked(50.0)
-    assert twin_share(weigh(best, [])) == 1.0
-    assert twin_share(weigh(best, [ranked(50.0)] * 3)) == pytest.approx(0.25)
-    assert twin_share(weigh(best, [ranked(80.0)])) == pytest.approx(0.5)
-    assert twin_share(weigh(best, [ranked(48.5)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
-    assert twin_share(weigh(best, [ranked(52.0, -3.5)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0))), (
-        "with the prior"
-    )
+    assert probability_among(compare_alternatives(best, [])) == 1.0
+    assert probability_among(compare_alternatives(best, [ranked(50.0)] * 3)) == pytest.approx(0.25)
+    assert probability_among(compare_alternatives(best, [ranked(80.0)])) == pytest.approx(0.5)
+    assert probability_among(compare_alternatives(best, [ranked(48.5)])) == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
+    assert probability_among(compare_alternatives(best, [ranked(52.0, -3.5)])) == pytest.approx(
+        1.0 / (1.0 + math.exp(-1.0))
+    ), "with the prior"
 
 
 @pytest.mark.parametrize(("cost", "lead"), [(0.0, 11.99), (6.0, 6.26), (60.0, 1.40)])
@@ -172,15 +176,15 @@ def test_the_farther_walls_are_off_the_less_centimetres_tell_rivals_apart(cost: 
 
     With 8 matches, and 2 walls for what was supposed: ``10 - 20 / 2 + 5 log((cost + 22) / (cost + 2))``.
     """
-    answer, rival = answer_with(ranked(50.0, cost=cost)), ranked(40.0, cost=cost + 20.0)
+    answer, rival = answer_with(ranked(50.0, chi_square=cost)), ranked(40.0, chi_square=cost + 20.0)
     features = features_beside(answer, [rival])
     assert features.lead == pytest.approx(lead, abs=0.01)
     assert features.solitude == pytest.approx(lead / tuning.CROWD_TEMPERATURE, abs=0.01)
-    assert twin_share(weigh(answer.best, [rival])) == pytest.approx(
-        1.0 / (1.0 + math.exp(-lead / tuning.TWIN_TEMPERATURE)), abs=0.002
+    assert probability_among(compare_alternatives(answer.best, [rival])) == pytest.approx(
+        1.0 / (1.0 + math.exp(-lead / tuning.ALTERNATIVE_TEMPERATURE)), abs=0.002
     )
-    assert features_beside(answer, [ranked(40.0, cost=cost)]).lead == pytest.approx(10.0)
-    nearest = features_beside(answer, [ranked(42.0, cost=cost), rival])
+    assert features_beside(answer, [ranked(40.0, chi_square=cost)]).lead == pytest.approx(10.0)
+    nearest = features_beside(answer, [ranked(42.0, chi_square=cost), rival])
     assert nearest.lead == pytest.approx(min(lead, 8.0), abs=0.01)
 
 
@@ -198,12 +202,12 @@ def test_scan() -> None:
 )  # fmt: skip
 def test_few_walls_of_which_one_alone_decides_are_thin(walls: int, deviation: float, offset: float, thin: bool) -> None:
     """Three of them only where they are farther from where the map has them than three sides of other rooms are."""
-    hinges = hinges_of(*((k, 0.0, deviation if k == 0 else 0.01) for k in range(walls)))
+    leverages = leverages_of(*((k, 0.0, deviation if k == 0 else 0.01) for k in range(walls)))
     best = ranked(matched=walls)
     best.matches["offset"] = np.where(best.matched, offset, 9.0)
-    answer = answer_with(best, settled=settled_of(registered_room(), hinges))
+    answer = answer_with(best, estimated=estimated_of(registered_room(), leverages))
     facts = facts_of(CONTEXT, answer)
-    assert is_thin(CONTEXT, answer, facts) is thin
-    assert is_thin(room(with_beams=True), answer, facts) is (walls <= 3 and deviation > 0.5), (
+    assert depends_on_one_wall(CONTEXT, answer, facts) is thin
+    assert depends_on_one_wall(room(with_beams=True), answer, facts) is (walls <= 3 and deviation > 0.5), (
         "beams move poses to where they fit"
     )

@@ -48,7 +48,7 @@ def test_a_curve_is_a_line_that_bends(value: float, expected: float) -> None:
 
 
 def test_the_odds_are_those_of_the_curves_together() -> None:
-    model = Model({"constant": Curve(-1.0), "share": Curve(3.0, ((0.6, -1.0),))})
+    model = Model({"constant": Curve(-1.0), "inlier_fraction": Curve(3.0, ((0.6, -1.0),))})
     assert model.logit(COUNTED) == pytest.approx(-0.5 + 3.0 * 0.8 - 0.2)
 
 
@@ -66,8 +66,8 @@ def test_the_odds_are_those_of_the_curves_together() -> None:
 )
 def test_of_a_pair_both_have_to_speak_or_one_is_enough(kind: str, share: float, lead: float, expected: float) -> None:
     """The share from 0.4 to 0.8, the lead from 4 down to 0."""
-    pair = Pair(kind, "share", "lead", 2.0, ((0.4, 0.8), (4.0, 0.0)))
-    features = USUAL._replace(share=share, lead=lead)
+    pair = Pair(kind, "inlier_fraction", "lead", 2.0, ((0.4, 0.8), (4.0, 0.0)))
+    features = USUAL._replace(inlier_fraction=share, lead=lead)
     assert Model({}, (pair,)).logit(features) == pytest.approx(expected)
     model = Model({"constant": Curve(1.0)}, (pair,))
     assert model.logit(features) == pytest.approx(1.0 + expected)
@@ -101,7 +101,7 @@ def test_a_bend_has_a_value_and_a_change() -> None:
 
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
-    document = json.loads((Path(association.__file__).parent / FILE).read_text())
+    document = json.loads((Path(association.__file__).parent / "verdict" / FILE).read_text())
     assert set(MODELS) == set(document["models"]) == set(FITTED_ON) == NAMES
     curves = document["models"][name]
     assert {name for key in curves for name in key.removeprefix(LEAST).removeprefix(MOST).split()} <= set(

@@ -8,21 +8,21 @@ from dataclasses import replace
 import pytest
 
 from association import AssociationResult, Deadline, HardPrior, Status, associate
-from association.tuning import NO_TWIN, TELLING_REASON
 from association.verdict import reasons
 from association.verdict.features import Features
 from association.verdict.models import USUAL, as_model
-from association.verdict.reasons import FEATURES_OF, SENTENCES, Standing, reasons_of
+from association.verdict.reasons import FEATURES_OF, SENTENCES, Doubts, reasons_of
+from association.verdict.tuning import NO_ALTERNATIVE, TELLING_REASON
 
 from ..scenes import CORRIDOR, INSIDE, ROOM, answer_of, equal_rooms, index_of, maze, pose, scan_of, seen
 
 USUAL_ONE = Features(*([0.0] * len(Features._fields)))
 # One feature of each reason, from which every unit takes a nat.
-MODEL = as_model({name: [-1.0] for name in ("lead", "hinge_moves", "share", "root_count", "null")})
+MODEL = as_model({name: [-1.0] for name in ("lead", "critical_displacement", "inlier_fraction", "root_count", "null")})
 ONE_OF = {
     "similar_place": "lead",
-    "single_wall": "hinge_moves",
-    "map_mismatch": "share",
+    "single_wall": "critical_displacement",
+    "map_mismatch": "inlier_fraction",
     "insufficient_evidence": "root_count",
 }
 ONE_OF["not_on_map"] = "null"
@@ -47,7 +47,7 @@ def codes_of(
     twin: bool = False,
 ) -> list[str]:
     """Return the codes of an answer of which these reasons take so many nats."""
-    standing = Standing(status, complete, contradicted, elsewhere=strange, thin=thin, twin=twin)
+    standing = Doubts(status, complete, contradicted, not_on_map=strange, few_walls=thin, similar_place=twin)
     features = USUAL_ONE._replace(**{ONE_OF[code]: nats for code, nats in taken.items()})
     told = reasons_of(standing, features, MODEL)
     assert all(reason.message == SENTENCES[reason.code] for reason in told)
@@ -78,23 +78,23 @@ def test_several_features_of_a_reason_count_together() -> None:
     names = [name for some in FEATURES_OF.values() for name in some]
     assert len(set(names)) == len(names)
     assert set(names) == set(Features._fields) - {"constant"}
-    model = as_model({"lead": [-1.0], "solitude": [-1.0], "share": [-1.0]})
-    features = USUAL_ONE._replace(lead=0.8, solitude=0.8, share=1.2)
-    told = reasons_of(Standing(Status.AMBIGUOUS, True, False, False, False, False), features, model)
+    model = as_model({"lead": [-1.0], "solitude": [-1.0], "inlier_fraction": [-1.0]})
+    features = USUAL_ONE._replace(lead=0.8, solitude=0.8, inlier_fraction=1.2)
+    told = reasons_of(Doubts(Status.AMBIGUOUS, True, False, False, False, False), features, model)
     assert [reason.code for reason in told] == ["similar_place", "map_mismatch"]
 
 
 def test_what_is_far_behind_is_no_twin() -> None:
     model = as_model({"solitude": [1.0], "root_count": [1.0]})
-    standing = Standing(Status.AMBIGUOUS, True, False, elsewhere=False, thin=False, twin=False)
+    standing = Doubts(Status.AMBIGUOUS, True, False, not_on_map=False, few_walls=False, similar_place=False)
 
     def codes_at(lead: float, *, alone: bool = False) -> list[str]:
         features = USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0)
         return [reason.code for reason in reasons_of(replace(standing, alone=alone), features, model)]
 
-    assert codes_at(NO_TWIN) == ["similar_place", "insufficient_evidence"]
-    assert codes_at(NO_TWIN + 0.01) == ["insufficient_evidence"]
-    assert codes_at(NO_TWIN, alone=True) == ["insufficient_evidence"]
+    assert codes_at(NO_ALTERNATIVE) == ["similar_place", "insufficient_evidence"]
+    assert codes_at(NO_ALTERNATIVE + 0.01) == ["insufficient_evidence"]
+    assert codes_at(NO_ALTERNATIVE, alone=True) == ["insufficient_evidence"]
 
 
 def test_what_the_verdict_is_comes_before_what_is_weighed() -> None:
@@ -130,7 +130,9 @@ def test_a_free_direction_is_told_instead_of_what_is_weighed() -> None:
 
 
 def test_without_an_answer_there_is_nothing_to_weigh() -> None:
-    told = reasons_of(Standing(Status.NO_MATCH, True, False, elsewhere=True, thin=False, twin=False), None, None)
+    told = reasons_of(
+        Doubts(Status.NO_MATCH, True, False, not_on_map=True, few_walls=False, similar_place=False), None, None
+    )
     assert [reason.code for reason in told] == ["not_on_map"]
 
 

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from association.tuning import LEAST_SIGNIFICANCE
-from association.verdict.significance import EXPONENTS, significance
+from association.verdict.chance import EXPONENTS, significance
+from association.verdict.tuning import LEAST_SIGNIFICANCE
 
 from ..reference import chance as twin
 from ..scenes import context_of, index_of, maze, pose, scan_of, seen

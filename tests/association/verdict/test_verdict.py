@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from association import AssociationOptions, Deadline, HardPrior, Reason, Status, associate, report, tuning
-from association.consensus.ranking import Ranked
+from association import AssociationOptions, Deadline, HardPrior, Reason, Status, associate, report
+from association.consensus.consensus_set import ConsensusSet
 from association.context import SearchContext
 from association.search import candidates
-from association.verdict import loosening, null, reasons, verdict
+from association.verdict import alternatives, chance, probabilities, reasons, tuning, verdict
 from association.verdict.verdict import Verdict, judge
 
-from ..answers import answer_with, explanations_of, ranked, registered_corridor, registered_room, room, settled_of
+from ..answers import answer_with, estimated_of, explanations_of, ranked, registered_corridor, registered_room, room
 from ..judged import AROUND, BESIDE, LIKELY, PLAIN, SOFT, Drawn, Numbers, crossing, judged_by
 from ..scenes import INSIDE, ROOM, equal_rooms, index_of, pose, same_pose, scan_of, seen
 
@@ -55,7 +55,7 @@ def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar
         usable = leading(high, with_beams=with_beams).verdict
     assert usable.usable
     # At the limit a twin that is so far behind takes from the chance what is left of it.
-    share = 1.0 / (1.0 + math.exp(-high / tuning.TWIN_TEMPERATURE))
+    share = 1.0 / (1.0 + math.exp(-high / tuning.ALTERNATIVE_TEMPERATURE))
     chance = share / (1.0 + math.exp(3.0 - 0.2 * high))
     assert chance == pytest.approx(bar)
     assert usable.probability == pytest.approx(chance if model.startswith("probability") else share)
@@ -68,7 +68,7 @@ def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.
     """
     with judged_by(SURE):
         assert leading(40.0).verdict.usable
-        monkeypatch.setattr(loosening, "LOOSE_RIVALS", tuning.LOOSE_RIVALS)
+        monkeypatch.setattr(alternatives, "LOOSE_ALTERNATIVES", tuning.LOOSE_ALTERNATIVES)
         got = leading(40.0).verdict
         for unusable in (replace(leading(40.0), thin=True), replace(leading(40.0), degenerate=True)):
             assert unusable.verdict.cautious == pytest.approx(1.0)
@@ -167,12 +167,12 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Return up to which shares of the score the mirrored scan was searched while an answer was judged."""
     asked: list[float] = []
 
-    def null_of(context: SearchContext, best: Ranked, share: float) -> null.Null:
+    def find_null_score(context: SearchContext, best: ConsensusSet, share: float) -> chance.NullScore:
         asked.append(share)
-        return null.null_of(context, best, share)
+        return chance.find_null_score(context, best, share)
 
     with monkeypatch.context() as patch:
-        patch.setattr(verdict, "null_of", null_of)
+        patch.setattr(probabilities, "find_null_score", find_null_score)
         judge(one.context, one.explanations)
     return asked
 
@@ -180,13 +180,13 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> list[float]:
 def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     """It costs a search: not where a twin, a free direction, the prior or either probability forbids it already."""
     sure = leading(40.0)
-    most = tuning.NULL_SHARES[-1]
+    most = tuning.NULL_FRACTIONS[-1]
     assert asked_of(sure, monkeypatch) == [most], "no other null takes anything from it"
     assert asked_of(replace(sure, complete=False), monkeypatch) == [0.0], "the reasons are told by it"
     for matters, share in ((most + 0.01, most), (1.01, 1.0), (0.96, 0.95), (0.71, 0.0)):
         with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, matters, -1000.0]}}):
             assert asked_of(sure, monkeypatch) == [share]
-    monkeypatch.setattr(verdict, "loose_twin_share", lambda *_: 0.92)
+    monkeypatch.setattr(probabilities, "probability_with_loose_walls", lambda *_: 0.92)
     for probable, asked in ((0.93, [0.0]), (0.91, [most])):
         with judged_by(SURE, USABLE_PROBABILITY=probable):
             assert asked_of(sure, monkeypatch) == asked, "it is not usable all the same, and the reasons are told by it"
@@ -204,7 +204,7 @@ def test_where_the_bar_is_next_to_one_every_null_matters(monkeypatch: pytest.Mon
     """Also where no odds are so great that rounding leaves room for a null."""
     for lacking in (1e-8, 1e-9, 5e-10, 1e-12):
         with judged_by(SURE, USABLE_CAUTIOUS=1.0 - lacking):
-            assert asked_of(leading(400.0), monkeypatch) == [tuning.NULL_SHARES[-1] if lacking > 2e-9 else 0.0]
+            assert asked_of(leading(400.0), monkeypatch) == [tuning.NULL_FRACTIONS[-1] if lacking > 2e-9 else 0.0]
 
 
 def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> None:
@@ -221,7 +221,7 @@ def test_where_the_mirrored_scan_scores_as_high_the_answer_is_not_usable() -> No
 def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """However sure the models are, and whether the map is symmetric or not: the laser is upside down, or elsewhere."""
     score = (1.0 + better) * LIKELY.score
-    monkeypatch.setattr(verdict, "null_of", lambda *_: null.Null(score, 1.0))
+    monkeypatch.setattr(probabilities, "find_null_score", lambda *_: chance.NullScore(score, 1.0))
     with judged_by(SURE):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.OK if usable else Status.AMBIGUOUS, usable)
@@ -251,8 +251,8 @@ def test_an_incomplete_search_is_never_usable() -> None:
     ("module", "during"),
     [
         (candidates, "search"),
-        (verdict, "null_of"),
-        (verdict, "loose_twin_share"),
+        (probabilities, "find_null_score"),
+        (probabilities, "probability_with_loose_walls"),
         (verdict, "with_lines_of_sight"),
         (report, "with_lines_of_sight"),
         (report, "missing_segments"),
@@ -261,7 +261,7 @@ def test_an_incomplete_search_is_never_usable() -> None:
 def test_what_is_compared_after_the_deadline_is_not_usable(
     module: ModuleType, during: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The deadline passes at the end of the search, while rivals are compared, or while the answer is put together."""
+    """The deadline passes at the end of the search, while alternatives are compared, or later."""
     index = index_of(np.vstack([ROOM, equal_rooms(2)[8:-3]]))
     sent = scan_of(seen(ROOM, INSIDE)[0])
     compared, deadline = getattr(module, during), Deadline(time.monotonic() + 60.0)
@@ -372,6 +372,6 @@ def test_margin_and_runner_up() -> None:
 
 
 def test_of_a_pose_that_is_fixed_the_registered_one_is_answered() -> None:
-    settled = settled_of(registered_room(), weakest=0.2)
-    got = judge(room(), explanations_of(answer_with(ranked(), settled=settled)))
+    estimated = estimated_of(registered_room(), weakest=0.2)
+    got = judge(room(), explanations_of(answer_with(ranked(), estimated=estimated)))
     assert got.pose == registered_room().pose

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 
 from association.consensus.kernels import acceptance
+from association.consensus.tuning import MAX_OTHERS, MOST_UNDER
 from association.layout import ENDS, MATCH, SCAN_LINE, as_records
 from association.tables import Lines
-from association.tuning import MAX_RIVALS, MOST_UNDER
 from registration.layout import Records
 
 from ...kernels.drawn import GATES, SEEDS, SMALL, drawn, in_pieces, workspace_of
@@ -103,8 +103,8 @@ def test_of_many_pieces_the_first_are_named() -> None:
     pairs, overlaps, rivals, starts = accepted_on(pieces, [0.25, 0.0, 5.75, 0.0])
     assert pairs.tolist() == [[0, 1]]
     assert overlaps[0] == pytest.approx(1.0)
-    assert rivals.tolist() == [0, *range(2, 2 + MAX_RIVALS - 1)]
-    assert starts.tolist() == [0, MAX_RIVALS]
+    assert rivals.tolist() == [0, *range(2, 2 + MAX_OTHERS - 1)]
+    assert starts.tolist() == [0, MAX_OTHERS]
 
 
 @given(SEEDS)
@@ -151,7 +151,7 @@ def test_the_work_does_not_grow_with_the_product_of_pieces_and_segments(jitter: 
     assert time.thread_time() - began < 2.0
     assert len(pairs) == 2_000
     assert overlaps.min() > 1.0 - 1e-6
-    assert (np.diff(starts) == MAX_RIVALS).all()
+    assert (np.diff(starts) == MAX_OTHERS).all()
     if not jitter:
         assert pairs[:, 1].tolist() == [0] * 2_000
 
@@ -168,7 +168,7 @@ def test_of_more_pieces_than_are_compared_the_overlap_is_right() -> None:
     )
     assert overlaps[0] == pytest.approx(2.0 / 3.0, abs=1e-3)
     assert len(pairs) == 1
-    assert len(rivals) == MAX_RIVALS
+    assert len(rivals) == MAX_OTHERS
 
 
 def test_nothing_matched_is_nothing_accepted() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from association.consensus.beams import beam_rows
 from association.consensus.kernels import beams
-from association.consensus.ranking import beam_rows
 from association.layout import BEAM_EVIDENCE, RAY
 from association.tables import Rays, Workspace
 from registration import RigidTransform
@@ -68,7 +68,7 @@ def test_beam_evidence(seed: int) -> None:
 
 def shares_of(ranges: np.ndarray) -> tuple[float, float]:
     rays, place = rays_of(ANGLES, ranges), ROOM_INDEX.tables.place
-    return beams.beam_shares(rays, estimate_of(HERE), place, Workspace.of(1, 1))
+    return beams.beam_fractions(rays, estimate_of(HERE), place, Workspace.of(1, 1))
 
 
 def test_beams_that_read_farther_and_nearer_than_the_map_shows() -> None:
@@ -90,8 +90,8 @@ def test_beam_shares(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rays, truth = drawn_rays(rng, 120)
     for at in (truth, moved(truth, rng.normal(size=3) * [0.1, 0.3, 0.3])):
-        found = beams.beam_shares(rays, estimate_of(at), PLACE, Workspace.of(1, 1))
-        assert found == pytest.approx(twin.beam_shares(rays, at, PLACE))
+        found = beams.beam_fractions(rays, estimate_of(at), PLACE, Workspace.of(1, 1))
+        assert found == pytest.approx(twin.beam_fractions(rays, at, PLACE))
 
 
 @given(SEEDS)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from association import AssociationOptions
-from association.consensus.kernels import matching
+from association.consensus.kernels import geometry, matching, raster
 from association.layout import FIGURE, HYPOTHESIS, MATCH, record
 from association.scan.scan_lines import gates
 from association.tables import Raster
@@ -30,7 +30,7 @@ WIDE = gates(AssociationOptions(offset_tolerance=0.3, angle_tolerance=0.2, min_o
 
 def test_wrap() -> None:
     for angle in (*np.linspace(-20.0, 20.0, 81), math.pi - 1e-9, 1e-9 - math.pi):
-        assert matching.wrap(angle) == pytest.approx(math.remainder(angle, math.tau), abs=1e-12)
+        assert geometry.wrap(angle) == pytest.approx(math.remainder(angle, math.tau), abs=1e-12)
 
 
 @given(SEEDS, st.sampled_from([GATES, WIDE]))
@@ -90,7 +90,7 @@ def test_gates_about(seed: int, theta_var: float, gates: Records) -> None:
     spreads, shifts, later = np.zeros(len(d.scan)), np.zeros(len(d.scan), np.int64), np.zeros(len(d.scan))
     pin, slip = d.rng.uniform(-5.0, 5.0, 2), float(d.rng.uniform(0.0, 0.3))
     figure = record(FIGURE, angle_variance=theta_var, pin_x=pin[0], pin_y=pin[1], slip=slip)
-    matching.gates_about(d.scan, figure[0], gates[0], spreads, shifts, later)
+    raster.gates_about(d.scan, figure[0], gates[0], spreads, shifts, later)
     expected, begins = twin.gates_about(d.scan, theta_var, pin, slip, gates)
     np.testing.assert_allclose(spreads, expected, rtol=1e-12)
     assert shifts.tolist() == begins.tolist()
@@ -103,7 +103,7 @@ def may_score(
     floors: Sequence[float],
     spreads: Floats,
     shifts: Any,
-    raster: Raster,
+    place: Raster,
 ) -> tuple[list[bool], Floats]:
     """Return of each pose whether the scan may come to its floor there, and what each line can add."""
     posed, near = np.zeros(len(poses) + 1, HYPOTHESIS), np.zeros((len(scan), len(poses) + 1), np.uint8)
@@ -111,7 +111,7 @@ def may_score(
     for one, at, floor in zip(posed, poses, floors, strict=False):
         one["x"], one["y"], one["theta"], one["floor"] = at.x, at.y, at.theta, floor
         one["cosine"], one["sine"] = math.cos(at.theta), math.sin(at.theta)
-    matching.may_score(scan, posed, len(poses), spreads, shifts, later, raster, near)
+    raster.may_score(scan, posed, len(poses), spreads, shifts, later, place, near)
     return [bool(told) for told in posed["possible"][:-1]], np.where(near.T[:-1], scan["gain"], -1.0)
 
 

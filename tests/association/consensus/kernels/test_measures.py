@@ -14,8 +14,8 @@ from registration.layout import Floats, Records
 from ...kernels.drawn import SEEDS
 from ...reference.consensus import matches_on
 from ...reference.geometry import normal
-from ...reference.settling import registering
-from .test_settling import Set, known_walls, some
+from ...reference.pose_estimation import registering
+from .test_pose_estimation import Set, known_walls, some
 
 
 def ends(rows: Records, middles: Floats, lengths: Floats) -> Floats:

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 
 from association.consensus.kernels import ranking
-from association.layout import MATCH, MERIT
+from association.consensus.tuning import SAME_FAMILY
+from association.layout import MATCH, SET_SCORE
 from association.tables import Place, Sights, Workspace
-from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, SAME_FAMILY
+from association.tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE
 from registration import RigidTransform
 from registration.layout import Floats, Records
 
@@ -23,17 +24,17 @@ from ...scenes import INSIDE, ROOM, context_of, index_of, local, pose, same_pose
 def ranked(
     scan: Records, poses: list[RigidTransform], sights: Sights, place: Place
 ) -> tuple[Records, Records, Records]:
-    """Return estimates, merits and matches."""
+    """Return estimates, scores and matches."""
     estimates = np.concatenate([estimate_of(at, np.full((3, 3), 9.0)) for at in poses])
-    merits, matches = np.zeros(len(poses), MERIT), np.zeros((len(poses), len(scan)), MATCH)
+    scores, matches = np.zeros(len(poses), SET_SCORE), np.zeros((len(poses), len(scan)), MATCH)
     work = Workspace.of(len(scan), len(place.walls))
-    ranking.rank(ASKED._replace(scan=scan), place, sights, estimates, merits, matches, work)
-    return estimates, merits, matches
+    ranking.score_candidates(ASKED._replace(scan=scan), place, sights, estimates, scores, matches, work)
+    return estimates, scores, matches
 
 
 @given(SEEDS)
 @settings(max_examples=12, deadline=None)
-def test_rank(seed: int) -> None:
+def test_score_candidates(seed: int) -> None:
     """Good poses, bad ones and some at which nothing fits; with lines of sight and without."""
     d = drawn(seed, radius=8.0)
     poses = [
@@ -46,12 +47,12 @@ def test_rank(seed: int) -> None:
     viewpoint = d.rng.normal(size=2) * 0.2
     for sighted in (False, True):
         sights = sights_of(d.scan, viewpoint, sighted=sighted)
-        estimates, merits, matches = ranked(d.scan, poses, sights, PLACE)
+        estimates, scores, matches = ranked(d.scan, poses, sights, PLACE)
         expected = twin.rank(d.scan, poses, viewpoint if sighted else None, PLACE, GATES, MODEL)
-        for k, (at, covariance, merit, match) in enumerate(expected):
+        for k, (at, covariance, score, match) in enumerate(expected):
             assert same_pose(pose_of(estimates[k]), at, 1e-5, 1e-6)
             np.testing.assert_allclose(covariance_of(estimates[k]), covariance, rtol=1e-4, atol=1e-8)
-            assert_records(merits[k : k + 1], merit, rtol=1e-5, atol=1e-4)
+            assert_records(scores[k : k + 1], score, rtol=1e-5, atol=1e-4)
             np.testing.assert_array_equal(matches[k]["wall"], match["wall"])
 
 
@@ -71,15 +72,15 @@ def test_lines_of_sight_are_spared_where_a_pose_is_far_behind(lacking: int, char
     assert both == (alone if charged else blind)
 
 
-def merits_of(scores: Floats) -> Records:
-    merits = np.zeros(len(scores), MERIT)
-    merits["score"] = scores
-    return merits
+def scores_of(scores: Floats) -> Records:
+    found = np.zeros(len(scores), SET_SCORE)
+    found["score"] = scores
+    return found
 
 
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
-def test_distinct(seed: int) -> None:
+def test_distinct_poses(seed: int) -> None:
     rng = np.random.default_rng(seed)
     drawn_poses = rng.choice(rng.uniform(-4.0, 4.0, (12, 3)), 40) + rng.normal(size=(40, 3)) * 0.2
     poses = [pose(*row) for row in drawn_poses.tolist()]
@@ -91,7 +92,7 @@ def test_distinct(seed: int) -> None:
     scores[order[36:]] = [0.0, -1.0, 0.0, -2.0]  # no explanations
     rules = DISTINCT_DISTANCE, DISTINCT_ANGLE, SAME_FAMILY, 6.0
     for most in (5, 40):
-        got = ranking.distinct(estimates, merits_of(scores), values - scores, most, *rules)
+        got = ranking.distinct_poses(estimates, scores_of(scores), values - scores, most, *rules)
         assert got.tolist() == twin.distinct(poses, covariances, scores, order[:36], most, *rules)
 
 
@@ -100,9 +101,9 @@ def test_a_pose_of_a_family_does_not_stand_for_a_much_better_one() -> None:
     poses = np.concatenate([estimate_of(pose(x), np.diag([4.0, 1e-4, 1e-4])) for x in (0.0, 1.0, 3.0)])
     for better, places in ((5.9, [0]), (6.1, [0, 2])):
         scores = np.array([10.0, 10.0, 10.0 + better])
-        assert ranking.distinct(poses, merits_of(scores), -scores, 3, 0.3, 0.1, 12.8, 6.0).tolist() == places
+        assert ranking.distinct_poses(poses, scores_of(scores), -scores, 3, 0.3, 0.1, 12.8, 6.0).tolist() == places
 
 
 def test_a_pose_without_a_covariance_stands_for_those_near_it_alone() -> None:
     poses = np.concatenate([estimate_of(pose(x)) for x in (0.0, 0.2, 0.5)])
-    assert ranking.distinct(poses, merits_of(np.ones(3)), np.zeros(0), 3, 0.3, 0.1, 12.8, 6.0).tolist() == [0, 2]
+    assert ranking.distinct_poses(poses, scores_of(np.ones(3)), np.zeros(0), 3, 0.3, 0.1, 12.8, 6.0).tolist() == [0, 2]

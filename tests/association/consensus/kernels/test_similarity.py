@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association.consensus.kernels.similarity import pose_of_similarity, settle_similarity, solve_similarity
+from association.consensus.kernels.similarity import estimate_similarity, pose_of_similarity, solve_similarity
 from association.layout import ESTIMATE
 from association.tables import Workspace
 from registration.layout import JOINT_SUMS, Floats
@@ -17,8 +17,8 @@ from ...kernels.drawn import ASKED, SEEDS
 from ...records import covariance_of
 from ...reference.consensus import matches_on
 from ...reference.geometry import direction, normal, point, wrap
-from ...reference.settling import pairs_of
-from .test_settling import Set, known_walls, some
+from ...reference.pose_estimation import pairs_of
+from .test_pose_estimation import Set, known_walls, some
 
 FACTORS = (0.97, 0.99, 1.0, 1.01, 1.03)
 
@@ -31,12 +31,12 @@ def stretched(one: Set, factor: float) -> Set:
     return Set(scan, one.walls, one.held, one.start)
 
 
-def settled(one: Set) -> tuple[float, Floats, Floats]:
+def estimated(one: Set) -> tuple[float, Floats, Floats]:
     """Return the walls' variance, (a, b, x, y) and their covariance."""
     solution, covariance = np.zeros(4), np.zeros((4, 4))
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = matches_on(one.held)
-    variance, _ = settle_similarity(question, known_walls(one), matches, solution, covariance, work)
+    variance, _ = estimate_similarity(question, known_walls(one), matches, solution, covariance, work)
     return variance, solution, covariance
 
 
@@ -59,7 +59,7 @@ def dense(one: Set, variance: float) -> tuple[Floats, Floats]:
 @settings(max_examples=40, deadline=None)
 def test_it_is_that_of_dense_least_squares(seed: int) -> None:
     one = stretched(some(seed), FACTORS[seed % len(FACTORS)])
-    variance, solution, covariance = settled(one)
+    variance, solution, covariance = estimated(one)
     normal_matrix, right = dense(one, max(0.0, variance))
     size = 1.0 / np.sqrt(normal_matrix.diagonal() + 1.0)
     regular = np.linalg.eigvalsh(size[:, None] * normal_matrix * size)[0]
@@ -74,7 +74,7 @@ def test_it_is_that_of_dense_least_squares(seed: int) -> None:
 @settings(max_examples=40, deadline=None)
 def test_its_pose_has_the_covariance_that_derivatives_give(seed: int) -> None:
     one = some(seed)
-    variance, solution, covariance = settled(one)
+    variance, solution, covariance = estimated(one)
     if variance < 0.0:
         return
     pose = np.zeros(1, ESTIMATE)
@@ -95,8 +95,8 @@ def test_its_pose_has_the_covariance_that_derivatives_give(seed: int) -> None:
 def test_the_walls_error_is_what_the_factor_leaves() -> None:
     """Walls that a factor of 3 % puts off by decimetres are on their places with it."""
     exact = [some(seed, 0.0) for seed in range(40)]
-    plain = [settled(one)[0] for one in exact]
-    off = [settled(stretched(one, 1.03))[0] for one in exact]
+    plain = [estimated(one)[0] for one in exact]
+    off = [estimated(stretched(one, 1.03))[0] for one in exact]
     np.testing.assert_allclose(off, plain, rtol=0.1)
 
 

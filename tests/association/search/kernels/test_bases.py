@@ -14,15 +14,7 @@ from association.layout import CROSSING
 from association.search.kernels import bases as planning
 from association.search.kernels import sliding
 from association.search.tables import Sampling
-from association.search.tuning import (
-    BASE_SEGMENTS,
-    COST_BASE,
-    COST_ENTRY,
-    GAIN_POWER,
-    PARALLEL_SINE,
-    REUSE,
-    UNTELLING,
-)
+from association.search.tuning import BASE_SEGMENTS, COST_BASE, COST_ENTRY, GAIN_POWER, PARALLEL_SINE, REUSE, UNTELLING
 from association.tables import Crossings
 from registration.layout import Records
 

@@ -10,13 +10,14 @@ import pytest
 from hypothesis import example, given, settings
 
 from association import HardPrior, MapIndex
+from association.consensus.tuning import ROUNDS
 from association.layout import HYPOTHESIS, RULES, record
 from association.search.kernels import hypotheses, sweeping
 from association.search.kernels.sliding import search_slides
 from association.search.layout import BASE
 from association.search.tables import SearchState
 from association.tables import Question
-from association.tuning import AT_ONCE, ROUNDS
+from association.tuning import AT_ONCE
 from registration.layout import Records
 
 from ...kernels.drawn import GATES, INDEX, MODEL, PLACE, SEEDS, TABLES, Drawn, drawn, oblique, workspace_of

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 
 from association import HardPrior
+from association.consensus.tuning import ROUNDS
 from association.layout import RULES, record
 from association.search.kernels import scoring
-from association.tuning import ROUNDS
 from registration import RigidTransform
 
 from ...kernels.drawn import GATES, INDEX, MODEL, PLACE, SEEDS, SMALL, TABLES, drawn, workspace_of

@@ -16,7 +16,7 @@ from association.search.kernels import stopping
 from ...kernels.drawn import MODEL, SEEDS, drawn
 from ...kernels.plans import sampled
 from ...reference import planning as twin
-from ...reference.consensus import Pairs, freedom_taken
+from ...reference.consensus import Pairs, log_determinant
 from ...reference.scans import freedom_alone
 
 
@@ -118,7 +118,7 @@ def test_no_set_takes_less_freedom(seed: int) -> None:
         for some in itertools.combinations(range(len(scan)), size):
             held = np.where(np.isin(np.arange(len(scan)), some), of_wall, -1)
             pairs = Pairs.of(scan, held, walls, float(model["wall_variance"]))
-            taken[some] = freedom_taken(pairs.information(0.0), model), scan["gain"][list(some)].sum()
+            taken[some] = log_determinant(pairs.information(0.0), model), scan["gain"][list(some)].sum()
     for needed in d.rng.uniform(1.0, scan["gain"].sum(), 8):
         least = min(freedom for freedom, gain in taken.values() if gain >= needed)
         assert stopping.least_freedom(scan, freest, needed) <= least + 1e-9

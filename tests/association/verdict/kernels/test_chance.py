@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from association.verdict.chance import EXPONENTS
 from association.verdict.kernels import chance
-from association.verdict.significance import EXPONENTS
 
 from ...kernels.drawn import GATES, INDEX, SEEDS, drawn
 from ...reference import chance as twin

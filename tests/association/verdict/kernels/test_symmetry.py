@@ -10,8 +10,9 @@ from hypothesis import given, settings
 
 from association import MapIndex, Scan
 from association.layout import POINT, RAY, SIGHTING, record
-from association.tuning import RAYS, SHORTEST_SHOWN
+from association.tuning import RAYS
 from association.verdict.kernels import symmetry
+from association.verdict.tuning import SHORTEST_SHOWN
 from registration import RigidTransform, Segments
 from registration.layout import Floats, Records
 
@@ -81,7 +82,7 @@ def test_the_share_is_that_of_the_gains_that_match(seed: int) -> None:
         matched += match_scan(row, pose_of(null[0]), covariance_of(null[0]), PLACE, GATES)[1]
         total += row["gain"][0]
     work = workspace_of(d.scan)
-    got = symmetry.mirrored_share(record(POINT), as_far_as(8.0), estimate_of(d.at), null, GATES, PLACE, work)
+    got = symmetry.mirrored_fraction(record(POINT), as_far_as(8.0), estimate_of(d.at), null, GATES, PLACE, work)
     assert got == pytest.approx(matched / total if total else 0.0, abs=1e-9)
 
 
@@ -100,7 +101,7 @@ def share(walls: Floats, at: RigidTransform, null: RigidTransform, reach: float 
     poses = [estimate_of(local(index, one), SMALL) for one in (at, null)]
     work = workspace_of(context_of(index, exact(walls)).lines.rows, index)
     place, seen = index.tables.place, as_far_as(reach)
-    return float(symmetry.mirrored_share(record(POINT), seen, poses[0], poses[1], GATES, place, work))
+    return float(symmetry.mirrored_fraction(record(POINT), seen, poses[0], poses[1], GATES, place, work))
 
 
 def test_a_square_is_its_own_mirror_image() -> None:

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from association.consensus.ranking import Ranked
+from association.consensus.consensus_set import ConsensusSet
+from association.consensus.tuning import BEAMS_READ
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.explanations import Answer
-from association.tuning import BEAMS_READ, LOOSE_BEAMS, TWIN_TEMPERATURE
-from association.verdict.features import twin_share, weigh
-from association.verdict.loosening import loose_twin_share
+from association.verdict.alternatives import compare_alternatives, probability_among, probability_with_loose_walls
+from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, LOOSE_BEAMS
 from registration import Segments
 
 from ..scenes import INSIDE, ROOM, context_of, equal_rooms, index_of, scan_of, seen
@@ -22,7 +22,7 @@ from ..scenes import INSIDE, ROOM, context_of, equal_rooms, index_of, scan_of, s
 SCAN = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
 
 
-def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Answer, tuple[Ranked, ...]]:
+def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Answer, tuple[ConsensusSet, ...]]:
     """Explain a scan of one of two equal rooms, of which each wall is drawn 5 cm off by itself."""
     rooms = Segments.from_array(equal_rooms(2))
     errors = np.random.default_rng(seed).normal(0.0, 0.05, len(rooms))
@@ -30,7 +30,7 @@ def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Ans
     context = context_of(index_of(walls, sigma), SCAN)
     found = search_and_explain(context)
     assert found.answer is not None
-    return context, found.answer, tuple(found.rivals)
+    return context, found.answer, tuple(found.alternatives)
 
 
 def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:
@@ -38,8 +38,8 @@ def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:
     close, loose = [], []
     for seed in range(24):
         context, answer, rivals = explained(seed)
-        close.append(twin_share(weigh(answer.best, rivals)) > 0.95)
-        loose.append(loose_twin_share(context, answer, rivals) > 0.95)
+        close.append(probability_among(compare_alternatives(answer.best, rivals)) > 0.95)
+        loose.append(probability_with_loose_walls(context, answer, rivals) > 0.95)
     assert sum(close) > 0.7 * len(close)
     assert sum(loose) < 0.3 * len(close)
 
@@ -47,32 +47,34 @@ def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:
 def test_that_the_answer_fits_well_shows_not_that_walls_are_where_they_are_drawn() -> None:
     """Of many twins one always fits well, and seems to show that the map is exact."""
     context, answer, rivals = explained(0)
-    well = replace(answer, settled=replace(answer.settled, wall_sigma=0.001))
-    assert twin_share(weigh(answer.best, rivals)) > 0.95
-    assert loose_twin_share(context, well, rivals) < 0.9
-    ill = replace(answer, settled=replace(answer.settled, wall_sigma=0.1))
-    assert loose_twin_share(context, ill, rivals) < loose_twin_share(context, well, rivals)
+    well = replace(answer, estimated=replace(answer.estimated, wall_sigma=0.001))
+    assert probability_among(compare_alternatives(answer.best, rivals)) > 0.95
+    assert probability_with_loose_walls(context, well, rivals) < 0.9
+    ill = replace(answer, estimated=replace(answer.estimated, wall_sigma=0.1))
+    assert probability_with_loose_walls(context, ill, rivals) < probability_with_loose_walls(context, well, rivals)
 
 
 def test_alone_or_where_walls_are_known_to_be_there_is_no_second_look() -> None:
     context, answer, _ = explained(0)
-    assert loose_twin_share(context, answer, ()) == 1.0
-    assert loose_twin_share(*explained(0, sigma=0.05)) == 1.0
+    assert probability_with_loose_walls(context, answer, ()) == 1.0
+    assert probability_with_loose_walls(*explained(0, sigma=0.05)) == 1.0
 
 
 def test_of_what_beams_say_a_share_counts() -> None:
     context, answer, rivals = explained(0)
-    plain = loose_twin_share(context, answer, rivals)
-    read = replace(answer.best, read=0.1, score=answer.best.score + 0.1 * BEAMS_READ, value=answer.best.value + 10.0)
-    by_beams = loose_twin_share(context, replace(answer, best=read), rivals)
+    plain = probability_with_loose_walls(context, answer, rivals)
+    read = replace(
+        answer.best, read=0.1, score=answer.best.score + 0.1 * BEAMS_READ, posterior=answer.best.posterior + 10.0
+    )
+    by_beams = probability_with_loose_walls(context, replace(answer, best=read), rivals)
     odds = by_beams / (1.0 - by_beams) / (plain / (1.0 - plain))
-    assert odds == pytest.approx(math.exp(LOOSE_BEAMS * 0.1 * BEAMS_READ / TWIN_TEMPERATURE), rel=1e-6)
+    assert odds == pytest.approx(math.exp(LOOSE_BEAMS * 0.1 * BEAMS_READ / ALTERNATIVE_TEMPERATURE), rel=1e-6)
 
 
 def test_what_a_prior_says_counts_whole() -> None:
     context, answer, rivals = explained(0)
-    plain = loose_twin_share(context, answer, rivals)
-    liked = replace(answer.best, value=answer.best.value + 1.0)
-    by_prior = loose_twin_share(context, replace(answer, best=liked), rivals)
+    plain = probability_with_loose_walls(context, answer, rivals)
+    liked = replace(answer.best, posterior=answer.best.posterior + 1.0)
+    by_prior = probability_with_loose_walls(context, replace(answer, best=liked), rivals)
     odds = by_prior / (1.0 - by_prior) / (plain / (1.0 - plain))
-    assert odds == pytest.approx(math.exp(1.0 / TWIN_TEMPERATURE), rel=1e-6)
+    assert odds == pytest.approx(math.exp(1.0 / ALTERNATIVE_TEMPERATURE), rel=1e-6)

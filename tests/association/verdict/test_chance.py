@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association import Beams, HardPrior, Scan, tuning
+from association import Beams, HardPrior, Scan
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.explanations import Answer
 from association.report import report
 from association.scan.scan import mirrored
-from association.verdict.null import Null, null_of
+from association.verdict.chance import NullScore, find_null_score
+from association.verdict.tuning import NULL_FRACTION, UNLIKE_SYMMETRY
 from association.verdict.verdict import judge
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import Floats
@@ -105,7 +106,7 @@ def best_of(walls: Floats, ends: Floats, prior: HardPrior | None = None) -> tupl
 def test_where_the_map_is_mirror_symmetric_the_null_scores_by_right(walls: Floats, at: RigidTransform) -> None:
     """As much as the answer does; what the map shows of the place it shows mirrored as well."""
     context, answer = best_of(walls, seen(walls, at, noise=0.01, radius=7.0, seed=1)[0])
-    null = null_of(context, answer.best)
+    null = find_null_score(context, answer.best)
     assert null.score == pytest.approx(answer.best.score, rel=1e-6)
     assert null.symmetry == pytest.approx(1.0)
 
@@ -113,26 +114,26 @@ def test_where_the_map_is_mirror_symmetric_the_null_scores_by_right(walls: Float
 def test_where_it_is_not_the_null_scores_by_chance() -> None:
     """Two walls of an L fit elsewhere as well when they are mirrored, the walls that were not seen do not."""
     context, answer = best_of(LOBBY, CORNER)
-    null = null_of(context, answer.best)
+    null = find_null_score(context, answer.best)
     assert null.score == pytest.approx(answer.best.score, rel=1e-6)
-    assert null.symmetry < tuning.UNLIKE_SYMMETRY
+    assert null.symmetry < UNLIKE_SYMMETRY
 
 
 @pytest.mark.parametrize("walls", [ROOM, maze(1)])
 def test_what_comes_nowhere_near_the_answer_is_not_looked_for(walls: Floats) -> None:
     at = INSIDE if len(walls) == len(ROOM) else pose(15.0, 14.0, 0.5)
     context, answer = best_of(walls, seen(walls, at, noise=0.01, radius=8.0)[0])
-    assert null_of(context, answer.best) == Null(0.0, 0.0)
+    assert find_null_score(context, answer.best) == NullScore(0.0, 0.0)
 
 
 def test_a_null_that_comes_to_less_than_is_asked_about_is_none() -> None:
     """One that comes to as much is told as it is."""
     context, answer = best_of(LOBBY, CORNER)
-    null = null_of(context, answer.best)
+    null = find_null_score(context, answer.best)
     share = null.score / answer.best.score
-    assert share > tuning.NULL_SHARE
-    assert null_of(context, answer.best, share - 1e-6) == null
-    assert null_of(context, answer.best, share + 0.4) == Null(0.0, 0.0)
+    assert share > NULL_FRACTION
+    assert find_null_score(context, answer.best, share - 1e-6) == null
+    assert find_null_score(context, answer.best, share + 0.4) == NullScore(0.0, 0.0)
 
 
 @pytest.mark.parametrize("with_beams", [False, True])
@@ -143,11 +144,11 @@ def test_the_null_is_the_same_each_time_and_leaves_the_search_as_it_was(sampling
     scan = scan_of(seen(ROOM, INSIDE, noise=0.02, cut=0.3, clutter=3, seed=1)[0], viewpoint=(0.0, 0.0))
     scan = replace(scan, beams=beams_of(index, INSIDE)) if with_beams else scan
 
-    def told(prior: HardPrior | None, nulls: int) -> tuple[str, list[Null]]:
+    def told(prior: HardPrior | None, nulls: int) -> tuple[str, list[NullScore]]:
         context = context_of(index, scan, prior, sampling=sampling, seed=3)
         explanations = search_and_explain(context)
         assert explanations.answer is not None
-        found = [null_of(context, explanations.answer.best) for _ in range(nulls)]
+        found = [find_null_score(context, explanations.answer.best) for _ in range(nulls)]
         return repr(report(context, explanations, judge(context, explanations))), found
 
     window = HardPrior(INSIDE, 1.0, 0.5)

@@ -1,4 +1,4 @@
-"""Poses that differ along a direction that nothing fixes: which of them is given."""
+"""Choose one of the poses that differ along an unobservable direction."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import numpy as np
 
 from registration import RigidTransform
 
-from ..consensus.ranking import Ranked
+from ..consensus.consensus_set import ConsensusSet
 from ..context import SearchContext
 from ..explanations import Answer
 
 
-def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | None:
-    """Choose among poses that differ along the free direction only; a pose that is fixed, if weakly, is that.
+def choose_along_direction(context: SearchContext, answer: Answer) -> RigidTransform | None:
+    """Choose among poses that differ along the unobservable direction only; a pose that is fixed, if weakly, is that.
 
     The nearest to the prior, else to where the raw beams fit best, else the one that centres what was seen on the walls
     that it matched.
     """
-    pose, direction = answer.registered.pose, answer.settled.direction
-    if pose is None or not answer.settled.free:
+    pose, direction = answer.registered.pose, answer.estimated.direction
+    if pose is None or not answer.estimated.free:
         return pose
     anchor = _anchor(context, answer.best)
     u = np.array(direction)
@@ -29,8 +29,8 @@ def place_on_family(context: SearchContext, answer: Answer) -> RigidTransform | 
     return RigidTransform(pose.x + shift * direction[0], pose.y + shift * direction[1], pose.theta)
 
 
-def _anchor(context: SearchContext, best: Ranked) -> RigidTransform | None:
-    """Return what picks one pose of a family: the prior, else where the raw beams fit best, else nothing."""
+def _anchor(context: SearchContext, best: ConsensusSet) -> RigidTransform | None:
+    """Return what picks one pose along the direction: the prior, else where the raw beams fit best, else nothing."""
     if context.prior is not None:
         return context.prior.pose
     return context.in_map(best.pose) if context.with_beams else None

@@ -1,4 +1,4 @@
-"""The answer worked out: its pose with the error of the map's walls, and what it would be without each of them."""
+"""Estimate poses together with the error of the map's walls, and what a pose would be without each wall."""
 
 from __future__ import annotations
 
@@ -16,21 +16,19 @@ from registration.observability import MAX_DEVIATION
 from registration.values import value
 
 from ..context import SearchContext
-from ..layout import HINGE, SETTLED
+from ..layout import ESTIMATED, LEVERAGE
 from ..scan.scan import Views
-from ..tuning import COMMON_WALL_ERROR, LEAST_KNOWN_VARIANCE, ONE_OF_MANY, SETTLED_AT_ONCE
-from .kernels import settling as kernels
-from .ranking import Ranked, matches_of, poses_of
-from .view_settling import SeenOnWalls, ViewsSettled
+from .consensus_set import ConsensusSet, matches_of, poses_of
+from .kernels import pose_estimation as kernels
+from .tuning import COMMON_WALL_ERROR, ESTIMATED_AT_ONCE, LEAST_KNOWN_VARIANCE, ONE_OF_MANY
+from .view_estimation import EstimatedViews, SeenOnWalls
 
-NO_HINGES = np.zeros(0, HINGE)
-
-_settle = kernels.settle
+NO_LEVERAGES = np.zeros(0, LEVERAGE)
 
 
 @value(frozen=True, slots=True)
-class Settled:
-    """A pose that reckons with walls that are off, as far as their residuals show it.
+class EstimatedPose:
+    """A pose with its covariance, where walls are as far off as their residuals show.
 
     Attributes
     ----------
@@ -48,9 +46,9 @@ class Settled:
         Whether the pose itself is one of many along that direction: parallel walls, or a deviation of metres.
     parallel : bool
         Whether all walls are parallel within three standard deviations of their angles.
-    hinges : (k,) of `HINGE`
+    leverages : (k,) of `LEVERAGE`
         What the pose would be without each of its walls.
-    views : ViewsSettled or None
+    views : EstimatedViews or None
         Where the scan's views were, if they are not exact.
     """
 
@@ -61,12 +59,12 @@ class Settled:
     direction: tuple[float, float]
     free: bool
     parallel: bool
-    hinges: Records
-    views: ViewsSettled | None = None
+    leverages: Records
+    views: EstimatedViews | None = None
 
     @classmethod
-    def of(cls, numbers: Any, hinges: Records) -> Settled:
-        """Return what a record of `SETTLED`, as a tuple, says."""
+    def of(cls, numbers: Any, leverages: Records) -> EstimatedPose:
+        """Return the pose of a record of `ESTIMATED`, given as a tuple."""
         (theta, x, y, xx, xy, xt, yy, yt, tt), variance, weakest, dx, dy, parallel = numbers
         sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
         spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
@@ -78,7 +76,7 @@ class Settled:
             direction=(sign * dx, sign * dy),
             free=bool(parallel) or spread > ONE_OF_MANY**2,
             parallel=bool(parallel),
-            hinges=hinges,
+            leverages=leverages,
         )
 
     @property
@@ -87,22 +85,24 @@ class Settled:
         return self.parallel or self.weakest > MAX_DEVIATION
 
 
-def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bool = False) -> list[Settled]:
-    """Work out the poses of consensus sets, of one at least; with `hinges` of the first, where the others have none.
+def estimate_poses(
+    context: SearchContext, sets: Sequence[ConsensusSet], *, leverages: bool = False
+) -> list[EstimatedPose]:
+    """Estimate the poses of consensus sets, of one at least; with the `leverages` of the walls of the first.
 
-    After the deadline no more than some are, the first one at least, and returned; and the hinges are those of some of
-    the walls.
+    After the deadline only some poses are estimated and returned, the first one at least, and the leverages are those
+    of some of the walls.
     """
-    every = slices_between_looks(context, len(explanations))
-    found, without = _settled(context, explanations[next(every)], hinges=hinges)
-    settled = list(map(Settled.of, found.tolist(), chain([without], repeat(NO_HINGES))))
+    every = slices_between_looks(context, len(sets))
+    found, without = _estimated(context, sets[next(every)], leverages=leverages)
+    estimated = list(map(EstimatedPose.of, found.tolist(), chain([without], repeat(NO_LEVERAGES))))
     for some in every:
-        settled += [Settled.of(one, NO_HINGES) for one in _settled(context, explanations[some])[0].tolist()]
+        estimated += [EstimatedPose.of(one, NO_LEVERAGES) for one in _estimated(context, sets[some])[0].tolist()]
     views = context.scan.views
     if views is None or not views.uncertain:
-        return settled
-    solved: list[Settled] = []
-    for one, alone in zip(explanations, settled, strict=False):
+        return estimated
+    solved: list[EstimatedPose] = []
+    for one, alone in zip(sets, estimated, strict=False):
         if solved and context.deadline.passed:
             break
         solved.append(_with_views(context, one, views, alone))
@@ -110,7 +110,7 @@ def settle(context: SearchContext, explanations: Sequence[Ranked], *, hinges: bo
 
 
 def slices_between_looks(context: SearchContext, count: int) -> Iterator[slice]:
-    """Yield the slices of some poses that are settled between two looks at the deadline, until it passes."""
+    """Yield the slices of some poses that are estimated between two looks at the deadline, until it passes."""
     step = _at_once(context)
     for begin in range(0, max(1, count), step):
         if begin > 0 and context.deadline.passed:
@@ -119,32 +119,32 @@ def slices_between_looks(context: SearchContext, count: int) -> Iterator[slice]:
 
 
 def _at_once(context: SearchContext) -> int:
-    """Return how many poses are settled, or walls left out of one, between two looks at the deadline."""
-    return max(1, SETTLED_AT_ONCE // max(1, len(context.lines.rows)) ** 2)
+    """Return how many poses are estimated, or walls left out of one, between two looks at the deadline."""
+    return max(1, ESTIMATED_AT_ONCE // max(1, len(context.lines.rows)) ** 2)
 
 
-def _settled(
-    context: SearchContext, explanations: Sequence[Ranked], *, hinges: bool = False
+def _estimated(
+    context: SearchContext, sets: Sequence[ConsensusSet], *, leverages: bool = False
 ) -> tuple[Records, Records]:
-    """Return the poses of some consensus sets, (k,) of `SETTLED`, and the hinges of the first as far as wanted."""
-    found = np.zeros(len(explanations), SETTLED)
+    """Return the poses of consensus sets, (k,) of `ESTIMATED`, and the leverages of the first, (m,) of `LEVERAGE`."""
+    found = np.zeros(len(sets), ESTIMATED)
     lines = len(context.lines.rows)
     # Each wall that is left out takes as long as the lines are many.
-    room = min(lines, max(1, SETTLED_AT_ONCE // max(1, lines))) if hinges else 0
-    without = np.zeros(lines if hinges else 0, HINGE)
+    room = min(lines, max(1, ESTIMATED_AT_ONCE // max(1, lines))) if leverages else 0
+    without = np.zeros(lines if leverages else 0, LEVERAGE)
     question, walls, work = context.question_of_a_pose, context.known_walls, context.workspace
-    matches, starts = matches_of(explanations), poses_of(explanations)
-    count = _settle(question, walls, matches, starts, found, 0, without[:room], work)
+    matches, starts = matches_of(sets), poses_of(sets)
+    count = kernels.estimate_poses(question, walls, matches, starts, found, 0, without[:room], work)
     done = min(room, count)
-    while hinges and done < count and not context.deadline.passed:
+    while leverages and done < count and not context.deadline.passed:
         some = without[done : done + room]
-        _settle(question, walls, matches[:1], starts[:1], found[:1], done, some, work)
+        kernels.estimate_poses(question, walls, matches[:1], starts[:1], found[:1], done, some, work)
         done = min(done + room, count)
     return found, without[:done]
 
 
-def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settled) -> Settled:
-    """Solve again for the errors of the views beside the pose.
+def _with_views(context: SearchContext, best: ConsensusSet, views: Views, alone: EstimatedPose) -> EstimatedPose:
+    """Estimate the errors of the views together with the pose.
 
     Without one of its walls the pose cannot be known better than with it.
     """
@@ -155,14 +155,14 @@ def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settl
     lines, sigma = context.index.walls.rows[on], context.index.sigma
     lines["offset"] += best.matches["shift"][seen["row"]]
     shown = SeenOnWalls.of(views, seen, lines, on)
-    found = shown.settle(alone.pose, None if sigma is None else max(sigma**2, LEAST_KNOWN_VARIANCE), context.deadline)
+    found = shown.estimate(alone.pose, None if sigma is None else max(sigma**2, LEAST_KNOWN_VARIANCE), context.deadline)
     loose = shown.covariance_with(found, max(found.wall_variance, COMMON_WALL_ERROR**2))
     values, vectors = np.linalg.eigh(loose[:2, :2])
     dx, dy = vectors[:, 1].tolist()
     sign = -1.0 if dx < 0.0 or (dx == 0.0 and dy < 0.0) else 1.0
     weakest = math.sqrt(max(0.0, float(values[1])))
-    hinges = alone.hinges.copy()
-    hinges["deviation"] = np.maximum(hinges["deviation"], weakest)
+    leverages = alone.leverages.copy()
+    leverages["deviation"] = np.maximum(leverages["deviation"], weakest)
     return replace(
         alone,
         pose=found.pose,
@@ -171,6 +171,6 @@ def _with_views(context: SearchContext, best: Ranked, views: Views, alone: Settl
         weakest=weakest,
         direction=(sign * dx, sign * dy),
         free=alone.parallel or float(np.linalg.eigvalsh(found.covariance[:2, :2])[1]) > ONE_OF_MANY**2,
-        hinges=hinges,
+        leverages=leverages,
         views=found,
     )

@@ -1,4 +1,4 @@
-"""Compiled sums of what several views show of walls, by view and by wall."""
+"""Sum what several views show of walls, by view and by wall."""
 
 import math
 
@@ -6,7 +6,7 @@ from compiled import kernel
 from registration.layout import Floats, Records
 
 from ...tables import SeenByViews
-from ...tuning import ROUGH_SHARE
+from ..tuning import ROUGH_FRACTION
 
 
 @kernel
@@ -16,8 +16,8 @@ def add_views(
     poses: Records,
     wall_variance: float,
     own: Floats,
-    shares: Floats,
-    shares_of_views: Floats,
+    wall_sums: Floats,
+    wall_sums_of_views: Floats,
     weights: Floats,
 ) -> None:
     """Add up offsets and angles from the walls, with their derivatives.
@@ -34,9 +34,9 @@ def add_views(
     own : (v, 7, 7)
         Of each view, the weighted products of offsets' and angles' derivatives by the pose, by the view's own pose, and
         of the residual, in this order. Added to.
-    shares : (w, 4)
+    wall_sums : (w, 4)
         Of each wall, weighted derivatives of offsets by the pose, and the weighted residual. Added to.
-    shares_of_views : (w, 3 v)
+    wall_sums_of_views : (w, 3 v)
         The same by the pose of each view. Added to.
     weights : (w,)
         The weights. Added to.
@@ -59,7 +59,7 @@ def add_views(
         to_c, to_s = math.cos(turn + pose.theta), math.sin(turn + pose.theta)
         to_x, to_y = to_c * line.dx - to_s * line.dy, to_s * line.dx + to_c * line.dy
         sine, cosine = wall.dx * to_y - wall.dy * to_x, wall.dx * to_x + wall.dy * to_y
-        weight = 1.0 / (line.variance + ROUGH_SHARE * wall_variance)
+        weight = 1.0 / (line.variance + ROUGH_FRACTION * wall_variance)
         row = (nx, ny, by_turn, own_nx, own_ny, by_own_turn, offset)
         sums = own[at]
         for i in range(7):
@@ -73,7 +73,7 @@ def add_views(
             sums[6, i] += angular * cosine * sine
         sums[6, 6] += angular * sine * sine
         for i in range(3):
-            shares[on, i] += weight * row[i]
-            shares_of_views[on, 3 * at + i] += weight * row[3 + i]
-        shares[on, 3] += weight * offset
+            wall_sums[on, i] += weight * row[i]
+            wall_sums_of_views[on, 3 * at + i] += weight * row[3 + i]
+        wall_sums[on, 3] += weight * offset
         weights[on] += weight

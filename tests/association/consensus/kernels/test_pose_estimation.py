@@ -1,4 +1,4 @@
-"""An answer is settled as by its twin, which solves every set of pairs from nothing."""
+"""Poses are estimated as by the twin, which solves every set of pairs from nothing."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from association.consensus.kernels.consensus import sort_by_ties
-from association.consensus.kernels.settling import settle, unlike, weakest
-from association.layout import HINGE, SETTLED, WALL, Integers
+from association.consensus.kernels.pose_estimation import estimate_poses, parallel_chi_square, weakest_direction
+from association.consensus.kernels.wall_errors import sort_by_ties
+from association.consensus.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, SORTED_BY_INSERTION, UNSEEN_ERROR
+from association.layout import ESTIMATED, LEVERAGE, WALL, Integers
 from association.tables import KnownWalls, Workspace
-from association.tuning import FREE_DEVIATION, LEAST_KNOWN_VARIANCE, SORTED_BY_INSERTION, UNSEEN_ERROR
 from registration import RigidTransform
 from registration.layout import Record, Records
 from registration.observability import most_parallel, most_parallel_up_to
 
 from ...kernels.drawn import ASKED, PLACE, SEEDS, Drawn, drawn
 from ...records import covariance_of, estimate_of, pose_of
-from ...reference import settling as twin
+from ...reference import pose_estimation as twin
 from ...reference.consensus import matches_on
 from ...reference.geometry import direction, normal
 from ...scenes import pose, same_pose
@@ -35,14 +35,14 @@ class Set:
     held: Integers
     start: RigidTransform
 
-    def settled(self, map_variance: float = -1.0) -> tuple[Record, Records]:
-        """Return `SETTLED` and the hinges."""
-        out, hinges = np.zeros(1, SETTLED), np.zeros(len(self.scan), HINGE)
+    def estimated(self, map_variance: float = -1.0) -> tuple[Record, Records]:
+        """Return `ESTIMATED` and the leverages."""
+        out, leverages = np.zeros(1, ESTIMATED), np.zeros(len(self.scan), LEVERAGE)
         question, work = ASKED._replace(scan=self.scan), Workspace.of(len(self.scan), len(self.walls))
         start, matches = estimate_of(self.start), matches_on(self.held)[None]
-        count = settle(question, known_walls(self, map_variance), matches, start, out, 0, hinges, work)
+        count = estimate_poses(question, known_walls(self, map_variance), matches, start, out, 0, leverages, work)
         assert start == estimate_of(self.start)
-        return out[0], hinges[:count]
+        return out[0], leverages[:count]
 
 
 def known_walls(one: Set, map_variance: float = -1.0) -> KnownWalls:
@@ -77,12 +77,12 @@ def some(seed: int, wall_error: float = 0.03) -> Set:
 
 @given(SEEDS)
 @settings(max_examples=40, deadline=None)
-def test_an_answer_is_settled_as_by_the_twin(seed: int) -> None:
+def test_a_pose_is_estimated_as_by_the_twin(seed: int) -> None:
     """With what is known of the walls, or what their residuals show."""
     one = some(seed)
     for known in (None, 0.0, 0.05**2):
-        got, _ = one.settled(-1.0 if known is None else known)
-        expected = twin.settle(one.scan, one.held, one.walls, one.start, known)
+        got, _ = one.estimated(-1.0 if known is None else known)
+        expected = twin.estimate_poses(one.scan, one.held, one.walls, one.start, known)
         # What the spring alone holds is moved by rounding.
         if max(got["weakest"], math.sqrt(np.linalg.norm(expected.at.covariance))) > 1.0:
             continue
@@ -92,14 +92,14 @@ def test_an_answer_is_settled_as_by_the_twin(seed: int) -> None:
         assert got["weakest"] == pytest.approx(expected.weakest, rel=1e-5)
         across = got["dx"] * expected.direction[1] - got["dy"] * expected.direction[0]
         assert abs(across) < 1e-3 or expected.weakest < 1e-3 or is_round(one, known)
-        apart = unlike(one.scan, matches_on(one.held), one.walls, float(got["wall_variance"]))
+        apart = parallel_chi_square(one.scan, matches_on(one.held), one.walls, float(got["wall_variance"]))
         assert apart == pytest.approx(expected.unlike, rel=1e-4, abs=1e-4)
         assert got["parallel"] == (apart <= most_parallel(int((one.held >= 0).sum())))
 
 
 def is_round(one: Set, known: float | None) -> bool:
     """Tell whether all directions are about as weak, so that rounding tells which is weakest."""
-    at = twin.settle(one.scan, one.held, one.walls, one.start, known).at
+    at = twin.estimate_poses(one.scan, one.held, one.walls, one.start, known).at
     low, high = np.linalg.eigvalsh(at.covariance[:2, :2])
     return bool(high < 1.2 * low)
 
@@ -107,30 +107,32 @@ def is_round(one: Set, known: float | None) -> bool:
 @given(SEEDS)
 @settings(max_examples=40, deadline=None)
 def test_what_the_pose_would_be_without_a_wall(seed: int) -> None:
-    """As solved anew from the others alone; walls in the order in which the lines lie on them."""
+    """As solved again from the others alone; walls in the order in which the lines lie on them."""
     one = some(seed)
-    _, hinges = one.settled(0.02**2)
-    expected = twin.settle(one.scan, one.held, one.walls, one.start, 0.02**2).hinges
-    assert hinges["wall"].tolist() == [hinge.wall for hinge in expected]
-    for got, hinge in zip(hinges, expected, strict=True):
-        if hinge.deviation < 1.0:  # else rounding moves it
-            assert got["moves"] == pytest.approx(hinge.moves, rel=1e-4, abs=1e-6)
-            assert got["deviation"] == pytest.approx(hinge.deviation, rel=1e-4)
+    _, leverages = one.estimated(0.02**2)
+    expected = twin.estimate_poses(one.scan, one.held, one.walls, one.start, 0.02**2).leverages
+    assert leverages["wall"].tolist() == [leverage.wall for leverage in expected]
+    for got, leverage in zip(leverages, expected, strict=True):
+        if leverage.deviation < 1.0:  # else rounding moves it
+            assert got["displacement"] == pytest.approx(leverage.moves, rel=1e-4, abs=1e-6)
+            assert got["deviation"] == pytest.approx(leverage.deviation, rel=1e-4)
         else:
             assert got["deviation"] > 0.9
-        if hinge.moves > 1.1 * hinge.deviation:
-            assert [got["dx"], got["dy"]] == pytest.approx(hinge.direction.tolist(), abs=1e-4)
+        if leverage.moves > 1.1 * leverage.deviation:
+            assert [got["dx"], got["dy"]] == pytest.approx(leverage.direction.tolist(), abs=1e-4)
 
 
-def test_hinges_begin_at_any_wall() -> None:
+def test_leverages_begin_at_any_wall() -> None:
     one = some(7)
-    everything, every = one.settled(0.02**2)
-    out, hinges = np.zeros(1, SETTLED), np.zeros(2, HINGE)
+    everything, every = one.estimated(0.02**2)
+    out, leverages = np.zeros(1, ESTIMATED), np.zeros(2, LEVERAGE)
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches, start = matches_on(one.held)[None], estimate_of(one.start)
-    assert settle(question, known_walls(one, 0.02**2), matches, start, out, 1, hinges, work) == len(every) > 3
+    assert (
+        estimate_poses(question, known_walls(one, 0.02**2), matches, start, out, 1, leverages, work) == len(every) > 3
+    )
     assert out == everything
-    np.testing.assert_array_equal(hinges, every[1:3])
+    np.testing.assert_array_equal(leverages, every[1:3])
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, SORTED_BY_INSERTION, SORTED_BY_INSERTION + 1, 300])
@@ -142,20 +144,20 @@ def test_walls_are_put_in_order_along_their_chains(count: int) -> None:
     np.testing.assert_array_equal(walls, expected)
 
 
-def test_several_sets_are_each_settled_as_if_alone() -> None:
-    """Hinges are those of the first."""
+def test_several_sets_are_each_estimated_as_if_alone() -> None:
+    """Leverages are those of the first."""
     one = some(7)
     helds = np.stack([one.held[::-1], one.held])
-    out, hinges = np.zeros(2, SETTLED), np.zeros(len(one.scan), HINGE)
+    out, leverages = np.zeros(2, ESTIMATED), np.zeros(len(one.scan), LEVERAGE)
     starts = np.concatenate([estimate_of(one.start)] * 2)
     question, work = ASKED._replace(scan=one.scan), Workspace.of(len(one.scan), len(one.walls))
     matches = np.stack([matches_on(held) for held in helds])
-    count = settle(question, known_walls(one), matches, starts, out, 0, hinges, work)
+    count = estimate_poses(question, known_walls(one), matches, starts, out, 0, leverages, work)
     for k, held in enumerate(helds):
-        alone, without = Set(one.scan, one.walls, held, one.start).settled()
+        alone, without = Set(one.scan, one.walls, held, one.start).estimated()
         assert out[k] == alone
         if k == 0:
-            np.testing.assert_array_equal(hinges[:count], without)
+            np.testing.assert_array_equal(leverages[:count], without)
     assert out[0] != out[1]
 
 
@@ -176,11 +178,11 @@ def test_without_the_only_wall_across_a_corridor_the_place_is_free_along_it() ->
     d = drawn(1)
     walls, held, at = crossing_walls(0.0, 0.0, math.pi / 2), np.array([0, 1, 2]), pose(0.3, 0.2, 0.1)
     one = Set(laid_on(walls, held, at, d, 0.0, 0.0), walls, held, at)
-    settled, hinges = one.settled(0.0)
-    assert settled["weakest"] < 0.1
-    assert hinges["deviation"] == pytest.approx([0.0, 0.0, FREE_DEVIATION], abs=0.05)
-    assert [abs(hinges["dx"][2]), abs(hinges["dy"][2])] == pytest.approx([1.0, 0.0], abs=1e-6)
-    assert hinges["moves"] == pytest.approx([0.0] * 3, abs=1e-6)
+    estimated, leverages = one.estimated(0.0)
+    assert estimated["weakest"] < 0.1
+    assert leverages["deviation"] == pytest.approx([0.0, 0.0, FREE_DEVIATION], abs=0.05)
+    assert [abs(leverages["dx"][2]), abs(leverages["dy"][2])] == pytest.approx([1.0, 0.0], abs=1e-6)
+    assert leverages["displacement"] == pytest.approx([0.0] * 3, abs=1e-6)
 
 
 def test_a_wall_that_is_off_moves_the_pose_by_so_much() -> None:
@@ -190,17 +192,17 @@ def test_a_wall_that_is_off_moves_the_pose_by_so_much() -> None:
     scan = laid_on(walls, held, at, d, 0.0, 0.0)
     scan["weight"], scan["spread"] = 9e3, 1e3
     walls["offset"][2] = 0.2
-    settled, hinges = Set(scan, walls, held, at).settled(0.0)
-    assert pose_of(settled["pose"]).x == pytest.approx(-0.1, abs=1e-3)
-    assert hinges["moves"] == pytest.approx([0.0, 0.1, 0.1], abs=2e-3)
-    assert hinges["dx"][1:].tolist() == pytest.approx([-1.0, 1.0], abs=1e-3)
+    estimated, leverages = Set(scan, walls, held, at).estimated(0.0)
+    assert pose_of(estimated["pose"]).x == pytest.approx(-0.1, abs=1e-3)
+    assert leverages["displacement"] == pytest.approx([0.0, 0.1, 0.1], abs=2e-3)
+    assert leverages["dx"][1:].tolist() == pytest.approx([-1.0, 1.0], abs=1e-3)
 
 
 def test_the_weakest_direction() -> None:
     covariance = np.zeros((3, 3))
     turn = np.array([[math.cos(0.7), -math.sin(0.7)], [math.sin(0.7), math.cos(0.7)]])
     covariance[:2, :2] = turn @ np.diag([0.09, 0.01]) @ turn.T
-    deviation, dx, dy = weakest(estimate_of(pose(), covariance)[0])
+    deviation, dx, dy = weakest_direction(estimate_of(pose(), covariance)[0])
     assert deviation == pytest.approx(0.3)
     assert abs(dx * math.sin(0.7) - dy * math.cos(0.7)) < 1e-9
 
@@ -216,7 +218,7 @@ def test_the_error_of_many_walls_is_estimated_from_their_residuals(wall_error: f
         scan = laid_on(PLACE.walls, held[: len(PLACE.walls)], d.at, d, wall_error, 0.0)
         # Each line is as noisy as the weights say that it is on such walls.
         scan = with_noise(scan, PLACE.walls, d, wall_error)
-        found, _ = Set(scan, PLACE.walls, held[: len(scan)], d.at).settled()
+        found, _ = Set(scan, PLACE.walls, held[: len(scan)], d.at).estimated()
         estimates.append(math.sqrt(found["wall_variance"]))
     assert np.mean(estimates) == pytest.approx(math.sqrt(UNSEEN_ERROR) * wall_error, rel=0.1)
 
@@ -239,6 +241,6 @@ def test_what_few_walls_show_is_shrunk_to_what_is_usual() -> None:
     d = drawn(1)
     walls, held, at = crossing_walls(0.0, math.pi / 2), np.array([0, 1]), pose()
     one = Set(laid_on(walls, held, at, d, 0.0, 0.0), walls, held, at)
-    assert 0.015 < math.sqrt(one.settled()[0]["wall_variance"]) < 0.06
-    assert one.settled(0.0)[0]["wall_variance"] == pytest.approx(LEAST_KNOWN_VARIANCE)
-    assert one.settled(0.07**2)[0]["wall_variance"] == pytest.approx(0.07**2)
+    assert 0.015 < math.sqrt(one.estimated()[0]["wall_variance"]) < 0.06
+    assert one.estimated(0.0)[0]["wall_variance"] == pytest.approx(LEAST_KNOWN_VARIANCE)
+    assert one.estimated(0.07**2)[0]["wall_variance"] == pytest.approx(0.07**2)

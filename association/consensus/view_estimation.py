@@ -1,4 +1,4 @@
-"""The pose of several views that are not exact: solved beside the errors of theirs.
+"""Estimate the pose of several views that are not exact, together with the errors of the views.
 
 Unknown are the pose and the variates z of `Views.root`, which odometry says are standard normal. Each view shows a
 matched line for itself; the offset of a wall is one error for all that was seen of it, from whatever view. With
@@ -22,7 +22,8 @@ from ..deadline import Deadline
 from ..layout import POINT, as_records, record
 from ..scan.scan import Views
 from ..tables import SeenByViews
-from ..tuning import (
+from .kernels.view_estimation import add_views
+from .tuning import (
     LEAST_WALL_ERROR,
     MAX_STEP,
     MAX_TURN,
@@ -32,14 +33,13 @@ from ..tuning import (
     USUAL_WALLS,
     VIEW_ROUNDS,
 )
-from .kernels.view_settling import add_views
 
-SETTLED_STEP = 1e-4  # m, rad and deviations; the step after one below it is none,
-SETTLED_SHARE = 0.02  # where the walls' variance changes by less than that
+CONVERGED_STEP = 1e-4  # m, rad and deviations; the step after one below it is none,
+CONVERGED_FRACTION = 0.02  # where the walls' variance changes by less than that
 
 
 @dataclass(frozen=True, slots=True)
-class ViewsSettled:
+class EstimatedViews:
     """A pose with the errors of its views.
 
     Attributes
@@ -89,7 +89,7 @@ class SeenOnWalls:
         origins = as_records(POINT, np.array([(pose.x, pose.y) for pose in views.poses]))
         return cls(views, seen, lines, number, origins)
 
-    def settle(self, start: RigidTransform, known: float | None, deadline: Deadline) -> ViewsSettled:
+    def estimate(self, start: RigidTransform, known: float | None, deadline: Deadline) -> EstimatedViews:
         """Solve for the pose and the errors of the views, with the walls' variance or as their residuals show it.
 
         A pose that would go too far stays, as it does for one view. After the deadline no further round begins.
@@ -102,7 +102,7 @@ class SeenOnWalls:
             x = x + step
             if known is None:
                 variance = self._shown_variance(x, np.asarray(np.linalg.inv(normal), dtype=np.float64), variance)
-            still = np.abs(step).max() < SETTLED_STEP and abs(variance - before) < SETTLED_SHARE * before
+            still = np.abs(step).max() < CONVERGED_STEP and abs(variance - before) < CONVERGED_FRACTION * before
             if still or deadline.passed:
                 break
         far = math.hypot(x[0] - start.x, x[1] - start.y) > MAX_STEP or abs(wrap_angle(x[2] - start.theta)) > MAX_TURN
@@ -110,11 +110,11 @@ class SeenOnWalls:
             x, variance = begin, USUAL_WALL_ERROR**2 if known is None else known
         inverse = self._covariance(x, variance)
         pose = RigidTransform(float(x[0]), float(x[1]), float(x[2]))
-        return ViewsSettled(pose, inverse[:3, :3], x[3:], inverse[3:, 3:], variance)
+        return EstimatedViews(pose, inverse[:3, :3], x[3:], inverse[3:, 3:], variance)
 
-    def covariance_with(self, settled: ViewsSettled, wall_variance: float) -> Floats:
-        """Return the covariance of a settled pose if walls are off with another variance, (3, 3)."""
-        x = np.array([settled.pose.x, settled.pose.y, settled.pose.theta, *settled.found])
+    def covariance_with(self, found: EstimatedViews, wall_variance: float) -> Floats:
+        """Return the covariance of an estimated pose if walls are off with another variance, (3, 3)."""
+        x = np.array([found.pose.x, found.pose.y, found.pose.theta, *found.found])
         return self._covariance(x, wall_variance)[:3, :3]
 
     def _covariance(self, x: Floats, wall_variance: float) -> Floats:
@@ -122,9 +122,9 @@ class SeenOnWalls:
         return np.asarray(0.5 * (inverse + inverse.T))
 
     def _shown_variance(self, x: Floats, covariance: Floats, wall_variance: float) -> float:
-        """Return the variance of the walls' own errors that their residuals show, as `settling` has it for one view."""
+        """Return the variance of the walls' own errors that their residuals show; see `wall_variance_shown`."""
         sums = self._sums(x, wall_variance)
-        means = sums.shares / sums.weights[:, None]
+        means = sums.wall_sums / sums.weights[:, None]
         spreads = ((means[:, :-1] @ covariance) * means[:, :-1]).sum(axis=1)
         free = np.maximum(0.0, 1.0 - spreads / (wall_variance + 1.0 / sums.weights))
         found = USUAL_WALLS * USUAL_WALL_ERROR**2 + float(np.sum(means[:, -1] ** 2 - free / sums.weights))
@@ -144,9 +144,9 @@ class SeenOnWalls:
         normal[3:, 3:] = root.T @ (own[:, 3:6, 3:6] @ by_view).reshape(root.shape)
         gradient[3:] = own[:, 3:6, 6].reshape(-1) @ root
         if wall_variance > 0.0:
-            apart = sums.shares / (sums.weights + 1.0 / wall_variance)[:, None]
-            normal -= sums.shares[:, :-1].T @ apart[:, :-1]
-            gradient -= apart[:, :-1].T @ sums.shares[:, -1]
+            apart = sums.wall_sums / (sums.weights + 1.0 / wall_variance)[:, None]
+            normal -= sums.wall_sums[:, :-1].T @ apart[:, :-1]
+            gradient -= apart[:, :-1].T @ sums.wall_sums[:, -1]
         prior = np.arange(3, size)
         normal[prior, prior] += 1.0
         gradient[prior] += x[prior]
@@ -159,10 +159,10 @@ class SeenOnWalls:
         shifts = (self.views.root @ (x[3:] - self.views.found)).reshape(-1, 3)
         pose = record(POSE, x=x[0], y=x[1], theta=x[2])
         own, weights = np.zeros((views, 7, 7)), np.zeros(walls)
-        shares, of_views = np.zeros((walls, 4)), np.zeros((walls, 3 * views))
+        wall_sums, of_views = np.zeros((walls, 4)), np.zeros((walls, 3 * views))
         by_views = SeenByViews(seen, self.walls, self.number, self.origins)
-        add_views(by_views, shifts, pose, wall_variance, own, shares, of_views, weights)
-        return _Sums(own, np.hstack([shares[:, :3], of_views @ self.views.root, shares[:, 3:]]), weights)
+        add_views(by_views, shifts, pose, wall_variance, own, wall_sums, of_views, weights)
+        return _Sums(own, np.hstack([wall_sums[:, :3], of_views @ self.views.root, wall_sums[:, 3:]]), weights)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,12 +173,12 @@ class _Sums:
     ----------
     own : (v, 7, 7)
         By view, of products of the derivatives by the pose, by that of the view, and the residual.
-    shares : (w, 3 + 3 u + 1)
+    wall_sums : (w, 3 + 3 u + 1)
         By wall, of the derivatives of offsets by pose and variates, the residuals last.
     weights : (w,)
         By wall.
     """
 
     own: Floats
-    shares: Floats
+    wall_sums: Floats
     weights: Floats

@@ -1,4 +1,4 @@
-"""Twins of the kernels that settle an answer: every set of pairs is solved from nothing."""
+"""Twins of the kernels that estimate poses: every set of pairs is solved from nothing."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from association.layout import Integers
-from association.tuning import (
+from association.consensus.tuning import (
     COMMON_WALL_ERROR,
+    ESTIMATION_ROUNDS,
     FREE_DEVIATION,
     LEAST_KNOWN_VARIANCE,
     LEAST_WALL_ERROR,
     MAX_STEP,
     MAX_TURN,
-    ROUGH_SHARE,
-    ROUGHNESS,
-    SETTLING_ROUNDS,
+    ROUGH_FRACTION,
     UNSEEN_ERROR,
     USUAL_WALL_ERROR,
     USUAL_WALLS,
 )
+from association.layout import Integers
+from association.tuning import ROUGHNESS
 from registration import RigidTransform
 from registration.layout import Floats, Records
 from registration.observability import MAX_DEVIATION, most_parallel
@@ -33,7 +33,7 @@ from .geometry import wrap
 def reweighted(scan: Records, variance: float) -> Records:
     """Return the lines with the weights that they have on walls which are so rough along themselves."""
     out = scan.copy()
-    out["weight"] = 1.0 / (1.0 / scan["weight"] - ROUGHNESS**2 + ROUGH_SHARE * variance)
+    out["weight"] = 1.0 / (1.0 / scan["weight"] - ROUGHNESS**2 + ROUGH_FRACTION * variance)
     return out
 
 
@@ -90,22 +90,24 @@ class Hinge:
 
 
 @dataclass(frozen=True)
-class Settled:
-    """A pose worked out; see `association.consensus.settling`."""
+class EstimatedPose:
+    """A pose worked out; see `association.consensus.estimation`."""
 
     at: Moved
     variance: float
     weakest: float
     direction: Floats
     unlike: float
-    hinges: list[Hinge]
+    leverages: list[Hinge]
 
 
-def settle(scan: Records, held: Integers, walls: Records, start: RigidTransform, known: float | None) -> Settled:
+def estimate_poses(
+    scan: Records, held: Integers, walls: Records, start: RigidTransform, known: float | None
+) -> EstimatedPose:
     """Solve, estimate, and solve again; `known` is the variance of the map's walls, m^2, or None."""
     variance = USUAL_WALL_ERROR**2 if known is None else max(known, LEAST_KNOWN_VARIANCE)
     pose = start
-    for _ in range(SETTLING_ROUNDS if known is None else 1):
+    for _ in range(ESTIMATION_ROUNDS if known is None else 1):
         at = moved(pairs_of(scan, held, walls, variance), pose)
         if not at.near:
             break
@@ -114,11 +116,11 @@ def settle(scan: Records, held: Integers, walls: Records, start: RigidTransform,
             variance = estimated_variance(at, scan, held, walls, variance)
     weakest, along = moved(pairs_of(scan, held, walls, max(variance, COMMON_WALL_ERROR**2)), pose).weakest
     at = moved(pairs_of(scan, held, walls, variance), pose)
-    apart, without = unlike(scan, held, walls, variance), hinges(scan, held, walls, at, variance)
+    apart, without = unlike(scan, held, walls, variance), leverages(scan, held, walls, at, variance)
     if apart > most_parallel(int((held >= 0).sum())) and weakest <= MAX_DEVIATION:
         found = solve(Pairs.of(registering(scan, held, variance), held, walls, 0.0), at.pose, 0.0)
         at = Moved(found.pose, np.asarray(np.linalg.inv(found.information)), near=True)
-    return Settled(at, variance, weakest, along, apart, without)
+    return EstimatedPose(at, variance, weakest, along, apart, without)
 
 
 def registering(scan: Records, held: Integers, variance: float) -> Records:
@@ -130,7 +132,7 @@ def registering(scan: Records, held: Integers, variance: float) -> Records:
     return out
 
 
-def hinges(scan: Records, held: Integers, walls: Records, at: Moved, variance: float) -> list[Hinge]:
+def leverages(scan: Records, held: Integers, walls: Records, at: Moved, variance: float) -> list[Hinge]:
     """Leave each wall out, in the order in which the lines come on them."""
     out = []
     for w in dict.fromkeys(held[held >= 0].tolist()):

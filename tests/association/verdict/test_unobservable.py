@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from association import HardPrior, MapIndex, SoftPrior
-from association.consensus.settling import Settled
+from association.consensus.estimation import EstimatedPose
 from association.explain import search_and_explain
-from association.verdict.families import place_on_family
+from association.verdict.unobservable import choose_along_direction
 from registration import RigidTransform
 from registration.layout import Floats
 
-from ..answers import answer_with, ranked, registered_room, room, settled_of
+from ..answers import answer_with, estimated_of, ranked, registered_room, room
 from ..scenes import INSIDE, context_of, index_of, pose, scan_of
 
 
@@ -25,27 +25,27 @@ from ..scenes import INSIDE, context_of, index_of, pose, scan_of
 )
 def test_a_position_is_fixed_to_half_a_metre(weakest: float, parallel: bool, degenerate: bool) -> None:
     """Along its weakest direction; and by walls that are not all parallel."""
-    assert replace(settled_of(registered_room()), weakest=weakest, parallel=parallel).degenerate is degenerate
+    assert replace(estimated_of(registered_room()), weakest=weakest, parallel=parallel).degenerate is degenerate
 
 
-def settled_on(walls: Floats, seen_walls: Floats) -> Settled:
+def estimated_on(walls: Floats, seen_walls: Floats) -> EstimatedPose:
     """Search, and return the answer worked out."""
     answer = search_and_explain(context_of(index_of(walls), scan_of(seen_walls))).answer
     assert answer is not None
-    return answer.settled
+    return answer.estimated
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.5, math.pi / 2, 2.0, 3.1])
 def test_the_direction_that_is_not_fixed(angle: float) -> None:
     """That along parallel walls; of the two opposite ones that to the right, or straight up."""
     by = RigidTransform(7.0, -3.0, angle)
-    settled = settled_on(by.apply(WALLS.reshape(-1, 2, 2)).reshape(-1, 4), SEEN)
-    assert settled.parallel
-    assert settled.degenerate
+    estimated = estimated_on(by.apply(WALLS.reshape(-1, 2, 2)).reshape(-1, 4), SEEN)
+    assert estimated.parallel
+    assert estimated.degenerate
     d = np.array([math.cos(angle), math.sin(angle)])
     expected = d if d[0] > 1e-9 or (abs(d[0]) < 1e-9 and d[1] > 0.0) else -d
-    assert abs(settled.direction[0] * d[1] - settled.direction[1] * d[0]) < 1e-6
-    assert settled.direction == pytest.approx(expected.tolist(), abs=1e-6) or abs(d[0]) < 1e-9
+    assert abs(estimated.direction[0] * d[1] - estimated.direction[1] * d[0]) < 1e-6
+    assert estimated.direction == pytest.approx(expected.tolist(), abs=1e-6) or abs(d[0]) < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_two_walls_that_are_nearly_parallel_fix_no_position(degrees: float, dege
     seen_walls = np.array(
         [[-6.0, -2.0, 6.0, -2.0], [6.0, 2.0, 6.0 - 12.0 * math.cos(turn), 2.0 - 12.0 * math.sin(turn)]]
     )
-    assert settled_on(walls, seen_walls).degenerate is degenerate
+    assert estimated_on(walls, seen_walls).degenerate is degenerate
 
 
 def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | None = None) -> RigidTransform:
@@ -67,8 +67,8 @@ def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | No
     context = context_of(index, scan_of(endpoints), prior)
     answer = search_and_explain(context).answer
     assert answer is not None
-    assert answer.settled.degenerate
-    found = place_on_family(context, answer)
+    assert answer.estimated.degenerate
+    found = choose_along_direction(context, answer)
     assert found is not None
     return found
 
@@ -110,19 +110,19 @@ def test_of_a_family_the_member_nearest_the_prior(turn: float) -> None:
 def test_of_a_family_the_member_at_which_the_beams_fit_best() -> None:
     """It is where the best explanation lies, along the direction that is free."""
     context = room(with_beams=True)
-    free = replace(settled_of(registered_room()), direction=(0.6, 0.8), free=True)
+    free = replace(estimated_of(registered_room()), direction=(0.6, 0.8), free=True)
     best = ranked(at=pose(1.0, -0.5, 0.7))  # of the index frame
-    found = place_on_family(context, answer_with(best, settled=free))
+    found = choose_along_direction(context, answer_with(best, estimated=free))
     assert found is not None
     x, y = context.index.origin
     away = 0.6 * (1.0 + x - INSIDE.x) + 0.8 * (-0.5 + y - INSIDE.y)
     assert (found.x, found.y) == pytest.approx((INSIDE.x + 0.6 * away, INSIDE.y + 0.8 * away))
     assert found.theta == pytest.approx(INSIDE.theta)
     known = SoftPrior(pose(4.0, 2.5, 0.0), np.eye(3))
-    found = place_on_family(room(with_beams=True, prior=known), answer_with(best, settled=free))
+    found = choose_along_direction(room(with_beams=True, prior=known), answer_with(best, estimated=free))
     assert found is not None
     assert (found.x, found.y) == pytest.approx((INSIDE.x + 0.6 * 0.6, INSIDE.y + 0.6 * 0.8)), "a prior goes before"
 
 
 def test_without_a_pose_there_is_no_family() -> None:
-    assert place_on_family(room(), answer_with(ranked(), replace(registered_room(), pose=None))) is None
+    assert choose_along_direction(room(), answer_with(ranked(), replace(registered_room(), pose=None))) is None

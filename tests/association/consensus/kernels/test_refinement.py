@@ -11,10 +11,10 @@ from hypothesis import example, given, settings
 from numpy.typing import ArrayLike
 
 from association import Scan
-from association.consensus.kernels import consensus, matching
+from association.consensus.kernels import matching, pair_sums, refinement, scoring, wall_errors
+from association.consensus.tuning import MAX_STEP, MAX_TURN, ROUNDS, SPRING
 from association.layout import MATCH, Integers, record
 from association.tables import Place, Workspace
-from association.tuning import MAX_STEP, MAX_TURN, ROUNDS, SPRING
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.kernels import joint_cost, joint_information
 from registration.layout import JOINT_SUMS, SYMMETRIC3, Floats, Records
@@ -30,10 +30,10 @@ from ...scenes import context_of, index_of, local, pose, same_pose, scan_of
 NO_TIES = np.full(1, -1.0)
 
 
-def test_turning() -> None:
+def test_covariance_about_a_point() -> None:
     """As its twin has it, and the covariance of the place of the point that is held is 0."""
     out = np.zeros(1, SYMMETRIC3)
-    consensus.turning(0.01, 2.0, -3.0, out[0])
+    scoring.covariance_about(0.01, 2.0, -3.0, out[0])
     got = covariance_of(out[0])
     np.testing.assert_allclose(got, proposing.turning(0.01, np.array([2.0, -3.0])), rtol=1e-15)
     at_pin = np.array([[1.0, 0.0, 3.0], [0.0, 1.0, 2.0]])  # derivative of R p + t by (x, y, theta), R p = (2, -3)
@@ -79,10 +79,10 @@ class Some:
     def summed(self, *before: Integers) -> Workspace:
         """Return a workspace with the sums of these pairs, which held other pairs before."""
         work = Workspace.of(len(self.scan), len(self.walls))
-        consensus.start_over(work)
+        pair_sums.empty_sums(work)
         for held in (*before, self.held):
-            consensus.take_up(self.scan, twin.matches_on(held), self.walls, work)
-        consensus.take_out_errors(work, self.ties, self.variance)
+            pair_sums.update_pairs(self.scan, twin.matches_on(held), self.walls, work)
+        wall_errors.eliminate_wall_errors(work, self.ties, self.variance)
         return work
 
 
@@ -109,15 +109,15 @@ def test_what_each_wall_has_in_the_sums(seed: int) -> None:
     some = Some.drawn(seed)
     others = np.random.default_rng(seed).integers(-1, 3, (5, len(some.scan)))
     work, fresh = some.summed(*others), some.summed()
-    assert_records(work.shares, fresh.shares, rtol=1e-9, atol=1e-7)
+    assert_records(work.wall_sums, fresh.wall_sums, rtol=1e-9, atol=1e-7)
     for k in range(3):
-        assert work.shares["count"][k] == (some.held == k).sum()
-        assert work.shares["weight"][k] == pytest.approx(some.scan["weight"][some.held == k].sum())
-        assert any(work.shares[name][k] for name in ("c", "s", "x", "y", "one", "weight")) == (k in some.held)
+        assert work.wall_sums["count"][k] == (some.held == k).sum()
+        assert work.wall_sums["weight"][k] == pytest.approx(some.scan["weight"][some.held == k].sum())
+        assert any(work.wall_sums[name][k] for name in ("c", "s", "x", "y", "one", "weight")) == (k in some.held)
     np.testing.assert_array_equal(work.held, some.held)
-    assert not consensus.take_up(some.scan, twin.matches_on(some.held), some.walls, work)
-    consensus.start_over(work)
-    for left in (work.shares[["c", "s", "x", "y", "one", "weight", "count"]], work.scratch["plain"]):
+    assert not pair_sums.update_pairs(some.scan, twin.matches_on(some.held), some.walls, work)
+    pair_sums.empty_sums(work)
+    for left in (work.wall_sums[["c", "s", "x", "y", "one", "weight", "count"]], work.scratch["plain"]):
         assert not np.array(left.tolist()).any()
     assert (work.held == -1).all()
 
@@ -136,7 +136,7 @@ def test_pieces_of_one_wall_are_no_better_than_the_wall() -> None:
 
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
-def test_solve(seed: int) -> None:
+def test_solve_pose(seed: int) -> None:
     """From where the pairs were seen; from far off, where the pose stays and the cost is that of it."""
     d = drawn(seed)
     matches, _ = match_scan(d.scan, d.at, SMALL, PLACE, GATES)
@@ -148,8 +148,8 @@ def test_solve(seed: int) -> None:
         expected, estimate = twin.solve(some.pairs, start), estimate_of(start)
         step = np.hypot(expected.pose.x - start.x, expected.pose.y - start.y)
         near = bool(step <= MAX_STEP and abs(expected.pose.theta - start.theta) <= MAX_TURN)
-        got = consensus.solve(
-            work.scratch[0]["sums"], estimate[0], work.scratch[0]["information"], work.scratch[0]["value"]
+        got = scoring.solve_pose(
+            work.scratch[0]["sums"], estimate[0], work.scratch[0]["information"], work.scratch[0]["terms"]
         )
         assert got is near
         assert same_pose(pose_of(estimate[0]), expected.pose if near else start, 1e-5, 1e-6)
@@ -157,28 +157,28 @@ def test_solve(seed: int) -> None:
             covariance_of(estimate[0]), np.linalg.inv(expected.information), rtol=1e-4, atol=1e-8
         )
         cost = expected.cost if near else some.pairs.cost(start)
-        assert work.scratch["value"]["cost"][0] == pytest.approx(cost, abs=1e-4, rel=1e-6)
+        assert work.scratch["terms"]["chi_square"][0] == pytest.approx(cost, abs=1e-4, rel=1e-6)
     assert_records(work.scratch["sums"], some.summed().scratch["sums"], rtol=1e-9, atol=1e-6)
 
 
 @example(134217728)
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
-def test_freedom_taken(seed: int) -> None:
+def test_log_determinant(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model = twin.model_of(1.0, float(rng.uniform(0.1, 2.0)), float(rng.uniform(0.01, 1.0)))
     for rank in (0, 1, 2, 3):
         root = rng.normal(size=(3, rank)) * 10.0 ** rng.uniform(-1.0, 3.0)
         matrix = root @ root.T
         information = record(SYMMETRIC3, **dict(zip(UPPER, matrix[np.triu_indices(3)], strict=True)))
-        got = consensus.freedom_taken(information[0], model[0])
-        assert got == pytest.approx(twin.freedom_taken(matrix, model[0]), abs=1e-7)
+        got = scoring.log_determinant(information[0], model[0])
+        assert got == pytest.approx(twin.log_determinant(matrix, model[0]), abs=1e-7)
         assert rank > 0 or got == 0.0
 
 
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
-def test_value_pairs(seed: int) -> None:
+def test_score_pairs(seed: int) -> None:
     """Also of matches that cost more than they gain, on walls of their own and beside others."""
     d = drawn(seed)
     variance = float(10.0 ** d.rng.uniform(-4.0, -1.0))
@@ -189,14 +189,14 @@ def test_value_pairs(seed: int) -> None:
     matches, _ = match_scan(d.scan, at, SMALL, PLACE, wide)
     # Lines are cut in two, so that walls have several of them.
     scan, matches = np.concatenate([d.scan, d.scan]), np.concatenate([matches, matches])
-    matches["worth"] = d.rng.normal(size=len(matches))  # of another pose
+    matches["score"] = d.rng.normal(size=len(matches))  # of another pose
     # Some walls are one in part.
     ties = d.rng.choice([-1.0, 0.0, 0.1, 0.5, 3.0], len(PLACE.walls))
     place = PLACE._replace(ties=ties)
     work = Some(scan, PLACE.walls, matches["wall"], at, variance, ties).summed()
     got, expected = matches.copy(), matches.copy()
-    total = consensus.value_pairs(scan, estimate_of(at)[0], place, variance, got, work)
-    assert total == pytest.approx(twin.value_pairs(scan, at, place, variance, expected), abs=1e-9)
+    total = scoring.score_pairs(scan, estimate_of(at)[0], place, variance, got, work)
+    assert total == pytest.approx(twin.score_pairs(scan, at, place, variance, expected), abs=1e-9)
     assert_records(got, expected, rtol=1e-6, atol=1e-6)
 
 
@@ -210,21 +210,21 @@ def test_a_match_that_costs_what_it_gains_is_none(share: float, stays: bool) -> 
     at, walls = local(index, pose(0.0, off)), index.walls.rows
     matches = twin.matches_on(np.array([int(np.argmax(walls["dx"]))]), rows)
     work = Some(rows, walls, matches["wall"], at, variance, index.ties).summed()
-    total = consensus.value_pairs(rows, estimate_of(at)[0], index.tables.place, variance, matches, work)
+    total = scoring.score_pairs(rows, estimate_of(at)[0], index.tables.place, variance, matches, work)
     assert (matches["wall"][0] >= 0, total > 0.0) == (stays, stays)
-    assert matches["worth"][0] == pytest.approx(rows["gain"][0] * (1.0 - share**2) if stays else 0.0)
+    assert matches["score"][0] == pytest.approx(rows["gain"][0] * (1.0 - share**2) if stays else 0.0)
 
 
-def test_hold_and_clear() -> None:
+def test_spring_and_clear_sums() -> None:
     """The spring costs the square of the distance from where it holds, and lets go without a trace."""
     sums = np.zeros(1, JOINT_SUMS)
-    consensus.hold(sums[0], 2.0, -1.0, 1.0)
+    scoring.add_spring(sums[0], 2.0, -1.0, 1.0)
     assert joint_cost(sums[0], 0.7, 5.0, 3.0) == pytest.approx(SPRING * (3.0**2 + 4.0**2))
     assert joint_cost(sums[0], -0.7, 2.0, -1.0) == pytest.approx(0.0, abs=1e-12)
-    consensus.hold(sums[0], 2.0, -1.0, -1.0)
+    scoring.add_spring(sums[0], 2.0, -1.0, -1.0)
     np.testing.assert_allclose(sums.view(float), 0.0, atol=1e-15)
     sums.view(float)[:] = 1.0
-    consensus.clear(sums[0])
+    pair_sums.clear_sums(sums[0])
     assert not sums.view(float).any()
 
 
@@ -233,7 +233,7 @@ def refine(
 ) -> float:
     """Match at a pose and refine it, (1,) of `ESTIMATE`; return the score."""
     matching.match_scan(rows, estimate[0], place, GATES[0], rows["gain"].copy(), 0.0, matches)
-    return consensus.refine(rows, estimate[0], place, ASKED.terms[0], matches, work, floor)
+    return refinement.refine(rows, estimate[0], place, ASKED.terms[0], matches, work, floor)
 
 
 @given(SEEDS)
@@ -243,8 +243,8 @@ def test_refine(seed: int) -> None:
     """From poses that are a little off, and from some that are far off."""
     d = drawn(seed)
     work = workspace_of(d.scan)
-    consensus.take_up(d.scan, twin.matches_on(d.rng.integers(-1, 9, len(d.scan))), PLACE.walls, work)
-    work.scratch["value"] = 1.0, 2.0, 3.0  # what another pose left behind
+    pair_sums.update_pairs(d.scan, twin.matches_on(d.rng.integers(-1, 9, len(d.scan))), PLACE.walls, work)
+    work.scratch["terms"] = 1.0, 2.0, 3.0  # what another pose left behind
     for start in (d.near(), d.near(0.05, 0.2, 0.2), d.near(0.02, 4.0, 4.0)):
         spread = covariance(d.rng)
         expected = twin.refine(d.scan, start, spread, PLACE, GATES, MODEL, ROUNDS)
@@ -256,9 +256,12 @@ def test_refine(seed: int) -> None:
             assert same_pose(pose_of(estimate[0]), expected.pose, 1e-5 * rounding, 1e-6 * rounding)
             np.testing.assert_allclose(covariance_of(estimate[0]), expected.covariance, rtol=1e-4 * rounding, atol=1e-8)
             np.testing.assert_array_equal(matches["wall"], expected.matches["wall"])
-            np.testing.assert_allclose(matches["worth"], expected.matches["worth"], atol=1e-4 * rounding)
-            gain, cost, freedom = work.scratch["value"][0].item()
-            assert got == pytest.approx(max(0.0, gain - 0.5 * cost - freedom)) or not (matches["wall"] >= 0).any()
+            np.testing.assert_allclose(matches["score"], expected.matches["score"], atol=1e-4 * rounding)
+            gain, chi_square, log_determinant = work.scratch["terms"][0].item()
+            assert (
+                got == pytest.approx(max(0.0, gain - 0.5 * chi_square - log_determinant))
+                or not (matches["wall"] >= 0).any()
+            )
         assert refine(d.scan, estimate_of(start, spread), PLACE, matches, work, gain + 1e-6) == 0.0
 
 
@@ -308,7 +311,7 @@ def test_a_set_that_would_turn_its_pose_far_leaves_it(off: float, stays: bool) -
     assert at.theta == pytest.approx(off if stays else 0.0, abs=0.01)
 
 
-def test_a_set_that_does_not_fix_the_rotation_is_worth_nothing() -> None:
+def test_a_set_that_does_not_fix_the_rotation_scores_nothing() -> None:
     """A segment that is known by one point, where the sensor stands."""
     seen = Segments.from_array([[-0.5, 0.0, 0.5, 0.0]])
     point = MeasuredSegments.from_segments(seen, 0.02, moments=(np.zeros((1, 2)), np.zeros(1)))

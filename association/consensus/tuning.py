@@ -1,0 +1,114 @@
+"""Every threshold of matching, scoring and estimating consensus sets, with its unit and where it comes from.
+
+The origins are explained in `association.tuning`.
+"""
+
+# --- Matching: when a scan segment lies on a wall ---------------------------------------------------------------------
+
+# Between these lengths a segment comes to bridge a gap between walls: a short one may well be clutter there.
+SHORT_BRIDGE, LONG_BRIDGE = 2.5, 3.5  # m, tables
+FLAT_STEP = 0.03  # m, tables; between two walls on which a segment lies, up to where both count fully
+FLAT_GATE = 0.9  # of a gate, tables; what lies farther off gains less, and nothing at the gate
+OVERLAP_TAPER = 0.05  # beyond the least overlap, tables; up to there a match gains less, and nothing at the least
+LEAST_COUNT = 1e-9  # rounding; of matches, to divide by
+WHOLE_SCORE = 2.0  # nats, tables; a match that scores less is a match in part
+MOST_BRIDGED = 2000  # neighbours on their chains that the walls under one scan segment have, measured
+
+# --- Consensus: growing and shrinking a set of matches at a pose ------------------------------------------------------
+
+ROUNDS = 3  # tables; of matching and solving
+MAX_STEP = 1.0  # m, tables; a consensus set that moves its pose farther than that, or
+MAX_TURN = 0.2  # rad, tables; is not the one that the pose was proposed for
+SAME_SHIFT = 1e-6  # m, rounding
+SPRING = 1e-2  # 1/m^2; holds a pose along directions that no pair fixes, with 10 m of standard deviation
+START_VARIANCE = 1e-4  # m^2, tables; of a pose that comes without a covariance
+START_ANGLE_VARIANCE = 1e-6  # rad^2, tables
+
+# --- Work between two looks at the clock ------------------------------------------------------------------------------
+
+# Work between two looks at the clock while poses are ranked: poses, times segments of the scan, times walls on the list
+# of a place. More than all poses of a usual search, and some seconds where thousands of walls lie in one place.
+RANKED_AT_ONCE = 200_000
+# Work between two looks at the clock while poses are estimated: pairs of scan lines. Some 20 ms; of fewer than 140
+# lines all poses that are returned.
+ESTIMATED_AT_ONCE = 1_000_000
+SORTED_BY_INSERTION = 64  # walls; of more an order by insertion takes longer than by merging
+PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at a time; 2 MB for each table
+
+# --- Estimation: the pose with the error of the map's walls -----------------------------------------------------------
+
+VIEW_ROUNDS = 6  # tables; of solving for a pose and the errors of its views
+
+# What the walls' own error is taken for before any is seen, and how many walls that counts as. Fitted.
+USUAL_WALL_ERROR = 0.02  # m
+USUAL_WALLS = 2.0
+UNSEEN_ERROR = 1.15  # fitted; variance of walls' errors over that of those which the gates let pass
+LEAST_KNOWN_VARIANCE = 1e-12  # m^2, rounding; of walls whose error the caller knows
+LEAST_WALL_ERROR = 0.003  # m, tables
+ROUGH_FRACTION = 0.1  # of a wall's variance, tables; what differs along it
+ESTIMATION_ROUNDS = 4  # tables
+FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
+COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
+
+# --- Ranking ----------------------------------------------------------------------------------------------------------
+
+LEAST_DISTINCT = 24  # tables; explanations at least: the verdict compares the best with the others
+SAME_FAMILY = 12.8  # squared deviations, geometry: 99.5 % of chi-square of three; two nearer poses are one
+
+# --- Lines of sight ---------------------------------------------------------------------------------------------------
+
+END_MARGIN = 0.06  # m, tables; rays keep this far from the ends of a segment, where neighbours meet
+SIGHT_TOLERANCE = 0.2  # m, tables; a wall this near before the end of a ray does not block it
+BLOCKED = 2.0  # nats per metre of wall, tables; against a pose, where rays to the consensus set pass through the wall
+BLOCKED_CLUTTER = 2.0  # nats per metre, tables; likewise for rays to clutter
+BLOCKING_LENGTH = 3.0  # m, tables; beyond it a wall counts no more
+BLOCKING_RAYS = 4.0  # that count fully, tables
+FAR_BEHIND = 25.0  # nats, tables; a candidate so far behind needs no lines of sight
+
+# --- Beams ------------------------------------------------------------------------------------------------------------
+
+FEW_BEAMS = 60  # tables; for a first look: neighbouring beams say the same
+MOST_BEAMS = 180  # tables
+BEAM_FINALISTS = 32  # tables
+# When the deadline has passed so many candidates are looked at, and of them so many finalists. Measured.
+LATE_CANDIDATES = 16
+LATE_FINALISTS = 2
+BEAMS_READ = 100.0  # nats, tables; for a pose at which all beams read the wall they should
+BEAMS_PASSED = 50.0  # nats, tables; against one at which all beams passed through a wall
+NEAR = 0.1  # m, tables; deviation of a reading across the wall it should come from: noise, map and pose together
+CERTAIN = 0.15  # m, tables; a reading farther across than this is not of that wall
+BEHIND = 2.0  # m, tables; how far behind a reading a wall is looked for
+LEAST_INCIDENCE = 0.15  # cosine, tables; nearer to grazing the pose decides too much
+LEAST_POINTS = 10  # tables; for the beams to move a pose
+BEAM_GATES = (0.35, 0.25, 0.15, 0.15)  # m, tables; of the rounds in which they do
+PASSED_SLACK = 0.01  # tables; fraction of beams that may pass more where a pose was moved
+FARTHER_BY = 0.05  # m, tables; across the wall that the map shows; a beam that reads farther by more, or
+NEARER_BY = 0.1  # m, tables; nearer, does not read it
+WALL_BEHIND = 30.0  # m, geometry; so far behind a reading a wall is looked for then
+SURE_LENGTH = 3.0  # m, tables; shorter walls on a map made by a robot may have been people or carts
+
+# --- Agreement: what is seen, compared with what the map shows --------------------------------------------------------
+
+AGREEING = 0.2  # m, tables; a scan segment and a wall nearer to each other than that, and
+AGREEING_FRACTION = 0.02  # of the distance more, agree
+MISSING_RANGE = 15.0  # m, tables; a wall nearer than that, within the reach of the scan,
+MISSING_LENGTH = 0.8  # m, tables; as long,
+MISSING_SINE = 0.3  # tables; and not seen at a grazing angle, should have left a segment
+BLIND_FRACTION = 0.25  # of the circle, tables; a wider gap without any segment is out of the sensor's view
+NEUTRAL = 0.8  # tables; where there is nothing to compare
+
+# --- Acceptance: correspondences with the map's own segments ----------------------------------------------------------
+
+MAX_OTHERS = 8  # map segments named beside the one that a scan segment lies on most
+MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85
+MIN_EXTENT = 1e-9  # m, rounding; what a segment along a wall counts as at least
+
+CONTRADICTION = 6.0  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
+ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls
+
+# --- Similarity: a pose together with a factor ------------------------------------------------------------------------
+
+TRIMMED_FITS = 3  # tables
+TRIMMED_LINES = 4  # geometry: as many unknowns
+TRIMMED_OUTLIER = 3.0  # times the median, tables; ends of scan lines that are farther off are on wrong walls
+LEAST_TRIMMED = 1e-3  # m, rounding; of that median

@@ -1,0 +1,74 @@
+"""How probable the best explanation is among its alternatives: perceptual aliasing.
+
+Alternatives are compared twice: as they were scored, and with walls taken to be off by more than the answer shows.
+Where a building repeats itself and its map is centimetres off, a wall at the right place may lie beyond the gates, and
+a similar place fit better by luck: the error of the walls is estimated from the one that fits best, and of many similar
+places one always fits well. What a place misses so, by centimetres, is no evidence against it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from registration.layout import Floats, Records
+
+from ..consensus.consensus_set import ConsensusSet
+from ..consensus.ranking import score_again
+from ..context import SearchContext
+from ..explanations import Answer
+from ..layout import ALTERNATIVE, COMPARED
+from ..scan.scan_lines import ScanLines
+from ..tuning import MODEL_OFFSET
+from .kernels import alternatives as kernels
+from .tuning import ALTERNATIVE_TEMPERATURE, LOOSE_ALTERNATIVES, LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_WALLS
+
+
+def compare_alternatives(best: ConsensusSet, others: Sequence[ConsensusSet]) -> Records:
+    """Compare the best explanation with others; return (k,) of `ALTERNATIVE`."""
+    explanations = np.array([(one.posterior, one.chi_square, one.count) for one in (best, *others)], COMPARED)
+    alternatives = np.zeros(len(others), ALTERNATIVE)
+    kernels.compare(explanations, alternatives)
+    return alternatives
+
+
+def probability_among(alternatives: Records) -> float:
+    """Return the probability of the best explanation among those that are about as good, above 0 and up to 1."""
+    return kernels.probability_among(alternatives)
+
+
+def probability_with_loose_walls(context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]) -> float:
+    """Return the probability of the best explanation among the next ones where walls may be off by more, up to 1.
+
+    1 where the caller knows by how much they are.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    if context.index.sigma is not None or not others:
+        return 1.0
+    lines = ScanLines.of(context.scan, _loose_sigma(answer.estimated.wall_sigma), context.options, context.lines.given)
+    explanations = (answer.best, *others[:LOOSE_ALTERNATIVES])
+    scores = score_again(context.instead(context.scan, lines), explanations)
+    return _probability_of_first(explanations, scores)
+
+
+def _loose_sigma(wall_sigma: float) -> float:
+    """Return the standard deviation of a wall's offset beyond `MODEL_OFFSET`, metres, for an estimate of its whole."""
+    loose = max(LOOSE_WALLS, LOOSE_FACTOR * wall_sigma)
+    return math.sqrt(loose * loose - MODEL_OFFSET * MODEL_OFFSET)
+
+
+def _probability_of_first(explanations: Sequence[ConsensusSet], scores: Floats) -> float:
+    """Return the probability of the first explanation among all, from what their segments score now, (k,) nats.
+
+    The prior counts in full; the beams' part, which depends on centimetres, counts by `LOOSE_BEAMS`.
+    """
+    prior_and_beams = [one.posterior - one.score + LOOSE_BEAMS * (one.score - one.by_segments) for one in explanations]
+    posteriors = scores + np.array(prior_and_beams)
+    others = np.exp(np.minimum(0.0, posteriors[1:] - posteriors[0]) / ALTERNATIVE_TEMPERATURE)
+    return 1.0 / (1.0 + float(others.sum()))

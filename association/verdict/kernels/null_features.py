@@ -1,0 +1,59 @@
+"""Features of the null score: what the mirrored scan scores over what the answer scores."""
+
+import math
+
+import numpy as np
+
+from compiled import kernel
+from registration.layout import Records
+
+from ...tables import Odds
+from ..tuning import MAX_GAP, MOST_NULL, NULL_FRACTION, NULL_FRACTIONS, SYMMETRIC, UNLIKE_SYMMETRY
+from .odds import log_odds
+
+ROUNDING = 1e-9  # of a probability
+
+
+@kernel
+def null_features(score: float, null: float, symmetry: float) -> tuple[float, float, float]:
+    """Return the features ``null``, ``null_gap`` and ``null_better`` of an answer."""
+    ratio = min(MOST_NULL, null / score) if score > 0.0 else MOST_NULL
+    symmetric = min(1.0, max(0.0, (symmetry - UNLIKE_SYMMETRY) / (SYMMETRIC - UNLIKE_SYMMETRY)))
+    excess = max(0.0, ratio - NULL_FRACTION) * (1.0 - symmetric)
+    gap = (1.0 - NULL_FRACTION - excess) * score
+    return NULL_FRACTION + excess, root_gap(gap), max(0.0, ratio - 1.0)
+
+
+@kernel
+def root_gap(gap: float) -> float:
+    """Return the root of a gap, nats, with its sign, up to that of `MAX_GAP`."""
+    return math.copysign(math.sqrt(min(abs(gap), MAX_GAP)), gap)
+
+
+@kernel
+def write_null_features(score: float, null: float, symmetry: float, features: Records) -> None:
+    """Write what an answer and the mirrored scan score into the features of the answer, (1,) of `FEATURES`."""
+    out = features[0]
+    out.null, out.null_gap, out.null_better = null_features(score, null, symmetry)
+
+
+@kernel
+def allowed_null(cautious: Odds, features: Records, score: float, bar: float) -> float:
+    """Return the greatest of `NULL_FRACTIONS` at which the probability is over `bar`; or 0.
+
+    That is the mirrored scan's score over the answer's. Wherever the map is not symmetric about the
+    place. The more it scores the less the probability. `features` (1,) are those of the answer; what they say of the
+    null score is changed.
+    """
+    numbers = features.view(np.float64)
+    least = bar + ROUNDING
+    if least >= 1.0:
+        return 0.0
+    least = math.log(least / (1.0 - least))
+    allowed = 0.0
+    for ratio in NULL_FRACTIONS:
+        write_null_features(score, ratio * score, 0.0, features)
+        if log_odds(cautious, numbers) < least:
+            break
+        allowed = ratio
+    return allowed

@@ -1,0 +1,69 @@
+"""Every threshold of the verdict, with its unit and where it comes from; see `association.tuning` for the origins."""
+
+# --- Alternatives: compared again with walls off by more --------------------------------------------------------------
+
+# Explanations are scored again with gates as wide as walls may be off: by so much at least,
+LOOSE_WALLS = 0.05  # m, tables
+LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
+LOOSE_BEAMS = 0.5  # tables; and with that fraction of the beams' part, which depends on centimetres
+LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
+
+# --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
+
+SHORTEST_SHOWN = 0.2  # m, tables; less of a wall tells nothing of its symmetry
+NULL_KEPT = 24  # poses, tables
+NULL_FRACTION = 0.7  # of the answer's score, tables; a null below it says no more
+# By what fraction a null may be better than the answer, measured: of 11,275 right answers that are sure otherwise 3
+# have one that is better by more. Else the laser is upside down, or the robot elsewhere.
+MIRRORED_BETTER = 0.02
+# Fractions at which it is looked up whether a null matters; beyond the last it always does.
+NULL_FRACTIONS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.0 + MIRRORED_BETTER)
+NULL_MARGIN = 0.9  # of the score in question, measured; a pose that scores less while it is searched for is not kept
+NULL_ENOUGH = 1.1  # likewise; a null above it
+# The probability that is allowed of having missed a better one. Tables: it is one feature among others;
+NULL_ALLOWED = 0.01
+NULL_ALLOWED_NEAR = 0.001  # where only what matters is looked for, which fewer bases show
+NULL_SAMPLES = 1_024  # consensus sets, a resolution of 1e-3
+
+# --- Chance: the bound ------------------------------------------------------------------------------------------------
+
+LEAST_CHANCE, MOST_CHANCE = 1e-6, 0.9  # of one match, rounding
+LEAST_SIGNIFICANCE = 1e-300  # rounding
+
+# --- Verdict ----------------------------------------------------------------------------------------------------------
+
+MANY = 8  # matched segments, tables; from which on the misfit says as much as it can
+NEARLY_ALL = 0.85  # of the scan's length, tables
+LONGEST_UNMATCHED = 4.0  # m, tables; a longer segment
+MOST_UNMATCHED = 16.0  # m, tables; and more clutter say no more
+MAX_LEAD = 40.0  # nats, tables
+MOST_DEVIATION = 1.0  # m, tables
+UNCOUNTED_FRACTION = 0.3  # of the best value, tables; worse alternatives do not count: the search finds them by chance
+CROWD_TEMPERATURE = 4.0  # nats, tables
+LEAST_CROWD = -12.0
+MAX_GAP = 60.0  # nats, tables
+LEAST_LOG_SIGNIFICANCE = -30.0  # log10, tables; smaller values say no more
+MOST_NULL = 1.2  # tables; a null above it says no more
+UNLIKE_SYMMETRY, SYMMETRIC = (
+    0.7,
+    0.95,
+)  # tables; fractions between which a map comes to count as symmetric about a place
+LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
+ALTERNATIVE_TEMPERATURE = 1.5  # nats, fitted; how far apart two explanations score that are as likely as one to e
+USABLE_PROBABILITY = 0.94  # cross-validated
+USABLE_CAUTIOUS = 0.9  # cross-validated; of the same, where other buildings are included,
+USABLE_CAUTIOUS_WITH_BEAMS = 0.9  # cross-validated; and with raw beams
+# The same of views that are not exact: the models were fitted to scans from one place. Of drives of 5 m through sister
+# buildings, and of 10 m in logs, those that were usable and wrong came to 0.92 and 0.945. Measured.
+USABLE_CAUTIOUS_DRIVE = 0.95
+# What the exact views of a drive read of the walls over what all do. Of 2,823 right drives in drawn buildings and logs
+# that were usable 1 in 500 came below 0.65; one whose frame was 3.8 degrees off to 0.36. Measured.
+LEAST_IN_STEP = 0.55
+FEW_WALLS = 3  # geometry: three sides of a room; fewer are never enough if one of them alone decides, and as many
+OFFSET_OF_FEW = 0.002  # m, measured; only of segments, and where they are off by no more, root mean square
+NO_ALTERNATIVE = 8.0  # nats, tables; an explanation that scores so much less is no alternative
+TELLING_REASON = 1.0  # nats, tables; a reason that takes less of the odds is not returned
+NO_MATCH_PROBABILITY = 0.03  # tables; of the first explanation or a similar place, other buildings included
+ELSEWHERE_PROBABILITY = 0.1  # cross-validated; likewise, below it 3 % of scans of the map and most of others are
+CONTRADICTED = 0.5  # the greatest probability of an answer then
+FAR_FROM_PRIOR = -9.0  # nats; a pose of which a soft prior says less lies outside it, at 4.2 standard deviations
