@@ -183,7 +183,7 @@ def test_the_covariance_is_that_of_least_squares_with_all_that_is_common(chained
     together = assemble(views).views
     assert together is not None
     shown, variance = on_walls(rng, together), 0.02**2
-    estimated = shown.estimate_poses(pose(), variance, Deadline())
+    estimated = shown.estimate(pose(), variance, Deadline())
     assert same_pose(estimated.pose, pose(), 1e-9, 1e-9)
     rows, by_pose, by_views, noise = [], [], [], []
     for one, wall in zip(shown.seen, shown.walls, strict=True):
