@@ -1,4 +1,4 @@
-"""Whether a scan that cannot be used fits much better once a caller's mistake is undone."""
+"""Find the mistake of a caller without which a scan that cannot be used fits much better."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from .verdict.verdict import Verdict, judge
 
 
 class Mistake(StrEnum):
-    """What a caller may have done to a scan; the code of the warning."""
+    """A mistake that a caller may have made with a scan; the code of the warning."""
 
     MIRRORED = "mirrored"
     REVERSED = "reversed"
@@ -52,13 +52,13 @@ class Cause:
     ----------
     mistake : Mistake
     factor : float
-        What undoes it: the scan's lengths times this are metres of the map; 1 where it is another mistake.
+        The correction: the scan's lengths times this are metres of the map; 1 for another mistake.
     score : float
         Of the scan once it is undone, nats.
     sure : bool
-        Whether the answer would then be usable.
+        True if the answer would then be usable.
     of_map : bool
-        Whether the map's lengths were changed, and not the scan's.
+        True if the map's lengths were changed, and not the scan's.
     """
 
     mistake: Mistake

@@ -1,4 +1,4 @@
-"""What one search goes by, derived once."""
+"""The inputs of one search, derived once."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class SearchContext:
 
     @property
     def with_beams(self) -> bool:
-        """Whether single beams are evidence."""
+        """Return whether single beams are evidence."""
         return self.scan.beams is not None
 
     @property
@@ -109,7 +109,7 @@ class SearchContext:
     def ends(self) -> Records:
         """The ends of the scan's segments, (n,) of `ENDS`.
 
-        Read-only, as those that were sent are: a kernel is not compiled once more for those of views that were moved.
+        Read-only, as those that were sent are: a kernel is not compiled again for those of views that were moved.
         """
         ends = as_records(ENDS, self.scan.measured.segments.endpoints).view()
         ends.flags.writeable = False
@@ -117,7 +117,7 @@ class SearchContext:
 
     @cached_property
     def sights(self) -> Sights:
-        """What was seen from each place, as far as lines of sight are evidence."""
+        """The lines seen from each place, as far as lines of sight are evidence."""
         seen, views = self.lines.sightings, self.scan.views
         if views is None:
             seen = seen if self.scan.viewpoint is not None else seen[:0]
@@ -142,7 +142,7 @@ class SearchContext:
 
     @cached_property
     def looks(self) -> float:
-        """How many walls, of cells that they pass, are looked at for the rays from one pose, at most.
+        """Bound the number of walls, in cells that they pass, that are looked at for the rays from one pose.
 
         Of the lines of sight of the scan, of those in all directions, and of the beams that are compared.
         """
@@ -165,17 +165,17 @@ class SearchContext:
 
     @property
     def can_look(self) -> bool:
-        """Whether rays can be followed: the map has few enough walls along them."""
+        """Return whether rays can be followed: the map has few enough walls along them."""
         return self.looks <= MOST_LOOKED_AT
 
     @property
     def too_late_to_look(self) -> bool:
-        """Whether rays cannot be followed, or take long after the deadline: many walls lie in one place."""
+        """Return whether rays cannot be followed, or take long after the deadline: many walls lie in one place."""
         return not self.can_look or (self.index.crowd > LATE_CROWD and self.deadline.passed)
 
     @cached_property
     def workspace(self) -> Workspace:
-        """What the kernels write to while they look at poses."""
+        """The arrays that the kernels write to while they look at poses."""
         return Workspace.of(len(self.lines.rows), len(self.index.walls.rows))
 
     @cached_property
@@ -186,12 +186,12 @@ class SearchContext:
         return KnownWalls(self.index.walls.rows, self.index.ties, -1.0 if known is None else known**2, parallel)
 
     def question(self, rules: Records) -> Question:
-        """Return what the kernels search for; `rules` (1,) say which poses are kept."""
+        """Return the input of the kernels' search; `rules` (1,) define which poses are stored."""
         return Question(self.lines.rows, self._terms, rules)
 
     @cached_property
     def question_of_a_pose(self) -> Question:
-        """The same for kernels that keep no poses."""
+        """The same for kernels that store no poses."""
         return Question(self.lines.rows, self._terms, NOTHING_KEPT)
 
     @cached_property
@@ -206,7 +206,7 @@ class SearchContext:
     def instead(self, scan: Scan, lines: ScanLines) -> SearchContext:
         """Return the search, without a prior, for a scan that differs from this one, on the same map.
 
-        Where it has as many lines, what the kernels write to is the same: one of both may search at a time.
+        If it has as many lines, both write to the same workspace: only one of them may search at a time.
         """
         other = self._searching(scan, lines)
         if lines.model is self.lines.model and self.prior is None:

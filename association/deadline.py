@@ -22,7 +22,7 @@ LONGEST_WAIT = 3600.0  # s; the time that a thread may wait at once is limited
 
 
 class CancelledError(Exception):
-    """The search was told to stop by `Deadline.cancel`; there is no answer."""
+    """`Deadline.cancel` stopped the search; there is no answer."""
 
 
 @dataclass(slots=True, eq=False)
@@ -52,12 +52,12 @@ class Deadline:
 
     @property
     def cancelled(self) -> bool:
-        """Whether `cancel` was called."""
+        """Return whether `cancel` was called."""
         return self._cancelled or (self._outer is not None and self._outer.cancelled)
 
     @property
     def passed(self) -> bool:
-        """Whether the search has to end: it was cancelled, or its time is over."""
+        """Return whether the search has to end: it was cancelled, or its time is over."""
         return self.cancelled or (self.at is not None and time.monotonic() >= self.at)
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""What association refuses.
+"""Errors of association.
 
 ::
 

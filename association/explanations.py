@@ -33,7 +33,7 @@ class Answer:
     agreement : float
         Fraction of directions in which the scan shows what the map does, 0 to 1.
     beams : BeamFractions
-        How many of the beams do not read what the map shows.
+        Fractions of the beams that do not read what the map shows.
     significance : float
         Probability that chance scores as high.
     """

@@ -37,8 +37,8 @@ WALL = fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
 # A line of the scan, one segment or several that continue or repeat one another, the most telling first: unit
 # direction; midpoint; length; angle of the direction; mean of the points and their second moment along the line (m^2);
 # variances of offset (m^2) and angle (rad^2) with the model's slack, for the gates; weight in the sums (1/m^2), without
-# what is common to a wall; what it is worth on a wall; the sum of that over all later lines; variance of the offset by
-# the sigmas alone (m^2); the freedom that it takes from a pose by itself, nats.
+# the error common to a wall; its gain on a wall; the sum of that over all later lines; variance of the offset by the
+# sigmas alone (m^2); the freedom that it alone takes from a pose, nats.
 SCAN_LINE = fields(
     (
         _F,
@@ -47,22 +47,22 @@ SCAN_LINE = fields(
     ),
 )
 
-# What segments of a scan show together that continue or repeat one another: unit direction; midpoint; length from end
-# to end, and of what they cover; mean of the points and their second moment along the line (m^2); how many
-# they are, and the standard deviation of one of them (m); variance of its offset (m^2); what is not known of where they
-# were seen from, as variances of the offset (m^2) and the angle (rad^2).
+# A line of segments of a scan that continue or repeat one another: unit direction; midpoint; length from end to end,
+# and the length that they cover; mean of the points and their second moment along the line (m^2); the number of points,
+# and the standard deviation of one of them (m); variance of its offset (m^2); uncertainty of the viewpoints, as
+# variances of the offset (m^2) and the angle (rad^2).
 LINE_PARTS = fields(
     (_F, "dx dy x y length covered centroid_x centroid_y spread points sigma variance common_offset common_angle")
 )
 
-# What one view shows of a line of the scan: which view's sensor that is; the row of that line; unit direction;
+# The part of a line of the scan that one view shows: number of the view's sensor; the row of that line; unit direction;
 # midpoint; length; mean of the points and their second moment along the line (m^2); variance of its offset (m^2).
 SIGHTING = fields((_I, "sensor row"), (_F, "dx dy x y length centroid_x centroid_y spread variance"))
 
-# Where a scan line lies: the wall or -1; offset from the line under it, which tied walls make up together; sine of the
-# angle to the wall; fraction of the length on walls; by how much that line is beside the wall's own (m), and the mean
-# square by which the walls under it are off it (m^2); what the match gains, and its score, which is
-# the gain less half of the chi-square that goes with it, nats.
+# The match of a scan line: the wall or -1; offset from the line under it, which tied walls make up together; sine of
+# the angle to the wall; fraction of the length on walls; lateral offset of that line from the wall's own (m), and the
+# mean square by which the walls under it are off it (m^2); the gain of the match, and its score, which is the gain less
+# half of the chi-square that goes with it, nats.
 MATCH = fields((_I, "wall"), (_F, "offset sine overlap shift uneven gain score"))
 
 # A pose with its covariance, of additive x, y, theta.
@@ -80,9 +80,9 @@ SET_SCORE = fields(
     (_F, "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed count"),
 )
 
-# What one wall has in the sums: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of
-# its elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs. What is known of the wall's error but
-# by these pairs: weight (1/m^2), and weight times the error (1/m) at a pose. Whether it is listed.
+# The sums of one wall: with the vector ``phi`` and the weight w of each pair, ``sum w phi`` by the names of its
+# elements (m and 1 times 1/m^2), ``sum w`` (1/m^2), and the number of pairs. Other evidence of the wall's error than
+# these pairs: weight (1/m^2), and weight times the error (1/m) at a pose. A flag for a wall that is listed.
 WALL_SUMS = fields((_F, "c s x y one weight count other_weight other_sum"), (_I, "listed"))
 
 # A pose among the best: score and prior together; the score alone.
@@ -91,23 +91,23 @@ FOUND = np.dtype([*POSE.descr, ("value", _F), ("score", _F)])
 # Geometry of a grid: its corner; the size of a cell; how many there are.
 GRID_SHAPE = fields((_F, "x0 y0 cell"), (_I, "columns rows"))
 
-# What a match has to pass: gates in standard deviations, and the least and greatest offset and angle that they may
-# come to; the least fraction of the length on walls.
+# The gates of a match: in standard deviations, and the least and greatest offset and angle that they may come to; the
+# least fraction of the length on walls.
 GATES = fields((_F, "sigmas least_offset greatest_offset least_angle greatest_angle least_overlap"))
 
 # The model that scores a consensus set: variance of a wall's own error, m^2; how far a pose is free before it is fixed,
 # as standard deviations of position (m) and heading (rad).
 MODEL = fields((_F, "wall_variance free_distance free_angle"))
 
-# Which poses are kept: share of the best value that is needed; distance and angle of distinct poses; share of the best
-# value that makes a rival, up to which the search goes on; the value that ends it.
+# Rules by which poses are stored: fraction of the best value that is needed; distance and angle of distinct poses;
+# fraction of the best value that makes an alternative, up to which the search goes on; the value that ends it.
 RULES = fields((_F, "kept_share distinct_distance distinct_angle rival_share enough"))
 
-# What is known before: kind; the pose; radius and angle of a window; information of a Gaussian.
+# The prior: kind; the pose; radius and angle of a window; information of a Gaussian.
 PRIOR = np.dtype([("kind", _I), *POSE.descr, ("radius", _F), ("angle", _F), *SYMMETRIC3.descr])
 NO_PRIOR, SOFT_PRIOR, HARD_PRIOR = range(3)
 
-# What a pose is judged by.
+# The terms by which a pose is judged.
 TERMS = np.dtype([("gates", GATES), ("prior", PRIOR), ("model", MODEL)])
 
 # Two wall chains whose lines cross, the second one to the left of the first; where they begin and end, as a number: see
@@ -117,13 +117,13 @@ CROSSING = fields((np.int32, "first second"), (np.uint32, "code"))
 # Some of the boxes around chains that are near one another in y: where they begin and end, and their range of y.
 BAND = fields((_I, "begin end"), (_F, "low high"))
 
-# Where crossings are listed: up to how far from the point where the lines cross, and how many cells there are that way.
+# The lists of crossings: the reach from the point where the lines cross, and the number of cells that way.
 CROSSING_SHAPE = fields((_F, "reach"), (_I, "columns"))
 
-# What the search of a base goes by, of its segments a, which slides, and b: from the midpoint of a to that of b, also
-# along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
+# The geometry of a base for its search, of its segments a, which slides, and b: from the midpoint of a to that of b,
+# also along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
 # rotation; by how much the two angles may disagree, by how much the rotation may be off until the final one is known,
-# and by how many metres b then is; half of what has to lie within its chain of a and of b.
+# and by how many metres b then is; half of the length that has to lie within its chain, of a and of b.
 FIGURE = fields((_F, "x y ahead beside turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
 
 # A pose proposed from a base: the pose; cosine and sine of its heading; from the sensor to the point about which it may
@@ -141,16 +141,16 @@ HYPOTHESIS = np.dtype(
 # direction; whether all walls are parallel within three standard deviations of their angles.
 ESTIMATED = np.dtype([("pose", ESTIMATE), *fields((_F, "wall_variance weakest dx dy"), (_I, "parallel")).descr])
 
-# A pose among walls of which each is off by itself, with that standard deviation, m.
+# A pose among walls of which each has its own error, with that standard deviation, m.
 POSE_AMONG_WALLS = fields((_F, "theta x y wall_sigma"))
 
-# What a pose would be without one wall, and what is tied to it: the wall; by how much it would move, m; the position's
-# deviation along its weakest direction, m; the unit direction of the move, or the weakest one where that is not fixed;
-# how far the wall counts as one of its own, next to those that it is tied to, 0 to 1.
+# A pose as it would be without one wall and the walls tied to it: the wall; by how much the pose would move, m; the
+# position's deviation along its weakest direction, m; the unit direction of the move, or the weakest one if that is not
+# fixed; how far the wall counts as one of its own, next to those that it is tied to, 0 to 1.
 LEVERAGE = np.dtype([("wall", _I), *fields((_F, "displacement deviation dx dy own")).descr])
 
-# What goes into the variances of scan segments: those of the map's lines and of what shifts neighbouring points
-# together, m^2; what those of offset (m^2) and angle (rad^2) come to at least.
+# Terms of the variances of scan segments: variance of the map's lines, and of the error that neighbouring points share,
+# m^2; the least variances of offset (m^2) and angle (rad^2).
 VARIANCES = fields((_F, "map common least_offset least_angle"))
 
 # A ray from a place in the index frame: unit direction; how far it is followed.
@@ -159,7 +159,7 @@ RAY = fields((_F, "x y dx dy limit"))
 # A beam of a laser: where it begins, and its unit direction, in the scan frame; its range, m, inf without a return.
 BEAM = fields((_F, "x y dx dy range"))
 
-# How many rays pass through a wall on their way to a segment of the consensus set, and to another one. While they are
+# The rays through a wall: their number to segments of the consensus set, and to other segments. While they are
 # counted: the scan line that the last one goes to, from 1 up; the view it comes from; how many go from there to that
 # line, and how many at most from any view.
 BLOCKER = fields((_I, "to_matched to_clutter row sensor here most"))
@@ -173,8 +173,8 @@ BEAM_EVIDENCE = fields((_F, "read passed"))
 COMPARED = fields((_F, "posterior chi_square count"))
 ALTERNATIVE = fields((_F, "gap counted"))
 
-# What is known of an answer besides its score: the position's deviation along its weakest direction, and by how much
-# it would move without one wall and its deviation then, m; how many walls hold a match; fraction of directions in which
+# Facts of an answer in addition to its score: the position's deviation along its weakest direction, and by how much it
+# would move without one wall and its deviation then, m; how many walls hold a match; fraction of directions in which
 # the scan shows what the map does; fractions of the beams that read farther, and nearer, than the map shows;
 # probability that chance scores as high; length of the longest segment that is not matched, and of all of these, m.
 FACTS = fields(
@@ -189,18 +189,18 @@ FACTS = fields(
 # set, and how many others are named; the fraction of its length that lies on any.
 PAIR = fields((_I, "piece others"), (_F, "overlap"))
 
-# What a model of the verdict adds for one feature, nats: which feature; where its bends begin and end; nats per unit of
-# it below the first of them. From `start` on the slope is more by `more`.
+# The term of a verdict's model for one feature, nats: which feature; where its bends begin and end; nats per unit of it
+# below the first of them. From `start` on the slope is more by `more`.
 CURVE = fields((_I, "feature begin end"), (_F, "slope"))
 BEND = fields((_F, "start more"))
 
-# What it adds for two features together: which; 1 where the lesser fraction counts, 0 for the greater; nats; for each
+# Its term for two features together: which; 1 where the lesser fraction counts, 0 for the greater; nats; for each
 # the value from which it speaks for the answer, and that at which it does in full.
 TWO_FEATURES = fields((_I, "first second least"), (_F, "nats start full second_start second_full"))
 
-# What kernels write to while they look at one pose: the pose; the information of its consensus set; its sums, without
-# the walls' errors and with them; a line; what is known of the error of walls that are tied; the terms of its score;
-# the end of a beam; a ray; the evidence of the beams; what the search of a base goes by. A record that a kernel takes
+# Records that kernels write to while they look at one pose: the pose; the information of its consensus set; its sums,
+# without the walls' errors and with them; a line; the other evidence of the error of walls that are tied; the terms of
+# its score; the end of a beam; a ray; the evidence of the beams; the geometry of a base. A record that a kernel takes
 # from an array of its own would outlive the array, whose last use ends it: hence these come from outside.
 SCRATCH = np.dtype(
     [

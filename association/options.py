@@ -84,19 +84,19 @@ class AssociationOptions:
     Attributes
     ----------
     max_alternatives : int
-        How many other poses to report at most.
+        Greatest number of other poses to report.
     confidence : float
         Wanted probability of not having missed a better consensus set, below 1.
     exhaustive : bool
         Go through all bases whatever the confidence.
     sampling : "ordered" or "random"
-        How bases are drawn: the cheap and telling ones first, or by `seed` with a probability by that merit. Ordered
-        bases stop when their own choice shows that nothing was missed, random ones when as many draws would have hit
-        the inliers of a better consensus set.
+        Order in which bases are drawn: cheap and informative ones first, or at random by `seed`, weighted by that
+        merit. Ordered bases stop when their own choice shows that nothing was missed. Random ones stop when as many
+        draws would have hit the inliers of a better consensus set.
     seed : int
         Of random bases; ordered ones are the same whatever the seed.
     oriented : bool
-        Whether directions mean anything.
+        True if the directions of segments are evidence: free space lies on their left.
     offset_tolerance : float or None
         Metres; gate on the distance of a scan segment's midpoint from its map line. None: from the sigmas.
     angle_tolerance : float or None

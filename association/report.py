@@ -35,7 +35,7 @@ def report(
 ) -> AssociationResult:
     """Put an answer together; `factor` is what the scan was put to scale by.
 
-    Where the deadline passes before it is put together, the answer is not complete, and so not usable.
+    If the deadline passes before it is put together, the answer is not complete, and so not usable.
     """
     answer = None if verdict.status is Status.NO_MATCH else explanations.answer
     others = explanations.ranked if answer is None else explanations.others

@@ -162,7 +162,7 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True)
 class SearchReport:
-    """How the search went.
+    """Report of the search.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ class SearchReport:
         False when the deadline ended it before the confidence was reached or the bases were used up, or before all that
         was found was compared.
     exhaustive : bool
-        Whether every base was gone through, and the search is complete.
+        True if every base was searched, and the search is complete.
     confidence : float
         Reached probability of not having missed a better consensus set among the bases; below the requested one where a
         scan of many segments has few that together fix a pose well.

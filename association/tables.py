@@ -1,4 +1,4 @@
-"""What the kernels are handed: arrays that belong together, of the records in `layout`.
+"""Inputs of the kernels: arrays that belong together, of the records in `layout`.
 
 A kernel binds those that it needs to names once, outside of its loops, because Numba counts references to each array
 that it takes out of a tuple.
@@ -212,7 +212,7 @@ class Lines(NamedTuple):
 
 
 class Sights(NamedTuple):
-    """What was seen from each view.
+    """The lines seen from each view.
 
     Attributes
     ----------
@@ -220,7 +220,7 @@ class Sights(NamedTuple):
     starts : (v + 1,) view v saw ``seen[starts[v]:starts[v + 1]]``; nothing where lines of sight are no evidence
     seen : (k,) of `SIGHTING`
     by_line : (k,) their order by scan line, and there by view
-    weights : (v,) what each view counts, so that views from one place count as one
+    weights : (v,) weight of each view, so that views from one place count as one
     """
 
     places: Records
@@ -245,7 +245,7 @@ class Rays(NamedTuple):
 
 
 class SeenByViews(NamedTuple):
-    """What views show of walls.
+    """The walls as the views show them.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class SeenByViews(NamedTuple):
 
 
 class Question(NamedTuple):
-    """What is searched for.
+    """The input of a search: the scan, the terms and the rules.
 
     Attributes
     ----------
@@ -342,7 +342,7 @@ class Blockers(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What the kernels write to while they look at one pose after the other.
+    """The arrays that the kernels write to while they look at one pose after the other.
 
     Attributes
     ----------
@@ -354,7 +354,7 @@ class Workspace(NamedTuple):
     hypotheses : (k,) of `HYPOTHESIS`, those that are scored together
     near : (n, k) whether each scan line may lie on a wall at each of them
     held : (n,) which wall of each scan line is in the sums, or -1
-    shifts_held : (n,) by how much the line that is in the sums is beside that wall, m
+    shifts_held : (n,) lateral offset from that wall of the line that is in the sums, m
     weights_held : (n,) with what weight it is
     listed : (n,) walls, for now
     wall_sums : (m,) of `WALL_SUMS`, by wall; all 0 between two poses

@@ -48,7 +48,7 @@ from .verdict.tuning import LOOSE_ALTERNATIVES
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """What the lengths of a scan have to be multiplied with.
+    """The factor on the lengths of a scan.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Factor:
 
 @value(frozen=True, slots=True)
 class ScaledSearch:
-    """What a search found, and the scan that it searched.
+    """The result of a search, and the scan that it searched.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class ScaledSearch:
     factor : Factor or None
         By which the scan was put to scale; None where it is as it was sent.
     off_scale : bool
-        Whether it is as it was sent, and its consensus set is off by more than `MOST_FACTOR`.
+        True if it is as it was sent, and its consensus set is off by more than `MOST_FACTOR`.
     """
 
     context: SearchContext
@@ -134,8 +134,7 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
 def _may_be_off(first: ScaledSearch) -> bool:
     """Tell whether a factor may matter, and nothing but the pose was solved for, and all that was.
 
-    What is off its walls by millimetres leaves nothing to a factor; nor does a map of which the caller says how good
-    it is.
+    A scan that is off its walls by millimetres leaves nothing to a factor; nor does a map with a declared `sigma`.
     """
     context, answer = first.context, first.explanations.answer
     if answer is None or answer.estimated.views is not None or context.options.estimator != "joint":

@@ -20,16 +20,16 @@ SECTORS = 1 << SECTOR_BITS  # of directions, in the lists by direction; 0 degree
 REACH = 0.4  # m, tables; a wall is listed in the cells this near to it, so gates end here
 NARROW_REACH = 0.15  # m, tables; a wall is in the raster of narrow gates where it is this near
 
-# --- Scan: what a segment is worth and how far it is to be trusted ----------------------------------------------------
+# --- Scan: the gain of a segment and its variances --------------------------------------------------------------------
 
-# What no sigma that is sent accounts for: maps drawn or built with some slack, walls that are not quite straight.
+# Errors that no sent sigma accounts for: maps drawn or built with some slack, walls that are not quite straight.
 MODEL_OFFSET = 0.02  # m, tables; of a wall as a whole,
 ROUGHNESS = 0.01  # m, tables; of which that much differs along it
 MODEL_ANGLE = math.radians(0.6)  # tables
-# What finding a segment on a wall is worth against its being clutter: a share of its own, and one by length.
+# Gain of a segment found on a wall, over its being clutter: a constant part, and one by length.
 GAIN = 6.0  # nats, tables
 GAIN_PER_METRE = 2.0  # nats, tables
-GAIN_LENGTH = 4.0  # m, tables; beyond it a segment tells no more
+GAIN_LENGTH = 4.0  # m, tables; beyond it a segment gains no more
 
 # --- Matching: when a scan segment lies on a wall ---------------------------------------------------------------------
 
@@ -37,7 +37,7 @@ GREATEST_ANGLE_GATE = 0.35  # rad, tables
 
 # --- Consensus: growing and shrinking a set of matches at a pose ------------------------------------------------------
 
-# How far a pose is free before anything fixes it: what a set is charged for fixing it more sharply. Tables.
+# Deviations of a pose before anything fixes it; the log-determinant charges a set for fixing it more sharply. Tables.
 FREE_DISTANCE = 0.3  # m
 FREE_ANGLE = 0.1  # rad
 
@@ -66,8 +66,8 @@ INSIDE = 1e6  # nats; puts every pose within a hard prior's window before those 
 
 RAY_SPACING = 0.25  # m, tables; between the points of a segment that rays are sent to
 MAX_RAYS = 12  # to one segment, tables
-# Walls that are looked at for rays between two looks at the clock, at most: a third of a second. Where one pose takes
-# more no ray is followed, and the search is not complete. Measured: scans in their maps take up to 3 million.
+# Walls that are looked at for rays between two looks at the clock, at most: a third of a second. If one pose takes
+# more, no ray is followed, and the search is not complete. Measured: scans in their maps take up to 3 million.
 MOST_LOOKED_AT = 200_000_000
 EMPTY_CELL = 4  # walls, measured; what it takes to go to the next cell
 LATE_CROWD = 500.0  # measured; walls on the list that a place on a wall has, from which rays are left out then
@@ -118,7 +118,7 @@ TIMES_FOR_CAUSES = 2.0  # of the answer's own time; the contract
 LEAST_TIME_FOR_CAUSES = 0.02  # s, measured; where nothing fits an answer takes no time, and twice that is none
 CAUSE_CONFIDENCE = 0.99  # tables
 CAUSE_KEPT = 24  # poses, tables
-# Where a changed scan would not be usable either, it still fits much better with so much more score and inliers.
+# A changed scan that would not be usable either still fits much better with so much more score and inliers.
 # Measured: of 127 scans in their map that were not usable none did so.
 CAUSE_GAP = 30.0  # nats
 CAUSE_RATIO = 1.5

@@ -22,8 +22,8 @@ from .tuning import (
     USUAL_PART,
 )
 
-# What a scan has to be multiplied with where the map's lengths are of one unit and are taken for another, which is the
-# greater one; and the reverse.
+# Factor on a scan if the map's lengths are of one unit and are taken for another, which is the greater one; and the
+# reverse.
 TAKEN_FOR: Mapping[float, tuple[str, str]] = {
     10.0: ("decimetres", "metres"),
     100.0: ("centimetres", "metres"),

@@ -150,7 +150,7 @@ def _facing_away(context: SearchContext) -> str | None:
     if context.scan.viewpoint is None or not context.options.oriented:
         return None
     views = context.scan.views
-    # What has no viewpoint, nan, shows its back to none.
+    # A segment without a viewpoint, nan, does not face away from any.
     seen_from = context.sights.places if views is None else as_records(POINT, views.viewpoints[views.of_segment])
     away = facing_away(context.ends, seen_from, FACING)
     if not away:

@@ -80,9 +80,9 @@ def register_accepted(
 ) -> tuple[RegistrationResult, EstimatedPose] | None:
     """Register the scan by the pairs, with the estimated error of walls, and take that pose; None without pairs.
 
-    So a caller who registers by the same pairs and weights gets the same pose. Where that is not fixed, where the views
-    are not exact, or unless it is to be `fitted`, the estimated pose is evaluated on the pairs instead, and by the
-    paper's estimator a pose of its own is fitted.
+    So a caller who registers by the same pairs and weights gets the same pose. The estimated pose is evaluated on the
+    pairs instead if it is not fixed, if the views are not exact, or unless it is to be `fitted`. The paper's estimator
+    then fits a pose of its own.
     """
     if not len(accepted.pairs):
         return None
@@ -112,8 +112,9 @@ def _options(estimator: Estimator, rotation: Rotation) -> RegistrationOptions:
 def _weights(context: SearchContext, best: ConsensusSet, accepted: Accepted, wall_sigma: float) -> Floats | None:
     """Return the weights of pairs that have evidence in common, (n,) 1/m^2; None where none have.
 
-    What several segments show of one line counts once, and so does the error of a wall that several pairs lie on: of
-    the variance of the wall each takes a part. Alone on its wall a pair has ``1 / (sigma^2 / points + wall_sigma^2)``.
+    Evidence of several segments for one line counts once. The error of a wall that several pairs lie on counts once,
+    too: each pair takes a part of the wall's variance. A pair alone on its wall has
+    ``1 / (sigma^2 / points + wall_sigma^2)``.
     """
     rows = context.lines.row_of[accepted.pairs[:, 0]]
     walls = best.matches["wall"][rows]

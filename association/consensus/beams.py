@@ -20,7 +20,8 @@ from .tuning import BEAMS_PASSED, BEAMS_READ
 def beam_evidence_at(context: SearchContext, poses: Records, most: int, refined: int) -> Records:
     """Return the evidence of at most `most` of the beams at each pose, (k,) of `BEAM_EVIDENCE`.
 
-    Moves the first `refined` of the poses. What the deadline leaves, and all where rays cannot be followed, is 0.
+    Moves the first `refined` of the poses. The evidence of poses not reached before the deadline is 0, and all of it if
+    rays cannot be followed.
     """
     evidence, rays, place = np.zeros(len(poses), BEAM_EVIDENCE), rays_of(context, most), context.index.tables.place
     step = max(1, int(MOST_LOOKED_AT / (1.0 + context.looks)))

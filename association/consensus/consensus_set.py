@@ -30,7 +30,7 @@ class ConsensusSet:
     posterior : float
         Score and prior together, nats.
     inside : bool
-        Whether it lies within a hard prior's window; True without one.
+        True if it lies within a hard prior's window, and without one.
     chi_square : float
         Of the offsets and angles of all pairs; the score takes half of it.
     one_step_chi_square : float
@@ -44,7 +44,7 @@ class ConsensusSet:
     misfit : float
         Mean squared offset over what the sigmas alone expect.
     blocked : float
-        What lines of sight speak against it, nats, in the score.
+        Penalty in the score for lines of sight through walls, nats.
     read, passed : float
         Fractions of the beams that read the wall they should, and that passed through one; 0 without beams.
     count : float

@@ -43,13 +43,13 @@ class EstimatedPose:
     direction : (float, float)
         That direction, a unit vector of which the first component is not negative.
     free : bool
-        Whether the pose itself is one of many along that direction: parallel walls, or a deviation of metres.
+        True if the pose itself is one of many along that direction: parallel walls, or a deviation of metres.
     parallel : bool
-        Whether all walls are parallel within three standard deviations of their angles.
+        True if all walls are parallel within three standard deviations of their angles.
     leverages : (k,) of `LEVERAGE`
-        What the pose would be without each of its walls.
+        The pose as it would be without each of its walls.
     views : EstimatedViews or None
-        Where the scan's views were, if they are not exact.
+        The estimated poses of the scan's views, if they are not exact.
     """
 
     pose: RigidTransform
@@ -81,7 +81,7 @@ class EstimatedPose:
 
     @property
     def degenerate(self) -> bool:
-        """Whether a direction of the position is not fixed: parallel walls, or a deviation beyond 0.5 m."""
+        """Return whether a direction of the position is not fixed: parallel walls, or a deviation beyond 0.5 m."""
         return self.parallel or self.weakest > MAX_DEVIATION
 
 

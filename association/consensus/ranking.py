@@ -195,7 +195,7 @@ def _add_beams(context: SearchContext, scored: _Scored) -> _Scored:
     by_few = scored.scores["score"] + beam_score(beam_evidence_at(context, scored.estimates, FEW_BEAMS, 0))
     best = np.argsort(-by_few, kind="stable")[:finalists]
     if context.window is not None:
-        # What lies within the window is looked at, however good the poses outside are.
+        # Poses within the window are looked at, however good the poses outside are.
         within = np.argsort(-(by_few + _prior_values(context, scored.estimates)), kind="stable")[:finalists]
         best = np.concatenate([within, best[~np.isin(best, within)]])
     poses = scored.estimates[best]

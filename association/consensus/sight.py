@@ -23,9 +23,9 @@ from .tuning import NEUTRAL
 
 @value(frozen=True, slots=True)
 class BeamFractions:
-    """How far the beams do not read what the map shows.
+    """Fractions of the beams that do not read what the map shows.
 
-    Fractions of them all; both 0 without beams.
+    Of all beams; both 0 without beams.
 
     Attributes
     ----------
@@ -34,8 +34,8 @@ class BeamFractions:
     nearer : float
         That read nearer: something stands before the wall.
     in_step : float
-        What the views that are exact read of the map's walls over what all views do; 1 where none is uncertain. Where
-        it is low the others may be placed well, and the scan's frame not.
+        Mean fraction of an exact view's beams that read the map's walls, over that of all views; 1 if no view is
+        uncertain. If it is low, the other views may be placed well, and the scan's frame not.
     """
 
     farther: float = 0.0

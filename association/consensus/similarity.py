@@ -28,11 +28,11 @@ class Similarity:
     covariance : (3, 3)
         Of additive (x, y, theta), with what is not known of the factor.
     factor : float
-        What the scan's lengths have to be multiplied with.
+        Factor on the scan's lengths.
     deviation : float
         Its standard deviation.
     more : float
-        How many more walls there are than it takes to fix it; those that others say little of count as parts.
+        Number of walls beyond those that fix the factor; walls that the others determine poorly count in part.
     """
 
     pose: RigidTransform

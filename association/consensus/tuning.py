@@ -39,7 +39,7 @@ PAIRS_COMPARED = 250_000  # pairs of correspondences whose walls are compared at
 
 VIEW_ROUNDS = 6  # tables; of solving for a pose and the errors of its views
 
-# What the walls' own error is taken for before any is seen, and how many walls that counts as. Fitted.
+# The walls' own error as assumed before any wall is observed, and how many walls that counts as. Fitted.
 USUAL_WALL_ERROR = 0.02  # m
 USUAL_WALLS = 2.0
 UNSEEN_ERROR = 1.15  # fitted; variance of walls' errors over that of those which the gates let pass
@@ -99,7 +99,7 @@ NEUTRAL = 0.8  # tables; where there is nothing to compare
 
 # --- Acceptance: correspondences with the map's own segments ----------------------------------------------------------
 
-MAX_OTHERS = 8  # map segments named beside the one that a scan segment lies on most
+MAX_OTHERS = 8  # map segments named in addition to the one that a scan segment lies on most
 MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85
 MIN_EXTENT = 1e-9  # m, rounding; what a segment along a wall counts as at least
 

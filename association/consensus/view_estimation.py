@@ -51,7 +51,7 @@ class EstimatedViews:
     found : (3 u,)
         The variates of `Views.root`.
     spread : (3 u, 3 u)
-        What remains of them.
+        Covariance of the variates that remains.
     wall_variance : float
         Of the walls' own offsets, m^2.
     """
@@ -65,7 +65,7 @@ class EstimatedViews:
 
 @dataclass(frozen=True, slots=True)
 class SeenOnWalls:
-    """What views show of walls.
+    """The walls as the views show them.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MapIndex:
-    """What is computed once per map; immutable, shared between threads.
+    """Everything that is computed once per map; immutable, shared between threads.
 
     Build with :meth:`build`.
 
@@ -167,20 +167,20 @@ class MapIndex:
 
     @cached_property
     def wall_lengths(self) -> WallLengths:
-        """How long its walls are."""
+        """The lengths of its walls."""
         lengths = np.sort(self.walls.longest)
         beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
         return WallLengths(lengths, beyond, self._agreeing_share(), self.area)
 
     @cached_property
     def crowd(self) -> float:
-        """How many walls are on the list of a cell, seen from the walls: the mean over all entries of all lists."""
+        """Return the mean number of walls on the list of a cell, over all entries of all lists."""
         counts = np.diff(self.grid.starts).astype(np.float64)
         return float((counts * counts).sum() / max(1.0, counts.sum()))
 
     @cached_property
     def most_near(self) -> int:
-        """How many walls the longest list of a cell holds."""
+        """Return the number of walls on the longest list of a cell."""
         return int(np.diff(self.grid.starts).max())
 
     def _agreeing_share(self) -> float:
@@ -205,7 +205,7 @@ class MapIndex:
 
     @cached_property
     def tables(self) -> MapTables:
-        """What the kernels of the search are handed."""
+        """The arrays that the kernels of the search take."""
         return MapTables(
             Place(self.walls.rows, self.walls.bin_starts, self.grid, self.ties), self.sweep, self.crossings, self.raster
         )

@@ -12,7 +12,7 @@ MAX_EXTENT = 1e5  # m; the contract
 MAX_MAP_SIGMA = 10.0  # m; the contract
 # Pieces that are one line to rounding are one wall; a declared deviation of the map makes that narrower.
 ONE_LINE = 1e-4  # m, rounding
-LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is said to be exact
+LEAST_ONE_LINE = 1e-6  # m, rounding; of a map that is declared exact
 ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
 # Walls that continue one another with a small step are put on a common line: the larger the step, the less, and from
 # here on not at all.

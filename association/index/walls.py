@@ -138,8 +138,8 @@ def _sorted(local: Segments, wall: NDArray[np.intp], lines: _Lines) -> tuple[Wal
 def chains_of(walls: Walls, deadline: Deadline | None = None) -> Walls:
     """Return the lines that a segment of a base may lie on, though it lies on several walls.
 
-    Those through walls that nearly continue one another, across doorways, too; and beside these those through what does
-    so with larger steps, for a wall with a step is then still found.
+    These are lines through walls that nearly continue one another, across doorways, too. In addition to them there are
+    lines through walls that do so with larger steps, so that a wall with a step is still found.
     """
     nearly, _ = merge(Segments.derived(ends_of(walls)), MERGE_GAP, MERGE_LATERAL, deadline)
     chains, _ = merge(Segments.derived(ends_of(nearly)), CHAIN_GAP, MERGE_LATERAL, deadline)

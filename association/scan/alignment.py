@@ -1,8 +1,8 @@
 """Views laid on one another before the search: a wall that two of them show is one, whatever odometry says.
 
-Where it is told apart from its neighbours by more than odometry may be off, a wall that two views show moves these
-views. What moves them is in the gates of the search from then on, and nothing else: the answer's own pose and
-covariance go back to what odometry said (`association.consensus.view_estimation`).
+A wall that two views show moves these views, if its distance from its neighbours exceeds the error of odometry. From
+then on the moves affect the gates of the search, and nothing else. The answer's own pose and covariance go back to the
+poses of odometry (`association.consensus.view_estimation`).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
         spread = np.asarray(np.linalg.inv(np.eye(len(found)) + seams.jacobian.T @ weighed))
         left = seams.residuals - seams.jacobian @ found
         found = np.asarray(spread @ (weighed.T @ -left))
-        # Where lines do not fit one another as they should, some of them are not one.
+        # If lines do not fit one another as they should, some of them are not one.
         worse = max(1.0, float(np.mean((left + seams.jacobian @ found) ** 2 / seams.variances)) if len(left) else 1.0)
         spread = spread * worse
     return corrected(scan, found, 0.5 * (spread + spread.T))
@@ -54,7 +54,7 @@ def aligned(scan: Scan, deadline: Deadline, *, directed: bool = True) -> Scan:
 
 @dataclass(frozen=True, slots=True)
 class _Seams:
-    """How far lines that are one lie apart in two views: offsets and sines of angles, with their variances.
+    """Distances of lines that are one in two views: offsets and sines of angles, with their variances.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class _Lines:
 
 
 def _variances_at(lines: Records, x: Floats, y: Floats) -> Floats:
-    """Return the variance of each line's offset beside a place, m^2."""
+    """Return the variance of each line's offset at the point of it nearest to a place, m^2."""
     along = lines["dx"] * (x - lines["centroid_x"]) + lines["dy"] * (y - lines["centroid_y"])
     return np.asarray(ROUGHNESS**2 + lines["variance"] * (1.0 + along**2 / np.maximum(lines["spread"], LEAST_SPREAD)))
 

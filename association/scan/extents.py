@@ -1,4 +1,4 @@
-"""How large scans are."""
+"""Measure the extents of scans."""
 
 from __future__ import annotations
 

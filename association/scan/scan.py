@@ -1,4 +1,4 @@
-"""What the robot saw: segments and beams, from one place or from several."""
+"""The scan of a robot: segments and beams, from one place or from several."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class Views:
     poses : tuple of RigidTransform
         scan_from_view, as far as it is known.
     viewpoints : (v, 2)
-        Where each sensor stood, metres in the scan frame; nan where the view is not from one place.
+        Position of each sensor, metres in the scan frame; nan where the view is not from one place.
     of_segment, of_beam : (n,), (m,)
         The view of each segment and of each beam.
     root : (3 v, 3 u)
-        What is not known of the poses: their errors, of additive (x, y, theta) in the scan frame, are `root` times u
+        Uncertainty of the poses: their errors, of additive (x, y, theta) in the scan frame, are `root` times u
         independent standard normal variates. No columns where all are exact.
     found : (3 u,)
-        What these variates have been found to be, as far as the poses reckon with it already.
+        The estimates of these variates, as far as the poses already include them.
     spread : (3 u, 3 u)
-        Covariance of what remains of them.
+        Covariance of the variates that remains.
     """
 
     poses: tuple[RigidTransform, ...]
@@ -54,7 +54,7 @@ class Views:
 
     @property
     def uncertain(self) -> bool:
-        """Whether any pose is not exact."""
+        """Return whether any pose is not exact."""
         return bool(self.root.shape[1] > 0)
 
     @property
@@ -64,7 +64,7 @@ class Views:
 
     @property
     def weights(self) -> Floats:
-        """What each view counts, (v,): one, or less where others see from the same place, so that these count as one.
+        """The weight of each view, (v,): one, or less where others see from the same place, so that these count as one.
 
         Views without a viewpoint count fully.
         """
@@ -93,22 +93,22 @@ class Views:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What the robot saw, in the sensor's frame; of several views, in the frame that they share.
+    """The scan of a robot, in the sensor's frame; of several views, in the frame that they share.
 
     Attributes
     ----------
     measured : MeasuredSegments
     viewpoint : (float, float) or None
-        Where the sensor stood, metres; None when the segments were not seen from one place, then lines of sight are no
+        Position of the sensor, metres. None if the segments were not seen from one place; lines of sight are then no
         evidence. Of several views it is that of the first that has one.
     beams : Beams or None
         The raw ranges, where the scan came as such; they start at `viewpoint`, or where each of them says.
     views : Views or None
-        Where it was put together of several.
+        The views that it was put together from, if there are several.
     ordered : bool
         True unless the scan was made of points that are not in scanning order.
     warnings : tuple of AssociationWarning
-        What is wrong with how it was taken; each answer has them.
+        Defects of how it was taken; each answer has them.
     """
 
     measured: MeasuredSegments
@@ -122,7 +122,7 @@ class Scan:
 def mirrored(scan: Scan, *, segments: bool = True) -> Scan:
     """Return a scan with left and right exchanged: y becomes -y, and free space stays on the left.
 
-    Without its `segments` for who has them otherwise.
+    Without its `segments` for a caller that has them otherwise.
     """
     at, views = scan.viewpoint, scan.views
     beams = None if scan.beams is None else scan.beams.mirrored()
@@ -137,8 +137,8 @@ def _mirrored(seen: MeasuredSegments) -> MeasuredSegments:
 def turned_round(scan: Scan) -> Scan:
     """Return a scan whose segments begin where they ended.
 
-    What it sees then has its back to the viewpoint, and where it came as ranges it is the map that is the wrong way
-    round: neither beams nor lines of sight count.
+    The segments then face away from the viewpoint; if the scan came as ranges, the map is the wrong way round. So
+    neither beams nor lines of sight count.
     """
     ends = scan.measured.segments.endpoints[:, [2, 3, 0, 1]]
     measured = replace(scan.measured, segments=Segments.derived(ends))

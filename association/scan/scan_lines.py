@@ -1,4 +1,4 @@
-"""The scan as the search wants it: its lines, the most telling first, what each is worth and how far to trust it."""
+"""Prepare a scan for the search: its lines, the most informative first, with the gain and the variances of each."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _set_map_sigma = describing.set_map_sigma
 
 @value(frozen=True, slots=True)
 class ScanLines:
-    """A scan as the kernels are handed it.
+    """A scan as the kernels take it.
 
     Attributes
     ----------
@@ -48,9 +48,9 @@ class ScanLines:
     rows : (n,) of `SCAN_LINE`
     model : (1,) of `MODEL`
     sightings : (k,) of `SIGHTING`
-        What each view shows of them, view by view; of one view the rows themselves.
+        The part of them that each view shows, view by view; of one view the rows themselves.
     given : Measured or None
-        What they were made from, of a scan of one view.
+        The input that they were made from, of a scan of one view.
     """
 
     row_of: NDArray[np.intp]
@@ -71,7 +71,7 @@ class ScanLines:
         map_sigma : float or None
             Standard deviation of the map's lines, metres; None where it is not known.
         options : AssociationOptions
-            A tolerance wider than the sigmas' own gate says that the map is that far off.
+            If a tolerance is wider than the sigmas' own gate, the map is taken to be that far off.
         given : Measured or None
             Of other lines of the same scan, where there are any.
         """
@@ -145,8 +145,8 @@ def _taken(measured: MeasuredSegments, rows: NDArray[np.intp]) -> MeasuredSegmen
 def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Integers, Records]:
     """Join what several views show of a line, so that it is one piece of evidence.
 
-    What is not known of where they were seen from lets them lie so much farther apart. The line that they make is as
-    badly known as its parts are, by their lengths: their errors may be one.
+    The uncertainty of the viewpoints lets them lie so much farther apart. The line that they make is as uncertain as
+    its parts, weighted by their lengths: their errors may be one.
     """
     lateral, turn = LINE_LATERAL, LINE_ANGLE
     if views.uncertain and len(parts):

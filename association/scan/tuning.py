@@ -12,7 +12,7 @@ import math
 # from one segment, or that come twice, are joined first, so that nothing else depends on it.
 CUT_LATERAL = 1e-4  # m, rounding
 CUT_COSINE = 1.0 - 1e-7  # rounding: some 0.03 degrees
-LINE_LATERAL = 0.04  # m, tables; how far the middle of one may lie beside the line of another,
+LINE_LATERAL = 0.04  # m, tables; how far the middle of one may lie off the line of another,
 LINE_ANGLE = math.radians(2.5)  # tables; the angle between them,
 LINE_COSINE = math.cos(LINE_ANGLE)
 LINE_GAP = 0.3  # m, geometry: as for walls; and along it

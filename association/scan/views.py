@@ -23,7 +23,7 @@ HERE = RigidTransform(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What was seen from one place.
+    """A scan from one place, with its pose.
 
     Attributes
     ----------
@@ -32,8 +32,8 @@ class View:
     pose : RigidTransform
         The sensor's in the scan's frame, scan_from_view.
     covariance : (3, 3) or None
-        What is not known of the step from the view `relative_to` to this one: of additive (x, y, theta) of this
-        view's pose in the frame of that one. None: the step is exact.
+        Covariance of the step from the view `relative_to` to this one: of additive (x, y, theta) of this view's pose
+        in the frame of that one. None: the step is exact.
     relative_to : int or None
         Index of that view; None: the scan's frame itself.
     """

@@ -10,11 +10,11 @@ loop is `kernels.searching.search_bases`:
    `kernels.hypotheses` turns what is found into poses. Each hypothesis is rejected early, or matched to the walls,
    refined by growing and shrinking its consensus set, and stored among the best poses (`kernels.scoring`,
    `kernels.best_poses`).
-3. Ask the stopping rule whether a better consensus set may have been missed: by a bound on its gain, and by the
+3. Evaluate the stopping rule, whether a better consensus set may have been missed: by a bound on its gain, and by the
    fraction of sampled consensus sets that hold none of the bases so far (`kernels.stopping`).
 
 Parallel walls alone, as in a corridor, make no base: `kernels.sliding` lays their segments on each chain at even steps.
 
 `candidates.find_candidates` is the entry from Python. A search is not resumed. It reads a flag between two hypotheses
-and ends where the deadline has set it; the best poses so far are then the result, which says that it is incomplete.
+and ends where the deadline has set it. The best poses so far are then the result, and its report has `complete` False.
 """

@@ -40,7 +40,7 @@ NO_NOISE = np.zeros(0)
 
 @value(frozen=True, slots=True)
 class Candidates:
-    """What the search found.
+    """The poses that the search found, with its report.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Candidates:
 
 @value(frozen=True, slots=True)
 class Effort:
-    """How much is looked for.
+    """The limits of a search for candidates.
 
     Attributes
     ----------
@@ -67,11 +67,11 @@ class Effort:
     allowed : float
         The greatest chance of having missed one; -1 goes through all bases.
     known : float
-        A value that is known to be reached, nats: what stays below these shares of it is not looked for.
+        A value that is known to be reached, nats: poses below these fractions of it are not looked for.
     enough : float
         A value that ends the search, nats.
     samples : int
-        Consensus sets by which the chance of having missed one is told.
+        Number of consensus sets by which the probability of having missed one is estimated.
     """
 
     kept: int

@@ -16,8 +16,8 @@ _F, _I = np.float64, np.int64
 # lesser gain, to a power, over the cost of searching the base; until it is weighed, over the least cost of any base.
 BASE = fields((_I, "sliding crossing listed weighed"), (_F, "merit"))
 
-# What a scan segment adds to the cost of its bases: the number of direction bins in which it can slide; its angle; the
-# factor on the number of hypotheses that follows from its length; the cost of sliding it everywhere.
+# The terms of a scan segment in the cost of its bases: the number of direction bins in which it can slide; its angle;
+# the factor on the number of hypotheses that follows from its length; the cost of sliding it everywhere.
 LINE_COST = fields((_I, "bins"), (_F, "angle short sweep"))
 
 # A list of crossings on which a base may lie: where it begins and ends; the column and row of its cell; the places of
@@ -41,7 +41,7 @@ SWEPT = fields((_I, "laid here"), (_F, "at until"))
 # list: its entry. In the first ones of an array: which of them b lies on.
 MET = fields((_I, "number cell hit"))
 
-# What a search has done. Bases that were searched, hypotheses, those of them that were matched and refined; why it
+# Statistics of a search. Bases that were searched, hypotheses, those of them that were matched and refined; why it
 # ended; probability of having missed a better consensus set; bound on the gain of a pose that contains none of the
 # bases so far.
 STATISTICS = fields((_I, "bases hypotheses verified why"), (_F, "missed bound"))
@@ -54,7 +54,7 @@ GOES_ON, INTERRUPTED, EXHAUSTED, PROVEN, CONFIDENT = range(5)
 # set takes at least whose score would be stored.
 BEST = fields((_I, "count"), (_F, "best_value least_value least_freedom"))
 
-# How far a search goes: the greatest probability of having missed a better consensus set, -1 for all bases; a value
+# Limits of a search: the greatest probability of having missed a better consensus set, -1 for all bases; a value
 # that is known to be reached; metres between slides, and the fraction of the best value that parallel segments have to
 # gain together to be slid; how many poses are stored.
 LIMITS = fields((_F, "allowed known spacing slides_fraction"), (_I, "stored"))

@@ -104,9 +104,9 @@ class Plan(NamedTuple):
     samples : Samples
         Consensus sets that all bases so far may have missed.
     fade : float
-        What the logarithm of a base's merit loses for each earlier use of one of its segments.
+        Decrease of the logarithm of a base's merit for each earlier use of one of its segments.
     random : bool
-        Whether the bases are drawn at random.
+        True if the bases are drawn at random.
     """
 
     bases: Records
@@ -121,14 +121,14 @@ class Plan(NamedTuple):
 
 
 class SearchState(NamedTuple):
-    """What a search has come to so far.
+    """The state of a search so far.
 
     Attributes
     ----------
     poses : (k,) of `FOUND`, the best poses in no order
     best : (1,) of `BEST`
     statistics : (1,) of `STATISTICS`
-    stop : (1,) not 0 once the search has to end; written by another thread, hence read anew for each hypothesis
+    stop : (1,) not 0 once the search has to end; written by another thread, hence read again for each hypothesis
     """
 
     poses: Records

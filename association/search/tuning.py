@@ -23,8 +23,8 @@ WINDOW_TURN = 0.1  # rad, tables; what lies farther outside a hard prior's windo
 
 SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
 SLIDE_SPACING = 2.0  # m, tables; what is found stands for the family along the walls
-SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; there beams tell where along them
-SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are told apart
+SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; beams then fix the position along them
+SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are distinct
 PARALLEL_SINE = 0.1  # tables
 KEPT_SLIDES = 64  # poses, tables
 
@@ -41,8 +41,8 @@ COST_ENTRY = 50.0
 COST_ANCHOR = 60.0
 COST_SLIDE = 3.0
 COST_HYPOTHESIS = 480.0
-# Observed over expected number of hypotheses: short walls stand beside long ones, at corners and doors, so that a base
-# with a short segment fits more often than lengths alone say, and one across at a small angle less often. Measured.
+# Observed over expected number of hypotheses. Short walls stand next to long ones, at corners and doors: a base with a
+# short segment fits more often than lengths alone predict, and one across at a small angle less often. Measured.
 HYPOTHESIS_SCALE = 2.0
 SHORT_POWER = -0.7  # of the length of the shorter segment, metres
 SHORT_LENGTH = 0.1  # m
@@ -57,7 +57,7 @@ SAMPLE_SEED = 20190901
 # --- Best poses -------------------------------------------------------------------------------------------------------
 
 KEPT = 64  # poses, tables
-KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no rivals
-# Where raw beams are to decide, the segments propose more. Tables.
+KEPT_SHARE = 0.65  # of the best value, tables; poses below it are no alternatives
+# If raw beams are to decide, the segments propose more. Tables.
 KEPT_FOR_BEAMS = 192
 KEPT_SHARE_FOR_BEAMS = 0.5

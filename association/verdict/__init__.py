@@ -1,1 +1,1 @@
-"""How likely the best pose is right, and whether a robot may use it."""
+"""Estimate how likely the best pose is right, and decide whether a robot may use it."""

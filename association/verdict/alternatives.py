@@ -1,9 +1,9 @@
-"""How probable the best explanation is among its alternatives: perceptual aliasing.
+"""Estimate how probable the best explanation is among its alternatives: perceptual aliasing.
 
 Alternatives are compared twice: as they were scored, and with walls taken to be off by more than the answer shows.
-Where a building repeats itself and its map is centimetres off, a wall at the right place may lie beyond the gates, and
-a similar place fit better by luck: the error of the walls is estimated from the one that fits best, and of many similar
-places one always fits well. What a place misses so, by centimetres, is no evidence against it.
+If a building repeats itself and its map is centimetres off, a wall at the right place may lie beyond the gates, and a
+similar place may fit better by luck. The error of the walls is estimated from the place that fits best, and of many
+similar places one always fits well. A misfit of centimetres is therefore no evidence against a place.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What chance scores: by a bound over all poses of the map, and by searching the mirrored scan.
+"""Estimate the score of chance: by a bound over all poses of the map, and by searching the mirrored scan.
 
 The bound takes walls to be drawn at random. Those have no right angles, no module and no equal rooms. The scan with
 left and right exchanged has all of these, and (almost) never was there to be seen: where it scores as high as the
@@ -31,7 +31,7 @@ def significance(context: SearchContext, score: float) -> float:
 
     At a pose drawn at random, turned so that some directions agree, scan segment i lies on a wall with a probability
     q_i that the walls' length per area gives. Chernoff's bound on the sum of the gains, times the number of poses that
-    the gates tell apart (the a-contrario count of false alarms of Desolneux, Moisan and Morel).
+    the gates distinguish (the a-contrario count of false alarms of Desolneux, Moisan and Morel).
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ class NullScore:
     score : float
         Of its best explanation anywhere on the map, nats; 0 where none comes near the answer.
     symmetry : float
-        How much of what the map shows from the answer it shows mirrored from there, 0 to 1: where that is nearly all,
-        the map is symmetric about the place, and the mirrored scan scores by right.
+        Fraction of the map's view from the answer that it also shows mirrored from there, 0 to 1. If that is nearly
+        all, the map is symmetric about the place, and the mirrored scan scores by right.
     """
 
     score: float
@@ -96,7 +96,7 @@ def find_null_score(context: SearchContext, best: ConsensusSet, least: float = 0
 def _mirrored(context: SearchContext) -> SearchContext:
     """Return the search of the mirrored scan, without a prior."""
     one_view = context.scan.views is None
-    # What is searched are its lines; those of several views are joined again.
+    # The search takes the scan's lines; those of several views are joined again.
     scan = mirrored(context.scan, segments=not one_view)
     lines = context.lines.mirrored() if one_view else ScanLines.of(scan, context.index.sigma, context.options)
     return context.instead(scan, lines)

@@ -49,7 +49,7 @@ class Pair:
     first, second : str
         Names, of `Features`.
     nats : float
-        What it adds where both speak for the answer.
+        The term that it adds where both are evidence for the answer.
     from_to : ((float, float), (float, float))
         For each the value that does not speak for the answer at all and the one that does in full. In between it is
         linear.
@@ -133,5 +133,5 @@ def _read() -> tuple[dict[str, Model], dict[str, str], Features]:
 
 
 # "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are
-# included; each also "_with_beams". What each was fitted on, and the medians of the features of right answers.
+# included; each also "_with_beams". The data that each was fitted on, and the medians of the features of right answers.
 MODELS, FITTED_ON, USUAL = _read()

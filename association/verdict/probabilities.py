@@ -37,7 +37,7 @@ class Probabilities:
     among_alternatives : float
         Of the answer among the explanations that are about as good; it is in `right` and `cautious`.
     few_walls : bool
-        Whether few walls fix the pose, and one of them alone decides.
+        True if few walls fix the pose, and one of them alone decides.
     described : (1,) of `FEATURES`
         The features; with the null score where it was needed and matters.
     model : Model
@@ -59,7 +59,7 @@ class Probabilities:
 
     @property
     def mirrored(self) -> bool:
-        """Whether the scan fits the map better with left and right exchanged."""
+        """Return whether the scan fits the map better with left and right exchanged."""
         return bool(self.described["null_better"][0] >= MIRRORED_BETTER)
 
 
@@ -70,7 +70,7 @@ def work_out_probabilities(
 
     1. Compare it with its alternatives, and describe it by features.
     2. Evaluate the fitted models.
-    3. Where it would be usable: compare again with walls off by more, and search the mirrored scan.
+    3. If it would be usable, compare again with walls off by more, and search the mirrored scan.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ def work_out_probabilities(
     answer : Answer
         Theirs.
     capped : bool
-        Whether no probability makes the answer usable.
+        True if no probability makes the answer usable.
     certain : bool
-        Whether the answer is usable if the probabilities suffice.
+        True if the answer is usable once the probabilities suffice.
 
     Raises
     ------
@@ -99,8 +99,8 @@ def work_out_probabilities(
     if decidable and cautious * among >= bar:
         among = min(among, probability_with_loose_walls(context, answer, others))
     if decidable and cautious * among >= bar:
-        # Only what would be usable has to stand up to the mirrored scan, which costs another search. Where it is
-        # usable the null score is not reported; where it is not, the reasons go by it.
+        # Only an answer that would be usable is compared with the mirrored scan, which costs another search. If it is
+        # usable, the null score is not reported; if it is not, the reasons go by it.
         certain = certain and right * among >= USABLE_PROBABILITY
         least = allowed_null(model.odds, described.copy(), best.score, bar / among) if certain else 0.0
         add_null_score(described, best, find_null_score(context, best, least))
@@ -117,7 +117,7 @@ def _models(context: SearchContext) -> tuple[Model, Model]:
 def _as_if_fixed(described: Records) -> Records:
     """Return features as if the position was as well fixed as usual.
 
-    Whether the scan is of this map is another question than whether it fixes the position, and where on it.
+    Two questions are separate: whether the scan is of this map, and whether it fixes the position there, and where.
     """
     fixed = described.copy()
     fixed["deviation"] = USUAL.deviation

@@ -15,27 +15,27 @@ from .tuning import NO_ALTERNATIVE, TELLING_REASON
 
 @value(frozen=True, slots=True)
 class Doubts:
-    """What speaks against an answer, but for its features.
+    """Evidence against an answer, except for its features.
 
     Attributes
     ----------
     status : Status
     complete, contradicted : bool
-        Whether the search was, and whether the prior speaks against the answer.
+        True if the search was complete; true if the prior contradicts the answer.
     not_on_map : bool
-        Whether little speaks for this map at all.
+        True if there is little evidence for this map at all.
     few_walls : bool
-        Whether few walls fix the pose, and one of them alone decides.
+        True if few walls fix the pose, and one of them alone decides.
     similar_place : bool
-        Whether alternatives alone make the answer too uncertain.
+        True if alternatives alone make the answer too uncertain.
     alone : bool
-        Whether no other explanation was found where the prior lets one be.
+        True if no other explanation was found where the prior allows one.
     mirrored : bool
-        Whether the scan fits the map better with left and right exchanged.
+        True if the scan fits the map better with left and right exchanged.
     out_of_step : bool
-        Whether what is seen from the scan's own place fits far worse than what was seen on the way.
+        True if the view from the scan's own place fits far worse than the views on the way.
     off_scale : bool
-        Whether scan and map differ by a factor that is too great to be made up for.
+        True if scan and map differ by a factor that is too great to be corrected.
     """
 
     status: Status
@@ -77,7 +77,7 @@ OFF_SCALE = (
     "and that this is the right map."
 )
 
-# The features of each reason. What a feature takes from the odds of a usual right answer is laid to its reason.
+# The features of each reason. The decrease of a usual right answer's odds by a feature is attributed to its reason.
 FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
     "similar_place": ("lead", "solitude", "squared_solitude"),
     "single_wall": ("critical_displacement", "critical_deviation", "deviation"),

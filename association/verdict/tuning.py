@@ -56,8 +56,9 @@ USABLE_CAUTIOUS_WITH_BEAMS = 0.9  # cross-validated; and with raw beams
 # The same of views that are not exact: the models were fitted to scans from one place. Of drives of 5 m through sister
 # buildings, and of 10 m in logs, those that were usable and wrong came to 0.92 and 0.945. Measured.
 USABLE_CAUTIOUS_DRIVE = 0.95
-# What the exact views of a drive read of the walls over what all do. Of 2,823 right drives in drawn buildings and logs
-# that were usable 1 in 500 came below 0.65; one whose frame was 3.8 degrees off to 0.36. Measured.
+# Fraction of the beams of a drive's exact views that read the walls, over that of all views. Of 2,823 right drives in
+# drawn buildings and logs that were usable 1 in 500 came below 0.65; one whose frame was 3.8 degrees off to 0.36.
+# Measured.
 LEAST_IN_STEP = 0.55
 FEW_WALLS = 3  # geometry: three sides of a room; fewer are never enough if one of them alone decides, and as many
 OFFSET_OF_FEW = 0.002  # m, measured; only of segments, and where they are off by no more, root mean square

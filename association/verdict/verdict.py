@@ -27,7 +27,7 @@ from .unobservable import choose_along_direction
 
 @value(frozen=True, slots=True)
 class Verdict:
-    """Whether the best explanation is right, and may be used.
+    """The verdict on the best explanation: whether it is right, and may be used.
 
     Attributes
     ----------
@@ -43,11 +43,11 @@ class Verdict:
     runner_up : float or None
         Those of the next over those of the best, never below 0.
     contradicted : bool
-        Whether the prior contradicts the pose.
+        True if the prior contradicts the pose.
     reasons : tuple of Reason
         Why it is not usable, the weightiest first.
     complete : bool
-        Whether neither the search nor what it was compared with was ended by the deadline.
+        True if the deadline ended neither the search nor the comparison of its result.
     cautious : float
         Probability that the pose is right where other buildings are included; 0 without an answer.
     """
@@ -83,7 +83,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     context : SearchContext
     explanations : Explanations
     off_scale : bool
-        Whether scan and map differ by a factor that nothing was done about.
+        True if scan and map differ by a factor that was not corrected.
 
     Raises
     ------

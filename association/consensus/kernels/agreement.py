@@ -74,8 +74,8 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
     """Return of the directions with evidence the fraction in which the scan shows what the map does, 0 to 1.
 
     Rays from the sensor of each view. For: the first segment and the first wall are as far away. Against: the wall is
-    before the segment, or there is none where the wall should have left one. What stands before a wall counts
-    for neither. Each view counts with its weight.
+    before the segment, or there is no segment although the wall should have left one. Segments before a wall count for
+    neither. Each view counts with its weight.
     `pose` (1,).
     """
     walls = place.walls

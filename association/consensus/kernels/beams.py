@@ -85,7 +85,7 @@ def beam_evidence(rays: Rays, pose: Record, place: Place, ray: Record, evidence:
 def beam_fractions(rays: Rays, poses: Records, place: Place, work: Workspace) -> tuple[float, float]:
     """Return the fractions of the beams that read farther, and nearer, than the map shows from the first pose.
 
-    Where the map shows nothing, and where nothing came back, nothing is compared. `poses` (1,).
+    Beams without a return, and beams for which the map shows nothing, are not compared. `poses` (1,).
     """
     beams = rays.beams
     walls = place.walls

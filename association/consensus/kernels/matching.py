@@ -36,7 +36,7 @@ def match_scan(
     place : Place
     gates : record of `GATES`
     possible : (n,)
-        What each line can gain at most, nats, as of `may_score` or `allow_all`; lines below 0 lie on no wall.
+        The greatest possible gain of each line, nats, as of `may_score` or `allow_all`; lines below 0 lie on no wall.
     threshold : float
         Nats; matching ends as soon as the gains cannot come to it.
     matches : (n,) of `MATCH`

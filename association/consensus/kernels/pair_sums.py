@@ -1,7 +1,7 @@
 """The sums of a consensus set, which change in constant time when a pair comes or goes.
 
-All that scores a set comes from these sums: the chi-square and the information of its pose. What the pairs of each wall
-add is also summed by wall, because they share the wall's own error: see `wall_errors`.
+The score of a set follows from these sums: the chi-square and the information of its pose. The pairs of each wall are
+also summed by wall, because they share the wall's own error: see `wall_errors`.
 """
 
 from compiled import kernel
@@ -96,7 +96,7 @@ def update_pair(work: Workspace, wall: Record, seen: Record, i: int, w: int, sig
 
 @kernel
 def update_pairs(scan: Records, matches: Records, walls: Records, work: Workspace) -> bool:
-    """Change the sums of `work` from the pairs that they hold to those of `matches`; tell whether any changed."""
+    """Change the sums of `work` from the pairs that they hold to those of `matches`; return whether any changed."""
     held = work.held
     shifts = work.shifts_held
     weights = work.weights_held

@@ -109,7 +109,7 @@ def register_pose(scan: Records, known_walls: KnownWalls, matches: Records, out:
             work.weights_held[i] = weights[i]
             update_pair(work, walls[w], scan[i], i, w, 1.0)
     scratch = work.scratch[0]
-    # What is fixed needs no spring.
+    # A pose that is fixed needs no spring.
     theta, x, y, _, _ = joint_solve(scratch.plain, pose.theta, False)
     joint_information(scratch.plain, theta, scratch.information)
     if invert3(scratch.information, pose):

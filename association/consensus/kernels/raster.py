@@ -39,11 +39,11 @@ class Columns(NamedTuple):
 
 @kernel
 def gates_about(scan: Records, figure: Record, gates: Record, spreads: Floats, shifts: Integers, later: Floats) -> None:
-    """Write what gates scan lines have at a pose that turns about the pin of `figure`, with the variance there.
+    """Write the gates of scan lines at a pose that turns about the pin of `figure`, with the variance there.
 
-    For the angle in sectors, a little wider than `match_scan` has it: see `GATE_MARGIN`; for the offset which bits of
-    the raster are to be looked at, those of what is near where the gate is narrow. The covariance of the pose may be
-    that of one that is turned by up to the ``slip``. What the lines after each of them can add goes to `later`.
+    The angle gate is in sectors, a little wider than in `match_scan`: see `GATE_MARGIN`. The offset gate is given by
+    the bits of the raster to look at; a narrow gate has those of the nearer walls. The covariance of the pose may be
+    that of one that is turned by up to the ``slip``. The possible gain of the lines after each one goes to `later`.
     """
     theta_var = figure.angle_variance
     x = figure.pin_x

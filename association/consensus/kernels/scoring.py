@@ -107,7 +107,7 @@ def log_determinant(information: Record, model: Record) -> float:
 
 @kernel
 def discount_steps(scan: Records, matches: Records) -> None:
-    """Take from each gain what it costs that the walls under one straight line are beside one another."""
+    """Reduce each gain by the penalty for steps between the walls under one straight line."""
     for i in range(len(scan)):
         match = matches[i]
         if match.wall >= 0 and match.uneven > 0.0:

@@ -136,7 +136,7 @@ def count_ray(blocker: Record, match: Record) -> None:
 
 @kernel
 def is_another(blocker: Record, sighting: Record) -> bool:
-    """Count a ray through a wall; tell whether no view before sent as many through it to that line of the scan."""
+    """Count a ray through a wall; return whether no view before sent as many through it to that line of the scan."""
     if blocker.row != sighting.row + 1:
         blocker.row = sighting.row + 1
         blocker.most = 0

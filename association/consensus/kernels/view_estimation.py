@@ -26,7 +26,7 @@ def add_views(
     ----------
     by_views : SeenByViews
     shifts : (v, 3)
-        How far the views are from where they were said to be: x, y, theta in the scan frame.
+        Corrections of the views' reported poses: x, y, theta in the scan frame.
     poses : (1,) of `POSE`
         Index frame from scan frame.
     wall_variance : float

@@ -1,4 +1,4 @@
-"""What a scan line covers of a wall chain: of walls that continue one another."""
+"""Measure the part of a wall chain, of walls that continue one another, that a scan line covers."""
 
 from compiled import kernel
 from registration.layout import Record, Records
@@ -14,7 +14,7 @@ Line = tuple[float, float, float, float, float, float]
 def gap_counts(gap: float, length: float) -> tuple[float, float]:
     """Return how much of a gap counts as covered, metres, and how much what a segment covers behind it counts.
 
-    What is open between two walls speaks against a segment that bridges it, unless it is hardly open; and a short
+    A gap between two walls is evidence against a segment that bridges it, unless the gap is very narrow. A short
     segment does not bridge it.
     """
     whole = fade(gap, WHOLE_GAP, APART_GAP)
@@ -26,7 +26,7 @@ def gap_counts(gap: float, length: float) -> tuple[float, float]:
 def wall_under(wall: Record, base: Record, line: Line, way: float, start: float, stop: float) -> tuple[float, float]:
     """Return how much a wall counts under a scan line between two abscissae, 0 to 1, and its step from `base`, m.
 
-    What lies off a wall counts less, at the gate nothing.
+    A line that lies off a wall counts less, at the gate nothing.
     """
     middle_x, middle_y, dx, dy, _, gate = line
     middle = way * 0.5 * (start + stop)
@@ -44,10 +44,10 @@ def follow_chain(
     """Add up what a scan line covers of the walls that follow wall `w` on its chain, as far as that is to the good.
 
     `line` is the scan line on the map: midpoint, direction, length, and how far it may be off a wall. `way` is 1 along
-    the walls, -1 against them; that way the line is covered up to `reach` metres from its midpoint. What is on a wall
-    that is beside `w` counts less. Returns by how many metres more the line counts as covered; the length
-    it covers; sums over that of how far the walls are beside `w`, and of the square; and how many walls are left to
-    look at, of `most`.
+    the walls, -1 against them; that way the line is covered up to `reach` metres from its midpoint. A part on a wall
+    with a lateral step from `w` counts less. Returns by how many metres more the line counts as covered; the length
+    that it covers; sums over that length of the walls' steps from `w`, and of their squares; and how many walls are
+    left to look at, of `most`.
     """
     middle_x, middle_y, _, _, length, _ = line
     base = walls[w]
@@ -94,8 +94,8 @@ def follow_both_ways(
 ) -> tuple[float, float, float, float, int]:
     """Add up what a scan line covers of wall `w`, on it between `low` and `high`, and of its neighbours on the chain.
 
-    Returns how many metres of the line count as covered; the length that it covers; sums over that of how far the walls
-    are beside `w`, and of the square; and how many walls are left to look at, of `most`.
+    Returns how many metres of the line count as covered; the length that it covers; sums over that length of the
+    walls' steps from `w`, and of their squares; and how many walls are left to look at, of `most`.
     """
     half = 0.5 * line[4]
     counted = high - low

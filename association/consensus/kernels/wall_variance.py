@@ -1,4 +1,4 @@
-"""How far the walls of a consensus set are off, as their residuals show it, and what weight lines on them have."""
+"""Estimate the walls' error of a consensus set from its residuals, and weight the lines on these walls."""
 
 import math
 
@@ -44,8 +44,8 @@ def wall_variance_shown(
         free = max(0.0, 1.0 - spread / variance)
         found += own[k] * (mean * mean - free / one.weight)
         count += own[k] * free
-    # What so few walls show is uncertain itself: Student's t has that much more variance. And those that are farthest
-    # off matched nothing.
+    # An estimate from so few walls is uncertain itself: Student's t has that much more variance. And the walls that are
+    # farthest off matched nothing.
     unsure = UNSEEN_ERROR * (1.0 + 2.0 / max(1.0, count - 2.0))
     return unsure * max(found / count, LEAST_WALL_ERROR**2)
 

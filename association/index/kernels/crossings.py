@@ -79,7 +79,7 @@ def code_of(first_begin: float, first_end: float, second_begin: float, second_en
 
 @kernel
 def away_from(band: Record, box: Record) -> float:
-    """Return how far at least the boxes of a band are from a box, in y; below 0 where they may lie beside it."""
+    """Return the least distance of the boxes of a band from a box in y; below 0 if their ranges of y overlap."""
     return max(band.low - box.y2, box.y1 - band.high)
 
 

@@ -113,8 +113,8 @@ def join_collinear(
 ) -> None:
     """Join pieces `first` to `last` with those that they continue or repeat, in `parent` (n,), a union-find forest.
 
-    Around each piece the begins of others are looked up. Where more than `MOST_LOOKS` begin about one piece, and beyond
-    `MOST_STEPS` places before its end, as on no map of a building, some are not merged. `ends` (n,) of `ENDS`,
+    Around each piece the begins of others are looked up. Some are not merged if more than `MOST_LOOKS` begin about one
+    piece, or beyond `MOST_STEPS` places before its end. No map of a building has so many. `ends` (n,) of `ENDS`,
     `directions` (n,) of `POINT`; `heads` and `following` of `list_begins`.
     """
     buckets = len(heads)

@@ -23,14 +23,14 @@ def overlap_middle(one: Record, other: Record) -> tuple[float, float]:
 
 @kernel
 def offset_at(one: Record, other: Record, x: float, y: float) -> float:
-    """Return how far `one` lies to the left of `other`, metres, beside a place on that."""
+    """Return how far `one` lies to the left of `other`, metres, at a place on that."""
     along = one.dx * (x - one.centroid_x) + one.dy * (y - one.centroid_y)
     return other.dx * (one.centroid_y + along * one.dy - y) - other.dy * (one.centroid_x + along * one.dx - x)
 
 
 @kernel
 def variance_at(line: Record, x: float, y: float) -> float:
-    """Return the variance of a line's offset beside a place, m^2."""
+    """Return the variance of a line's offset at the point of it nearest to a place, m^2."""
     along = line.dx * (x - line.centroid_x) + line.dy * (y - line.centroid_y)
     return ROUGHNESS**2 + line.variance * (1.0 + along * along / max(line.spread, LEAST_SPREAD))
 

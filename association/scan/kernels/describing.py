@@ -18,7 +18,7 @@ from .joining import lines_of_a_view, longest_first
 
 @kernel
 def freedom_alone(line: Record, model: Record, information: Record) -> float:
-    """Return the freedom that a line takes from a pose by itself, nats: no set with it takes less."""
+    """Return the freedom that a line alone takes from a pose, nats: no set with it takes less."""
     weight = line.weight / (1.0 + line.weight * model.wall_variance)
     lever = line.dx * line.centroid_x + line.dy * line.centroid_y
     information.xx = weight  # across the line
@@ -74,7 +74,7 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
 def set_map_sigma(sigma: float, variances: Records, model: Records) -> None:
     """Write what follows from the deviation of the map's lines, metres, to both, (1,) each.
 
-    A tolerance that is wider says that the map is that far off.
+    If the tolerance is wider, the map is taken to be that far off.
     """
     given = variances[0]
     given.map = sigma * sigma

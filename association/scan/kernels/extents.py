@@ -31,7 +31,7 @@ def extent_along(ends: Records, directions: Records) -> float:
 def facing_away(ends: Records, seen_from: Records, least: float) -> int:
     """Count the segments, (n,) of `ENDS`, that have the place they were seen from on their right, by over `least` m.
 
-    `seen_from` (n,) of `POINT`, or (1,) where all were seen from there; nan where nobody knows.
+    `seen_from` (n,) of `POINT`, or (1,) where all were seen from there; nan where the place is unknown.
     """
     away = 0
     for i in range(len(ends)):

@@ -15,7 +15,7 @@ from ..tuning import CUT_COSINE, CUT_LATERAL, LINE_COSINE, LINE_GAP, LINE_LATERA
 
 @kernel
 def as_lines(measured: Measured) -> Records:
-    """Return each segment as a line by itself, (n,) of `LINE_PARTS`."""
+    """Return each segment as a line of its own, (n,) of `LINE_PARTS`."""
     directions = measured.directions
     midpoints = measured.midpoints
     lengths = measured.lengths
@@ -134,7 +134,7 @@ def take_on(near: Integers, lows: Floats, highs: Floats, length: float, label: i
 def join_labelled(given: Records, order: Integers, labels: Integers, counted: bool) -> Records:
     """Return what the parts of each label show together, (k,) of `LINE_PARTS`.
 
-    What overlaps counts its points once. Where they were not `counted`, a line has `LEAST_POINTS` at least.
+    The points of overlapping parts count once. If they were not `counted`, a line has `LEAST_POINTS` at least.
     """
     n = len(order)
     count = 0

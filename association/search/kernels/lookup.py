@@ -25,7 +25,7 @@ LEAST_AT_ONCE = 64  # entries; where there is less room the crossings that were 
 def deciding_place(low: float, high: float, half: float, reach: float) -> float:
     """Return which place of a segment decides its cell, from its midpoint, which lies between two abscissae.
 
-    Few chains reach far from where they cross: the far end, or else the near one. Where that is beyond the lists, inf.
+    Few chains reach far from their crossing: the far end, or else the near one. Returns inf if that is beyond the lists.
     """
     if half <= 0.0:
         return 0.0 if max(-low, high) <= reach else math.inf
@@ -40,7 +40,7 @@ def look_up(figure: Record, crossings: Crossings, lists: Records) -> tuple[int, 
     """Write the lists that hold the crossings on which a base may lie, to `lists` (k,) of `LISTED`.
 
     Its first segment has the second one to its left. Returns how many lists and how many entries there are; 0 and -1
-    where not all crossings that matter are listed. Where there is no room for lists the entries are counted.
+    where not all crossings that matter are listed. Entries of lists without room in `lists` are counted, too.
     """
     reach = crossings.shape[0].reach
     columns = crossings.shape[0].columns
@@ -92,8 +92,8 @@ def angle_bins(figure: Record) -> tuple[int, int]:
 def midpoints_in(k: int, figure: Record) -> tuple[float, float, float, float]:
     """Return between which abscissae, from the crossing, the midpoints of a and of b lie at the angles of a bin.
 
-    At the angle phi these are ``cot(phi) beside - ahead`` and ``beside / sin(phi)``; a little more is allowed than what
-    the segments may stick out at the ends of their chains.
+    At the angle phi these are `cot(phi) beside - ahead` and `beside / sin(phi)`. The margin is a little more than the
+    length by which the segments may stick out at the ends of their chains.
     """
     beyond_a = max(0.0, -figure.half_a) + CROSSING_MARGIN
     beyond_b = max(0.0, -figure.half_b) + CROSSING_MARGIN

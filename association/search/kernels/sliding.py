@@ -68,7 +68,7 @@ def search_slides(
 ) -> bool:
     """Lay scan segment `sliding` on every chain that is long enough, at slides `spacing` metres apart; score each.
 
-    What is found is a family of poses, fixed across the walls and free along them. Segments that make a base with this
+    The result is a family of poses, fixed across the walls and free along them. Segments that make a base with this
     one do not count: the others have to be enough by themselves. Returns False if the search has to end before the last
     slide.
     """

@@ -144,8 +144,8 @@ def enter_grid(one: Record, shape: Record) -> None:
 def sweep(laid: Records, first: int, count: int, present: Integers, shape: Record, swept: Records) -> tuple[int, int]:
     """Write the cells that b sweeps and that list chains of its direction, from the `first` of `count` laid ones on.
 
-    Returns with which of these it stopped because `swept` (k,) was full, or `count`, and the number of cells. What is
-    `laid` keeps how far it is.
+    Returns with which of these it stopped because `swept` (k,) was full, or `count`, and the number of cells. The
+    records of `laid` store their progress.
     """
     columns = shape.columns
     rows = shape.rows

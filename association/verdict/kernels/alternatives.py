@@ -13,13 +13,13 @@ from .odds import fraction_between
 
 @kernel
 def log_evidence(one: Record) -> float:
-    """Return the evidence of an explanation, a record of `COMPARED`, where nobody knows how far walls are off, nats.
+    """Return the evidence of an explanation, a record of `COMPARED`, if the walls' error is unknown, nats.
 
     The score takes half the chi-square, the likelihood of its residuals where walls are off by `MODEL_OFFSET`. Of n
     matches with an unknown variance, which `USUAL_WALLS` (k) before are taken to have shown to be as much, the
     likelihood is Student's t:
     ``log G((n + k) / 2) - log G(k / 2) - n / 2 log(k / 2) - (n + k) / 2 log(1 + chi_square / k)``.
-    Where the walls of a map are off by more, the centimetres that tell alternatives apart count that much less.
+    If the walls of a map are off by more, the centimetres between alternatives count that much less.
     """
     n = one.count
     k = USUAL_WALLS
