@@ -57,7 +57,7 @@ def _terms(gates: bytes, prior: bytes, model: bytes) -> bytes:
 
 @value(frozen=True)
 class SearchContext:
-    """A search's map, scan, prior and options, and what the kernels are handed of them.
+    """A search's map, scan, prior and options, and the arrays of them that the kernels take.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class SearchContext:
     ) -> SearchContext:
         """Prepare a search; views that are not exact are laid on one another, as far as the deadline lets it.
 
-        On a map whose directions mean nothing those of the scan mean nothing, whatever the options say.
+        On a map whose directions mean nothing those of the scan mean nothing either, whatever the options are.
         """
         place = index if options.oriented else index.undirected
         if options.oriented and len(place.segments) > place.directed:
@@ -131,7 +131,7 @@ class SearchContext:
 
     @property
     def lines_of_sight(self) -> Sights:
-        """The same where it scores poses: segments have no lines of sight where single beams tell more."""
+        """The same where it scores poses: segments have no lines of sight where single beams are better evidence."""
         return self.nothing_seen if self.with_beams else self.sights
 
     @cached_property

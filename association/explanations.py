@@ -91,6 +91,6 @@ def add_alternatives(explanations: Explanations, alternatives: Sequence[Consensu
 
 
 def _same_place(one: ConsensusSet, other: ConsensusSet) -> bool:
-    """Tell whether two poses are of one place, at whatever scales."""
+    """Return whether two poses are of one place, at whatever scales."""
     a, b = one.pose, other.pose
     return math.hypot(a.x - b.x, a.y - b.y) <= SAME_PLACE and abs(wrap_angle(a.theta - b.theta)) <= DISTINCT_ANGLE

@@ -1,7 +1,7 @@
-"""The records that the kernels speak in; `tables` has the arrays of them that are handed on together.
+"""The records that the kernels exchange; `tables` has the arrays of them that are passed on together.
 
-Lengths in metres, angles in radians, scores and gains in nats. Poses are in the index frame, from the scan frame. What
-a kernel changes besides arrays is a record of an array of length 1.
+Lengths in metres, angles in radians, scores and gains in nats. Poses are in the index frame, from the scan frame. In
+addition to arrays a kernel changes only records of arrays of length 1.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ENDS = fields((_F, "x1 y1 x2 y2"))
 # the direction; angle of the direction; the walls before and after it that are linked to it, or -1. One cache line.
 WALL = fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
 
-# A line of the scan, one segment or several that continue or repeat one another, the most telling first: unit
+# A line of the scan, one segment or several that continue or repeat one another, the most informative first: unit
 # direction; midpoint; length; angle of the direction; mean of the points and their second moment along the line (m^2);
 # variances of offset (m^2) and angle (rad^2) with the model's slack, for the gates; weight in the sums (1/m^2), without
 # the error common to a wall; its gain on a wall; the sum of that over all later lines; variance of the offset by the

@@ -69,7 +69,7 @@ class HardPrior:
                 raise InvalidSearchError(f"expected a number above 0 and at most {high:g}", argument=f"prior.{name}")
 
     def contains(self, pose: RigidTransform) -> bool:
-        """Tell whether a pose lies within the window."""
+        """Return whether a pose lies within the window."""
         away = math.hypot(pose.x - self.pose.x, pose.y - self.pose.y)
         return away <= self.radius and abs(wrap_angle(pose.theta - self.pose.theta)) <= self.angle
 
@@ -107,7 +107,7 @@ class AssociationOptions:
         Which of "correspondences", "alternatives", "missing_map" the answer is to have; the others are empty. Without
         them a usable answer has no alternatives; any other has, because `message_of` returns their number.
     causes : bool
-        Whether to look for a mistake of the caller's where the answer is not usable, for twice the time at most.
+        True to look for a mistake of the caller's if the answer is not usable, for twice the time at most.
     estimator, rotation : str
         Of the final pose, as in `registration.RegistrationOptions`; the estimator also of the returned scores.
 

@@ -252,7 +252,7 @@ class SeenByViews(NamedTuple):
     seen : (k,) of `SIGHTING`
     walls : (k,) of `WALL`, on which each lies
     number : (k,) which of the walls that is, from 0 up
-    origins : (v,) of `POINT`, where the views' frames begin, as they were said to be, in the scan frame
+    origins : (v,) of `POINT`, where the views' frames begin, as reported, in the scan frame
     """
 
     seen: Records
@@ -277,7 +277,7 @@ class Question(NamedTuple):
 
 
 class WallLengths(NamedTuple):
-    """The lengths of a map's walls: what chance goes by.
+    """The lengths of a map's walls, for the score of chance.
 
     Attributes
     ----------

@@ -132,7 +132,7 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
 
 
 def _may_be_off(first: ScaledSearch) -> bool:
-    """Tell whether a factor may matter, and nothing but the pose was solved for, and all that was.
+    """Return whether a factor may matter, and nothing but the pose was solved for, and all that was.
 
     A scan that is off its walls by millimetres leaves nothing to a factor; nor does a map with a declared `sigma`.
     """
@@ -182,12 +182,12 @@ def _similarity(found: ScaledSearch) -> Similarity | None:
 
 
 def is_off(similarity: Similarity) -> bool:
-    """Tell whether a similarity differs from a rigid motion by its factor."""
+    """Return whether a similarity differs from a rigid motion by its factor."""
     return abs(similarity.factor - 1.0) >= max(LEAST_FACTOR, FACTOR_DEVIATIONS * similarity.deviation)
 
 
 def is_far_off(similarity: Similarity) -> bool:
-    """Tell whether the factor of a similarity is greater than those that a scan is searched with.
+    """Return whether the factor of a similarity is greater than those that a scan is searched with.
 
     Then its pose is off by decimetres, or it is in another room of the same shape.
     """

@@ -133,7 +133,7 @@ def _stuck_ranges(beams: Beams | None) -> str | None:
 def _exceeding(context: SearchContext) -> str | None:
     """Describe a scan that, without its outermost pieces, is larger than the box around the map."""
     segments, room = context.scan.measured.segments, context.index.diagonal
-    # With its outermost pieces it is no less wide, which is sooner told.
+    # With its outermost pieces it is no less wide, and that extent is computed faster.
     if extent(context.ends) <= EXCEEDING * room:
         return None
     reach = inner_extent(segments)

@@ -208,6 +208,6 @@ def _add_beams(context: SearchContext, scored: _Scored) -> _Scored:
 
 
 def _prior_values(context: SearchContext, poses: Records) -> Floats:
-    """Return what the prior says of each pose, nats."""
+    """Return the score of each pose by the prior, nats."""
     values: Floats = prior_values(context.prior_record, poses)
     return values

@@ -73,7 +73,7 @@ class SeenOnWalls:
     seen : (k,) of `SIGHTING`, view by view
     walls : (k,) of `WALL`, on which each lies
     number : (k,) which of the walls that is, from 0 up
-    origins : (v,) of `POINT`, where the views' frames begin, as they were said to be
+    origins : (v,) of `POINT`, where the views' frames begin, as reported
     """
 
     views: Views

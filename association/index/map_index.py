@@ -184,7 +184,7 @@ class MapIndex:
         return int(np.diff(self.grid.starts).max())
 
     def _agreeing_share(self) -> float:
-        """Return the chance that two points of walls have the same direction, up to a neighbouring bin."""
+        """Return the probability that two points of walls have the same direction, up to a neighbouring bin."""
         shares = np.add.reduceat(
             np.append(self.walls.longest, 0.0), np.minimum(self.walls.bin_starts[:-1], len(self.walls.rows))
         )
@@ -211,7 +211,7 @@ class MapIndex:
         )
 
     def is_one_wall(self, walls: Integers, wall: int) -> NDArray[np.bool_]:
-        """Tell of `walls` (k,) which are rather one with another one than walls of their own."""
+        """Return which of `walls` (k,) are rather one with another one than walls of their own."""
         ties, tie = self.ties[walls], self.ties[wall]
         near = 2.0 * np.abs(ties - tie) < math.log(2.0)
         return np.asarray((walls == wall) | (near & (ties >= 0.0) & (tie >= 0.0)))

@@ -1,4 +1,4 @@
-"""Views laid on one another before the search: a wall that two of them show is one, whatever odometry says.
+"""Views laid on one another before the search: a wall that two of them show is one, whatever the odometry.
 
 A wall that two views show moves these views, if its distance from its neighbours exceeds the error of odometry. From
 then on the moves affect the gates of the search, and nothing else. The answer's own pose and covariance go back to the

@@ -102,7 +102,7 @@ class Scan:
         Position of the sensor, metres. None if the segments were not seen from one place; lines of sight are then no
         evidence. Of several views it is that of the first that has one.
     beams : Beams or None
-        The raw ranges, where the scan came as such; they start at `viewpoint`, or where each of them says.
+        The raw ranges, where the scan came as such; they start at `viewpoint`, or at an origin of their own.
     views : Views or None
         The views that it was put together from, if there are several.
     ordered : bool

@@ -63,7 +63,7 @@ class ScanLines:
     def of(
         cls, scan: Scan, map_sigma: float | None, options: AssociationOptions, given: Measured | None = None
     ) -> ScanLines:
-        """Join the segments that continue or repeat one another, and order them by what they tell; ties by index.
+        """Join the segments that continue or repeat one another, and order them by their information; ties by index.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class ScanLines:
 
 
 def _given(measured: MeasuredSegments) -> Measured:
-    """Return segments as the kernels are handed them."""
+    """Return segments as the kernels take them."""
     segments = measured.segments
     return Measured(
         as_records(POINT, segments.directions), as_records(POINT, segments.midpoints), segments.lengths,

@@ -188,7 +188,7 @@ def _outward(views: Sequence[View]) -> list[int]:
 
 
 def _root(views: Sequence[View], order: Sequence[int]) -> Floats:
-    """Return what `Views.root` says, step by step: the errors of a view are those of the one before it, and its step's.
+    """Return `Views.root`, built up step by step: the errors of a view are those of the one before it, and its step's.
 
     With the pose ``P_v = P_r (s + e)``, where s is the step and e its error, the first order is
     ``dt_v = dt_r + J R_r s dtheta_r + R_r e_t`` and ``dtheta_v = dtheta_r + e_theta``.

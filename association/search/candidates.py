@@ -61,11 +61,11 @@ class Effort:
     kept : int
         Poses at most.
     kept_share : float
-        Of the best value, below which a pose is not kept.
+        Of the best value, below which a pose is not stored.
     rival_share : float
         Of the best value, above which no pose may have been missed.
     allowed : float
-        The greatest chance of having missed one; -1 goes through all bases.
+        The greatest probability of having missed one; -1 goes through all bases.
     known : float
         A value that is known to be reached, nats: poses below these fractions of it are not looked for.
     enough : float
@@ -90,7 +90,7 @@ class Effort:
 
 
 def allowed_by(options: AssociationOptions) -> float:
-    """Return the chance of having missed a better consensus set that a caller allows; -1 for none."""
+    """Return the probability of having missed a better consensus set that a caller allows; -1 for none."""
     return -1.0 if options.exhaustive else 1.0 - options.confidence
 
 

@@ -90,7 +90,7 @@ class Sampling(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The bases of a scan, and what the stopping rule knows.
+    """The bases of a scan, and the state of the stopping rule.
 
     Attributes
     ----------

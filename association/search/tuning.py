@@ -7,7 +7,7 @@ floor plans and logs, and little changes near it; *measured* is a fit or a timin
 # --- Bases ------------------------------------------------------------------------------------------------------------
 
 BASE_SEGMENTS = 40  # tables; bases are drawn among this many of the longest segments; and, in scans of more,
-# those that tell enough among as many of these as there are: else what all others could add keeps a search going.
+# the informative ones among as many of these as there are: else the possible gain of all others keeps a search going.
 TELLING_SEGMENTS = (48, 56, 64, 72, 80, 88, 96)  # tables
 MIN_CROSSING_BASE = 0.3  # sine of the least angle between the scan segments of a base, tables
 

@@ -120,7 +120,7 @@ def facts_of(context: SearchContext, answer: Answer) -> Records:
 
 
 def depends_on_one_wall(context: SearchContext, answer: Answer, facts: Records) -> bool:
-    """Tell whether so few walls fix the pose that one alone decides; `facts` (1,) are those of the answer."""
+    """Return whether so few walls fix the pose that one alone decides; `facts` (1,) are those of the answer."""
     return bool(kernels.depends_on_one_wall(facts, answer.best.matches, context.with_beams))
 
 

@@ -38,8 +38,8 @@ class Verdict:
     pose : RigidTransform or None
         In the map frame; along an unobservable direction the one that was chosen.
     margin : float or None
-        Score and prior of the best explanation less those of the next, nats; None where no other was found, which says
-        nothing of poses below `SearchReport.complete_above` of the score.
+        Score and prior of the best explanation less those of the next, nats; None where no other was found. There
+        may be others below `SearchReport.complete_above` of the score.
     runner_up : float or None
         Those of the next over those of the best, never below 0.
     contradicted : bool
@@ -107,7 +107,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     )
     pose = choose_along_direction(context, answer)
     if context.window is not None and pose is not None and not context.window.contains(pose):
-        # It was inside before it was registered: the window is narrower than what the scan says.
+        # It was inside before it was registered: the window is narrower than the error of the pose.
         contradicted = contradicted or status is not Status.NO_MATCH
     usable = status is Status.OK and complete and not contradicted
     doubts = _doubts(explanations, answer, found, status, complete=complete, contradicted=contradicted)
@@ -145,7 +145,7 @@ def _margin(context: SearchContext, explanations: Explanations, answer: Answer) 
 def _probability(status: Status, right: float, *, contradicted: bool) -> float | None:
     """Return the probability that the pose is right; along an unobservable direction there is none.
 
-    The features say whether the walls that fix the pose are the right ones, and the pose along them is a choice.
+    The features are evidence of whether the walls that fix the pose are right. The pose along them is a choice.
     """
     if status is Status.DEGENERATE:
         return None
@@ -161,7 +161,7 @@ def _doubts(
     complete: bool,
     contradicted: bool,
 ) -> Doubts:
-    """Return what speaks against an answer, but for its features."""
+    """Return the evidence against an answer, except for its features."""
     return Doubts(
         status,
         complete,
@@ -176,7 +176,7 @@ def _doubts(
 
 
 def _out_of_step(answer: Answer) -> bool:
-    """Tell whether the last view of a drive fits far worse than those before it: then its own place is not known."""
+    """Return whether the last view of a drive fits far worse than those before it: then its own place is not known."""
     return answer.beams.in_step < LEAST_IN_STEP
 
 

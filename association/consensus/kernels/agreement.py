@@ -123,7 +123,7 @@ def agreement(sights: Sights, pose: Records, place: Place, work: Workspace) -> f
 
 @kernel
 def leaves_segment(wall: Record, reach: float, dx: float, dy: float) -> bool:
-    """Tell whether a wall that a ray meets should leave a segment: near, long, and not seen at a grazing angle."""
+    """Return whether a wall that a ray meets should leave a segment: near, long, and not seen at a grazing angle."""
     if reach >= MISSING_RANGE or wall.end - wall.begin <= MISSING_LENGTH:
         return False
     return abs(wall.dx * dy - wall.dy * dx) > MISSING_SINE

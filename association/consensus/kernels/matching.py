@@ -136,7 +136,7 @@ def lay_on_wall(wall: Record, line: Line, cos_gate: float) -> tuple[float, float
 
 @kernel
 def continues(wall: Record, low: float, high: float, line: Line) -> bool:
-    """Tell whether a line that lies on a wall from `low` to `high` goes on where other walls continue that."""
+    """Return whether a line that lies on a wall from `low` to `high` goes on where other walls continue that."""
     half = 0.5 * line[4]
     return (low > -half and wall.before >= 0) or (high < half and wall.after >= 0)
 

@@ -12,7 +12,7 @@ from .geometry import wrap
 
 @kernel
 def prior_value(prior: Record, pose: Record) -> float:
-    """Return what the prior says of a pose, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
+    """Return the score of a pose by the prior, nats: at most 0 for a soft one, `INSIDE` or 0 for a hard one."""
     if prior.kind == NO_PRIOR:
         return 0.0
     dx = pose.x - prior.x
@@ -33,7 +33,7 @@ def prior_value(prior: Record, pose: Record) -> float:
 
 @kernel
 def prior_values(prior: Records, poses: Records) -> Floats:
-    """Return what the prior (1,) says of each of the poses (k,), nats."""
+    """Return the scores of poses, (k,), by the prior (1,), nats."""
     values = np.empty(len(poses), np.float64)
     for k in range(len(poses)):
         values[k] = prior_value(prior[0], poses[k])

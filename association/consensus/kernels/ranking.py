@@ -168,7 +168,7 @@ def distinct_poses(
 
 @kernel
 def is_near(one: Record, other: Record, distance: float, angle: float) -> bool:
-    """Tell whether two poses are within `distance` metres and `angle` radians."""
+    """Return whether two poses are within `distance` metres and `angle` radians."""
     x = one.x - other.x
     y = one.y - other.y
     return math.sqrt(x * x + y * y) < distance and abs(wrap(one.theta - other.theta)) < angle

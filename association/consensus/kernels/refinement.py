@@ -85,7 +85,7 @@ def score_set(
 ) -> float:
     """Drop the pairs that cost more than they gain, solve again, and score the set: see `refine`.
 
-    The score is the gains less half of the chi-square, less the log-determinant of what the set fixes. `changed` tells
+    The score is the gains less half of the chi-square, less the log-determinant of what the set fixes. `changed` is
     whether pairs came or went since the pose was solved for.
     """
     scratch = work.scratch[0]

@@ -59,7 +59,7 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
         one.weight = 1.0 / max(line.variance + ROUGHNESS**2 + common, given.least_angle * spread)
         one.gain = GAIN + GAIN_PER_METRE * min(line.covered, GAIN_LENGTH)
         if common > 0.0:
-            # Wider gates are met by chance more often: what a match tells less for that.
+            # Matches in wider gates occur by chance more often: such a match gains less.
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_offset / offset))
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_angle / angle))
         one.later_gain = later
@@ -83,7 +83,7 @@ def set_map_sigma(sigma: float, variances: Records, model: Records) -> None:
 
 @kernel
 def describe_labelled(labels: Integers, lines: Records, variances: Records, model: Records) -> tuple[Indices, Records]:
-    """Order lines by what they tell; return the row of each part that is labelled, and the rows."""
+    """Order lines by their information; return the row of each part that is labelled, and the rows."""
     order = longest_first(lines)
     place = np.empty(len(order), np.int64)
     for k in range(len(order)):

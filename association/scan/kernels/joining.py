@@ -183,7 +183,7 @@ def union_length(lows: Floats, highs: Floats, count: int) -> float:
 
 @kernel
 def shares_of(given: Records, members: Integers, line: Record) -> Floats:
-    """Return (m,) the share of each part along a line that those before it do not cover; write `covered`."""
+    """Return (m,) the fraction of each part along a line that those before it do not cover; write `covered`."""
     lows = np.empty(len(members), np.float64)
     highs = np.empty(len(members), np.float64)
     shares = np.empty(len(members), np.float64)

@@ -25,7 +25,8 @@ LEAST_AT_ONCE = 64  # entries; where there is less room the crossings that were 
 def deciding_place(low: float, high: float, half: float, reach: float) -> float:
     """Return which place of a segment decides its cell, from its midpoint, which lies between two abscissae.
 
-    Few chains reach far from their crossing: the far end, or else the near one. Returns inf if that is beyond the lists.
+    Few chains reach far from where they cross: the far end, or else the near one. Returns inf if that is beyond the
+    lists.
     """
     if half <= 0.0:
         return 0.0 if max(-low, high) <= reach else math.inf
@@ -40,7 +41,7 @@ def look_up(figure: Record, crossings: Crossings, lists: Records) -> tuple[int, 
     """Write the lists that hold the crossings on which a base may lie, to `lists` (k,) of `LISTED`.
 
     Its first segment has the second one to its left. Returns how many lists and how many entries there are; 0 and -1
-    where not all crossings that matter are listed. Entries of lists without room in `lists` are counted, too.
+    where not all crossings that matter are listed. If `lists` has no room, the entries are counted.
     """
     reach = crossings.shape[0].reach
     columns = crossings.shape[0].columns

@@ -89,7 +89,7 @@ def lay(
         lay_on(figure, a, b, chain, one)
         one.sectors = sectors_about((chain.angle + figure.turn + math.pi) * PER_RADIAN + 0.5, spread)
         if windowed:
-            # A hard prior says about where the midpoint of a is.
+            # A hard prior limits the midpoint of a.
             away = chain.dx * near_y - chain.dy * near_x - chain.offset
             along = chain.dx * near_x + chain.dy * near_y
             one.at = max(one.at, along - window)

@@ -68,7 +68,7 @@ def log_tail(scan: Records, chances: Floats, score: float, exponents: Floats) ->
 
 @kernel
 def significance(scan: Records, walls: WallLengths, gates: Records, exponents: Floats, score: float) -> float:
-    """Return a bound on the chance that some pose of the map scores that, nats: see `association.verdict.chance`.
+    """Return a bound on the probability that some pose of the map scores that, nats: see `association.verdict.chance`.
 
     `gates` (1,), `exponents` (k,) of Chernoff's bound, ascending.
     """

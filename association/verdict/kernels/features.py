@@ -106,7 +106,7 @@ def measure_leverages(leverages: Records, facts: Records) -> None:
 
 @kernel
 def depends_on_one_wall(facts: Records, matches: Records, with_beams: bool) -> bool:
-    """Tell whether so few walls fix the pose that one alone decides: any building has such a corner.
+    """Return whether so few walls fix the pose that one alone decides: any building has such a corner.
 
     Many have three sides of a room that are about as far apart, too, but few to millimetres. Beams move a pose to
     where those three fit, so that with them it proves less. `facts` (1,) of its leverages, see `measure_leverages`.

@@ -42,8 +42,8 @@ def allowed_null(cautious: Odds, features: Records, score: float, bar: float) ->
     """Return the greatest of `NULL_FRACTIONS` at which the probability is over `bar`; or 0.
 
     That is the mirrored scan's score over the answer's. Wherever the map is not symmetric about the
-    place. The more it scores the less the probability. `features` (1,) are those of the answer; what they say of the
-    null score is changed.
+    place. The more it scores the less the probability. `features` (1,) are those of the answer; those of
+    the null score are changed.
     """
     numbers = features.view(np.float64)
     least = bar + ROUNDING
