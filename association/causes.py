@@ -117,7 +117,7 @@ def find_causes(
 
 
 def _known(explanations: Explanations, scan: Scan) -> float:
-    """Return the score of the scan as sent, by what counts in the changed one, nats."""
+    """Return the score of the scan as sent, by the evidence that counts in the changed one, nats."""
     alone = scan.viewpoint is None
     scores = (one.by_segments + one.blocked if alone else one.score for one in explanations.ranked)
     return max(scores, default=0.0)

@@ -180,7 +180,7 @@ class SearchContext:
 
     @cached_property
     def known_walls(self) -> KnownWalls:
-        """The walls, and what is known of where they stand."""
+        """The walls, and the uncertainty of their positions."""
         known = self.index.sigma
         parallel = most_parallel_up_to(len(self.lines.rows))
         return KnownWalls(self.index.walls.rows, self.index.ties, -1.0 if known is None else known**2, parallel)

@@ -24,7 +24,7 @@ NOT_SEARCHED = SearchReport(False, False, 0.0, 0, 0, 0, 0, "ordered", 1.0)
 
 
 def search_and_explain(context: SearchContext, effort: Effort | None = None) -> Explanations:
-    """Search a scan and explain it by what was found; by default with the effort that the context calls for.
+    """Search a scan and explain it by the poses found; by default with the effort that the context calls for.
 
     Raises
     ------

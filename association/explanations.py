@@ -1,4 +1,4 @@
-"""The explanations of a scan: ranked consensus sets, the best of them estimated. This is what the verdict judges."""
+"""The explanations of a scan: ranked consensus sets, the best of them estimated. The verdict judges them."""
 
 from __future__ import annotations
 

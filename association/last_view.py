@@ -54,9 +54,9 @@ NO_LAST_VIEW = LastView(None)
 def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     """Search the last view of a drive that is not usable alone, and return its answer where it may stand for the drive.
 
-    The answer is used where it is usable, the drive's best pose agrees within `AGREED_DISTANCE` and `AGREED_ANGLE`,
-    and the cautious probability of the drive is at least `AGREED_CAUTIOUS`. The last view consists of all views whose
-    pose in the scan's frame is exact.
+    The answer is used if it is usable, and the drive's best pose agrees within `AGREED_DISTANCE` and `AGREED_ANGLE`.
+    The cautious probability of the drive must also be at least `AGREED_CAUTIOUS`. The last view consists of all views
+    whose pose in the scan's frame is exact.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _agree(one: RigidTransform | None, other: RigidTransform | None) -> bool:
 
 
 def _of_the_drive(context: SearchContext, result: AssociationResult, own: Indices) -> AssociationResult:
-    """Return an answer with the indices of the drive's segments; what the other views show is unmatched.
+    """Return an answer with the indices of the drive's segments; the segments of the other views are unmatched.
 
     Warnings about the scan of the drive are included: their causes may be why the drive is not usable.
     """

@@ -74,7 +74,7 @@ SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
 # matched segments; its fraction of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
-# sigmas alone expect; what lines of sight speak against it, nats; the fractions of the beams that read the wall they
+# sigmas alone expect; the penalty of lines of sight, nats; the fractions of the beams that read the wall they
 # should, and that passed through one, 0 without beams; how many rows are matched.
 SET_SCORE = fields(
     (_F, "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed count"),
@@ -122,13 +122,13 @@ CROSSING_SHAPE = fields((_F, "reach"), (_I, "columns"))
 
 # The geometry of a base for its search, of its segments a, which slides, and b: from the midpoint of a to that of b,
 # also along a and to its left, and the angle between them; the point about which a pose turns, and the variance of its
-# rotation; by how much the two angles may disagree, by how much the rotation may be off until the final one is known,
-# and by how many metres b then is; half of the length that has to lie within its chain, of a and of b.
+# rotation; the tolerance of the two angles; by how much the rotation may be off until the final one is known, and by
+# how many metres b then is; half of the length that has to lie within its chain, of a and of b.
 FIGURE = fields((_F, "x y ahead beside turn pin_x pin_y angle_variance tolerance slip swing half_a half_b"))
 
 # A pose proposed from a base: the pose; cosine and sine of its heading; from the sensor to the point about which it may
-# turn, in the scan frame, rotated, and the variance of that rotation; what the prior adds to its score, and what its
-# score has to come to; whether it may score that.
+# turn, in the scan frame, rotated, and the variance of that rotation; the prior's bonus to its score, and the
+# least score that it needs; whether it may score that.
 HYPOTHESIS = np.dtype(
     [
         *POSE.descr,

@@ -33,7 +33,7 @@ from .warnings import warnings_of, warnings_of_causes
 def report(
     context: SearchContext, explanations: Explanations, verdict: Verdict, factor: Factor | None = None
 ) -> AssociationResult:
-    """Put an answer together; `factor` is what the scan was put to scale by.
+    """Put an answer together; `factor` is the one by which the scan was put to scale.
 
     If the deadline passes before it is put together, the answer is not complete, and so not usable.
     """

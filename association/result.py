@@ -167,8 +167,8 @@ class SearchReport:
     Attributes
     ----------
     complete : bool
-        False when the deadline ended it before the confidence was reached or the bases were used up, or before all that
-        was found was compared.
+        False if the deadline ended it before the confidence was reached or the bases were used up. Also False if the
+        deadline ended it before all found poses were compared.
     exhaustive : bool
         True if every base was searched, and the search is complete.
     confidence : float

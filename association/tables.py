@@ -1,7 +1,7 @@
 """Inputs of the kernels: arrays that belong together, of the records in `layout`.
 
-A kernel binds those that it needs to names once, outside of its loops, because Numba counts references to each array
-that it takes out of a tuple.
+A kernel binds those that it needs to names once, outside of its loops. Numba counts references to each array that is
+taken out of a tuple.
 """
 
 from __future__ import annotations
@@ -311,7 +311,7 @@ class Odds(NamedTuple):
 
 
 class KnownWalls(NamedTuple):
-    """The walls, and what is known of where they really stand.
+    """The walls, and the uncertainty of their positions.
 
     Attributes
     ----------
@@ -349,13 +349,13 @@ class Workspace(NamedTuple):
     matches : (n,) of `MATCH`
     spreads : (n,) angle gates in sectors
     shifts : (n,) where in the raster's cells the bits for the offset gate begin; below 0 where none is looked up
-    later : (n,) what the scan lines after each can add, of those that are looked up, nats
-    possible : (n,) what each scan line can add at a pose, nats, -1 where it can lie on no wall
+    later : (n,) possible gain of the scan lines after each, of those that are looked up, nats
+    possible : (n,) possible gain of each scan line at a pose, nats, -1 where it can lie on no wall
     hypotheses : (k,) of `HYPOTHESIS`, those that are scored together
     near : (n, k) whether each scan line may lie on a wall at each of them
     held : (n,) which wall of each scan line is in the sums, or -1
     shifts_held : (n,) lateral offset from that wall of the line that is in the sums, m
-    weights_held : (n,) with what weight it is
+    weights_held : (n,) its weight there
     listed : (n,) walls, for now
     wall_sums : (m,) of `WALL_SUMS`, by wall; all 0 between two poses
     scratch : (1,) of `SCRATCH`

@@ -1,9 +1,9 @@
 """Search where scan and map differ by a factor: the one place that searches scaled scans.
 
-A map that is off by a factor near one, as a drawing that was scaled by hand, puts far walls off by much and near ones
-by little. A pose makes up for part of it: the place is found, some decimetres off, and a covariance that takes walls to
-be off one by one says centimetres. The sums of the matches determine the factor, if they are not held to one. With the
-scan's lengths multiplied by it the search finds what it missed.
+A map may be off by a factor near one, as a drawing that was scaled by hand. Far walls are then off by much, near ones
+by little. A pose corrects part of it: the place is found, some decimetres off. A covariance that takes walls to be off
+one by one has deviations of centimetres there. The sums of the matches determine the factor, if they are not held to
+one. With the scan's lengths multiplied by it the search finds the missed matches.
 """
 
 from __future__ import annotations
@@ -102,12 +102,12 @@ def search_to_scale(context: SearchContext) -> ScaledSearch:
 
 
 def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
-    """Search a scan again to scale where its best explanation is off by a factor near one; keep what fits much better.
+    """Search a scan again to scale if its best explanation is off by a factor near one; use the result if much better.
 
     1. Estimate the factor by a similarity that is fitted to the best consensus set.
     2. Search the scan at that factor, until the factor is right.
     3. Search for alternatives at other scales, each at the one that fits it best.
-    4. Add to the pose's covariance what is not known of the factor.
+    4. Add the uncertainty of the factor to the pose's covariance.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def _may_be_off(first: ScaledSearch) -> bool:
 
 
 def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> ScaledSearch:
-    """Search again with the factor of a similarity, until it is right; what fits no better is left as it was."""
+    """Search again with the factor of a similarity, until it is right; a scan that fits no better is left as it was."""
     found, factor = first, 1.0
     for _ in range(FACTOR_ROUNDS):
         if similarity is None or not is_off(similarity):
@@ -197,7 +197,7 @@ def is_far_off(similarity: Similarity) -> bool:
 
 
 def _alternatives_at_other_scales(first: ScaledSearch, found: ScaledSearch) -> list[ConsensusSet]:
-    """Return what explains the scan at other scales, each at the one that fits it best.
+    """Return the consensus sets that explain the scan at other scales, each at the one that fits it best.
 
     Of two rooms that differ by a factor the one fits with a map too large, the other with one too small.
     """
@@ -226,7 +226,7 @@ def _at_best_scale(first: ScaledSearch, context: SearchContext, scale: float, on
 
 
 def _with_uncertain_factor(found: ScaledSearch) -> ScaledSearch:
-    """Return what was put to scale with the pose of a similarity, and the covariance that comes with its factor."""
+    """Return the search put to scale with the pose of a similarity, and the covariance that comes with its factor."""
     answer, factor, similarity = found.explanations.answer, found.factor, _similarity(found)
     if answer is None or factor is None or similarity is None:
         return found
@@ -239,11 +239,11 @@ def _with_uncertain_factor(found: ScaledSearch) -> ScaledSearch:
 
 
 def estimate_factor(context: SearchContext, rung: float = 1.0) -> float | None:
-    """Estimate what a scan has to be multiplied with, where that is within `GREATEST_STRETCH` of a `rung`.
+    """Estimate the factor on a scan, if that is within `GREATEST_STRETCH` of a `rung`.
 
-    The scan is searched with the widest gate on offsets. At a place in the scan's frame a factor of ``1 + e`` puts a
-    wall off by e times its distance, so that the walls near the sensor are found all the same; a similarity fitted to
-    the matches of each of the best poses has the factor.
+    The scan is searched with the widest gate on offsets. A factor of ``1 + e`` puts a wall off by e times its distance:
+    walls near the sensor are found all the same. A similarity fitted to the matches of each of the best
+    poses has the factor.
 
     Returns
     -------

@@ -81,8 +81,8 @@ def register_accepted(
     """Register the scan by the pairs, with the estimated error of walls, and take that pose; None without pairs.
 
     So a caller who registers by the same pairs and weights gets the same pose. The estimated pose is evaluated on the
-    pairs instead if it is not fixed, if the views are not exact, or unless it is to be `fitted`. The paper's estimator
-    then fits a pose of its own.
+    pairs instead if it is not fixed, if views are not exact, or unless it is to be `fitted`. With the paper's estimator
+    a pose of its own is fitted.
     """
     if not len(accepted.pairs):
         return None

@@ -52,5 +52,5 @@ def beam_rows(begins: ArrayLike, angles: Floats, ranges: Floats) -> Records:
 
 
 def beam_score(evidence: Records) -> Floats:
-    """Return what beams add to the score of each pose, nats, over one where none reads what it should."""
+    """Return the term of beams in the score of each pose, nats, over one where none reads what it should."""
     return np.asarray(BEAMS_READ * evidence["read"] - BEAMS_PASSED * evidence["passed"])

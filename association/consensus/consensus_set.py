@@ -1,4 +1,4 @@
-"""A scored consensus set: what the search's poses become, and what the verdict weighs."""
+"""A scored consensus set: the search makes them of its poses, and the verdict weighs them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Estimate poses together with the error of the map's walls, and what a pose would be without each wall."""
+"""Estimate poses together with the error of the map's walls, and poses as they would be without each wall."""
 
 from __future__ import annotations
 

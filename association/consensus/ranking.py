@@ -141,13 +141,13 @@ def with_lines_of_sight(
 
 
 def charge_for_sight(context: SearchContext, one: ConsensusSet) -> ConsensusSet:
-    """Return a consensus set with what lines of sight speak against it."""
+    """Return a consensus set with the penalty of lines of sight."""
     blocked = float(_score(context, one.estimate.copy()).scores["blocked"][0])
     return replace(one, score=one.score - blocked, posterior=one.posterior - blocked, blocked=blocked)
 
 
 def _place(one: ConsensusSet) -> tuple[bool, float]:
-    """Return what orders consensus sets."""
+    """Return the key that orders consensus sets."""
     return not one.inside, -one.posterior
 
 

@@ -1,4 +1,4 @@
-"""Lines of sight at the answer: what should have been seen, and whether it was."""
+"""Check lines of sight at the answer: whether the expected walls were seen."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def agreement(context: SearchContext, best: ConsensusSet) -> float:
 
 
 def compare_beams(context: SearchContext, estimated: EstimatedPose) -> BeamFractions:
-    """Return how many beams do not read what the map shows from the estimated pose."""
+    """Return the fractions of beams that do not read what the map shows from the estimated pose."""
     if not context.with_beams or not context.can_look:
         return NO_BEAMS
     pose, place = estimated.pose, context.index.tables.place

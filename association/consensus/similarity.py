@@ -26,7 +26,7 @@ class Similarity:
     pose : RigidTransform
         Without the factor.
     covariance : (3, 3)
-        Of additive (x, y, theta), with what is not known of the factor.
+        Of additive (x, y, theta), with the uncertainty of the factor.
     factor : float
         Factor on the scan's lengths.
     deviation : float
@@ -55,7 +55,7 @@ def fit_trimmed_similarity(context: SearchContext, best: ConsensusSet) -> tuple[
     Returns
     -------
     (Similarity, float) or None
-        With the median of what it leaves between ends and walls, metres. None where too few lines are left.
+        With the median of the distances between ends and walls, metres. None where too few lines are left.
     """
     matches = best.matches.copy()
     rows = context.lines.rows[best.matched]

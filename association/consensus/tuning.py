@@ -8,7 +8,7 @@ The origins are explained in `association.tuning`.
 # Between these lengths a segment comes to bridge a gap between walls: a short one may well be clutter there.
 SHORT_BRIDGE, LONG_BRIDGE = 2.5, 3.5  # m, tables
 FLAT_STEP = 0.03  # m, tables; between two walls on which a segment lies, up to where both count fully
-FLAT_GATE = 0.9  # of a gate, tables; what lies farther off gains less, and nothing at the gate
+FLAT_GATE = 0.9  # of a gate, tables; a line farther off gains less, and nothing at the gate
 OVERLAP_TAPER = 0.05  # beyond the least overlap, tables; up to there a match gains less, and nothing at the least
 LEAST_COUNT = 1e-9  # rounding; of matches, to divide by
 WHOLE_SCORE = 2.0  # nats, tables; a match that scores less is a match in part
@@ -45,7 +45,7 @@ USUAL_WALLS = 2.0
 UNSEEN_ERROR = 1.15  # fitted; variance of walls' errors over that of those which the gates let pass
 LEAST_KNOWN_VARIANCE = 1e-12  # m^2, rounding; of walls whose error the caller knows
 LEAST_WALL_ERROR = 0.003  # m, tables
-ROUGH_FRACTION = 0.1  # of a wall's variance, tables; what differs along it
+ROUGH_FRACTION = 0.1  # of a wall's variance, tables; the part that differs along it
 ESTIMATION_ROUNDS = 4  # tables
 FREE_DEVIATION = 10.0  # m, geometry: what `SPRING` leaves
 COMMON_WALL_ERROR = 0.04  # m, tables; what fixes a pose has to hold against that much
@@ -87,7 +87,7 @@ NEARER_BY = 0.1  # m, tables; nearer, does not read it
 WALL_BEHIND = 30.0  # m, geometry; so far behind a reading a wall is looked for then
 SURE_LENGTH = 3.0  # m, tables; shorter walls on a map made by a robot may have been people or carts
 
-# --- Agreement: what is seen, compared with what the map shows --------------------------------------------------------
+# --- Agreement: the view of the scan, compared with that of the map ---------------------------------------------------
 
 AGREEING = 0.2  # m, tables; a scan segment and a wall nearer to each other than that, and
 AGREEING_FRACTION = 0.02  # of the distance more, agree
@@ -101,7 +101,7 @@ NEUTRAL = 0.8  # tables; where there is nothing to compare
 
 MAX_OTHERS = 8  # map segments named in addition to the one that a scan segment lies on most
 MOST_UNDER = 1000  # map segments under one scan segment that are compared; measured: in 443 maps a wall has up to 85
-MIN_EXTENT = 1e-9  # m, rounding; what a segment along a wall counts as at least
+MIN_EXTENT = 1e-9  # m, rounding; least length that a segment along a wall counts as
 
 CONTRADICTION = 6.0  # nats, tables; by which a pose that the prior speaks against must be better to contradict it
 ONE_OF_MANY = 2.0  # m, tables; beyond it a fit along the weakest direction says less than the middle of the walls

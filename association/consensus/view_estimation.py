@@ -1,10 +1,10 @@
 """Estimate the pose of several views that are not exact, together with the errors of the views.
 
-Unknown are the pose and the variates z of `Views.root`, which odometry says are standard normal. Each view shows a
-matched line for itself; the offset of a wall is one error for all that was seen of it, from whatever view. With
-``phi`` the row of an offset's derivatives, w its weight, V the walls' variance, the normal matrix is ``sum w phi phi'``
-of offsets and angles, less ``v v' / (s + 1 / V)`` of each wall, plus the unit matrix for z. The pose's covariance is
-its block of the inverse: what is left of view v is ``(I + F_v S_v)^-1 F_v`` where views are independent.
+Unknown are the pose and the variates z of `Views.root`, which by odometry are standard normal. Each view shows a
+matched line for itself; the offset of a wall is one error for all its observations, from whatever view. Let ``phi`` be
+the row of an offset's derivatives, w its weight, and V the walls' variance. The normal matrix is ``sum w phi phi'`` of
+offsets and angles, less ``v v' / (s + 1 / V)`` of each wall, plus the unit matrix for z. The pose's covariance is its
+block of the inverse: the rest of view v is ``(I + F_v S_v)^-1 F_v`` where views are independent.
 """
 
 from __future__ import annotations

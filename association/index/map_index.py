@@ -46,9 +46,9 @@ class MapIndex:
     walls : Walls
     ties : (m,) how walls that continue one another are tied: see `tables.Place`
     chains : Walls
-        Lines through what nearly continues one another, also across doorways: where a segment of a base may lie.
+        Lines through walls that nearly continue one another, also across doorways: where a segment of a base may lie.
     grid : Grid
-        Walls within `REACH` of each cell, whatever their direction: what lies at a point?
+        Walls within `REACH` of each cell, whatever their direction: the walls that lie at a point.
     sweep : Sweep
         Which chains of a direction does a sweep meet? The list alone answers this, since reading a chain takes longer
         than all else.

@@ -19,7 +19,7 @@ ONE_LINE_SHARE = 0.1  # of the map's deviation, geometry
 BLENDED_STEP = 0.045  # m, tables; of a map without a declared deviation
 BLENDED_SIGMAS = 4.0  # geometry; otherwise, up to the same
 BLENDED_WALLS = 16  # on either side, measured
-LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over what is open between them
+LINK_GAP = 3.0  # m, tables; of walls that a scan segment may lie on over the gap between them
 TIE_FREE = 30.0  # minus the log of a correlation that is none
 TIES_BEFORE = 6  # walls before it that one is tied to at most, measured
 

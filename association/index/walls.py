@@ -164,7 +164,7 @@ class _Linked:
         directions = np.column_stack([walls.rows["dx"], walls.rows["dy"]])
         records = as_records(ENDS, ends), as_records(POINT, directions)
         self.of_wall = collinear_groups(*records, join_gates(LINK_GAP, APART_STEP), deadline)
-        # Along what the walls of a group have in common, for their own directions differ.
+        # Along the common direction of the walls of a group, for their own directions differ.
         common = np.zeros((len(ends), 2))
         np.add.at(common, self.of_wall, directions * walls.longest[:, None])
         common = common[self.of_wall]

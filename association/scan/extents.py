@@ -22,7 +22,7 @@ def extent(ends: Records) -> float:
 
 
 def inner_extent(segments: Segments) -> float:
-    """Return the extent without what is outermost, metres.
+    """Return the extent without its outermost parts, metres.
 
     Of their length a fraction of `OUTERMOST_SHARE` at either end does not count: some beams leave through a window.
     """

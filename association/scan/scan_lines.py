@@ -105,7 +105,7 @@ def _given(measured: MeasuredSegments) -> Measured:
 def parts_of(
     measured: MeasuredSegments, views: Views, *, directed: bool = True
 ) -> tuple[NDArray[np.intp], Records, NDArray[np.intp]]:
-    """Join what each view shows of a line; unless they are `directed`, also segments that run against one another.
+    """Join the parts of a line in each view; unless they are `directed`, also segments that run against one another.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def _taken(measured: MeasuredSegments, rows: NDArray[np.intp]) -> MeasuredSegmen
 
 
 def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Integers, Records]:
-    """Join what several views show of a line, so that it is one piece of evidence.
+    """Join the parts of a line that several views show, so that it is one piece of evidence.
 
     The uncertainty of the viewpoints lets them lie so much farther apart. The line that they make is as uncertain as
     its parts, weighted by their lengths: their errors may be one.
@@ -160,7 +160,7 @@ def _joined_views(parts: Records, views: Views, *, directed: bool) -> tuple[Inte
 
 
 def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) -> Records:
-    """Return what each view shows of the rows."""
+    """Return the parts of the rows that each view shows."""
     seen = np.zeros(len(parts), SIGHTING)
     seen["sensor"], seen["row"] = views, rows
     for name in ("dx", "dy", "x", "y", "length", "centroid_x", "centroid_y", "spread", "variance"):
@@ -170,7 +170,7 @@ def _sightings(parts: Records, views: NDArray[np.intp], rows: NDArray[np.intp]) 
 
 @lru_cache
 def variances_of(map_sigma: float, options: AssociationOptions, *, with_beams: bool) -> tuple[Records, Records]:
-    """Return what goes into the variances of lines, (1,) of `VARIANCES`, and of walls, (1,) of `MODEL`."""
+    """Return the terms of the variances of lines, (1,) of `VARIANCES`, and of walls, (1,) of `MODEL`."""
     variances = record(
         VARIANCES,
         common=COMMON_ERROR**2 if with_beams else 0.0,
@@ -184,7 +184,7 @@ def variances_of(map_sigma: float, options: AssociationOptions, *, with_beams: b
 
 @lru_cache
 def gates(options: AssociationOptions) -> Records:
-    """Return what a match has to pass, (1,) of `GATES`."""
+    """Return the gates of a match, (1,) of `GATES`."""
     offset, angle = options.offset_tolerance, options.angle_tolerance
     return record(
         GATES,

@@ -52,7 +52,7 @@ def assemble(views: Sequence[View]) -> Scan:
     Raises
     ------
     InvalidSearchError
-        When there are no views, or too many, or they are relative to one another in a circle, or the error of a step
+        If there are no views, or too many, or they are relative to one another in a circle. Also if the error of a step
         has a deviation beyond 10 m or rad.
     """
     if not 1 <= len(views) <= MAX_VIEWS:
@@ -190,7 +190,7 @@ def _outward(views: Sequence[View]) -> list[int]:
 def _root(views: Sequence[View], order: Sequence[int]) -> Floats:
     """Return `Views.root`, built up step by step: the errors of a view are those of the one before it, and its step's.
 
-    With the pose ``P_v = P_r (s + e)``, where s is the step and e its error, the first order is
+    The pose is ``P_v = P_r (s + e)``, where s is the step and e its error. The first order is
     ``dt_v = dt_r + J R_r s dtheta_r + R_r e_t`` and ``dtheta_v = dtheta_r + e_theta``.
     """
     uncertain = [v for v in order if _uncertain(views[v])]

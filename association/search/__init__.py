@@ -7,9 +7,9 @@ loop is `kernels.searching.search_bases`:
    Those come first whose pose is precise and whose search costs little; at random only on request.
 2. Form the hypotheses of the base: one for each pair of wall chains on which both segments may lie. Crossings of chains
    are looked up in lists (`kernels.lookup`), or else one segment is swept along each chain (`kernels.sweeping`);
-   `kernels.hypotheses` turns what is found into poses. Each hypothesis is rejected early, or matched to the walls,
-   refined by growing and shrinking its consensus set, and stored among the best poses (`kernels.scoring`,
-   `kernels.best_poses`).
+   `kernels.hypotheses` turns what is found into poses. Each hypothesis is rejected early, or matched to the walls
+   and refined by growing and shrinking its consensus set (`kernels.scoring`). It is then stored among the best poses
+   (`kernels.best_poses`).
 3. Evaluate the stopping rule, whether a better consensus set may have been missed: by a bound on its gain, and by the
    fraction of sampled consensus sets that hold none of the bases so far (`kernels.stopping`).
 

@@ -78,7 +78,7 @@ class Sampling(NamedTuple):
     ranks : (n, s) as in `Samples`
     fade : float
         As in `Plan`.
-    noise : (k,) what is added to the merits of bases that are drawn at random; empty where they are not
+    noise : (k,) terms added to the merits of bases that are drawn at random; empty where they are not
     """
 
     chains: Walls
@@ -98,7 +98,7 @@ class Plan(NamedTuple):
     costs : Costs
         By which those bases are weighed that may come next.
     uses : (n,) how often each of the first n scan segments was part of a base so far
-    residual : (all scan segments,) what is left of each gain in the bound, nats
+    residual : (all scan segments,) the rest of each gain in the bound, nats
     best_gains : (n,) the gains of the first n, the largest first, nats
     freest : (all scan lines,) those that take most freedom by themselves first
     samples : Samples

@@ -17,12 +17,12 @@ CROSSING_MARGIN = 1e-3  # m, rounding; of the lists of crossings
 MOST_LISTS = 256  # for one base; it is swept where there are more. Measured: at most one base in a thousand
 WHOLE_OVERLAP = 0.5  # geometry; least overlap from which a midpoint is on a wall, or between two
 WINDOW_MARGIN = 0.5  # m, tables, and
-WINDOW_TURN = 0.1  # rad, tables; what lies farther outside a hard prior's window is not refined into it
+WINDOW_TURN = 0.1  # rad, tables; a pose farther outside a hard prior's window is not refined into it
 
 # --- Slides of parallel segments --------------------------------------------------------------------------------------
 
 SLIDE_SEGMENTS = 4  # tables; parallel walls alone are laid on every wall, by this many of the longest segments
-SLIDE_SPACING = 2.0  # m, tables; what is found stands for the family along the walls
+SLIDE_SPACING = 2.0  # m, tables; the pose found stands for the family along the walls
 SLIDE_SPACING_FOR_BEAMS = 0.5  # m, tables; beams then fix the position along them
 SLIDE_DISTINCT_SHARE = 0.9  # of the spacing, geometry; at which two of one family are distinct
 PARALLEL_SINE = 0.1  # tables

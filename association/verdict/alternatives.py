@@ -1,9 +1,9 @@
 """Estimate how probable the best explanation is among its alternatives: perceptual aliasing.
 
 Alternatives are compared twice: as they were scored, and with walls taken to be off by more than the answer shows.
-If a building repeats itself and its map is centimetres off, a wall at the right place may lie beyond the gates, and a
-similar place may fit better by luck. The error of the walls is estimated from the place that fits best, and of many
-similar places one always fits well. A misfit of centimetres is therefore no evidence against a place.
+Suppose a building repeats itself and its map is centimetres off. A wall at the right place may then lie beyond the
+gates, and a similar place may fit better by luck. The error of the walls is estimated from the place that fits best,
+and of many similar places one always fits well. A misfit of centimetres is therefore no evidence against a place.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _loose_sigma(wall_sigma: float) -> float:
 
 
 def _probability_of_first(explanations: Sequence[ConsensusSet], scores: Floats) -> float:
-    """Return the probability of the first explanation among all, from what their segments score now, (k,) nats.
+    """Return the probability of the first explanation among all, from the present scores of their segments, (k,) nats.
 
     The prior counts in full; the beams' part, which depends on centimetres, counts by `LOOSE_BEAMS`.
     """

@@ -29,9 +29,10 @@ EXPONENTS = np.geomspace(0.01, 2.0, 40)  # of Chernoff's bound
 def significance(context: SearchContext, score: float) -> float:
     """Bound the probability that some pose scores `score` on a map that has nothing to do with the scan.
 
-    At a pose drawn at random, turned so that some directions agree, scan segment i lies on a wall with a probability
-    q_i that the walls' length per area gives. Chernoff's bound on the sum of the gains, times the number of poses that
-    the gates distinguish (the a-contrario count of false alarms of Desolneux, Moisan and Morel).
+    Consider a pose drawn at random, turned so that some directions agree. Scan segment i lies on a wall with a
+    probability q_i that the walls' length per area gives. The bound is Chernoff's on the sum of the gains, times the
+    number of poses that the gates distinguish. This is the a-contrario count of false alarms of Desolneux, Moisan and
+    Morel.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def find_null_score(context: SearchContext, best: ConsensusSet, least: float = 0
     best : ConsensusSet
         Of the answer.
     least : float
-        Fraction of the answer's score; what scores less may be returned as none, which takes less of a search.
+        Fraction of the answer's score; a lower score may be returned as none, which takes less of a search.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def _efforts(context: SearchContext, best: ConsensusSet, wanted: float) -> tuple
 
 
 def symmetry_of(context: SearchContext, best: ConsensusSet, null: ConsensusSet) -> float:
-    """Return how much of what the map shows from an answer it shows mirrored from there, at the null's pose, 0 to 1.
+    """Return the fraction of the map's view from an answer that it shows mirrored, at the null's pose, 0 to 1.
 
     0, as of a map without symmetry, where rays cannot be followed.
     """

@@ -49,7 +49,7 @@ class Features(NamedTuple):
     null_gap : root of what the answer's score has over the mirrored scan's, in nats, up to that of `MAX_GAP`; likewise
     null_better : by how much the mirrored scan's score over the answer's is above 1, symmetric or not, at most
     root_score : root of the score by segments, nats
-    blocked : root of what lines of sight speak against the answer, nats
+    blocked : root of the penalty of lines of sight, nats
     walls : root of the number of walls that hold a match
     misfit_of_many : misfit times the number of matched segments over `MANY`
     beyond_nearly_all : fraction of the length beyond `NEARLY_ALL`
@@ -93,7 +93,7 @@ FEATURES = np.dtype([(name, np.float64) for name in Features._fields])
 
 
 def facts_of(context: SearchContext, answer: Answer) -> Records:
-    """Return what is known of an answer next to its score, (1,) of `FACTS`."""
+    """Return the facts of an answer in addition to its score, (1,) of `FACTS`."""
     facts = record(
         FACTS,
         weakest=answer.estimated.weakest,

@@ -104,8 +104,9 @@ class Model:
 def as_model(document: Mapping[str, Sequence[float]]) -> Model:
     """Read a model.
 
-    For each feature its slope, then the value and the change of slope of each bend in turn. For a pair, whose key is
-    its kind and the names of both, what it adds, then for each where it begins to count and where it does in full.
+    An entry of a feature has its slope, then the value and the change of slope of each bend in turn. The key of a pair
+    is its kind and the names of both. Its entry has its term, then for each feature the values at which it begins to
+    count and at which it counts in full.
     """
     curves, pairs = {}, []
     for key, (first, *rest) in document.items():

@@ -125,7 +125,7 @@ def _as_if_fixed(described: Records) -> Records:
 
 
 def least_cautious(context: SearchContext) -> float:
-    """Return what the cautious probability of a usable answer is at least."""
+    """Return the least cautious probability of a usable answer."""
     if context.scan.views is not None and context.scan.views.uncertain:
         return USABLE_CAUTIOUS_DRIVE
     return USABLE_CAUTIOUS_WITH_BEAMS if context.with_beams else USABLE_CAUTIOUS

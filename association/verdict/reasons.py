@@ -124,7 +124,7 @@ def reasons_of(doubts: Doubts, features: Features | None, cautious: Model | None
 
 
 def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[ReasonCode]:
-    """Order the reasons by what their features take from the logarithm of the odds; at least the first of them.
+    """Order the reasons by the decrease of the log odds by their features; at least the first of them.
 
     `alone`: whether there is no other explanation; then the lead is the answer's own score.
     """
@@ -137,10 +137,11 @@ def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[Reason
 
 
 def _taken(features: Features, cautious: Model, names: tuple[str, ...]) -> float:
-    """Return what some features take from the logarithm of the odds, nats.
+    """Return the decrease of the logarithm of the odds by some features, nats.
 
-    That is the mean of what it loses when these become, of a usual right answer, what they are here, and of what it
-    gains when they become here what they usually are: what pairs of features add is split between both by that.
+    This is the mean of two differences. One is the loss of a usual right answer if these features become as they are
+    here. The other is the gain of this answer if they become as usual. The mean splits the terms of pairs of features
+    between both.
     """
     here = {name: getattr(features, name) for name in names}
     usual = {name: getattr(USUAL, name) for name in names}

@@ -14,8 +14,8 @@ from ..explanations import Answer
 def choose_along_direction(context: SearchContext, answer: Answer) -> RigidTransform | None:
     """Choose among poses that differ along the unobservable direction only; a pose that is fixed, if weakly, is that.
 
-    The nearest to the prior, else to where the raw beams fit best, else the one that centres what was seen on the walls
-    that it matched.
+    The nearest to the prior, else to where the raw beams fit best. Without either it is the one that centres the
+    observed segments on the walls that they matched.
     """
     pose, direction = answer.registered.pose, answer.estimated.direction
     if pose is None or not answer.estimated.free:
@@ -30,7 +30,7 @@ def choose_along_direction(context: SearchContext, answer: Answer) -> RigidTrans
 
 
 def _anchor(context: SearchContext, best: ConsensusSet) -> RigidTransform | None:
-    """Return what picks one pose along the direction: the prior, else where the raw beams fit best, else nothing."""
+    """Return the pose that picks one along the direction: the prior, else where the raw beams fit best, else None."""
     if context.prior is not None:
         return context.prior.pose
     return context.in_map(best.pose) if context.with_beams else None
@@ -39,7 +39,7 @@ def _anchor(context: SearchContext, best: ConsensusSet) -> RigidTransform | None
 def _centring_shift(
     context: SearchContext, answer: Answer, pose: RigidTransform, direction: tuple[float, float]
 ) -> float:
-    """Return how far along the direction the middle of what was seen comes to lie on that of the walls it matched."""
+    """Return the shift along the direction that puts the middle of the observed lines on that of their walls."""
     u, matched = np.array(direction), answer.best.matched
     walls = context.index.walls.rows[answer.best.matches["wall"][matched]]
     d = np.stack([walls["dx"], walls["dy"]], axis=1)

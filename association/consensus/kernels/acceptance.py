@@ -150,8 +150,8 @@ def accept_matches(
     Returns, by scan index, pairs (k, 2) of scan index and piece; the fraction of each segment that lies on pieces of
     these walls (k,); and the other pieces that it lies on: of pair i ``others[other_starts[i]:other_starts[i + 1]]``.
 
-    The pieces of each wall are ordered once, so that the time grows with their number and that of the segments, not
-    with the product of both.
+    The pieces of each wall are ordered once. So the time grows with their number and that of the segments, not with the
+    product of both.
     """
     row_of = lines.row_of
     n = len(row_of)

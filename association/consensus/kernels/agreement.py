@@ -1,4 +1,4 @@
-"""Compare what is seen with what the map shows."""
+"""Compare the view of the scan with that of the map."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Weigh single beams: what a laser should read at a pose, and what it did."""
+"""Weigh single beams: compare the expected readings of a laser at a pose with its readings."""
 
 import math
 

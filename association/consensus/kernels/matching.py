@@ -143,7 +143,7 @@ def continues(wall: Record, low: float, high: float, line: Line) -> bool:
 
 @kernel
 def gain_of(line: Record, match: Record, gates: Record, offset: float, across: float, turned: float) -> float:
-    """Return what a match gains, nats: by the overlap, and nothing at a gate, so that no gate decides.
+    """Return the gain of a match, nats: by the overlap, and nothing at a gate, so that no gate decides.
 
     `offset` is that from the wall itself; `across` and `turned` are the gates, m and rad.
     """

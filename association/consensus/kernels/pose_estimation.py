@@ -30,8 +30,8 @@ def estimate_poses(
 ) -> int:  # fmt: skip
     """Estimate the poses of consensus sets from `starts` (k,), with the error of the walls as their residuals show it.
 
-    `matches` (k, n). Writes `estimated` (k,) and, for the walls from number `begin` on that hold a match of the first
-    set, as many `leverages` as there is room for; returns how many walls hold one.
+    `matches` (k, n). Writes `estimated` (k,). Writes as many `leverages` as there is room for, for the walls from
+    number `begin` on that hold a match of the first set. Returns how many walls hold one.
     """
     count = 0
     for k in range(len(starts)):

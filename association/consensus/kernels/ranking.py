@@ -65,7 +65,7 @@ def score_candidates(
         measure_sums(work.scratch[0].sums, work.scratch[0].terms, one, out)
         measure_matches(scan, matches[k], out)
         out.blocked = 0.0
-        # The candidates come best first: what is far behind is no alternative, its score may stay too good.
+        # The candidates come best first: a candidate far behind is no alternative, its score may stay too good.
         if sighted and out.score > best - FAR_BEHIND:
             count = count_blockers(sights, matches[k], one, place, blockers, work.scratch[0].ray)
             out.blocked = sight_penalty(blockers, count, place.walls)
@@ -129,12 +129,12 @@ def distinct_poses(
 ) -> Integers:
     """Pick at most `most` poses without those that a better one stands for, the greatest sum first.
 
-    A pose stands for those that are near, within `distance` metres and `angle` radians, and for those that its own
-    covariance does not distinguish from it, at less than `same_family` squared deviations: a family along a corridor is
-    one explanation. It does not stand for one of its family with a score that is better by more than `much_better`
-    nats: a prior may put that one behind it, and is contradicted by it.
+    A pose stands for those that are near, within `distance` metres and `angle` radians. It also stands for those that
+    its own covariance does not distinguish from it, at less than `same_family` squared deviations: a family along a
+    corridor is one explanation. It does not stand for one of its family with a score that is better by more than
+    `much_better` nats: a prior may put that one behind it, and is contradicted by it.
 
-    `poses` (k,) of `ESTIMATE`, `scores` (k,) of `SET_SCORE`; what does not score is no explanation. Summed are the
+    `poses` (k,) of `ESTIMATE`, `scores` (k,) of `SET_SCORE`; a pose without a score is no explanation. Summed are the
     score and what the prior adds, `bonuses` (k,), or (0,) without a prior. Returns the places in them; ties by place.
     """
     losses = np.empty(len(poses), np.float64)

@@ -24,7 +24,7 @@ class Columns(NamedTuple):
     cosines, sines : (k,) of the headings, over the size of a cell
     lefts, bottoms : (k,) positions in the raster, in cells
     turned : (k,) headings in sectors
-    lacking : (k,) what the gains still have to come to, nats
+    lacking : (k,) the gains that are still needed, nats
     open_ones : (k,) which of them may score, as many as there are
     """
 
@@ -74,8 +74,8 @@ def may_score(
     Of the first `count` of `posed`, (k,) of `HYPOTHESIS`, against the ``floor`` of each. Writes to `near` (n, k) which
     lines may lie on a wall, as far as it takes to decide.
 
-    A rejection is never wrong, as long as half of a line at least has to lie on walls, so that its midpoint does or
-    is between two. `spreads`, `shifts` and `later` as of `gates_about`; a line whose shift is below 0 is not looked
+    A rejection is never wrong, as long as at least half of a line has to lie on walls: its midpoint then does, or is
+    between two. `spreads`, `shifts` and `later` as of `gates_about`; a line whose shift is below 0 is not looked
     up, and counts for nothing here.
 
     Line by line, for all poses that are left: so it does not wait for one place of the raster before the next.

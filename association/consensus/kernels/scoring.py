@@ -120,7 +120,7 @@ def score_pairs(
 ) -> float:
     """Score each match by what the set would lose without it at this pose; drop those without; return the sum of gains.
 
-    The score of a match is its gain less half of the chi-square that goes with it, the wall's own error taken out
+    The score of a match is its gain less half of the chi-square that goes with it. The wall's own error is taken out
     before and after. A match that scores nothing is clutter.
     """
     walls = place.walls

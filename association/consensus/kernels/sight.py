@@ -1,4 +1,4 @@
-"""Follow lines of sight: which wall a ray from a pose meets first, and what passes through walls."""
+"""Follow lines of sight: which wall a ray from a pose meets first, and which rays pass through walls."""
 
 import math
 
@@ -156,8 +156,8 @@ def sight_penalty(blockers: Blockers, count: int, walls: Records) -> float:
     """Return the penalty for walls that should have blocked the view, nats, at least 0; clear the counts.
 
     A wall counts once, however many rays pass, and by its length: short ones on a map made by a robot are often people
-    and carts that have gone since. Rays to clutter prove less than rays to the consensus set, yet many walls between
-    the sensor and what it saw are unlikely at the right pose.
+    and carts that have gone since. Rays to clutter prove less than rays to the consensus set. Yet many walls between
+    the sensor and the observed segments are unlikely at the right pose.
     """
     counts = blockers.counts
     total = 0.0

@@ -1,7 +1,7 @@
 """Fit a similarity to the pairs of a consensus set: its pose where the map is off by a factor.
 
 Let ``a = f cos theta`` and ``b = f sin theta``. The sums of a set are `x' Q x` of `x = [a, b, t_x, t_y, 1]`, as of a
-pose, but without its ``a^2 + b^2 = 1``. So the solution of linear equations minimizes them.
+pose. The condition ``a^2 + b^2 = 1`` of a pose does not hold, so that the solution of linear equations minimizes them.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Sum what several views show of walls, by view and by wall."""
+"""Sum the evidence of walls by several views, by view and by wall."""
 
 import math
 

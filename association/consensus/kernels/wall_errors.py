@@ -1,9 +1,9 @@
 """The walls' own errors, taken out of the sums of a consensus set.
 
-Pieces of one wall share the wall's own error: with ``v = sum w phi`` and ``s = sum w`` over the pairs of a wall, and
-its variance V, the wall's part in the sums is ``sum w phi phi' - v v' / (s + 1 / V)``. The errors of walls that
-continue one another are correlated, the less the farther apart they are; these are taken out of a copy of the sums
-before it is solved.
+Pieces of one wall share the wall's own error. Let ``v = sum w phi`` and ``s = sum w`` over the pairs of a wall, and V
+its variance: the wall's part in the sums is ``sum w phi phi' - v v' / (s + 1 / V)``. The errors of walls that continue
+one another are correlated, the less the farther apart they are. These are taken out of a copy of the sums before it is
+solved.
 """
 
 import math
@@ -25,8 +25,8 @@ def eliminate_wall_errors(work: Workspace, ties: Floats, wall_variance: float) -
     """Write the sums of `work` without the errors of its walls.
 
     The errors of walls along a chain are a Markov process, with the variance V and the correlation r of two that follow
-    one another. They are eliminated one after the other: with the weight l and the sum b of an error, of which the
-    cost is ``l e^2 - 2 e b'x``, and ``q = V (1 - r^2)``, the next one's are ``l / (l q + r^2)`` and
+    one another. They are eliminated one after the other. Let l be the weight and b the sum of an error, of which the
+    cost is ``l e^2 - 2 e b'x``, and ``q = V (1 - r^2)``. The weight and sum of the next one are ``l / (l q + r^2)`` and
     ``r b / (l q + r^2)``, and ``(b'x)^2 q / (l q + r^2)`` is taken out; of the last one ``(b'x)^2 / l``.
     """
     scratch = work.scratch[0]
@@ -134,7 +134,7 @@ def subtract_square(sums: Record, own_sums: Record, k: float) -> None:
 
 @kernel
 def pass_error_on(common: Record, own_sums: Record, factor: float) -> None:
-    """Set what is known of an error to `factor` times what was known of the one before, and add a wall's sums."""
+    """Set the evidence of an error to `factor` times that of the one before, and add a wall's sums."""
     common.c = factor * common.c + own_sums.c
     common.s = factor * common.s + own_sums.s
     common.x = factor * common.x + own_sums.x
@@ -145,7 +145,7 @@ def pass_error_on(common: Record, own_sums: Record, factor: float) -> None:
 
 @kernel
 def infer_wall_errors(work: Workspace, ties: Floats, wall_variance: float, estimate: Record) -> None:
-    """Write for each wall that is held what other walls show of its error, at a pose."""
+    """Write for each wall that is held the evidence of its error by other walls, at a pose."""
     wall_sums = work.wall_sums
     listed = work.listed
     alone, count = list_walls(work, ties)

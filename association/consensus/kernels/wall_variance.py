@@ -23,7 +23,7 @@ def wall_variance_shown(
 
     Each of the walls counts as far as it is one of its `own`, (k,).
 
-    The mean residual of wall k, m_k, has the variance ``(V + 1 / s_k) (1 - h_k)`` at the pose that was fitted to all,
+    At the pose that was fitted to all, the mean residual m_k of wall k has the variance ``(V + 1 / s_k) (1 - h_k)``,
     with its leverage h_k. Hence V is about ``sum(m_k^2 - (1 - h_k) / s_k) / sum(1 - h_k)``; `USUAL_WALLS` more walls
     are taken to have shown `usual`.
     """

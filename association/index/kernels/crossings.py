@@ -1,8 +1,8 @@
 """Compiled lists of the pairs of chains whose lines cross, by how a scan segment would lie on each.
 
-Two scan segments fix where each of them lies, counted from the point where their lines cross. So the pairs of chains on
-which they may lie are those that cross at the angle between them and have something at both of these places: one list,
-or a few next to one another, holds them all. `looking_up` finds these.
+Two scan segments fix where each of them lies, counted from the point where their lines cross. They may lie on the pairs
+of chains that cross at the angle between them and reach both of these places. One list, or a few next to one another,
+holds all these pairs. `looking_up` finds these lists.
 """
 
 import math
@@ -61,7 +61,7 @@ def cells_of(a: Record, b: Record, reach: float, columns: int) -> tuple[int, int
 
 @kernel
 def step_of(abscissa: float, per_metre: float) -> int:
-    """Return a place on a line in the steps of a code; what is beyond the lists is where they end."""
+    """Return a place on a line in the steps of a code; a place beyond the lists is where they end."""
     return int(min(float(STEPS), max(0.0, abscissa * per_metre + 0.5 * STEPS)))
 
 

@@ -45,7 +45,7 @@ def angle_variance(line: Record) -> float:
 def step_variance(
     covariance: Floats, one: int, other: int, line: Record, x: float, y: float, places: Records
 ) -> tuple[float, float]:
-    """Return the variances of an offset from `line` at a place, and of an angle, by what is not known of two views."""
+    """Return the variances of an offset from `line` at a place, and of an angle, by the uncertainty of two views."""
     g = np.empty(6, np.float64)
     for k in range(2):
         v = one if k == 0 else other
@@ -68,8 +68,8 @@ def step_variance(
 def pair_lines(lines: Records, starts: Integers, places: Records, covariance: Floats) -> Integers:
     """Pair lines of each view with those of the views before it that alone they can be, (k, 2).
 
-    Two can be one if they run the same way, have enough in common, and lie no farther apart than they and the views
-    may be off. A line that can be two of another view, which are farther apart than one wall is, is none of them there.
+    Two can be one if they run the same way, have enough in common, and lie within the error of both and of their views.
+    A line that can be two of another view, which are farther apart than one wall is, is none of them there.
     Each is paired at most once, with the nearest view before its own.
 
     Parameters

@@ -72,7 +72,7 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
 
 @kernel
 def set_map_sigma(sigma: float, variances: Records, model: Records) -> None:
-    """Write what follows from the deviation of the map's lines, metres, to both, (1,) each.
+    """Write the terms that follow from the deviation of the map's lines, metres, to both, (1,) each.
 
     If the tolerance is wider, the map is taken to be that far off.
     """
@@ -96,7 +96,7 @@ def describe_labelled(labels: Integers, lines: Records, variances: Records, mode
 
 @kernel
 def seen_at_once(rows: Records) -> Records:
-    """Return what one view shows of the rows: each of them, in their order, (n,) of `SIGHTING`."""
+    """Return the parts of the rows that one view shows: each of them, in their order, (n,) of `SIGHTING`."""
     seen = np.zeros(len(rows), SIGHTING)
     for i in range(len(rows)):
         seen[i].row = i
@@ -112,7 +112,7 @@ def seen_at_once(rows: Records) -> Records:
 def describe_view(
     measured: Measured, counted: bool, directed: bool, variances: Records, model: Records
 ) -> tuple[Indices, Records, Records]:
-    """Return the row of each segment of a scan of one view, the rows, and what is seen of them."""
+    """Return the row of each segment of a scan of one view, the rows, and the parts of them that are seen."""
     labels, lines = lines_of_a_view(measured, counted, directed)
     row_of, rows = describe_labelled(labels, lines, variances, model)
     return row_of, rows, seen_at_once(rows)
@@ -120,7 +120,7 @@ def describe_view(
 
 @kernel
 def mirror_lines(rows: Records) -> tuple[Records, Records]:
-    """Return the rows of the scan with left and right exchanged, and what one view shows of them.
+    """Return the rows of the scan with left and right exchanged, and the parts of them that one view shows.
 
     Then y is -y, and free space stays on the left.
     """

@@ -54,8 +54,8 @@ def longest_first(lines: Records) -> Integers:
 def collinear_lines(given: Records, order: Integers, lateral: float, least_cosine: float, directed: bool) -> Indices:
     """Label parts of lines that continue or repeat one another, (n,): the number of the line each is part of.
 
-    In `order`, the longest first: each that is on no line yet begins one, and takes on those whose middle is within
-    `lateral` metres of it and whose direction agrees up to `least_cosine`, as far as they follow without a gap of more
+    In `order`, the longest first: each part that is on no line yet begins one. It takes on parts whose middle is within
+    `lateral` metres of it and whose direction agrees up to `least_cosine`. They have to follow without a gap of more
     than `LINE_GAP`. Unless they are `directed` a part may run against its line. The lines are numbered in the order of
     those that begin them.
     """
@@ -132,7 +132,7 @@ def take_on(near: Integers, lows: Floats, highs: Floats, length: float, label: i
 
 @kernel
 def join_labelled(given: Records, order: Integers, labels: Integers, counted: bool) -> Records:
-    """Return what the parts of each label show together, (k,) of `LINE_PARTS`.
+    """Return the line that the parts of each label show together, (k,) of `LINE_PARTS`.
 
     The points of overlapping parts count once. If they were not `counted`, a line has `LEAST_POINTS` at least.
     """

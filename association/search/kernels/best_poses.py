@@ -55,7 +55,7 @@ def store(found: Records, best: Record, rules: Record, pose: Record, score: floa
 
 @kernel
 def floor_of(rules: Record, best: Record, bonus: float) -> float:
-    """Return the score that a pose must reach to be stored, given what the prior adds to it."""
+    """Return the score that a pose must reach to be stored, given the prior's bonus to it."""
     return max(rules.kept_share * best.best_value, best.least_value) - bonus
 
 

@@ -88,14 +88,14 @@ def score_hypothesis(question: Question, place: Place, k: int, state: SearchStat
     pose.x = one.x
     pose.y = one.y
     covariance_about(one.angle_variance, one.lever_x, one.lever_y, pose)
-    # An earlier hypothesis may have scored more than what was known when the floors were set.
+    # An earlier hypothesis may have scored more than the best value when the floors were set.
     floor = floor_of(rules, best, one.bonus) + best.least_freedom
     if most_possible(scan, k, work) < floor:
         return
     if match_scan(scan, pose, place, terms.gates, work.possible, floor, work.matches) < 0.0:
         return
     state.statistics[0].verified += 1
-    # No prior makes up for what the set lacks.
+    # A prior does not make up for a score of the set that is too low.
     least = floor_of(rules, best, 0.0) + best.least_freedom
     score = refine(scan, pose, place, terms, work.matches, work, least)
     offer(state.poses, best, rules, terms.prior, pose, score)

@@ -16,10 +16,10 @@ from .bases import is_telling, middle_of
 def why_stop(question: Question, plan: Plan, base: Record, state: SearchState, allowed: float) -> int:
     """Return why a search ends after a base, `GOES_ON` where it does not.
 
-    It ends where the best value is enough, where the bound on what a pose gains without any of the bases so far is
-    below what an alternative needs, or where the probability of having missed such a set is at most `allowed`. That of
-    a search in order is the fraction of sampled sets that hold none of the bases; of a random one it follows from the
-    number of draws. With `allowed` below 0 all bases are searched.
+    It ends if the best value is enough. It ends if the bound on the gain of a pose without any of the bases so far is
+    too low for an alternative. It also ends if the probability of having missed such a set is at most
+    `allowed`. That of a search in order is the fraction of sampled sets that hold none of the bases; of a random one it
+    follows from the number of draws. With `allowed` below 0 all bases are searched.
     """
     scan = question.scan
     rules = question.rules[0]

@@ -1,4 +1,4 @@
-"""Bound what chance scores; see `association.verdict.chance`."""
+"""Bound the score of chance; see `association.verdict.chance`."""
 
 import math
 

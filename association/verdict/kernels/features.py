@@ -93,7 +93,7 @@ def measure_unmatched(scan: Records, matches: Records, facts: Records) -> None:
 
 @kernel
 def measure_leverages(leverages: Records, facts: Records) -> None:
-    """Write to `facts` (1,) how many walls there are, and what the pose is at worst without one of them."""
+    """Write to `facts` (1,) how many walls there are, and the worst pose without one of them."""
     fact = facts[0]
     fact.walls = 0.0
     fact.critical_displacement = 0.0

@@ -1,4 +1,4 @@
-"""Features of the null score: what the mirrored scan scores over what the answer scores."""
+"""Features of the null score: the mirrored scan's score over that of the answer."""
 
 import math
 
@@ -32,7 +32,7 @@ def root_gap(gap: float) -> float:
 
 @kernel
 def write_null_features(score: float, null: float, symmetry: float, features: Records) -> None:
-    """Write what an answer and the mirrored scan score into the features of the answer, (1,) of `FEATURES`."""
+    """Write the scores of an answer and of the mirrored scan into the features of the answer, (1,) of `FEATURES`."""
     out = features[0]
     out.null, out.null_gap, out.null_better = null_features(score, null, symmetry)
 

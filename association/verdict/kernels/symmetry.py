@@ -1,4 +1,4 @@
-"""Test a map for mirror symmetry: what it shows at one pose, mirrored, at another."""
+"""Test a map for mirror symmetry: compare its view from one pose, mirrored, with that from another."""
 
 import math
 
@@ -93,7 +93,7 @@ def reach_of(places: Records, seen: Records) -> float:
 def mirrored_fraction(
     views: Records, seen: Records, pose: Records, null: Records, gates: Records, place: Place, work: Workspace
 ) -> float:
-    """Return how much of what the map shows from `pose` it shows mirrored from `null`, 0 to 1; both (1,).
+    """Return the fraction of the map's view from `pose` that it shows mirrored from `null`, 0 to 1; both (1,).
 
     From the places (v,) of `views` together, as far as what was `seen`, (k,) of `SIGHTING`: the fraction of the gains
     of the walls that are seen, each matched as a scan line would be.
