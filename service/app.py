@@ -135,7 +135,7 @@ def _services(settings: Settings, part: Part) -> Services:
         readiness=readiness,
         entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
         gate=gate,
-        # How many wait there is bounded by their bytes.
+        # The number that waits there is bounded by their bytes.
         parsing=Gate(1, settings.max_connections, "parsing", long_per_slot=0),
         parsing_apart=Gate(1, settings.max_connections, "parsing-apart", long_per_slot=0),
         indexing=indexing,
@@ -215,7 +215,7 @@ async def _prepare(services: Services) -> None:
     try:
         await services.probe.open()
     except StoreError as error:
-        # readyz goes on trying; meanwhile it says what is wrong.
+        # readyz goes on trying; meanwhile it reports the error.
         where = services.settings.url.render_as_string(hide_password=True)
         logger.error("the store does not open: %s", error, extra={"store": where})
     threads, parser = services.parse_threads, services.parser
@@ -223,8 +223,8 @@ async def _prepare(services: Services) -> None:
     if not is_complete():
         await _compile(services)
     await asyncio.gather(threads.run(warm_up), threads.run(parser.start), _fetch_first_keys(services))
-    # What was made until now lives as long as the process: the garbage collector need not look through it, ever. It has
-    # been off since the process began, which saves a fifth of the start; hardly anything of what it left is garbage.
+    # Objects made until now live as long as the process: the garbage collector need not look through them, ever. It has
+    # been off since the process began, which saves a fifth of the start; hardly any of these objects is garbage.
     gc.freeze()
     gc.enable()
     services.readiness.warm = True

@@ -10,9 +10,9 @@ _LARGE = 1 << 20  # bytes
 
 
 def return_large_blocks() -> None:
-    """Have every large block mapped by itself, so that the system has it back when it is freed; glibc only.
+    """Have every large block mapped separately, so that the system has it back when it is freed; glibc only.
 
-    By itself glibc stops doing so with the first large block that is freed, and keeps the heap that they then lie in:
+    Otherwise glibc stops this with the first large block that is freed, and keeps the heap that they then lie in:
     three times the memory after some maps of 16 MB. And each thread would get a heap of its own, with its own holes: of
     two there is always one free, since what allocates much holds Python's lock.
     """

@@ -1,4 +1,4 @@
-"""Memory that requests, or answers, may take: of all together, and of each who asks."""
+"""Memory that requests or answers may take: a limit for all together and one for each caller."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class ByteBudget:
 
 
 class ByteAccount:
-    """What one request holds of the budget.
+    """The bytes that one request holds of the budget.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@
     ├── UnknownKeyError      a key that is none of the service's
     ├── MissingRoleError     a key without the role that the request needs
     ├── ForeignMapError      a map that there is not for this key
-    ├── ForeignHostError     under a name that nobody has said to be the service's
+    ├── ForeignHostError     under a host name that is not allowed
     ├── ForeignOriginError   sent by the page of another site
     ├── NotReadyError        the service does not serve yet, or no longer
     ├── QueueFullError       every place is taken
@@ -60,7 +60,7 @@ class ForeignMapError(AdmissionError):
 
 
 class ForeignHostError(AdmissionError):
-    """Asked for under a name that nobody has said to be the service's."""
+    """The request names a host that is not among the service's allowed names."""
 
     def __init__(self) -> None:
         super().__init__(

@@ -92,12 +92,12 @@ class Gate:
 
     @property
     def waiting(self) -> int:
-        """How many wait."""
+        """The number of searches that wait."""
         return self._queue.waiting
 
     @property
     def full(self) -> bool:
-        """Whether everything is taken or spoken for; a holder with less than its share may still be let in."""
+        """Return whether every place is taken or reserved; a holder with less than its share may still be let in."""
         return self.running + self.waiting + self._expected >= self._places
 
     def expect(self, holder: Holder) -> None:
@@ -133,9 +133,9 @@ class Gate:
         Parameters
         ----------
         heeds : callable
-            Tells whether the function looks at the deadline by now, and returns soon after it. As long as it does not,
-            as while it indexes a map, it is waited for until the deadline and no longer: it goes on, and keeps its
-            slot, for whoever asks next.
+            Returns whether the function looks at the deadline by now, and returns soon after it. As long as it does
+            not, as while it indexes a map, the caller waits for it until the deadline and no longer. The function then
+            goes on and keeps its slot, for the next caller.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class Gate:
         DeadlinePassedError
             When the deadline passes before there is a slot, or before the function heeds it.
         CancelledError
-            When everything is told to give up.
+            When every search is cancelled.
         """
         ticket.arrive()
         await self._enter(deadline, ticket)

@@ -115,7 +115,7 @@ def _read(file: Path) -> tuple[Key, ...]:
     except OSError as error:
         raise KeyFileError(f"{file}: {error.strerror}") from None
     except ValidationError as error:
-        # Whoever wrote a key in the place of its digest does not want to see it in a log.
+        # A key in the place of its digest must not appear in a log.
         where = "; ".join(".".join(map(str, fault["loc"])) + ": " + fault["msg"] for fault in error.errors())
         raise KeyFileError(f"{file}: {where}") from None
     except ValueError:

@@ -1,4 +1,4 @@
-"""Who asks: by a key, by a token, or by an address where the service has neither."""
+"""Identification of callers: by a key, by a token, or by an address where the service has neither."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .grants import Grant
 from .key_file import KeyFile
 
 Client = tuple[str, int] | None
-# Whoever can check such a signature cannot make one; "none" and shared secrets are not among them.
+# The key that checks such a signature cannot make one; "none" and shared secrets are not among them.
 ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA")
 
 
 @dataclass(frozen=True, slots=True)
 class Issuer:
-    """Whose tokens are taken.
+    """An issuer whose tokens are accepted.
 
     Attributes
     ----------
     name, audience : str
-        What `iss` and `aud` have to be.
+        Required values of the claims `iss` and `aud`.
     keys : str
         Path or URL of its JSON Web Key Set.
     algorithms : tuple of str
-        Of `ALGORITHMS`; a token's own word on that counts for nothing.
+        Of `ALGORITHMS`; the algorithm that a token names does not count.
     leeway : float
         Seconds that its clock and this one may differ.
     """
@@ -46,7 +46,7 @@ class Issuer:
 
 
 class TokenSource(Protocol):
-    """What checks tokens."""
+    """A checker of tokens."""
 
     def grant(self, token: bytes) -> Grant:
         """Return what a token may do; raises `UnknownKeyError` where it is none."""
@@ -61,10 +61,10 @@ class Keyring:
     Parameters
     ----------
     keys : sequence of SecretStr
-        That may do everything.
+        Keys with every permission.
     file : KeyFile, or None
     tokens : TokenSource, or None
-        With none of the three whoever comes is let in.
+        Without all three every caller is let in.
     """
 
     def __init__(

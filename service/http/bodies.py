@@ -32,7 +32,7 @@ class Body:
     data : bytearray
     gzipped : bool
     account : ByteAccount
-        Where its bytes are counted, and those that it unpacks to have to be.
+        Account of its bytes, and of those that it unpacks to.
     """
 
     data: bytearray
@@ -52,8 +52,8 @@ class BodyReceiver:
     timeout : float
         Seconds that a request may take to arrive, its head included.
     guarded : bool
-        Whether the service has keys. Without them a POST has to name its media type: one that a browser sends for the
-        page of another site cannot name JSON without asking first.
+        True when the service has keys. Without them a POST has to name its media type: a browser that sends a POST for
+        the page of another site cannot name JSON without a preflight request.
     """
 
     def __init__(self, max_bytes: int, budget: ByteBudget, timeout: float, *, guarded: bool = True) -> None:
@@ -74,9 +74,9 @@ class BodyReceiver:
         arrived : float
             When its first byte came, by the event loop's clock, seconds.
         holder : Holder
-            Who sends it.
+            The sender.
         form : bool
-            Whether it is to be a form with files; else it is to be JSON.
+            True when it is to be a form with files; else it is to be JSON.
 
         Raises
         ------

@@ -85,8 +85,8 @@ async def ask_store(services: Services, call: Callable[[], T]) -> T:
     Raises
     ------
     StoreError
-        When it cannot do what is asked, or does not answer in `STORE_SECONDS`. What was to be written may have been
-        written all the same.
+        When it cannot complete the call, or does not answer in `STORE_SECONDS`. The data may have been written all
+        the same.
     """
     try:
         async with asyncio.timeout(STORE_SECONDS):

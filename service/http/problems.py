@@ -45,7 +45,7 @@ class Kind:
     status : int
     title : str
     raised_as : tuple of exception types
-        What becomes this problem.
+        The exceptions that become this problem.
     """
 
     code: ProblemCode

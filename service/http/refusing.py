@@ -1,4 +1,4 @@
-"""What the application answers when something is raised."""
+"""Responses of the application to exceptions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .problems import INTERNAL, RAISED, problem_of
 from .searching import HangUpError
 
 logger = logging.getLogger("linefix")
-CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do
+CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 
 
 def handle_errors(app: FastAPI) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # the store comes without what computes
     from association import Deadline, MapIndex
 
 ALONE = 2  # times the cache; the largest map takes that where its directions mean nothing
-LOOK_SECONDS = 0.05  # after which who waits for another's index looks whether its own client is still there
+LOOK_SECONDS = 0.05  # between two checks, while waiting for another's index, that the own client is still there
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class CachedMap:
 
     @property
     def oriented(self) -> bool:
-        """Whether directions of its segments mean anything; else it is listed both ways."""
+        """Return whether directions of its segments mean anything; else the index lists each segment both ways."""
         return len(self.index.segments) == self.index.directed
 
 
@@ -116,7 +116,7 @@ class IndexCache:
 
 
 def _awaited(promise: Future[CachedMap], deadline: Deadline) -> CachedMap:
-    """Return what another builds, if that is there in time; whoever waits here holds a slot."""
+    """Return the map that another thread builds, if it is there in time; the waiting thread holds a slot."""
     while not deadline.passed:
         left = LOOK_SECONDS if deadline.at is None else deadline.at - time.monotonic()
         done, _ = wait([promise], max(0.0, min(LOOK_SECONDS, left)))

@@ -1,4 +1,4 @@
-"""What the failures of a database mean."""
+"""Meanings of the failures of a database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of a stored map, and how damage to it shows."""
+"""Properties of a stored map, and how damage to it shows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ABSENT = ""  # the sha256 of a map that was deleted
 
 @dataclass(frozen=True, slots=True)
 class MapRecord:
-    """What identifies the content of a stored map; `oriented` is in it, too, and is needed before it is read."""
+    """The identity of a stored map's content; `oriented` is in the content, too, and is needed before that is read."""
 
     map_id: str
     revision: int
@@ -24,18 +24,18 @@ class MapRecord:
 
 @dataclass(frozen=True, slots=True)
 class MapOutline:
-    """What is told of a map without its content.
+    """The properties of a map without its content.
 
     Attributes
     ----------
     segments : int
-        How many.
+        The number of segments.
     bounds : tuple
         ``min_x, min_y, max_x, max_y``, metres.
     sigma : float, or None
-        Standard deviation of its lines, metres; None where the map says nothing.
+        Standard deviation of its lines, metres; None where the map does not state it.
     oriented : bool, or None
-        Whether directions of its segments mean anything; None where the map says nothing.
+        True when directions of its segments mean anything; None where the map does not state it.
     """
 
     segments: int

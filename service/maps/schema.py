@@ -37,8 +37,8 @@ metadata = MetaData()
 # Compared byte by byte whatever the database's collation, so that the order of a listing is one.
 MAP_ID = String(128).with_variant(String(128, collation="C"), "postgresql")
 
-# What a map is, short enough to be looked at before every search. A deleted map keeps its row, with an empty sha256:
-# its next revision is a new number, so that an old ETag never matches a new map.
+# The properties of a map, short enough to be read before every search. A deleted map keeps its row, with an empty
+# sha256: its next revision is a new number, so that an old ETag never matches a new map.
 maps = Table(
     "maps",
     metadata,

@@ -1,8 +1,8 @@
 """A process of its own for parsing what is large.
 
 Parsing 15 MB of JSON holds Python's global lock for a fifth of a second in one piece: nothing else of the service would
-answer meanwhile, probes included. What comes back are arrays, which cross as bytes. The memory that a hostile body may
-take is taken there, too.
+answer meanwhile, probes included. The results are arrays, which cross as bytes. The memory that a hostile body may take
+is taken there, too.
 """
 
 from __future__ import annotations
@@ -133,9 +133,9 @@ def send(connection: Connection, value: Any) -> None:
 
 
 def receive(connection: Connection) -> Any:
-    """Wait for an object; whoever may send here is trusted, since it comes as a pickle.
+    """Wait for an object from a trusted sender, since it comes as a pickle.
 
-    What was a `bytearray` is `bytes`, and arrays cannot be written to.
+    A `bytearray` arrives as `bytes`, and arrays cannot be written to.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def read_model(model: type[M], data: bytes | bytearray, limits: Limits) -> M:
 
 
 def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, list[BatchItem | RequestError]]:
-    """Return a batch without its scans, and each scan by itself: checked, or why it is none."""
+    """Return a batch without its scans, and each scan separately: checked, or the error that rejects it."""
     asked = read_model(BatchRequest, data, limits)
     items: list[BatchItem | RequestError] = []
     for index, scan in enumerate(asked.scans):

@@ -1,7 +1,7 @@
 """The log: one JSON object a line, on stderr.
 
-Who reads it may be slow, or asleep. The service does not wait for that: lines that find no room are counted, and the
-count is told when there is room again.
+The log's reader may be slow, or stopped. The service does not wait for it: lines that find no room are counted, and
+the count is logged when there is room again.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class PatientHandler(logging.Handler):
                 record = logging.LogRecord("linefix", logging.WARNING, "", 0, "lines of the log were lost", None, None)
                 record.count = lost
                 line = self.format(record) + "\n" + line
-            with suppress(OSError):  # nobody reads it any more
+            with suppress(OSError):  # the reader has gone
                 _write(line.encode("utf-8", "backslashreplace") + b"\n")
             self._written += 1
 

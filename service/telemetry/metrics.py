@@ -23,7 +23,7 @@ EXPOSITION_SECONDS = 0.2  # between two texts; one takes 10 ms of the event loop
 
 
 def share_counts(directory: str, index: int) -> None:
-    """Have the counts of this worker kept in files beside those of the others; before any count is made.
+    """Have the counts of this worker kept in files next to those of the others; before any count is made.
 
     A worker that takes the place of another goes on with its files: counts never go down.
     """
@@ -63,7 +63,7 @@ class Metrics:
         self.watch("linefix_resident_bytes", "Memory of the workers", _resident_bytes)
 
     def watch(self, name: str, what: str, read: Callable[[], float]) -> None:
-        """Report a number that is read now and then, and whenever this worker is asked."""
+        """Report a number that is read now and then, and on each request to this worker."""
         gauge = Gauge(name, what, registry=self.registry, multiprocess_mode="livesum")
         self._watched.append((gauge, read))
 
@@ -98,7 +98,7 @@ class Metrics:
     async def exposition(self) -> bytes:
         """Return the text that Prometheus reads, as things stand now; however many ask, a few of them in a second.
 
-        Who asks soon after another waits, together with all who do so meanwhile.
+        A request soon after another waits, together with all that arrive meanwhile.
         """
         if self._text is None:
             self._text = asyncio.ensure_future(self._next_text())

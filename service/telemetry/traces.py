@@ -28,7 +28,7 @@ def stage(name: str) -> AbstractContextManager[object]:
     tracer = _TRACER.get()
     if tracer is None:
         return nullcontext()
-    # What went wrong is in the log; a collector gets no messages and no tracebacks.
+    # Errors are in the log; a collector gets no messages and no tracebacks.
     return tracer.start_as_current_span(name, record_exception=False, set_status_on_exception=False)
 
 
@@ -87,7 +87,7 @@ class Traces:
 
 
 def traces_of_environment() -> Traces | None:
-    """Return the traces that the ``OTEL_`` variables ask for; None where they ask for none."""
+    """Return the traces that the ``OTEL_`` variables request; None where they request none."""
     asked = any(os.environ.get(name) for name in ENDPOINTS)
     off = os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true" or os.environ.get("OTEL_TRACES_EXPORTER") == "none"
     if not asked or off:

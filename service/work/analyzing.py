@@ -25,7 +25,7 @@ TURN_SECONDS = 0.1  # of the gate, before others have theirs
 
 @dataclass(slots=True)
 class Tally:
-    """What has been found out so far; one per request, filled by turns at the gate.
+    """The results so far; one per request, filled in steps of one slot of the gate.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Tally:
 
     @property
     def done(self) -> bool:
-        """Whether every pose was tried."""
+        """Return whether every pose was tried."""
         return len(self.found) == len(self.analysis.standing.order)
 
 
@@ -94,7 +94,7 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
 
 
 def take_looks(tally: Tally, deadline: Deadline) -> bool:
-    """Try poses for a turn's time; tell whether any are left.
+    """Try poses for `TURN_SECONDS`; return whether any are left.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class BatchResult:
-    """What came of one scan of a batch.
+    """The result of one scan of a batch.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class Associator:
     ) -> BatchResult:
         """Find one scan of a batch; raises also what was wrong with the scan itself.
 
-        What cannot be answered is found out here, where it spoils nothing else.
+        An error of one scan is found here, where it spoils nothing else.
         """
         if isinstance(sought, Exception):
             raise sought

@@ -1,4 +1,4 @@
-"""Checks of maps, in steps of one turn at the gate each: the map by itself, each sample scan, the conclusion."""
+"""Checks of maps, in steps of one slot of the gate: the map alone, each sample scan, the conclusion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .job import Done, Job
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A map that is checked by itself, ready for samples.
+    """A map whose own check is done, ready for samples.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Begun:
     cached : CachedMap
         With its directions, whatever they mean.
     oriented : bool
-        Whether the map states that they mean something.
+        True when the map states that they mean something.
     scans : sequence of Scan
         The samples.
     found : MapCheck

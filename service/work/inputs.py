@@ -58,7 +58,7 @@ def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegment
 def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan, *, timed: bool = True) -> Scanned:
     """Return what the robot saw, whatever form it came in.
 
-    Where not `timed`, a motion that is not known during a scan is taken for none.
+    If not `timed`, an unknown motion during a scan counts as none.
     """
     if isinstance(scan, ViewsScan):
         return _of_views(scan, timed=timed)

@@ -70,7 +70,7 @@ class Scanned:
 def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = True) -> RangeScan:
     """Return the ranges of a scanner; `place` is the pointer of its scan.
 
-    Where not `timed`, a motion that is not known is taken for none.
+    If not `timed`, an unknown motion counts as none.
     """
     bounds = {
         name: value
