@@ -1,4 +1,4 @@
-"""Logs to Parquet files whose row groups are no larger than blocks, so that any block is read by itself."""
+"""Logs to Parquet files whose row groups are no larger than blocks, so that any block is read alone."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Layout:
 
     @property
     def done(self) -> bool:
-        """Whether the file exists."""
+        """Return whether the file exists."""
         return Path(self.path).exists()
 
     def blocks(self) -> list[Block]:

@@ -34,7 +34,7 @@ class Processes:
     Attributes
     ----------
     count : int
-        How many work at a time.
+        Number of processes that work at a time.
     """
 
     count: int

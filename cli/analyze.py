@@ -112,7 +112,7 @@ def analyze(
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Which analysis is asked for, as the options of the command say."""
+    """The analysis that the options of the command request."""
 
     scanner: ScannerOptions
     drive: float

@@ -145,7 +145,7 @@ def shown_progress() -> Iterator[Callable[[Progress], None]]:
 
 
 class _Speed(ProgressColumn):
-    """How many a second."""
+    """The number of items a second."""
 
     def render(self, task: Bar) -> Text:
         """Return it as text."""

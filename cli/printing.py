@@ -63,7 +63,7 @@ def shown(value: object) -> str:
 
 
 def verdict_rows(answer: Json) -> list[tuple[str, str]]:
-    """Return what a person wants to know of a pose that was found, or was not."""
+    """Return the rows that show a person whether a pose was found, and which."""
     usable = "usable" if answer["usable"] else "not usable"
     told = f"{answer['status']}, {usable}"
     if answer.get("probability") is not None:

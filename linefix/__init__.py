@@ -7,8 +7,8 @@
 >>> answer.usable
 True
 
-Metres, radians, counter-clockwise. The packages beside this one hold everything; what is named here is what most
-programs need. What reads and writes files comes with the extra ``linefix[formats]``.
+Metres, radians, counter-clockwise. The packages next to this one hold everything; this one names the parts that most
+programs need. The readers and writers of files come with the extra ``linefix[formats]``.
 """
 
 from __future__ import annotations

@@ -55,8 +55,8 @@ def locate(
     -------
     AssociationResult
         Its `usable` is the one flag to gate on; `pose` is map_from_scan. Of a `MountedScan` it is that of the robot at
-        the first beam, map_from_base, where the mount is known, else that of the sensor. Where a scan took time and
-        its motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation).
+        the first beam, map_from_base, if the mount is known, else that of the sensor. If a scan took time and its
+        motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation).
 
     Raises
     ------
@@ -137,7 +137,7 @@ def _index_document(document: Mapping[str, Any]) -> MapIndex:
 def scan_of(
     scan: Scan | MountedScan | LaserScan | Segments | ArrayLike, angles: tuple[float, float] | None = None
 ) -> Scan:
-    """Return a scan as the search takes it; ranges stay evidence beside the segments that are found in them.
+    """Return a scan as the search takes it; ranges stay evidence in addition to the segments that are found in them.
 
     Parameters
     ----------

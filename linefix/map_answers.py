@@ -36,7 +36,7 @@ def import_json(imported: ImportedMap, found: MapCheck) -> Json:
 
 
 def check_json(found: MapCheck) -> Json:
-    """Return a check of a map by itself."""
+    """Return the check of a map without scans as JSON."""
     return {
         "findings": [_finding_json(one) for one in found.findings],
         "size": {name: getattr(found.size, name) for name in ("segment_count", "walls", "length", "diagonal")},

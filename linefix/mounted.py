@@ -81,7 +81,7 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     Returns
     -------
     View
-        Several of them, put together by `assemble`, are one scan. Where the scanner's motion during the scan is not
+        Several of them, put together by `assemble`, are one scan. If the scanner's motion during the scan is not
         known, it has the covariance and the warning for that.
 
     Raises

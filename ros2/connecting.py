@@ -41,7 +41,7 @@ def domain_of(environment: Mapping[str, str]) -> int:
 
 
 def configuration_of(environment: Mapping[str, str]) -> str:
-    """Return the configuration of Cyclone DDS that the variables of ROS ask for; ``CYCLONEDDS_URI`` comes after it.
+    """Return the configuration of Cyclone DDS for the variables of ROS; ``CYCLONEDDS_URI`` comes after it.
 
     ``ROS_LOCALHOST_ONLY=1`` counts before ``ROS_AUTOMATIC_DISCOVERY_RANGE``, as in ROS.
 

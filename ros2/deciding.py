@@ -25,7 +25,7 @@ class InitialPose:
 
     @property
     def wanted(self) -> bool:
-        """Whether the next agreed pose is published unless the localizer has it already."""
+        """Return whether the next agreed pose is published unless the localizer has it already."""
         return self._wanted
 
     def want(self) -> None:
@@ -40,9 +40,9 @@ class InitialPose:
         event : Event
             Of the scan.
         localizer_agrees : bool or None
-            Whether the localizer has this pose; None: not known.
+            True when the localizer has this pose; None: not known.
         lost : bool
-            Whether it has had another one for some scans.
+            True when it has had another one for some scans.
         now : float
             `time.monotonic()`, seconds.
         """

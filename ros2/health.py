@@ -1,4 +1,4 @@
-"""What the node reports about itself: diagnostics, status, and lines of a log."""
+"""Reports of the node about itself: diagnostics, status, and lines of a log."""
 
 from __future__ import annotations
 

@@ -37,11 +37,11 @@ def ways_from(
     segments : Segments
         The map.
     pose : RigidTransform
-        Where it begins, map_from_robot.
+        The start of the drive, map_from_robot.
     metres : float
         The longest way.
     reach : float
-        How far it feels, metres.
+        Range of the rays that look for room, metres.
     """
     steps = math.floor(metres / STEP + 1e-9)
     room = _room(segments, pose, reach)

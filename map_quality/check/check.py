@@ -1,4 +1,4 @@
-"""Checking a map by itself."""
+"""Checking a map without scans."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
     deadline : Deadline, optional
         When it passes, what was found so far is the answer and ``complete`` is False.
     oriented : bool
-        Whether the map says that directions mean something.
+        True when the map states that directions mean something.
 
     Returns
     -------

@@ -54,7 +54,7 @@ class Sample:
     mistakes : tuple of Mistake
         Without which it would fit much better.
     factor : float or None
-        What its lengths are to be multiplied with to fit better; None where they are right.
+        Factor by which its lengths fit better; None where they are right.
     moved : RigidTransform or None
         From where it was said to be taken to where it was found, in the map frame; None where either is not known.
     """
@@ -78,11 +78,11 @@ def try_sample(
         Built with its directions, whatever they mean; its sigma is the map's.
     scan : Scan
     deadline : Deadline
-        What it leaves no time for is not tried.
+        A trial that does not fit before it is skipped.
     oriented : bool
-        Whether the map says that directions mean something.
+        True when the map states that directions mean something.
     said : RigidTransform, optional
-        Where the scan was taken, as its sender believes, map_from_scan.
+        Pose of the scan as its sender states it, map_from_scan.
 
     Returns
     -------
