@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-ATTEMPTS = 3  # at an item, while those who work at it end early
+ATTEMPTS = 3  # at an item, if its workers end early
 
 
 @dataclass(frozen=True, slots=True)

@@ -205,7 +205,7 @@ def _row(scan: LoggedScan) -> dict[str, Any]:
 
 
 def _checked(path: Path) -> pq.FileMetaData:
-    """Return what a Parquet file says of itself.
+    """Return the metadata of a Parquet file of scans.
 
     Raises
     ------

@@ -155,7 +155,7 @@ def _analyzed(target: Json, asked: Asked) -> Json:
 
 @contextmanager
 def _progress() -> Iterator[Progress]:
-    """Show how far it is, to a person who looks on; never in what is piped on."""
+    """Show the progress on a terminal; never in piped output."""
     columns = TextColumn("places"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Bar(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
         task = bar.add_task("places", total=None)

@@ -27,7 +27,7 @@ def console() -> Console:
 
 
 def plain(text: object) -> Text:
-    """Return what a file or a server said, without what a terminal would obey."""
+    """Return text of a file or a server without control characters for a terminal."""
     return Text("".join(letter if letter.isprintable() else "?" for letter in str(text)))
 
 
@@ -40,7 +40,7 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
 
 
 def noted(note: Json) -> str:
-    """Return what an import or a log said of itself."""
+    """Return the text of a note of an import or a log, with its count."""
     return f"{note['message']} ({note['count']})" if note["count"] else str(note["message"])
 
 

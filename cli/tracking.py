@@ -15,7 +15,7 @@ from .locators import Found
 # Assumed accuracy of odometry, as standard deviations: at rest, for each metre driven, for each radian turned.
 METRES, METRES_A_METRE = 0.1, 0.1
 RADIANS, RADIANS_A_METRE, RADIANS_A_RADIAN = 0.05, 0.02, 0.1
-LOST = 5.0  # m; a prior that says less than this is none
+LOST = 5.0  # m; a prior wider than this is dropped
 
 
 @dataclass(slots=True)

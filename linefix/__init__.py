@@ -95,7 +95,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Bring in what reads and writes files when it is first asked for: its libraries may be missing."""
+    """Import the readers and writers of files on first use: their libraries may be missing."""
     if name not in _OF_FORMATS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

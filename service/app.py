@@ -163,7 +163,7 @@ def _services(settings: Settings, part: Part) -> Services:
 
 
 def _keyring(settings: Settings) -> Keyring:
-    """Return who is let in."""
+    """Return the keyring that the settings describe."""
     file = None if settings.keys_file is None else KeyFile(settings.keys_file)
     if settings.issuer is None:
         return Keyring(settings.keys, file)

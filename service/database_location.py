@@ -35,7 +35,7 @@ def database_url(text: str) -> URL:
 
 
 def file_of(url: URL) -> Path | None:
-    """Return the file that a database is kept in; None where it is in no file of its own, or the URL says how."""
+    """Return the file of a database; None where it has no file of its own, or the URL opens it as a URI."""
     if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:" or "uri" in url.query:
         return None
     return Path(url.database).absolute()

@@ -163,7 +163,7 @@ def _best(scores: Scores) -> float:
 
 
 def _beside(change: float) -> tuple[float, float]:
-    """Return the changes that are one step smaller and larger; rounded, for they are keys."""
+    """Return the changes that are one step smaller and larger; rounded, as keys."""
     return round(change - THICKER_STEP, 3), round(change + THICKER_STEP, 3)
 
 

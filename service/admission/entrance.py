@@ -25,7 +25,7 @@ def search_of(method: str, path: str) -> str | None:
 
 
 class Entrance:
-    """Gives tickets, and sends away who may not come in, and what would have to search while the queue is full.
+    """Gives tickets, and refuses requests without permission, and searches while the queue is full.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 
 class AdmissionError(Exception):
-    """A request is not let in, or has to go; the message says why."""
+    """A request is not let in, or has to go; the message gives the reason."""
 
 
 class MissingKeyError(AdmissionError):
@@ -53,7 +53,7 @@ class MissingRoleError(AdmissionError):
 
 
 class ForeignMapError(AdmissionError):
-    """A map that there is not for this key: whether there is one for others is not told."""
+    """A map that does not exist for this key: the error hides whether one exists for others."""
 
     def __init__(self) -> None:
         super().__init__("no map is stored under this id; GET /v1/maps lists the ids")

@@ -27,7 +27,7 @@ Digest = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
 
 
 class KeyFileError(Exception):
-    """The file cannot be used; the message says why, and repeats nothing of it."""
+    """The file cannot be used; the message gives the reason, and repeats nothing of it."""
 
 
 class Key(BaseModel):
@@ -123,7 +123,7 @@ def _read(file: Path) -> tuple[Key, ...]:
 
 
 def _state(path: Path) -> object:
-    """Return what tells one content from another without reading it."""
+    """Return values that differ between contents, found without reading them."""
     try:
         stats = [file.stat() for file in _files(path)]
     except (KeyFileError, OSError):

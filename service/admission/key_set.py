@@ -27,7 +27,7 @@ Keys = dict[str | None, jwt.PyJWK]
 
 
 class KeySetError(Exception):
-    """There is no key set to be had; the message says why, and repeats nothing of what was sent."""
+    """No key set is available; the message gives the reason, and repeats nothing of what was sent."""
 
 
 def read_key_set(where: str) -> Keys:

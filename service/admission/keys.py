@@ -102,7 +102,7 @@ class Keyring:
         key = key.strip()
         if scheme.lower() != b"bearer" or not key:
             raise MissingKeyError
-        # Digests of one length, all of them compared: the time taken tells nothing of the keys.
+        # Digests of one length, all of them compared: the time taken shows nothing of the keys.
         digest = digest_of(key)
         known: list[Grant] = [*self._whole.values(), *(self._file.grants.values() if self._file else ())]
         found = [grant for grant in known if hmac.compare_digest(digest, grant.holder or b"")]
@@ -130,7 +130,7 @@ def digest_of(key: bytes) -> bytes:
 
 @lru_cache(maxsize=256)
 def address_of(client: Client) -> Holder:
-    """Return who a client is by its address: of IPv6 the network, since one client has all of its addresses."""
+    """Return the holder of an address: of IPv6 the network, since one client has all of its addresses."""
     if client is None:
         return None
     try:

@@ -69,7 +69,7 @@ def _units(values: Sequence[str]) -> str | float:
     try:
         return _number(values)
     except ValueError:
-        return _text(values)  # a name, which `ImportOptions` knows or refuses
+        return _text(values)  # a name, which `ImportOptions` accepts or refuses
 
 
 def _truth(values: Sequence[str]) -> bool:

@@ -104,7 +104,7 @@ def _bind(bounds: Bounds) -> None:
         (resource.RLIMIT_NOFILE, MOST_OPEN),
         (resource.RLIMIT_CORE, 0),
     ):
-        with suppress(ValueError, OSError):  # less is allowed already, or the system knows no such limit
+        with suppress(ValueError, OSError):  # less is allowed already, or the system has no such limit
             resource.setrlimit(what, (limit, limit))
     with suppress(OSError):
         os.nice(NICE)

@@ -57,12 +57,12 @@ class IndexCache:
             return key in self._ready
 
     def get(self, key: Hashable, build: Callable[[], CachedMap], deadline: Deadline) -> CachedMap:
-        """Return the map of a key, built by this caller or by the one that asked first.
+        """Return the map of a key, built by this caller or by the first one that requested it.
 
         Raises
         ------
         IndexNotReadyError
-            When the deadline passes, or is cancelled, while the one that asked first still builds it.
+            When the deadline passes, or is cancelled, while the first caller still builds it.
         """
         with self._lock:
             found = self._ready.get(key)

@@ -1,10 +1,10 @@
-"""Why the store of maps does not do what was asked.
+"""Errors of the store of maps.
 
 ::
 
     StoreError
     ├── UnknownMapError        nothing is stored under the id
-    ├── CorruptMapError        what is stored is damaged
+    ├── CorruptMapError        the stored map is damaged
     ├── RevisionConflictError  the map is not as the writer demands
     ├── StoreFullError         there is no room for it
     ├── ReadOnlyStoreError     nothing can be written

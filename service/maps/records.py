@@ -121,6 +121,6 @@ def is_sealed(row: Row[Any]) -> bool:
 
 
 def seal(*what: object) -> str:
-    """Return the SHA-256 of what a row says, in this order."""
-    # repr tells 1 from 1.0 from "1", and gives a float to the bit.
+    """Return the SHA-256 of the values of a row, in this order."""
+    # repr distinguishes 1, 1.0 and "1", and gives a float to the bit.
     return hashlib.sha256(repr(what).encode("utf-8", "surrogatepass")).hexdigest()

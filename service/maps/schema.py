@@ -56,7 +56,7 @@ maps = Table(
     Column("quarantined", Boolean, nullable=False, server_default=false()),
 )
 
-# The content. Id and revision stand here a second time: where damage hides a row of `maps`, this one tells.
+# The content. Id and revision stand here a second time: they remain where damage hides a row of `maps`.
 documents = Table(
     "map_documents",
     metadata,

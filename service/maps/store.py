@@ -147,7 +147,7 @@ class MapStore:
             connection.execute(delete(documents).where(documents.c.map_id == map_id))
 
     def record(self, map_id: str) -> MapRecord:
-        """Return what identifies the present content; cheap, asked before every use of a cached index."""
+        """Return the record of the present content; cheap, called before every use of a cached index."""
         self._require_open()
         found = self._reader.read(map_id)
         if found is not None:

@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 STDERR = 2
-WAITING_LINES = 4096  # that are kept for a reader who is late
+WAITING_LINES = 4096  # that are buffered for a late reader
 LAST_SECONDS = 0.5  # that an ending process waits for the reader
 _USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
 
@@ -101,6 +101,6 @@ def log_config(level: str) -> dict[str, Any]:
         "formatters": {"json": {"()": JsonFormatter}},
         "handlers": {"stderr": {"class": f"{__name__}.PatientHandler", "formatter": "json"}},
         "root": {"level": level.upper(), "handlers": ["stderr"]},
-        # Numba tells every pass of its compiler at debug, Alembic each start that nothing had to be done.
+        # At debug, Numba logs every pass of its compiler; Alembic logs each start without migrations.
         "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},
     }

@@ -68,12 +68,12 @@ class Metrics:
         self._watched.append((gauge, read))
 
     def refresh(self) -> None:
-        """Read what is watched."""
+        """Read the watched values."""
         for gauge, read in self._watched:
             gauge.set(read())
 
     async def refresh_now_and_then(self) -> None:
-        """Read what is watched for the workers that are asked instead of this one."""
+        """Read the watched values, for requests that reach another worker."""
         while True:
             self.refresh()
             await asyncio.sleep(REFRESH_SECONDS)
