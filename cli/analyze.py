@@ -1,4 +1,4 @@
-"""``linefix analyze``: where on a map a robot would not know where it is."""
+"""``linefix analyze``: places of a map where a robot would not find its pose."""
 
 from __future__ import annotations
 

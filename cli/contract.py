@@ -36,7 +36,7 @@ class MapKeeper(Protocol):
         ...
 
     def close(self) -> None:
-        """Close what was opened."""
+        """Close all that was opened."""
         ...
 
 

@@ -9,7 +9,7 @@ from service.serving import ONE_THREAD, serve
 
 from .errors import CommandError
 
-INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number what a signal ended
+INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number the end by a signal
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-BUSY = (401, 403, 408, 429)  # of 4xx those that are no word about what was sent
+BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 
 
 class CommandError(Exception):
@@ -82,7 +82,7 @@ class Asked:
     files: tuple[str, ...] = ()
 
     def place(self, pointer: str) -> str:
-        """Return what the user calls a place in the request."""
+        """Return the user's name for a place in the request."""
         if not self.files:
             return pointer
         first, _, rest = pointer.removeprefix("/").partition("/")

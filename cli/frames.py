@@ -13,7 +13,7 @@ from .errors import RefusedError
 if TYPE_CHECKING:
     from formats import LoggedScan
 
-ROBOT = "base_link"  # what a robot is called whose mount is given
+ROBOT = "base_link"  # name of the robot's frame where the user sets the mount
 
 
 @dataclass(slots=True)

@@ -17,7 +17,7 @@ from .contract import Json
 
 
 def print_json(answer: Any) -> None:
-    """Print one document in one line, without what a terminal would obey."""
+    """Print one document in one line, without control characters for a terminal."""
     sys.stdout.write(escaped(encode(answer).decode()) + "\n")
 
 
@@ -56,7 +56,7 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 
 def shown(value: object) -> str:
-    """Return a cell's text; what is not there is a dash."""
+    """Return a cell's text; a missing value is a dash."""
     if value is None:
         return "-"
     return f"{value:.3f}" if isinstance(value, float) else str(value)

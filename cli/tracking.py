@@ -33,7 +33,7 @@ class Tracker:
     _turned: float = 0.0
 
     def prior(self, odometry: RigidTransform | None) -> SoftPrior | None:
-        """Return what is known of the pose of the next scan, None where nothing is.
+        """Return the prior of the next scan's pose, None without one.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class Tracker:
         return SoftPrior(here, np.diag([sigma**2, sigma**2, angle**2]))
 
     def learn(self, found: Found, odometry: RigidTransform | None) -> None:
-        """Take up what came of that scan."""
+        """Update the last usable pose with the answer to that scan."""
         if "prior_contradicted" in found.warnings:
             self._pose = None
         elif found.usable:

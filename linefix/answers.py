@@ -153,7 +153,7 @@ class Included:
     Attributes
     ----------
     parts : frozenset of str
-        Names of the parts that are asked for, as in ``include``.
+        Names of the requested parts, as in ``include``.
     frame_id, child_frame_id : str
         Of the map and of the scan.
     stamp : JSON

@@ -61,7 +61,7 @@ def locate(
     Raises
     ------
     InputError
-        When map, scan or options are not what is taken; the message names the argument.
+        When map, scan or options are not valid; the message names the argument.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     Parameters
     ----------
     map : MapIndex, LineMap, ImportedMap, Segments, mapping, or array-like of shape (n, 4)
-        An index is returned as it is. Nothing is known of the error of bare segments: each answer estimates it. A
+        An index is returned as it is. The error of bare segments is not known: each answer estimates it. A
         mapping is a map document as in a map file: ``segments``, and optionally ``sigma`` and ``oriented``.
 
     Raises
@@ -111,7 +111,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
         return map
     if isinstance(map, Mapping):
         return _index_document(map)
-    inner: Any = getattr(map, "map", map)  # what was imported comes with a report
+    inner: Any = getattr(map, "map", map)  # an imported map comes with a report
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):
         return MapIndex.build(segments, inner.sigma, oriented=inner.oriented)

@@ -31,7 +31,7 @@ def map_json(line_map: LineMap) -> Json:
 
 
 def import_json(imported: ImportedMap, found: MapCheck) -> Json:
-    """Return the answer of an import: the map, what was made of its files, and what is doubtful in it."""
+    """Return the answer of an import: the map, the report of its files, and its doubtful parts."""
     return {"map": map_json(imported.map), "report": asdict(imported.report), "check": check_json(found)}
 
 

@@ -48,7 +48,7 @@ def configuration_of(environment: Mapping[str, str]) -> str:
     Raises
     ------
     ConnectionRefusedError
-        When a variable has a value that ROS does not know.
+        When a variable has a value that ROS does not define.
     """
     local, discovery = environment.get("ROS_LOCALHOST_ONLY", ""), environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     if local not in ("", "0", "1"):

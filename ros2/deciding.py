@@ -54,7 +54,7 @@ class InitialPose:
         if self._wanted:
             return "agreed"
         if event is Event.AGREED and self._published:
-            return "corrected"  # what was published before is contradicted
+            return "corrected"  # the pose published before is contradicted
         since = LOST_SECONDS if self._at is None else now - self._at
         if lost and self.when != "start" and since >= LOST_SECONDS:
             return "lost"

@@ -45,7 +45,7 @@ def current_time() -> Time:
 
 @dataclass(slots=True)
 class Health:
-    """Publishes what the node reports.
+    """Publishes the node's reports.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A message and the mount of its scanner to what the search takes; what is wrong with either is noted."""
+"""A message and the mount of its scanner to the input of the search; errors of either are noted."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ MOST = 200  # messages that are taken from a reader at a time
 SENSOR = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1))
 # For streams of which each message counts, though some may be lost.
 STREAM = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(100))
-# For what is published once and holds, also for subscribers that come later: maps and mounts.
+# For messages that are published once and hold, also for subscribers that come later: maps and mounts.
 LATCHED = Qos(
     Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(10)
 )

@@ -53,7 +53,7 @@ LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries t
 FIRST_KEYS_SECONDS = (
     12.0  # that a start waits for the issuer's keys: as long as a fetch of them may take, and some more
 )
-PROGRESS_SECONDS = 5.0  # between two lines that say how far compiling is
+PROGRESS_SECONDS = 5.0  # between two log lines with the progress of compiling
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
@@ -240,12 +240,12 @@ async def _fetch_first_keys(services: Services) -> None:
 
 
 async def _compile(services: Services) -> None:
-    """Compile the kernels in a process that ends with it, and say how far it is."""
+    """Compile the kernels in a process that ends with it, and log the progress."""
     logger.info("compiling the kernels, which takes about a minute; later starts load them from the cache")
     services.readiness.compiled = compiled_fraction
     logging_progress = asyncio.create_task(_log_progress())
     try:
-        with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
+        with suppress(ParserEndedError):  # if that process ends early, this one compiles the missing kernels
             await services.parse_threads.run(partial(services.parser.call, compile_kernels))
     finally:
         logging_progress.cancel()

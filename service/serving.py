@@ -69,7 +69,7 @@ def run(settings: Settings) -> int:
 def cannot_keep_maps(settings: Settings) -> str | None:
     """Make the file of the maps where there is none; return why that will never do, None where it does or may yet.
 
-    Running all the same the service would never be ready, and only its log would say why.
+    If it ran all the same, the service would never be ready, and only its log would show the reason.
     """
     from .database_location import file_of, make_file
 

@@ -212,7 +212,7 @@ def _units(text: str | None) -> str | float | None:
 
 
 def report_rows(answer: Json) -> list[tuple[str, str]]:
-    """Return for people what was made of the files."""
+    """Return the report of an import as text for people."""
     report, line_map = answer["report"], answer["map"]
     directed = "free space on the left" if line_map["oriented"] else "directions mean nothing"
     rows = [

@@ -211,7 +211,7 @@ class Analysis:
         return None
 
     def _scan(self, pose: RigidTransform, *number: int) -> Scan:
-        """Return what the robot would send from there; the noise of a place is the same whenever it is tried."""
+        """Return the scan that the robot would send from there; the noise of a place is the same on each attempt."""
         return look(self.segments, pose, self.robot, np.random.default_rng((self.seed, *number))).scan
 
 

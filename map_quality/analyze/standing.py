@@ -18,8 +18,8 @@ from .reach import Reach
 PLACES = 400  # over the map's box, if no spacing is given
 SPACINGS = (0.3, 100.0)  # m
 MOST = 50_000  # poses to try
-RAYS = 72  # that feel for what is about a place
-CLEARANCE = 0.2  # m; what a robot keeps from everything
+RAYS = 72  # that look for walls around a place
+CLEARANCE = 0.2  # m; a robot's distance from everything
 SEEN, SEEN_UNDIRECTED = 0.2, 0.5  # least fraction of the rays that meet anything; more where walls have no free side
 # Least fraction of these that meet a wall on its free side; in line maps made of logs 19 of 20 robots saw more.
 FREE_SIDES = 0.6

@@ -85,7 +85,7 @@ def _best_directions(samples: Sequence[Sample], present: Way) -> bool:
 
 
 def _nearest_way(samples: Sequence[Sample], present: Way, directed: bool, off: float | None) -> Way:
-    """Return what was tried and is nearest to walls that are so far off; no sigma at all stands for little."""
+    """Return the way tried whose sigma is nearest to how far walls are off; no sigma at all counts as `LITTLE`."""
     ways = [way for one in samples for way in one.trials if way[0] == directed]
     if off is None or not ways:
         return present
@@ -142,7 +142,7 @@ def _moved(samples: Sequence[Sample]) -> Finding | None:
     if not moves:
         return None
     at = np.array([(one.x, one.y) for one in moves])
-    # Of a turn what is far from the origin moves most: agree about all three at the median.
+    # In a rotation the places far from the origin move most: agree about all three at the median.
     x, y = (float(value) for value in np.median(at, axis=0))
     turn = math.atan2(*(float(np.median([f(one.theta) for one in moves])) for f in (math.sin, math.cos)))
     same = sum(
@@ -160,7 +160,7 @@ def _moved(samples: Sequence[Sample]) -> Finding | None:
 
 
 def _sigma_of(samples: Sequence[Sample], directed: bool) -> float | None:
-    """Return how far walls are off, metres: the root mean square over walls of what the scans saw of each.
+    """Return how far walls are off, metres: the root mean square over walls of the offsets in the scans.
 
     If the assumed sigma is small, walls that are off by more are left out, and poses give way to the rest. So the
     widest sigma that was tried is used.

@@ -256,7 +256,7 @@ def drawn_sigma(index: MapIndex) -> float | None:
     ends = index.segments.endpoints[: index.directed]
     ends = ends - ends[0, [0, 1, 0, 1]]
     step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
-    # A caller copies what is advised: to a tenth of a millimetre.
+    # A caller copies the advice: to a tenth of a millimetre.
     return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None
 
 

@@ -60,7 +60,7 @@ class Size:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place from which the map shows what it shows elsewhere too.
+    """A place from which the map looks as from another place.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ class Trial:
     score : float
         Nats; 0 where nothing fits.
     offsets : dict of int to float
-        By map segment, how far what was seen of it is off, metres; empty where too little of the scan fits.
+        By map segment, how far its matched scan segments are off, metres; empty where too little of the scan fits.
     """
 
     usable: bool
@@ -56,7 +56,7 @@ class Sample:
     factor : float or None
         Factor by which its lengths fit better; None where they are right.
     moved : RigidTransform or None
-        From where it was said to be taken to where it was found, in the map frame; None where either is not known.
+        From its stated pose to the pose where it was found, in the map frame; None where either is not known.
     """
 
     result: AssociationResult
@@ -161,7 +161,7 @@ def _trial(result: AssociationResult) -> Trial:
 
 
 def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> float | None:
-    """Return by what a scan is to be multiplied to score clearly more than it does anyhow, `known` nats.
+    """Return the factor of a scan's lengths at which it scores clearly more than unscaled, `known` nats.
 
     Rooms between lines along the middle of walls look too large by as much as the walls are thick, at any scale.
     """

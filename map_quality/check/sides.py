@@ -78,7 +78,7 @@ class Sides:
     walls : (k,) indices of the walls that were looked from
     lengths : (k,) metres
     left, right : (k, 2) how many rays met a front, and how many a back, on either side
-    room : (k, 2) how far away what is nearest is on the left, and on the right, metres; inf where nothing is
+    room : (k, 2) distance of the nearest wall on the left, and on the right, metres; inf where there is none
     lost : (k,) True where a ray on the left ended within the map without a hit: its hit is not known
     """
 
@@ -130,8 +130,8 @@ class Sides:
 def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Sides:
     """Follow rays from both sides of the longest walls of a directed map, as many as the deadline allows.
 
-    Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong: they are not looked from, and to meet
-    one says nothing.
+    Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong: no rays start from them, and a hit on
+    one is no evidence.
     """
     lengths = index.walls.longest
     longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]

@@ -1,15 +1,15 @@
 """Every threshold of the map check, by stage; each with its unit, and where it comes from.
 
-"Geometry" follows from what is measured, "tables" was looked up in plans and drawn worlds: no finding where they are
-right, one where they were spoilt.
+"Geometry" follows from the measured quantity, "tables" was looked up in plans and drawn worlds: no finding where they
+are right, one where they were spoilt.
 """
 
 import math
 
 # --- Pieces -----------------------------------------------------------------------------------------------------------
 
-SHORT = 0.1  # m, tables; a wall shorter than that tells a search nothing
-LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between what meets and what is a slit that was drawn on purpose
+SHORT = 0.1  # m, tables; a wall shorter than that is no evidence for a search
+LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between ends that meet and a slit that was drawn on purpose
 MOST_ENDS = 20_000  # that are looked about from, some 10 microseconds each
 ENDS_AT_A_TIME = 5_000  # whose nearest other is sought between two looks at the deadline
 OVERLAP = 0.05  # m, tables; pieces of one line share less than that where they are cut
@@ -57,18 +57,18 @@ SMALLEST, LARGEST = 2.0, 3000.0  # m, tables; the diagonal of what robots drive 
 
 SIGMAS = (0.05, 0.1, 0.2)  # m, tables; tried in addition to the map's own: half the thickness of walls, or more
 WIDEST = max(SIGMAS)
-LITTLE = 0.01  # m, tables; what an estimate comes to where walls are right
+LITTLE = 0.01  # m, tables; the estimate where walls are right
 BETTER_SCALED = 1.05  # times, tables
 LADDER = tuple(1.12**k for k in range(-14, 15) if k)  # 0.2 to 5, tables; factors by which scans are tried to be off
 LADDER_SECONDS = 1.0  # of a scan, small maps take a quarter of that; or as long as all else took
 BETTER_SCORE = 1.15  # times, tables
 BETTER_USABLE = 0.15  # of the scans, tables
-MANY = 0.5  # of the scans that tell anything
+MANY = 0.5  # of the scans that give evidence
 LEAST_SCALE = 0.004  # as `LEAST_STRETCH`; a factor that is reported differs from one by this
 SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those of walls too thick differ by room
 HIDDEN_SCALE = 0.08  # tables; as much the thickness of walls may feign where lines run along their middle
 MOVED_METRES, MOVED_RADIANS = 0.2, math.radians(2.0)  # tables; less than that may be the poses that were sent
-LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match for its walls to say how far they are off
+LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
 MOST_FOR_THICKNESS, MOST_LINES_FOR_THICKNESS = 10, 20_000  # scans, and segments; time
 THICKER = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4)  # m; how much thicker walls may be than drawn
 THICKER_STEP = 0.05  # m, tables; the score is a parabola about as wide where walls are off by `THICKNESS_SIGMA`

@@ -58,7 +58,7 @@ class Entrance:
         MissingRoleError, ForeignMapError
             When the key lacks the role for the request, or no such map exists for the key.
         BodyTooLargeError
-            When the body is too long by what the head says of it.
+            When the body is too long by the length that the head states.
         QueueFullError, ShareUsedError
             When there is no place for a search.
         """

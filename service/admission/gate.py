@@ -113,8 +113,8 @@ class Gate:
     def require_place(self, holder: Holder = None) -> None:
         """Refuse a request whose body is still to be read, when there is no place for it.
 
-        A full queue is shared: a holder that has less than its share of the places is let in all the same, and whoever
-        has the most gives up one.
+        A full queue is shared: a holder that has less than its share of the places is let in all the same, and the
+        holder that has the most gives up one.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class Gate:
         raise DeadlinePassedError
 
     def cancel_all(self) -> None:
-        """Tell everything that runs to give up, and soon wait no longer for what does not, as indexing a map."""
+        """Cancel everything that runs, and soon wait no longer for functions that do not end, as indexing a map."""
         for deadline in self._deadlines.values():
             deadline.cancel()
         if self._over is not None:

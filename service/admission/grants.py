@@ -130,7 +130,7 @@ def _looked_up(method: str, path: str) -> Asked:
 def _patterns() -> dict[str, list[tuple[Access, re.Pattern[str]]]]:
     found: dict[str, list[tuple[Access, re.Pattern[str]]]] = {}
     for access in ROUTES:
-        # As the router has it, a line's end behind the path included: what it takes for a route has to be one here.
+        # As the router has it, a line's end behind the path included: each route of the router has to be one here.
         pattern = re.compile(re.escape(access.path).replace(r"\{map_id\}", "(?P<map_id>[^/]+)") + "$")
         for method in access.methods.split():
             found.setdefault(method, []).append((access, pattern))

@@ -49,7 +49,7 @@ class TokenSource(Protocol):
     """A checker of tokens."""
 
     def grant(self, token: bytes) -> Grant:
-        """Return what a token may do; raises `UnknownKeyError` where it is none."""
+        """Return the permissions of a token; raises `UnknownKeyError` where it is none."""
 
     def refresh(self) -> None:
         """Look for new keys of the issuer; off the event loop."""
@@ -77,7 +77,7 @@ class Keyring:
         self._guarded = bool(keys) or file is not None or tokens is not None
 
     def grant(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Grant:
-        """Return what a request may do; where the service has no keys, everything, for the address it comes from.
+        """Return the permissions of a request; where the service has no keys, all, for the address it comes from.
 
         Parameters
         ----------
@@ -124,7 +124,7 @@ class Keyring:
 
 
 def digest_of(key: bytes) -> bytes:
-    """Return what is kept of a key."""
+    """Return the digest that is stored of a key."""
     return hashlib.sha256(key).digest()
 
 

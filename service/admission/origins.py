@@ -37,7 +37,7 @@ class Origins:
         self._guarded = guarded
 
     def require(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
-        """Refuse what the page of another site may have sent.
+        """Refuse requests that the page of another site may have sent.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class Origins:
             raise ForeignOriginError
 
     def is_preflight(self, method: str, headers: Iterable[tuple[bytes, bytes]]) -> bool:
-        """Return whether a browser asks what the page of a named origin may send; it has no key for that."""
+        """Return whether this is a browser's preflight request for the page of a named origin; it has no key."""
         if method != "OPTIONS" or not self._named:
             return False
         found = dict(headers)
@@ -91,7 +91,7 @@ def _is_address(name: str) -> bool:
 
 
 def _is_same(origin: str, host: str | None) -> bool:
-    """Return whether a page's origin is the host that it asks, whichever scheme a proxy before it speaks."""
+    """Return whether a page's origin is the host of its request, whichever scheme a proxy before it speaks."""
     try:
         page = urlsplit(origin)
         asked = urlsplit(f"//{host or ''}")

@@ -48,13 +48,13 @@ class Ticket:
         self._announced = False
 
     def announce(self) -> None:
-        """Say that the body is there and the request on its way to the gate."""
+        """Announce to the gate that the body is there and the request on its way."""
         if self._gate is not None and not self._announced:
             self._announced = True
             self._gate.expect(self.holder)
 
     def arrive(self) -> None:
-        """Say that the request is at the gate, or will never come; it is not announced again."""
+        """Note that the request is at the gate, or will never come; it is not announced again."""
         gate, self._gate = self._gate, None
         if gate is not None and self._announced:
             gate.expect_no_longer(self.holder)

@@ -45,7 +45,7 @@ class Tokens:
         self._fetched = 0.0
 
     def grant(self, token: bytes) -> Grant:
-        """Return what a token may do.
+        """Return the permissions of a token.
 
         Raises
         ------

@@ -118,7 +118,7 @@ class Intake:
 
     def __init__(self, receive: Receive, headers: Sequence[tuple[bytes, bytes]]) -> None:
         self._receive = receive
-        # A client that asks before it sends its body has sent nothing yet.
+        # A client that waits for "100 Continue" has sent nothing yet.
         self._unread = any(_announces_body(*field) for field in headers) and not any(
             name == b"expect" for name, _ in headers
         )
@@ -130,7 +130,7 @@ class Intake:
         return message
 
     async def drop_rest(self, most_bytes: int) -> None:
-        """Read what is left and drop it, as far as it comes soon and is not too much."""
+        """Read the rest and drop it, as far as it comes soon and is not too much."""
         if not self._unread:
             return
         dropped = 0
@@ -141,7 +141,7 @@ class Intake:
 
 
 def _is_gzip(request: Request, *, form: bool) -> bool:
-    """Return whether a body is gzip; refuse what by its head is not what is taken."""
+    """Return whether a body is gzip; refuse media types and encodings that are not supported."""
     told = request.headers.get("content-type", FORM if form else JSON)
     media_type = told.split(";")[0].strip().lower()
     if media_type != FORM if form else not _is_json(media_type):

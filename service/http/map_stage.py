@@ -30,7 +30,7 @@ async def looking_up(
 ) -> AsyncIterator[InlineMap | FoundMap]:
     """Look a stored map up before its slot at the gate: a database server that hangs delays no other request.
 
-    Its document counts as held until the block ends. `oriented` None is as the map itself says.
+    Its document counts as held until the block ends. `oriented` None: as the map states.
 
     Raises
     ------

@@ -58,7 +58,7 @@ def _own(request: Request, error: Exception) -> Exception:
 
 
 def _methods_of(request: Request) -> list[str]:
-    """Return what the path takes; the framework names the methods of one route only."""
+    """Return the methods of the path; the framework names the methods of one route only."""
     every = [getattr(included, "original_router", None) or included for included in request.app.routes]
     routes = [route for one in every for route in getattr(one, "routes", [one])]
     matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)

@@ -146,7 +146,7 @@ def _require_report(told: dict[str, Any]) -> None:
 
 
 def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadline) -> int:
-    """Run a process to its end and return its status; what it writes is put into `ANSWER` and `FAILURE`.
+    """Run a process to its end and return its status; its output is put into `ANSWER` and `FAILURE`.
 
     They are files, which may not grow beyond what one file may: the process is not relied on to write little.
     """

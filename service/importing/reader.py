@@ -61,7 +61,7 @@ class Bounds:
 
 
 def main(told: str, folder: str) -> None:
-    """Read the form on stdin, its files put into a folder; print a report and what was read, or why there is none."""
+    """Read the form on stdin, its files put into a folder; print a report and the content, or the error."""
     asked = orjson.loads(told)
     bounds = Bounds(**asked["bounds"])
     _bind(bounds)
@@ -94,7 +94,7 @@ def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
 
 
 def _bind(bounds: Bounds) -> None:
-    """Take away from this process what it does not need."""
+    """Take away from this process all that it does not need."""
     most = bounds.memory_bytes
     for what, limit in (
         (resource.RLIMIT_DATA, most),

@@ -35,7 +35,7 @@ class CachedMap:
 
 
 class IndexCache:
-    """Builds what it does not have; callers that want the same map wait for one build.
+    """Builds missing indices; callers that want the same map wait for one build.
 
     Keys name content, not maps: a map that changes gets another key, so that nothing stale is ever found.
     """
@@ -80,7 +80,7 @@ class IndexCache:
         return self._build(key, promise, build)
 
     def make_room(self, size: int) -> None:
-        """Drop what was used the longest ago until so much more would fit; before something large is built."""
+        """Drop the maps used the longest ago until so much more would fit; before something large is built."""
         with self._lock:
             self._drop_until(self._max_bytes - size)
 

@@ -1,4 +1,4 @@
-"""Connections to the database behind the map store, so set that what is committed stays committed."""
+"""Connections to the database behind the map store, so set that committed data stays committed."""
 
 from __future__ import annotations
 

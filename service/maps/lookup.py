@@ -60,7 +60,7 @@ class MapLookup:
     def find(self, map_id: str, *, oriented: bool | None) -> FoundMap:
         """Look a stored map up, with its document where it is not indexed yet; runs in a thread that may wait.
 
-        `oriented` None is as the map itself says.
+        `oriented` None: as the map states.
 
         Looked up before every use, so that a change by another worker is never missed.
 
@@ -112,7 +112,7 @@ class MapLookup:
         if isinstance(asked, FoundMap):
             directed = is_oriented(oriented, asked.record.oriented)
             return self._cache.get((asked.record, directed), partial(self._read, asked, directed), deadline)
-        # Robots send the same map with every scan: what is in it names it.
+        # Robots send the same map with every scan: its content is its name.
         digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
         directed = is_oriented(oriented, asked.oriented)
         key = digest, asked.sigma, asked.frame_id, directed

@@ -91,7 +91,7 @@ class MapPage:
 
 
 def digest(document: object) -> str:
-    """Return the SHA-256 of a document; of what is no bytes, as damage may leave it, nothing that ever matches."""
+    """Return the SHA-256 of a document; of a value that is no bytes, as after damage, text that never matches."""
     return hashlib.sha256(document).hexdigest() if isinstance(document, bytes) else "damaged"
 
 
@@ -106,7 +106,7 @@ SEALED = (
 def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
     """Return a sealed row of `maps`.
 
-    The seal is a SHA-256 of all that the row says: a flipped bit in a revision is found as surely as one in a document.
+    The seal is a SHA-256 of all values of the row: a flipped bit in a revision is found as surely as one in a document.
     """
     # SQLite does not keep the sign of zero.
     numbers = tuple(value + 0.0 for value in outline.bounds)

@@ -29,7 +29,7 @@ VERSIONS = ("0001", "0002", "0003")  # of the migrations; the last is that of th
 BEFORE_ALEMBIC, NEWEST = VERSIONS[0], VERSIONS[-1]
 _version_table = Table(VERSION_TABLE, MetaData(), Column("version_num", String(32), primary_key=True))  # as Alembic's
 _ADVISORY_LOCK = 0x6C696E65666978  # "linefix"
-# Alembic keeps what it migrates in module globals.
+# Alembic stores the subject of a migration in module globals.
 _one_at_a_time = threading.Lock()
 
 metadata = MetaData()

@@ -134,7 +134,7 @@ class MapStore:
             )
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
-        """Forget a map; the number of its last revision is kept."""
+        """Forget a map; the number of its last revision stays."""
         self._twice(lambda: self._delete(map_id, demands))
 
     def _delete(self, map_id: str, demands: Preconditions) -> None:

@@ -3,7 +3,7 @@
 ::
 
     ParsingError
-    ├── NotJsonError      the body is not JSON, or not packed as it says
+    ├── NotJsonError      the body is not JSON, or not packed as its head states
     └── ParserEndedError  the process that parses large bodies has ended meanwhile
 """
 

@@ -64,13 +64,13 @@ class PatientHandler(logging.Handler):
             self.handleError(record)
 
     def flush(self) -> None:
-        """Wait for what was handed over to be written, for a moment."""
+        """Wait for the queued lines to be written, for a moment."""
         give_up = time.monotonic() + LAST_SECONDS
         while self._written < self._handed and self._thread.is_alive() and time.monotonic() < give_up:
             time.sleep(0.002)
 
     def close(self) -> None:
-        """Write what is left and end."""
+        """Write the remaining lines and end."""
         self.flush()
         self._lines.put(None)
         super().close()

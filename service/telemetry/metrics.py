@@ -32,7 +32,7 @@ def share_counts(directory: str, index: int) -> None:
 
 
 def forget_worker(directory: str, index: int) -> None:
-    """Take what a dead worker had running and waiting out of the sums; its counts stay."""
+    """Take the running and waiting requests of a dead worker out of the sums; its counts stay."""
     multiprocess.mark_process_dead(index, directory)  # type: ignore[no-untyped-call]
 
 
@@ -96,7 +96,7 @@ class Metrics:
         self.hypotheses.inc(hypotheses)
 
     async def exposition(self) -> bytes:
-        """Return the text that Prometheus reads, as things stand now; however many ask, a few of them in a second.
+        """Return the text for Prometheus, with the present values; however many request it, a few in a second.
 
         A request soon after another waits, together with all that arrive meanwhile.
         """
@@ -140,7 +140,7 @@ class RefusalTally:
         self._refused[route, method, code, status] += 1
 
     def report(self) -> None:
-        """Count and log what was refused since the last time."""
+        """Count and log the refusals since the last time."""
         for (route, method, code, status), count in self._refused.items():
             self._metrics.count_refusals(route, method, status, count)
             logger.warning("refused", extra={"route": route, "code": code, "count": count})

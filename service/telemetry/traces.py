@@ -1,4 +1,4 @@
-"""Traces for OpenTelemetry: off, and free, unless the extra ``linefix[otel]`` is there and ``OTEL_`` variables ask."""
+"""Traces for OpenTelemetry: off, and free, unless ``linefix[otel]`` is there and ``OTEL_`` variables request them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Traces:
             _TRACER.reset(token)
 
     def close(self) -> None:
-        """Send what is left, if the collector takes it soon."""
+        """Send the remaining spans, if the collector takes them soon."""
         # In a thread: the exporter tries again for longer than its timeout.
         flushing = Thread(target=self._provider.force_flush, daemon=True)
         flushing.start()

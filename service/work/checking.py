@@ -53,7 +53,7 @@ def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | Non
     ParserEndedError
         When it is large and could not be read.
     InvalidRequestError
-        When one of the samples is not what the libraries take.
+        When the libraries reject one of the samples.
     DeadlinePassedError
         When the deadline has passed before.
     CancelledError

@@ -1,4 +1,4 @@
-"""A piece of work: for which request, since when, until when, and what came of it."""
+"""A piece of work: its request, its begin, its deadline and its result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiling, or loading from the cache, what the first request would otherwise wait for."""
+"""Compiling, or loading from the cache, the kernels for which the first request would otherwise wait."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def warm_up_registering() -> None:
         RegistrationOptions(estimator="one_step", evaluate_at=RigidTransform(0.0, 0.0, 0.0)),
     ):
         register(room, MeasuredSegments.from_segments(room), pairs, 0.0, options)
-    # No request needs it, but kernels count as compiled once something of each module is kept.
+    # No request needs it, but kernels count as compiled once something of each module is cached.
     one_by_one = Correspondences.of(room, MeasuredSegments.from_segments(room), pairs)
     assert OneStepSums.of_set(one_by_one, np.ones(len(pairs))).reliability > 0.0
 
