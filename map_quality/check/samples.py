@@ -32,7 +32,7 @@ class Trial:
     score : float
         Nats; 0 where nothing fits.
     offsets : dict of int to float
-        By map segment, how far its matched scan segments are off, metres; empty where too little of the scan fits.
+        By map segment, how far its matched scan segments are off, metres. Empty where too little of the scan fits.
     """
 
     usable: bool
@@ -56,7 +56,7 @@ class Sample:
     factor : float or None
         Factor by which its lengths fit better; None where they are right.
     moved : RigidTransform or None
-        From its stated pose to the pose where it was found, in the map frame; None where either is not known.
+        From its stated pose to the pose where it was found, in the map frame. None where either is not known.
     """
 
     result: AssociationResult

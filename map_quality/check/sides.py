@@ -130,7 +130,7 @@ class Sides:
 def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Sides:
     """Follow rays from both sides of the longest walls of a directed map, as many as the deadline allows.
 
-    Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong: no rays start from them, and a hit on
+    Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong. No rays start from them, and a hit on
     one is no evidence.
     """
     lengths = index.walls.longest

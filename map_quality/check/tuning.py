@@ -1,7 +1,7 @@
 """Every threshold of the map check, by stage; each with its unit, and where it comes from.
 
-"Geometry" follows from the measured quantity, "tables" was looked up in plans and drawn worlds: no finding where they
-are right, one where they were spoilt.
+"Geometry" follows from the measured quantity, "tables" was looked up in plans and drawn worlds. The check finds nothing
+where these are right, and something where they were spoilt.
 """
 
 import math

@@ -17,7 +17,7 @@ class FairQueue:
     """Waiting requests, one line per holder; the holder that has used the least time is served first.
 
     A holder counts as active while it has something waiting, running or on its way. A new one starts where the least
-    served of the active ones is: it neither pays for old use nor has credit from the time it was away.
+    served of the active ones is. It neither pays for old use nor has credit from the time it was away.
     """
 
     def __init__(self) -> None:

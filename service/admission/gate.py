@@ -113,8 +113,8 @@ class Gate:
     def require_place(self, holder: Holder = None) -> None:
         """Refuse a request whose body is still to be read, when there is no place for it.
 
-        A full queue is shared: a holder that has less than its share of the places is let in all the same, and the
-        holder that has the most gives up one.
+        A full queue is shared. A holder that has less than its share of the places is let in all the same. The holder
+        with the most gives up one.
 
         Raises
         ------

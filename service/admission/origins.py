@@ -1,8 +1,8 @@
 """Hosts and origins from which a browser may send requests.
 
-Without keys any program on the operator's machine may use the service. So might any web page that the operator opens:
-by a name of its own that resolves to the service's address, or by a form or a script that sends without reading the
-answer. A key keeps both out, since no page has it.
+Without keys any program on the operator's machine may use the service. So might any web page that the operator opens.
+It may use a name of its own that resolves to the service's address, or a form or a script that sends without reading
+the answer. A key keeps both out, since no page has it.
 """
 
 from __future__ import annotations

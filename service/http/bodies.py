@@ -52,7 +52,7 @@ class BodyReceiver:
     timeout : float
         Seconds that a request may take to arrive, its head included.
     guarded : bool
-        True when the service has keys. Without them a POST has to name its media type: a browser that sends a POST for
+        True when the service has keys. Without them a POST has to name its media type. A browser that sends a POST for
         the page of another site cannot name JSON without a preflight request.
     """
 

@@ -94,7 +94,7 @@ class MapLookup:
     def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
         """Return a map ready to be searched.
 
-        Oriented and unoriented indices of a map are different ones, each with a place of its own in the cache;
+        Oriented and unoriented indices of a map are different ones, each with a place of its own in the cache.
         `oriented` None: as the map states. If another request indexes the same map, wait for it until the deadline.
 
         Runs off the event loop.

@@ -1,7 +1,7 @@
 """The identity of a map, read on a connection that stays open, by one short statement and without the toolkit.
 
-The service reads it before every use of a cached index and caches nothing: the result is the state that is committed
-by now, in whichever process.
+The service reads it before every use of a cached index and caches nothing. The result is the state that is committed by
+now, in whichever process.
 """
 
 from __future__ import annotations

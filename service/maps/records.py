@@ -106,7 +106,7 @@ SEALED = (
 def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
     """Return a sealed row of `maps`.
 
-    The seal is a SHA-256 of all values of the row: a flipped bit in a revision is found as surely as one in a document.
+    The seal is a SHA-256 of all values of the row. A flipped bit in a revision is found as surely as one in a document.
     """
     # SQLite does not keep the sign of zero.
     numbers = tuple(value + 0.0 for value in outline.bounds)

@@ -1,6 +1,6 @@
 """A process of its own for parsing large bodies.
 
-Parsing 15 MB of JSON holds Python's global lock for a fifth of a second in one piece: nothing else of the service would
+Parsing 15 MB of JSON holds Python's global lock for a fifth of a second in one piece. Nothing else of the service would
 answer meanwhile, probes included. The results are arrays, which cross as bytes. The memory that a hostile body may take
 is taken there, too.
 """
