@@ -76,7 +76,7 @@ class Row:
         return None if stamp is None else int(stamp)
 
     def scan(self) -> Scan:
-        """Return what is searched.
+        """Return the scans to search.
 
         Raises
         ------

@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-ATTEMPTS = 3  # at an item, while those who work at it end early
+ATTEMPTS = 3  # at an item, if its workers end early
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +48,13 @@ class WorkerError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Raised:
-    """Instead of a result: what the function raised, as text, since not every exception can be pickled."""
+    """Instead of a result: the exception of the function, as text, since not every exception can be pickled."""
 
     text: str
 
 
 def attempt(function: Callable[[Any], Any], item: Any) -> Any:
-    """Return the result, or what was raised."""
+    """Return the result, or the exception."""
     try:
         return function(item)
     except Exception:

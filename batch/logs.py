@@ -1,4 +1,4 @@
-"""Logs to Parquet files whose row groups are no larger than blocks, so that any block is read by itself."""
+"""Logs to Parquet files whose row groups are no larger than blocks, so that any block is read alone."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Layout:
 
     @property
     def done(self) -> bool:
-        """Whether the file exists."""
+        """Return whether the file exists."""
         return Path(self.path).exists()
 
     def blocks(self) -> list[Block]:
@@ -65,7 +65,7 @@ class Layout:
         return [*found, Block(self.number, self.log, self.path, start, stop)] if stop > start else found
 
     def notes(self) -> list[LogNote]:
-        """Return what was assumed of a log of another tool, and what of it was left out."""
+        """Return the assumptions about a log of another tool, and its parts that were left out."""
         if Path(self.log).suffix.lower() in PARQUET:
             return []
         told = (pq.read_metadata(self.path).metadata or {}).get(NOTES, b"[]")
@@ -179,7 +179,7 @@ class _Reading:
             yield {"error": f"the log could not be read any further: {error}"}
 
     def notes(self) -> list[dict[str, Any]]:
-        """Return what was assumed and what was left out so far."""
+        """Return the assumptions and the omissions so far."""
         if self._opened is None:
             return []
         report = self._opened.report
@@ -205,7 +205,7 @@ def _row(scan: LoggedScan) -> dict[str, Any]:
 
 
 def _checked(path: Path) -> pq.FileMetaData:
-    """Return what a Parquet file says of itself.
+    """Return the metadata of a Parquet file of scans.
 
     Raises
     ------

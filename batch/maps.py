@@ -51,11 +51,11 @@ class MapShelf:
             raise UnreadableMapsError("holds no map that is read here", argument=str(place))
         shelf = cls(files)
         if len(files) == 1:
-            read_index(next(iter(files.values())))  # what is wrong with the only map spoils everything
+            read_index(next(iter(files.values())))  # an error in the only map spoils everything
         return shelf
 
     def name(self, told: str | None, log: str) -> str | None:
-        """Return the id of a scan's map: as it says itself, as its log is called, or the only one."""
+        """Return the id of a scan's map: its own value, the name of its log, or the only one."""
         if told is not None:
             return told
         stem = Path(log).stem

@@ -14,9 +14,8 @@ from .engine import ATTEMPTS, Item, Lost, Result, attempt, checked
 class OnRay:
     """Workers of a Ray cluster, each of one core.
 
-    Where they are is Ray's business: the cluster that the caller is connected to, that of ``RAY_ADDRESS``, or a new
-    one on this machine. Each machine needs Linefix, and the logs, the maps and the place of the
-    output under the same paths.
+    Ray chooses their place: the cluster that the caller is connected to, that of ``RAY_ADDRESS``, or a new one on this
+    machine. Each machine needs Linefix, and the logs, the maps and the place of the output under the same paths.
     """
 
     def run(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[Item, Result | Lost]]:
@@ -25,10 +24,10 @@ class OnRay:
             return
         import ray.data
 
-        # What is lost for good is left out of the results, and so noticed here.
+        # Items that are lost for good stay out of the results; `left` shows them.
         ray.data.DataContext.get_current().max_errored_blocks = -1
         rows = [{"number": number, "item": pickle.dumps(item)} for number, item in enumerate(items)]
-        # An item each: who is lost costs one, and no more of them than there are cores are held anywhere.
+        # An item each: a lost worker costs one, and no more of them than there are cores are held anywhere.
         asked = ray.data.from_items(rows, override_num_blocks=len(rows))
         done = asked.map(_Call(function), num_cpus=1, max_retries=ATTEMPTS)
         left = set(range(len(items)))

@@ -100,7 +100,7 @@ def opened(out: Path, told: dict[str, Any]) -> Iterator[Parts]:
     ----------
     out : Path
     told : dict
-        What makes two runs the same; can be JSON.
+        The values that make two runs the same; can be JSON.
 
     Raises
     ------

@@ -34,7 +34,7 @@ class Processes:
     Attributes
     ----------
     count : int
-        How many work at a time.
+        Number of processes that work at a time.
     """
 
     count: int
@@ -87,7 +87,7 @@ def _started(function: Callable[[Item], Result]) -> _Worker:
     ours, theirs = context.Pipe()
     process = context.Process(target=_work, args=(function, theirs), daemon=True)
     process.start()
-    theirs.close()  # so that ours tells when the worker has ended
+    theirs.close()  # so that ours shows the end of the worker
     return _Worker(process, ours)
 
 

@@ -49,12 +49,12 @@ class Summary:
     scans : int
         Rows.
     taken_over : int
-        How many of them an earlier run had done.
+        Number of rows that an earlier run had done.
     usable : int
     errors : int
         Rows with an error.
     statuses : dict of str to int
-        How many of each; those with an error have none.
+        Number of rows of each status; those with an error have none.
     notes : tuple of LogNote
         Assumptions and omissions of logs of other tools.
     """
@@ -87,11 +87,11 @@ def associate_many(
         A map, or a folder of them. A scan lies on the one that its column ``map_id`` names, else on the one named as
         its log, else on the only one.
     out : path
-        The Parquet file to write, with the columns `POSES`, in the order of logs and scans. It is there when all is
-        done, and whole; until then a folder beside it grows.
+        The Parquet file to write, with the columns `POSES`, in the order of logs and scans. It appears, whole, when all
+        is done; until then a folder next to it grows.
     options : FleetOptions, optional
     engine : Engine, optional
-        Who does the work; this machine's processes, one for each core, where none is given.
+        The engine that does the work; by default this machine's processes, one for each core.
     watch : callable, optional
         Called after each step.
 

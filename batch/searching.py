@@ -28,9 +28,9 @@ class FleetOptions:
     search : AssociationOptions
         Directions count only where those of the map do, too.
     deadline_ms : float
-        For each search; what was found until then is its answer.
+        For each search; its answer is the best result until then.
     block : int
-        Scans that a worker does at a time: what a killed one costs, and what is held in memory.
+        Scans that a worker does at a time: the loss when one is killed, and the number held in memory.
     prepare : callable, optional
         Called once in each worker before it searches, such as to compile the kernels while no deadline runs.
     """
@@ -55,7 +55,7 @@ class BlockSearch:
         return pa.Table.from_pylist(rows, schema=POSES)
 
     def _found(self, block: Block, row: Row) -> dict[str, Any]:
-        """Return what came of one scan, whatever is wrong with it: no scan costs another its row."""
+        """Return the result of one scan, whatever is wrong with it: no scan costs another its row."""
         name = self.maps.name(row.values.get("map_id"), block.log)
         try:
             index, scan, begun = self.maps.get(name), row.scan(), time.perf_counter()

@@ -1,4 +1,4 @@
-"""The columns of what is read and written."""
+"""The columns of input and output tables."""
 
 from __future__ import annotations
 

@@ -124,12 +124,12 @@ class Player:
             ended = any(told.header.stamp == scan.header.stamp for told in self._diagnostics.take())
             if math.isnan(answered) and (found or ended):
                 answered = 1e3 * (now - begun)
-            if ended:  # is the last that is said of a scan
+            if ended:  # the diagnostics are the last message about a scan
                 return answered, poses
         raise RuntimeError("the bridge does not answer")
 
     def initial(self) -> list[int]:
-        """Return the stamps that ``/initialpose`` was said for since last asked."""
+        """Return the stamps of ``/initialpose`` published since the last call."""
         return [nanoseconds(told.header.stamp) for told in self._initial.take()]
 
 

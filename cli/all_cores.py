@@ -53,7 +53,7 @@ class Task:
 
 
 def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progress: Progress) -> Looks:
-    """Try every place, and return what came of those that there was time for.
+    """Try every place, and return the results of those for which there was time.
 
     The verdicts are the same however many cores there are.
 
@@ -63,7 +63,7 @@ def look_on_all_cores(analysis: Analysis, cores: int, deadline: Deadline, progre
     cores : int
     deadline : Deadline
     progress : callable
-        Is told how many places are done, of how many.
+        Called with the number of places that are done, and of all.
     """
     order = analysis.standing.order.tolist()
     portions = [order[k : k + PORTION] for k in range(0, len(order), PORTION)]
@@ -98,7 +98,7 @@ def _look(analysis: Analysis, portion: Sequence[int], deadline: Deadline) -> Loo
             break
         verdict = analysis.look(number, deadline)
         if deadline.passed:
-            break  # what was found is no answer: the search was cut
+            break  # an unfinished result is no answer: the search was cut
         found[number] = verdict
     return found
 

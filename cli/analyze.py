@@ -1,4 +1,4 @@
-"""``linefix analyze``: where on a map a robot would not know where it is."""
+"""``linefix analyze``: places of a map where a robot would not find its pose."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def analyze(
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Which analysis is asked for, as the options of the command say."""
+    """The analysis that the options of the command request."""
 
     scanner: ScannerOptions
     drive: float
@@ -155,7 +155,7 @@ def _analyzed(target: Json, asked: Asked) -> Json:
 
 @contextmanager
 def _progress() -> Iterator[Progress]:
-    """Show how far it is, to a person who looks on; never in what is piped on."""
+    """Show the progress on a terminal; never in piped output."""
     columns = TextColumn("places"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Bar(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty(), transient=True) as bar:
         task = bar.add_task("places", total=None)

@@ -1,4 +1,4 @@
-"""Whom a command asks: the server at a URL, or this process and the store of maps of this machine."""
+"""The target of a command: the server at a URL, or this process and the store of maps of this machine."""
 
 from __future__ import annotations
 

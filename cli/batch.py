@@ -129,7 +129,7 @@ def _noted(note: LogNote) -> str:
 
 @contextmanager
 def shown_progress() -> Iterator[Callable[[Progress], None]]:
-    """Show how far a run is where a terminal is there to see it; give what has to be told of it."""
+    """Show the progress of a run on a terminal; yield the function that takes its steps."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _Speed(), TimeRemainingColumn())
     console = Console(stderr=True)
     with Bars(*columns, console=console, disable=not console.is_terminal) as bars:
@@ -145,7 +145,7 @@ def shown_progress() -> Iterator[Callable[[Progress], None]]:
 
 
 class _Speed(ProgressColumn):
-    """How many a second."""
+    """The number of items a second."""
 
     def render(self, task: Bar) -> Text:
         """Return it as text."""

@@ -16,7 +16,7 @@ KEY = "LINEFIX_KEY"  # in the environment: arguments are seen by everyone on a m
 class MapKeeper(Protocol):
     """Stored maps.
 
-    Every method raises `RefusedError` when what is sent is not taken, and `NoServerError` when nobody answers.
+    Every method raises `RefusedError` when the input is rejected, and `NoServerError` when no server answers.
     """
 
     def put(self, map_id: str, document: Json) -> Json:
@@ -36,7 +36,7 @@ class MapKeeper(Protocol):
         ...
 
     def close(self) -> None:
-        """Close what was opened."""
+        """Close all that was opened."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""Where ``linefix`` starts: runs a command, and turns what goes wrong into one line and an exit code."""
+"""Entry point of ``linefix``: runs a command, and turns an error into one line and an exit code."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from service.serving import ONE_THREAD, serve
 
 from .errors import CommandError
 
-INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number what a signal ended
+INTERRUPTED, PIPE_CLOSED = 130, 141  # as shells number the end by a signal
 
 
 def main() -> None:
@@ -35,7 +35,7 @@ def run(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read the output has enough, such as head; nothing is to be written to it at the end, either.
+        # The reader of the output, such as head, has closed it; nothing is to be written to it at the end, either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
     except OSError as error:

@@ -1,12 +1,12 @@
-"""Why a command ends without doing what was asked, each in one line that says what to do.
+"""Errors that end a command before its result, each in one line that names the remedy.
 
 ::
 
     CommandError
     ├── WrongUseError   exit code 2: the command cannot be meant so
     ├── RefusedError    exit code 3: a file, or what is in it, is not taken
-    │   └── NoSuchMapError   what is named is neither a file nor a stored map
-    └── NoServerError   exit code 4: nobody there who would answer
+    │   └── NoSuchMapError   the name is neither that of a file nor of a stored map
+    └── NoServerError   exit code 4: no server answers
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-BUSY = (401, 403, 408, 429)  # of 4xx those that are no word about what was sent
+BUSY = (401, 403, 408, 429)  # of 4xx those that do not concern the content sent
 
 
 class CommandError(Exception):
@@ -48,7 +48,7 @@ class RefusedError(CommandError):
 
 
 class NoSuchMapError(RefusedError):
-    """What is named is neither a file nor a stored map.
+    """The name is neither that of a file nor of a stored map.
 
     Parameters
     ----------
@@ -61,14 +61,14 @@ class NoSuchMapError(RefusedError):
 
 
 class NoServerError(CommandError):
-    """Nobody is there who would answer."""
+    """No server answers."""
 
     exit_code = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What was asked for, as the user knows it.
+    """The subject of a request, as the user knows it.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Asked:
     files: tuple[str, ...] = ()
 
     def place(self, pointer: str) -> str:
-        """Return what the user calls a place in the request."""
+        """Return the user's name for a place in the request."""
         if not self.files:
             return pointer
         first, _, rest = pointer.removeprefix("/").partition("/")

@@ -1,4 +1,4 @@
-"""Whose poses are told of a log: the robot's where it is known how its laser is mounted, else the laser's."""
+"""Frame of the poses of a log: the robot's if the mount of its laser is known, else the laser's."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .errors import RefusedError
 if TYPE_CHECKING:
     from formats import LoggedScan
 
-ROBOT = "base_link"  # what a robot is called whose mount is given
+ROBOT = "base_link"  # name of the robot's frame where the user sets the mount
 
 
 @dataclass(slots=True)
@@ -23,13 +23,13 @@ class Frames:
     Attributes
     ----------
     given : RigidTransform or None
-        base_from_laser, as the user says; goes before what the log says.
+        base_from_laser, as the user states it; goes before the mount in the log.
     name : str
-        Of the frame whose poses are told; empty before the first.
+        Of the frame whose poses are reported; empty before the first.
     of_laser : bool
-        Whether that is the laser's.
+        True when that is the laser's.
     told : str
-        Whose poses are told and why, for people.
+        The frame whose poses are reported and the reason, for people.
     """
 
     given: RigidTransform | None

@@ -57,7 +57,7 @@ def json_of(data: bytes) -> Any:
 
 
 def read_json(name: str) -> Any:
-    """Return what a file of JSON holds; ``-`` reads it from stdin.
+    """Return the content of a file of JSON; ``-`` reads it from stdin.
 
     Raises
     ------

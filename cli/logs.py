@@ -81,7 +81,7 @@ def spread(found: Sequence[T], most: int) -> list[T]:
 
 
 def print_notes(log: Log, where: TextIO) -> None:
-    """Print what was assumed of a log, and what was left out."""
+    """Print the assumptions about a log, and its parts that were left out."""
     for kind in ("assumed", "dropped"):
         for note in getattr(log.report, kind):
             print(f"{kind:10}{plain(noted(asdict(note)))}", file=where)

@@ -17,7 +17,7 @@ from .contract import Json
 
 
 def print_json(answer: Any) -> None:
-    """Print one document in one line, without what a terminal would obey."""
+    """Print one document in one line, without control characters for a terminal."""
     sys.stdout.write(escaped(encode(answer).decode()) + "\n")
 
 
@@ -27,7 +27,7 @@ def console() -> Console:
 
 
 def plain(text: object) -> Text:
-    """Return what a file or a server said, without what a terminal would obey."""
+    """Return text of a file or a server without control characters for a terminal."""
     return Text("".join(letter if letter.isprintable() else "?" for letter in str(text)))
 
 
@@ -40,7 +40,7 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
 
 
 def noted(note: Json) -> str:
-    """Return what an import or a log said of itself."""
+    """Return the text of a note of an import or a log, with its count."""
     return f"{note['message']} ({note['count']})" if note["count"] else str(note["message"])
 
 
@@ -56,14 +56,14 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 
 def shown(value: object) -> str:
-    """Return a cell's text; what is not there is a dash."""
+    """Return a cell's text; a missing value is a dash."""
     if value is None:
         return "-"
     return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
 def verdict_rows(answer: Json) -> list[tuple[str, str]]:
-    """Return what a person wants to know of a pose that was found, or was not."""
+    """Return the rows that show a person whether a pose was found, and which."""
     usable = "usable" if answer["usable"] else "not usable"
     told = f"{answer['status']}, {usable}"
     if answer.get("probability") is not None:

@@ -61,7 +61,7 @@ class Tally:
 
     @property
     def count(self) -> int:
-        """How many scans there were."""
+        """The number of scans so far."""
         return sum(self.verdicts.values())
 
     def take(self, stamp_ns: int, found: Found | CommandError) -> None:

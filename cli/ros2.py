@@ -47,7 +47,7 @@ def _read_params(context: typer.Context, file: Path | None) -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class MapSource:
-    """Where the map comes from, as options."""
+    """The source of the map, as options."""
 
     on: Annotated[
         str | None,
@@ -60,7 +60,7 @@ class MapSource:
 
 @dataclass(frozen=True, slots=True)
 class ScanSources:
-    """Where scans and odometry come from, as options."""
+    """The sources of scans and odometry, as options."""
 
     scan: Annotated[
         list[str] | None, typer.Option(metavar="TOPIC", help="Topic of scans; repeat for more scanners. Default: scan.")
@@ -83,7 +83,7 @@ class ScanSources:
 
 @dataclass(frozen=True, slots=True)
 class RobotNames:
-    """How topics and frames of the robot are named, as options."""
+    """The names of the robot's topics and frames, as options."""
 
     base: Annotated[str, typer.Option(metavar="FRAME", help="The base frame of the robot.")] = "base_link"
     odom_frame: Annotated[
@@ -100,7 +100,7 @@ class RobotNames:
 
 @dataclass(frozen=True, slots=True)
 class Publishing:
-    """What is published and when, as options."""
+    """The times and contents of publishing, as options."""
 
     agree: Annotated[
         int,

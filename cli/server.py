@@ -1,4 +1,4 @@
-"""Answers of a server, asked by ``linefix-client``."""
+"""Answers of a server to requests of ``linefix-client``."""
 
 from __future__ import annotations
 

@@ -12,10 +12,10 @@ from registration import RigidTransform
 
 from .locators import Found
 
-# What odometry is trusted with, as standard deviations: at rest, for each metre driven, for each radian turned.
+# Assumed accuracy of odometry, as standard deviations: at rest, for each metre driven, for each radian turned.
 METRES, METRES_A_METRE = 0.1, 0.1
 RADIANS, RADIANS_A_METRE, RADIANS_A_RADIAN = 0.05, 0.02, 0.1
-LOST = 5.0  # m; a prior that says less than this is none
+LOST = 5.0  # m; a prior wider than this is dropped
 
 
 @dataclass(slots=True)
@@ -33,7 +33,7 @@ class Tracker:
     _turned: float = 0.0
 
     def prior(self, odometry: RigidTransform | None) -> SoftPrior | None:
-        """Return what is known of the pose of the next scan, None where nothing is.
+        """Return the prior of the next scan's pose, None without one.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class Tracker:
         return SoftPrior(here, np.diag([sigma**2, sigma**2, angle**2]))
 
     def learn(self, found: Found, odometry: RigidTransform | None) -> None:
-        """Take up what came of that scan."""
+        """Update the last usable pose with the answer to that scan."""
         if "prior_contradicted" in found.warnings:
             self._pose = None
         elif found.usable:

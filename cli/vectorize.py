@@ -53,7 +53,7 @@ def vectorize(
 
 
 def _scan_of(told: Json, answer: Json) -> Json:
-    """Return the segments as a scan, with what was said of it."""
+    """Return the segments as a scan, with the frame, stamp and viewpoint of the input."""
     kept: Json = {name: told[name] for name in ("frame_id", "stamp", "viewpoint") if name in told}
     found = {name: answer[name] for name in ("segments", "point_counts", "centroids", "spreads")}
     return {**kept, **found, "sigma": answer["sigmas"]}

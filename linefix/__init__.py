@@ -7,8 +7,8 @@
 >>> answer.usable
 True
 
-Metres, radians, counter-clockwise. The packages beside this one hold everything; what is named here is what most
-programs need. What reads and writes files comes with the extra ``linefix[formats]``.
+Metres, radians, counter-clockwise. The packages next to this one hold everything; this one names the parts that most
+programs need. The readers and writers of files come with the extra ``linefix[formats]``.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Bring in what reads and writes files when it is first asked for: its libraries may be missing."""
+    """Import the readers and writers of files on first use: their libraries may be missing."""
     if name not in _OF_FORMATS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

@@ -153,7 +153,7 @@ class Included:
     Attributes
     ----------
     parts : frozenset of str
-        Names of the parts that are asked for, as in ``include``.
+        Names of the requested parts, as in ``include``.
     frame_id, child_frame_id : str
         Of the map and of the scan.
     stamp : JSON
@@ -174,7 +174,7 @@ class Included:
 
 
 def association_json(result: AssociationResult, included: Included) -> Json:
-    """Return the answer of a search, without the parts that are not asked for."""
+    """Return the answer of a search as JSON, with the parts that are included."""
     named, parts = _Names(included.starts), included.parts
     diagnostics = result.diagnostics
     search = result.search

@@ -1,4 +1,4 @@
-"""Checking a map: by itself, and with sample scans."""
+"""Checking a map: without scans, and with sample scans."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from registration import RigidTransform
 
 @dataclass(frozen=True, slots=True)
 class CheckedMap:
-    """What is doubtful in a map, by itself and with sample scans.
+    """The doubtful parts of a map, found without scans and with sample scans.
 
     Attributes
     ----------
     found : MapCheck
-        Of the map by itself.
+        Of the map without scans.
     samples : tuple of Sample or None
         Of each scan; None where there was no time for it.
     report : SampleReport or None
-        What the samples show together; None without samples.
+        The conclusion from all samples; None without samples.
     complete : bool
         False when the deadline ended a part of it.
     """
@@ -53,7 +53,7 @@ def check(
     *,
     oriented: bool = True,
 ) -> CheckedMap:
-    """Check a map by itself, and, with sample scans, whether these fit better mirrored, scaled, moved or undirected.
+    """Check a map, and, with sample scans, whether these fit better mirrored, scaled, moved or undirected.
 
     Parameters
     ----------
@@ -62,10 +62,10 @@ def check(
     scans : sequence of Scan
         Taken in the map.
     poses : sequence of RigidTransform or None, optional
-        Where each scan was taken, as the sender believes, map_from_scan.
+        Pose of each scan as the sender states it, map_from_scan.
     deadline : Deadline, optional
     oriented : bool
-        Whether the map states that directions mean something.
+        True when the map states that directions mean something.
 
     Raises
     ------

@@ -55,13 +55,13 @@ def locate(
     -------
     AssociationResult
         Its `usable` is the one flag to gate on; `pose` is map_from_scan. Of a `MountedScan` it is that of the robot at
-        the first beam, map_from_base, where the mount is known, else that of the sensor. Where a scan took time and
-        its motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation).
+        the first beam, map_from_base, if the mount is known, else that of the sensor. If a scan took time and its
+        motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation).
 
     Raises
     ------
     InputError
-        When map, scan or options are not what is taken; the message names the argument.
+        When map, scan or options are not valid; the message names the argument.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     Parameters
     ----------
     map : MapIndex, LineMap, ImportedMap, Segments, mapping, or array-like of shape (n, 4)
-        An index is returned as it is. Nothing is known of the error of bare segments: each answer estimates it. A
+        An index is returned as it is. The error of bare segments is not known: each answer estimates it. A
         mapping is a map document as in a map file: ``segments``, and optionally ``sigma`` and ``oriented``.
 
     Raises
@@ -111,7 +111,7 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
         return map
     if isinstance(map, Mapping):
         return _index_document(map)
-    inner: Any = getattr(map, "map", map)  # what was imported comes with a report
+    inner: Any = getattr(map, "map", map)  # an imported map comes with a report
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):
         return MapIndex.build(segments, inner.sigma, oriented=inner.oriented)
@@ -137,7 +137,7 @@ def _index_document(document: Mapping[str, Any]) -> MapIndex:
 def scan_of(
     scan: Scan | MountedScan | LaserScan | Segments | ArrayLike, angles: tuple[float, float] | None = None
 ) -> Scan:
-    """Return a scan as the search takes it; ranges stay evidence beside the segments that are found in them.
+    """Return a scan as the search takes it; ranges stay evidence in addition to the segments that are found in them.
 
     Parameters
     ----------

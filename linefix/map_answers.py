@@ -31,12 +31,12 @@ def map_json(line_map: LineMap) -> Json:
 
 
 def import_json(imported: ImportedMap, found: MapCheck) -> Json:
-    """Return the answer of an import: the map, what was made of its files, and what is doubtful in it."""
+    """Return the answer of an import: the map, the report of its files, and its doubtful parts."""
     return {"map": map_json(imported.map), "report": asdict(imported.report), "check": check_json(found)}
 
 
 def check_json(found: MapCheck) -> Json:
-    """Return a check of a map by itself."""
+    """Return the check of a map without scans as JSON."""
     return {
         "findings": [_finding_json(one) for one in found.findings],
         "size": {name: getattr(found.size, name) for name in ("segment_count", "walls", "length", "diagonal")},

@@ -68,7 +68,7 @@ class RangeScan:
 
 
 def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: float | None = None) -> View:
-    """Return what a mounted scanner saw, in the frame of the robot; of the sensor where its mount is not known.
+    """Return the view of a mounted scanner, in the frame of the robot; of the sensor where its mount is not known.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     Returns
     -------
     View
-        Several of them, put together by `assemble`, are one scan. Where the scanner's motion during the scan is not
+        Several of them, put together by `assemble`, are one scan. If the scanner's motion during the scan is not
         known, it has the covariance and the warning for that.
 
     Raises
@@ -111,7 +111,7 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
 
 
 def _motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
-    """Return what is not known of where a scanner was because it moved during the scan; None where its motion is known.
+    """Return the covariance of a scanner's place from its motion during the scan; None where the motion is known.
 
     On average the beams are taken half the duration after the first one. A robot moves by ``v`` and ``omega``
     meanwhile, and a sensor at ``r`` by ``v + omega x r``.

@@ -1,7 +1,7 @@
-"""What is doubtful in a map, and where on it a robot would fail to localize.
+"""Quality of a map: its doubtful parts, and the poses at which a robot would fail to localize.
 
-`check` looks at a map by itself and with sample scans taken in it; `analyze` puts a virtual scanner on a grid of poses
-and searches each of its scans in the map. Both call the search as a program would; a finding never changes an answer.
+`check` examines a map alone and with sample scans taken in it. `analyze` puts a virtual scanner on a grid of poses and
+searches each of its scans in the map. Both call the search as a program would; a finding never changes an answer.
 """
 
 from .analyze.analyze import Analysis, PlaceVerdict

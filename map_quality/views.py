@@ -14,7 +14,7 @@ from simulation import Scanner, scan
 from vectorization import LaserScan, VectorizationOptions, vectorize
 
 MOST_BEAMS = 20_000
-LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # m; what a search takes for the sigma of ranges
+LEAST_SIGMA, MOST_SIGMA = 1e-6, 10.0  # m; accepted values of the sigma of ranges
 ALL_ROUND = math.tau - 0.01  # rad; a full turn, and what people write for one
 HEADINGS = 4  # of a scanner that does not see all round, from each place
 SAME_PLACE, SAME_HEADING = 0.5, 0.5  # m, rad; a pose that is nearer to another one is the same

@@ -15,7 +15,7 @@
     locating          one scan to the robot's pose
     searching         the thread of the searches
     map_conversion    an OccupancyGrid to a map, in a process of its own
-    localization      results of scans to what is published of the pose
+    localization      results of scans to the published poses
     agreement         several scans that agree through odometry
     deciding          when initialpose is published
     watching          whether the localizer of the robot agrees

@@ -63,7 +63,7 @@ class Observation:
     others : sequence of RigidTransform
         Other poses, map_from_base, that explain the scan.
     conclusive : bool
-        Whether every pose that explains the scan about as well is `pose` or one of `others`.
+        True when every pose that explains the scan about as well is `pose` or one of `others`.
     """
 
     stamp: int
@@ -76,11 +76,11 @@ class Observation:
 
 
 class Event(StrEnum):
-    """What an observation changes."""
+    """The change that an observation makes."""
 
     NOTHING = "nothing"
     AGREED = "agreed"  # another hypothesis is agreed now
-    CONFIRMED = "confirmed"  # the agreed hypothesis is supported once more
+    CONFIRMED = "confirmed"  # the agreed hypothesis is supported again
     CONTRADICTED = "contradicted"  # the observation speaks against the agreed hypothesis
 
 
@@ -125,7 +125,7 @@ class Agreement:
     Attributes
     ----------
     needed : int
-        Scans that have to agree; 1: each usable scan is agreed by itself.
+        Scans that have to agree; 1: each usable scan is agreed alone.
     """
 
     needed: int = 3
@@ -141,7 +141,7 @@ class Agreement:
 
     @property
     def contradicted(self) -> bool:
-        """Whether something spoke against the agreed hypothesis since it was last supported."""
+        """Return whether a scan contradicted the agreed hypothesis since it was last supported."""
         return self._contradicted
 
     @property

@@ -41,14 +41,14 @@ def domain_of(environment: Mapping[str, str]) -> int:
 
 
 def configuration_of(environment: Mapping[str, str]) -> str:
-    """Return the configuration of Cyclone DDS that the variables of ROS ask for; ``CYCLONEDDS_URI`` comes after it.
+    """Return the configuration of Cyclone DDS for the variables of ROS; ``CYCLONEDDS_URI`` comes after it.
 
     ``ROS_LOCALHOST_ONLY=1`` counts before ``ROS_AUTOMATIC_DISCOVERY_RANGE``, as in ROS.
 
     Raises
     ------
     ConnectionRefusedError
-        When a variable has a value that ROS does not know.
+        When a variable has a value that ROS does not define.
     """
     local, discovery = environment.get("ROS_LOCALHOST_ONLY", ""), environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     if local not in ("", "0", "1"):

@@ -25,7 +25,7 @@ class InitialPose:
 
     @property
     def wanted(self) -> bool:
-        """Whether the next agreed pose is published unless the localizer has it already."""
+        """Return whether the next agreed pose is published unless the localizer has it already."""
         return self._wanted
 
     def want(self) -> None:
@@ -40,9 +40,9 @@ class InitialPose:
         event : Event
             Of the scan.
         localizer_agrees : bool or None
-            Whether the localizer has this pose; None: not known.
+            True when the localizer has this pose; None: not known.
         lost : bool
-            Whether it has had another one for some scans.
+            True when it has had another one for some scans.
         now : float
             `time.monotonic()`, seconds.
         """
@@ -54,7 +54,7 @@ class InitialPose:
         if self._wanted:
             return "agreed"
         if event is Event.AGREED and self._published:
-            return "corrected"  # what was published before is contradicted
+            return "corrected"  # the pose published before is contradicted
         since = LOST_SECONDS if self._at is None else now - self._at
         if lost and self.when != "start" and since >= LOST_SECONDS:
             return "lost"

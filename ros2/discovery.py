@@ -28,7 +28,7 @@ class Endpoints:
     own : sequence of Qos
         Of this participant's endpoints on the topic.
     writers : bool
-        Whether the others are writers.
+        True when the others are writers.
     """
 
     def __init__(self, participant: DomainParticipant, topic: str, own: Sequence[Qos], *, writers: bool) -> None:
@@ -43,7 +43,7 @@ class Endpoints:
 
     @property
     def incompatible(self) -> bool:
-        """Whether there are some whose quality of service does not fit."""
+        """Return whether there are some whose quality of service does not fit."""
         return not all(self._found().values())
 
     def _found(self) -> dict[Any, bool]:

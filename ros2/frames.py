@@ -63,7 +63,7 @@ class Frames:
         self._frames: OrderedDict[str, _Frame] = OrderedDict()
 
     def take(self, message: TFMessage, *, static: bool, prefix: str = "") -> list[str]:
-        """Add the transforms of a message, each by itself; only those of frames that begin with a prefix.
+        """Add the transforms of a message, one by one; only those of frames that begin with a prefix.
 
         Returns
         -------

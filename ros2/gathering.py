@@ -24,7 +24,7 @@ class Gathering:
     Attributes
     ----------
     topics : int
-        How many.
+        Number of topics.
     seconds : float
         Scans that are taken no farther apart are answered together; as long it is waited for the others.
     """

@@ -1,4 +1,4 @@
-"""What the node reports about itself: diagnostics, status, and lines of a log."""
+"""Reports of the node about itself: diagnostics, status, and lines of a log."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def current_time() -> Time:
 
 @dataclass(slots=True)
 class Health:
-    """Publishes what the node reports.
+    """Publishes the node's reports.
 
     Attributes
     ----------

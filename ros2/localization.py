@@ -1,4 +1,4 @@
-"""From the results of scans to what is published of the robot's pose: ``initialpose``, agreed poses, the transform."""
+"""From the results of scans to the published poses of the robot: ``initialpose``, agreed poses, the transform."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Localization:
     health : Health
     frames : Frames
     odometry : OdometryHistory
-        Both are kept by the node.
+        The node owns both.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class Localization:
         self._topics.tf.publish(transform_of(Time(ahead // NS, ahead % NS), frames, map_from_odom))
 
     def state(self, *, searched: bool) -> State:
-        """Return what is known of the pose; `searched` is whether the last scans could be searched."""
+        """Return the state of the pose; `searched` is whether the last scans could be searched."""
         if self._agreement.latest is None:
             return State.SEARCHING if searched else State.NO_SCAN
         if self._agreement.contradicted:

@@ -52,7 +52,7 @@ class Located:
 
     @property
     def _conclusive(self) -> bool:
-        """Whether each pose that explains the scan about as well is listed."""
+        """Return whether each pose that explains the scan about as well is listed."""
         answer = self.answer
         if answer.status not in (linefix.Status.OK, linefix.Status.AMBIGUOUS) or answer.diagnostics is None:
             return False

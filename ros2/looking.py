@@ -1,4 +1,4 @@
-"""A message and the mount of its scanner to what the search takes; what is wrong with either is noted."""
+"""A message and the mount of its scanner to the input of the search; errors of either are noted."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Look:
         base_from_laser.
     flipped : bool
     base_from_then : RigidTransform
-        Where the robot was at that time, as seen from where it was at the time that is asked about.
+        The robot's pose at that time, in the frame of its base at the requested time.
     notes : mapping of str to str
         By code, what is wrong with the scan.
     """

@@ -11,7 +11,7 @@ _TOPIC = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 class OptionError(ValueError):
-    """An option cannot be used; the message names it, what was found, and what was expected."""
+    """An option cannot be used; the message names it, the value found, and the value expected."""
 
 
 def quoted(name: str) -> str:

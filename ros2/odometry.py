@@ -61,7 +61,7 @@ class OdometryHistory:
         message : Odometry
             Of its child frame, twist as well.
         child_from_base : RigidTransform
-            Where the base frame is in the child frame.
+            Pose of the base frame in the child frame.
 
         Raises
         ------

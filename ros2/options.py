@@ -23,7 +23,7 @@ class NodeOptions:
     scans : tuple of str
         Topics of scans.
     together_s : float
-        Seconds; scans of several topics that are taken no farther apart are searched as one. 0: each by itself.
+        Seconds; scans of several topics that are taken no farther apart are searched as one. 0: each separately.
     odometry : str
         Topic of odometry: the motion of the robot between scans, and during each.
     motion : bool
@@ -40,7 +40,7 @@ class NodeOptions:
     frame_prefix : str
         That all frames of the robot begin with, such as ``robot1/``.
     agree : int
-        Scans that have to agree before a pose is published; 1: each usable scan by itself.
+        Scans that have to agree before a pose is published; 1: each usable scan alone.
     when : "start", "lost" or "always"
         When ``initialpose`` is published: at the start, on request and for new subscribers; also when the localizer of
         the robot disagrees; or for each scan that confirms the pose.

@@ -13,7 +13,7 @@ from .wire import Subscription
 
 
 class Silence:
-    """Looks once in `SILENT_SECONDS` for what is missing.
+    """Looks once in `SILENT_SECONDS` for missing input.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Silence:
         self._searched = time.monotonic()
 
     def look(self, *, has_map: bool) -> None:
-        """Log what is missing."""
+        """Log missing input."""
         now = time.monotonic()
         if now - self._looked < SILENT_SECONDS:
             return

@@ -1,4 +1,4 @@
-"""The topics of the node: what it subscribes to, and what it publishes."""
+"""The topics of the node: its subscriptions and its publications."""
 
 from __future__ import annotations
 

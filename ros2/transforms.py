@@ -27,14 +27,14 @@ class FrameError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where a laser is mounted on the robot.
+    """The mount of a laser on the robot.
 
     Attributes
     ----------
     base_from_laser : RigidTransform
         In the plane.
     flipped : bool
-        Whether the laser is mounted upside down.
+        True when the laser is mounted upside down.
     tilt : float
         Radians between the scan plane and the horizontal plane of the base frame.
     """
@@ -45,7 +45,7 @@ class Mount:
 
     @property
     def level(self) -> bool:
-        """Whether the tilt is too small to matter."""
+        """Return whether the tilt is too small to matter."""
         return self.tilt <= LEVEL_TILT
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-# What is read of messages from outside. More is refused, never cut.
+# Limits of messages from outside. The node refuses more, and never cuts.
 MAX_TRANSFORMS = 2_000  # of one message; a humanoid robot has some 200
 MAX_FRAMES = 5_000  # that are stored, some 2 KB each
 TRANSFORMS_KEPT = 200  # of a moving frame: 2 s at 100 Hz
@@ -13,12 +13,12 @@ MAX_MOUNT = 100.0  # m from the base to a laser; the longest vehicles with laser
 MAX_GRID_BYTES = 64 * 2**20  # of an OccupancyGrid: 64 million cells
 MAX_SPEED = 100.0  # m/s
 MAX_TURN_RATE = 100.0  # rad/s
-QUATERNION_TOLERANCE = 0.1  # of the length; tf2 refuses what is farther from 1 than 0.01
+QUATERNION_TOLERANCE = 0.1  # of the length; tf2 refuses lengths farther from 1 than 0.01
 LEVEL_TILT = math.radians(2.0)  # below this, ranges are less than 0.1 % too long
 STALE_NS = 500_000_000  # ns; a moving transform is not used this long after its last value
 CLOCK_BACK_NS = 1_000_000_000  # ns; stamps that jump back by more are those of a clock that was set back
 
-# What takes time.
+# Times of work.
 CONVERSION_SECONDS = 60.0  # s of a core for a grid: the slowest public plan takes 4 s, noise some minutes
 CONVERSION_PATIENCE = 300.0  # s, where others are at work on the cores
 CONVERSION_IDLE = 60.0  # s after which the process of conversions ends; it holds some 200 MB
@@ -44,7 +44,7 @@ FORGOTTEN_NS = 60_000_000_000  # ns after which a hypothesis without support is 
 MAX_HYPOTHESES = 20
 INCONCLUSIVE_NATS = 10.0  # a scan decides only if poses that are not listed score lower by at least this
 
-# What is published, and when.
+# Limits and times of publishing.
 LOCALIZER_SIGMA = 0.1  # m; how far a localizer that is right may be off besides its own covariance,
 LOCALIZER_SIGMA_THETA = math.radians(3.0)  # rad
 MAX_COVARIANCE = 1e6  # m^2, rad^2

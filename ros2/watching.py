@@ -1,4 +1,4 @@
-"""Whether the localizer of the robot, such as AMCL, has the robot where the scans find it."""
+"""Comparison of the pose of the robot's localizer, such as AMCL, with the pose that the scans give."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Watch:
 
     @property
     def lost(self) -> bool:
-        """Whether the localizer disagreed with the last scans that confirmed the pose."""
+        """Return whether the localizer disagreed with the last scans that confirmed the pose."""
         return self._against >= LOST_SCANS
 
     def reset(self) -> None:

@@ -25,7 +25,7 @@ MOST = 200  # messages that are taken from a reader at a time
 SENSOR = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(1))
 # For streams of which each message counts, though some may be lost.
 STREAM = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(100))
-# For what is published once and holds, also for subscribers that come later: maps and mounts.
+# For messages that are published once and hold, also for subscribers that come later: maps and mounts.
 LATCHED = Qos(
     Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal, Policy.History.KeepLast(10)
 )
@@ -84,12 +84,12 @@ class Subscription(Generic[Message]):
 
     @property
     def publishers(self) -> int:
-        """How many publishers are connected."""
+        """The number of publishers that are connected."""
         return len(self._writers.connected)
 
     @property
     def incompatible(self) -> bool:
-        """Whether there are publishers whose quality of service fits none of the readers."""
+        """Return whether there are publishers whose quality of service fits none of the readers."""
         return self._writers.incompatible
 
     def _taken(self, reader: Any) -> list[Message]:
@@ -125,12 +125,12 @@ class Publisher(Generic[Message]):
 
     @property
     def incompatible(self) -> bool:
-        """Whether there are subscribers whose quality of service does not fit."""
+        """Return whether there are subscribers whose quality of service does not fit."""
         return self._readers.incompatible
 
     @property
     def subscribed(self) -> bool:
-        """Whether there is a subscriber."""
+        """Return whether there is a subscriber."""
         return bool(self._readers.connected)
 
     def joined(self) -> bool:

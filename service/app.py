@@ -53,7 +53,7 @@ LEAST_IMPORT_BYTES = 400_000_000  # as of the setting; with less the libraries t
 FIRST_KEYS_SECONDS = (
     12.0  # that a start waits for the issuer's keys: as long as a fetch of them may take, and some more
 )
-PROGRESS_SECONDS = 5.0  # between two lines that say how far compiling is
+PROGRESS_SECONDS = 5.0  # between two log lines with the progress of compiling
 INDEXING_NICE = 5  # searches go before it, at three times as much of a core that both want
 
 
@@ -135,7 +135,7 @@ def _services(settings: Settings, part: Part) -> Services:
         readiness=readiness,
         entrance=Entrance(gate, keyring, origins, settings.max_body_bytes),
         gate=gate,
-        # How many wait there is bounded by their bytes.
+        # The number that waits there is bounded by their bytes.
         parsing=Gate(1, settings.max_connections, "parsing", long_per_slot=0),
         parsing_apart=Gate(1, settings.max_connections, "parsing-apart", long_per_slot=0),
         indexing=indexing,
@@ -163,7 +163,7 @@ def _services(settings: Settings, part: Part) -> Services:
 
 
 def _keyring(settings: Settings) -> Keyring:
-    """Return who is let in."""
+    """Return the keyring that the settings describe."""
     file = None if settings.keys_file is None else KeyFile(settings.keys_file)
     if settings.issuer is None:
         return Keyring(settings.keys, file)
@@ -215,7 +215,7 @@ async def _prepare(services: Services) -> None:
     try:
         await services.probe.open()
     except StoreError as error:
-        # readyz goes on trying; meanwhile it says what is wrong.
+        # readyz goes on trying; meanwhile it reports the error.
         where = services.settings.url.render_as_string(hide_password=True)
         logger.error("the store does not open: %s", error, extra={"store": where})
     threads, parser = services.parse_threads, services.parser
@@ -223,8 +223,8 @@ async def _prepare(services: Services) -> None:
     if not is_complete():
         await _compile(services)
     await asyncio.gather(threads.run(warm_up), threads.run(parser.start), _fetch_first_keys(services))
-    # What was made until now lives as long as the process: the garbage collector need not look through it, ever. It has
-    # been off since the process began, which saves a fifth of the start; hardly anything of what it left is garbage.
+    # Objects made until now live as long as the process: the garbage collector need not look through them, ever. It has
+    # been off since the process began, which saves a fifth of the start; hardly any of these objects is garbage.
     gc.freeze()
     gc.enable()
     services.readiness.warm = True
@@ -240,12 +240,12 @@ async def _fetch_first_keys(services: Services) -> None:
 
 
 async def _compile(services: Services) -> None:
-    """Compile the kernels in a process that ends with it, and say how far it is."""
+    """Compile the kernels in a process that ends with it, and log the progress."""
     logger.info("compiling the kernels, which takes about a minute; later starts load them from the cache")
     services.readiness.compiled = compiled_fraction
     logging_progress = asyncio.create_task(_log_progress())
     try:
-        with suppress(ParserEndedError):  # if that process ends early this one compiles what is missing
+        with suppress(ParserEndedError):  # if that process ends early, this one compiles the missing kernels
             await services.parse_threads.run(partial(services.parser.call, compile_kernels))
     finally:
         logging_progress.cancel()

@@ -1,6 +1,6 @@
 """Request documents to what `linefix` takes: the part of the service that the command line checks its files with.
 
-It loads neither HTTP nor a database. What refuses a document names its place by a JSON pointer.
+It loads neither HTTP nor a database. An error that rejects a document names its place by a JSON pointer.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Where the maps are kept: the database that an operator names, and the file of one of SQLite's.
+"""Location of the stored maps: the database that an operator names, and the file of an SQLite database.
 
-Light to import: the supervisor of the workers asks, too.
+Light to import: the supervisor of the workers uses it, too.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def database_url(text: str) -> URL:
 
 
 def file_of(url: URL) -> Path | None:
-    """Return the file that a database is kept in; None where it is in no file of its own, or the URL says how."""
+    """Return the file of a database; None where it has no file of its own, or the URL opens it as a URI."""
     if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:" or "uri" in url.query:
         return None
     return Path(url.database).absolute()
@@ -54,7 +54,7 @@ def make_file(path: Path) -> None:
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     for made in missing:
         _sync(made.parent)
-    # What SQLite puts beside it later has the same permissions.
+    # Files that SQLite later puts next to it have the same permissions.
     os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
     _sync(folder)
 

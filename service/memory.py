@@ -10,11 +10,11 @@ _LARGE = 1 << 20  # bytes
 
 
 def return_large_blocks() -> None:
-    """Have every large block mapped by itself, so that the system has it back when it is freed; glibc only.
+    """Have every large block mapped separately, so that the system has it back when it is freed; glibc only.
 
-    By itself glibc stops doing so with the first large block that is freed, and keeps the heap that they then lie in:
-    three times the memory after some maps of 16 MB. And each thread would get a heap of its own, with its own holes: of
-    two there is always one free, since what allocates much holds Python's lock.
+    Otherwise glibc stops this with the first large block that is freed, and keeps the heap that they then lie in. That
+    takes three times the memory after some maps of 16 MB. And each thread would get a heap of its own, with its own
+    holes. Of two heaps there is always one free, since a thread that allocates much holds Python's lock.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:

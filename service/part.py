@@ -13,7 +13,7 @@ class Part:
     ----------
     index, of : int
     replaces : bool
-        Whether it stands in for one that has died.
+        True when it replaces a process that has died.
     """
 
     index: int = 0
@@ -22,12 +22,12 @@ class Part:
 
     @property
     def is_first(self) -> bool:
-        """Whether it may make what has to be there once; the others come to what is there."""
+        """Return whether it may make the objects that exist once; the other processes use the existing ones."""
         return self.index == 0 and not self.replaces
 
     @property
     def opens_late(self) -> bool:
-        """Whether it takes connections only when it is ready: others take them meanwhile, or the first says why not.
+        """Return whether it opens its port only when ready: others serve meanwhile, or the first reports why not.
 
         A service is ready as soon as one of its processes is. No other may take a request that it has to refuse.
         """

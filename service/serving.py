@@ -18,7 +18,7 @@ logger = logging.getLogger("linefix")
 # One search runs per core already: a second layer of threads in numpy's libraries would only get in its way. They read
 # this when they are loaded, so before anything imports numpy.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-# What a disk may be mended of while the service runs, and says that it is not ready.
+# Failures of a disk that can be repaired while the service runs and reports that it is not ready.
 AILING_DISK = (errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EIO)
 # Read by compiled.cache and by `cli`, which are not loaded here for these names.
 NO_SETTINGS = ("LINEFIX_KERNELS", "LINEFIX_KEY")
@@ -69,7 +69,7 @@ def run(settings: Settings) -> int:
 def cannot_keep_maps(settings: Settings) -> str | None:
     """Make the file of the maps where there is none; return why that will never do, None where it does or may yet.
 
-    Running all the same the service would never be ready, and only its log would say why.
+    If it ran all the same, the service would never be ready, and only its log would show the reason.
     """
     from .database_location import file_of, make_file
 

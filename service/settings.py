@@ -23,7 +23,7 @@ from .schemas.limits import Limits
 
 Finite = Annotated[float, AllowInfNan(False)]
 HELP = "Start the service. Each option may also be set in the environment, as LINEFIX_ and its name: LINEFIX_PORT=8001."
-# What the help calls the values of settings that are no numbers, and defaults that are found when the service starts.
+# Value names in the help for settings that are no numbers, and for defaults that are found when the service starts.
 _METAVARS = {
     "host": "ADDRESS",
     "data_dir": "DIRECTORY",
@@ -207,19 +207,19 @@ class Settings(BaseSettings):
 
     @property
     def guarded(self) -> bool:
-        """Whether it asks for keys."""
+        """Return whether the service requires keys."""
         return bool(self.keys) or self.keys_file is not None or self.jwt_issuer is not None
 
     @property
     def issuer(self) -> Issuer | None:
-        """Whose tokens are taken."""
+        """The issuer whose tokens are accepted."""
         if self.jwt_issuer is None or self.jwt_audience is None or self.jwt_keys is None:
             return None
         return Issuer(self.jwt_issuer, self.jwt_audience, self.jwt_keys, self.jwt_algorithms, self.jwt_leeway_s)
 
     @property
     def url(self) -> URL:
-        """Where the store is."""
+        """The URL of the store."""
         if self.database_url is not None:
             return database_url(self.database_url.get_secret_value())
         return URL.create("sqlite", database=str(self.data_dir / "maps.sqlite3"))
@@ -284,7 +284,7 @@ def read_settings(arguments: Sequence[str]) -> Settings:
 
 
 def _require_usable_keys(settings: Settings) -> None:
-    """Refuse keys that could not be checked later: a start is when somebody looks."""
+    """Refuse keys that could not be checked later: an operator reads the errors of a start."""
     if settings.keys_file is not None:
         try:
             read_keys(settings.keys_file)
@@ -302,12 +302,12 @@ def _require_usable_keys(settings: Settings) -> None:
 
 
 def _require_usable_certificate(settings: Settings) -> None:
-    """Refuse a certificate that nobody could be shown."""
+    """Refuse a certificate that cannot be loaded with its key."""
     if (settings.tls_cert is None) != (settings.tls_key is None):
         raise SettingsError("tls_cert, tls_key: expected both or neither")
     if settings.tls_cert is not None:
         try:
-            # Without an answer to that the start would wait for somebody to type one.
+            # Without a callback the start would wait for a password to be typed.
             ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(settings.tls_cert, settings.tls_key, lambda: "")
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) and error.strerror else "no such certificate and key"

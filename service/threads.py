@@ -25,7 +25,7 @@ class Threads:
         self._executor = ThreadPoolExecutor(count, thread_name_prefix=name)
 
     async def run(self, call: Callable[[], T]) -> T:
-        """Return what a call returns in one of the threads."""
+        """Return the result of a call in one of the threads."""
         return await asyncio.get_running_loop().run_in_executor(self._executor, call)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A building on another day than that of its map: things moved or gone, doors, and what no map knows."""
+"""A building on another day than that of its map: things moved or gone, doors, and objects that are in no map."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ def _wrong_step(scanner: Scanner, rng: np.random.Generator) -> Scanner:
 
 
 def _turning(scanner: Scanner, rng: np.random.Generator) -> Scanner:
-    """Let the laser sweep more or less than it says, for it turns with its robot; the pose is that of mid-sweep."""
+    """Let the laser sweep more or less than declared, for it turns with its robot; the pose is that of mid-sweep."""
     share = 1.0 + _sign(rng) * TURNING * SWEEP / math.tau
     return replace(scanner, angle_min=scanner.angle_min * share, angle_increment=scanner.angle_increment * share)
 

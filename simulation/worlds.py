@@ -1,4 +1,4 @@
-"""Worlds to scan: rooms with known answers, the paper's three, and boxes that no map knows.
+"""Worlds to scan: rooms with known answers, the paper's three, and boxes that are in no map.
 
 All are drawn with free space on the left of every segment: a room's outline runs counter-clockwise, an obstacle's
 clockwise. The paper (section 4, figure 5) prints no coordinates; its three are drawn here in their character on its

@@ -1,4 +1,4 @@
-"""``linefix map check``: what is doubtful in a map."""
+"""``linefix map check``: doubtful parts of a map."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ..scans import read_scan
 if TYPE_CHECKING:
     from formats import LoggedScan
 
-SAMPLES = 10  # of a log: ten from all over the building tell more than a hundred from one room
+SAMPLES = 10  # of a log: ten from all over the building give more evidence than a hundred from one room
 
 
 def check(
@@ -71,7 +71,7 @@ def samples_of(log: Path, topic: str | None, tf_namespace: str | None = None) ->
 
 
 def check_rows(found: Json) -> list[tuple[str, str]]:
-    """Return for people what was found in a map."""
+    """Return the findings of a map as text for people."""
     size = found["size"]
     rows = [("size", f"{size['walls']} walls, {size['length']:.1f} m, {size['diagonal']:.1f} m across")]
     rows += [("finding", f"{one['code']}: {one['message']}") for one in found["findings"]]

@@ -28,7 +28,7 @@ IMAGE = re.compile(r"^image:\s*[\"']?(?:.*[/\\])?([^/\\\"'#]+?)[\"']?\s*(?:#.*)?
 
 @dataclass(frozen=True, slots=True)
 class SaidOfFile:
-    """What a file does not say itself, as options."""
+    """Facts that a file does not state itself, as options."""
 
     units: Annotated[
         str | None, typer.Option(help="Unit of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
@@ -193,7 +193,7 @@ def beside_log(answer: Json, file: Path, said: SaidOfFile, log: Path) -> Json:
 
 
 def _with_what_it_names(file: Path) -> list[Path]:
-    """Return the files to send: a bag's folder whole, and beside a yaml its picture."""
+    """Return the files to send: a bag's folder whole, and in addition to a yaml its picture."""
     if file.is_dir():
         return sorted(path for path in file.iterdir() if path.is_file())
     if file.suffix.lower() not in (".yaml", ".yml"):
@@ -212,7 +212,7 @@ def _units(text: str | None) -> str | float | None:
 
 
 def report_rows(answer: Json) -> list[tuple[str, str]]:
-    """Return for people what was made of the files."""
+    """Return the report of an import as text for people."""
     report, line_map = answer["report"], answer["map"]
     directed = "free space on the left" if line_map["oriented"] else "directions mean nothing"
     rows = [

@@ -1,4 +1,4 @@
-"""``linefix map put``, ``list``, ``get``, ``rm``: maps kept by id."""
+"""``linefix map put``, ``list``, ``get``, ``rm``: maps stored by id."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Where on a map localization fails: a virtual scanner on a grid of poses, each scan searched in the map."""
+"""Places of a map where localization fails: a virtual scanner on a grid of poses, each scan searched in the map."""

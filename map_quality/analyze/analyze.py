@@ -35,11 +35,11 @@ class PlaceVerdict:
     number : int
         Of the pose in `Standing.poses`.
     pose : RigidTransform
-        Where it stands, map_from_scan.
+        The true pose, map_from_scan.
     status : Status
         Of the answer; ambiguous where that is another place, however sure the search was.
     usable : bool
-        Whether the answer was usable, and this place.
+        True when the answer was usable and is this place.
     probability : float or None
         As answered, 0 to 1; None where the position stays free along a direction.
     similar_pose : RigidTransform or None
@@ -49,11 +49,10 @@ class PlaceVerdict:
     reasons : tuple of str
         Codes of why it is not usable, the weightiest first.
     resolved_after : float or None
-        How far it drives until it knows where it is, metres, on the better of the two ways of
-        `map_quality.analyze.drive`; 0 where it knows at once, None where it does not within what was asked for, or
-        nothing was.
+        Metres until the robot's pose is resolved, on the better of the two ways of `map_quality.analyze.drive`. 0 where
+        it is resolved at once; None where it is not within the requested drive, or none was requested.
     with_landmark : PlaceVerdict or None
-        What it would know with the landmark; None where there is none, or it stands in the way.
+        The result with the landmark; None where there is none, or it stands in the way.
     """
 
     number: int
@@ -75,17 +74,17 @@ class Analysis:
     Attributes
     ----------
     index : MapIndex
-        Where scans are searched.
+        The index in which scans are searched.
     segments : Segments
-        What the scanner sees: the map as sent.
+        The segments that the scanner sees: the map as sent.
     robot : Robot
     standing : Standing
     oriented : bool
-        Whether directions mean something.
+        True when directions mean something.
     seed : int
         Of the noise.
     drive : float
-        How far the robot may drive from a place where it does not know where it is, metres; 0: not at all.
+        Longest drive of the robot from a place where its pose is not resolved, metres; 0: no drive.
     landmark : Analysis or None
         The same of a map with the landmark.
     """
@@ -140,7 +139,7 @@ class Analysis:
         return analysis if landmark is None or not len(landmark) else analysis.with_segments(landmark)
 
     def with_segments(self, landmark: Segments) -> Analysis:
-        """Return the same, which also says what would be known with more segments, on the map and in the building.
+        """Return the same analysis with a second one that has more segments, on the map and in the building.
 
         Parameters
         ----------
@@ -212,7 +211,7 @@ class Analysis:
         return None
 
     def _scan(self, pose: RigidTransform, *number: int) -> Scan:
-        """Return what the robot would send from there; the noise of a place is the same whenever it is tried."""
+        """Return the scan that the robot would send from there; the noise of a place is the same on each attempt."""
         return look(self.segments, pose, self.robot, np.random.default_rng((self.seed, *number))).scan
 
 

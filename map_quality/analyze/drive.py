@@ -15,7 +15,7 @@ from simulation import Scanner, scan
 STEP = 1.0  # m from view to view
 # Standard deviations of odometry on a step: m, m, rad. As of wheels that are not looked after.
 ODOMETRY = (0.02, 0.02, 0.02)
-CLEARANCE = 0.3  # m; what it keeps from everything ahead
+CLEARANCE = 0.3  # m; its distance from everything ahead
 RAYS = 72  # that feel for where there is room
 BESIDE = 2  # rays on either side that have to have room, too
 ANGLES = -math.pi + math.tau / RAYS * np.arange(RAYS)
@@ -37,11 +37,11 @@ def ways_from(
     segments : Segments
         The map.
     pose : RigidTransform
-        Where it begins, map_from_robot.
+        The start of the drive, map_from_robot.
     metres : float
         The longest way.
     reach : float
-        How far it feels, metres.
+        Range of the rays that look for room, metres.
     """
     steps = math.floor(metres / STEP + 1e-9)
     room = _room(segments, pose, reach)
@@ -90,7 +90,7 @@ def _away(angle: float) -> Floats:
 
 
 def seen_on_the_way(views: Sequence[tuple[RigidTransform, Scan]], rng: np.random.Generator) -> Scan:
-    """Put together what was seen at the poses of a drive, in the frame of the last, by odometry with its errors.
+    """Join the scans at the poses of a drive, in the frame of the last, by odometry with its errors.
 
     Parameters
     ----------

@@ -15,11 +15,11 @@ from simulation import Scanner, scan
 from ..views import AnalysisError, Robot
 from .reach import Reach
 
-PLACES = 400  # over the map's box, where no spacing is asked for
+PLACES = 400  # over the map's box, if no spacing is given
 SPACINGS = (0.3, 100.0)  # m
 MOST = 50_000  # poses to try
-RAYS = 72  # that feel for what is about a place
-CLEARANCE = 0.2  # m; what a robot keeps from everything
+RAYS = 72  # that look for walls around a place
+CLEARANCE = 0.2  # m; a robot's distance from everything
 SEEN, SEEN_UNDIRECTED = 0.2, 0.5  # least fraction of the rays that meet anything; more where walls have no free side
 # Least fraction of these that meet a wall on its free side; in line maps made of logs 19 of 20 robots saw more.
 FREE_SIDES = 0.6
@@ -55,7 +55,7 @@ def standing_places(
 ) -> Standing:
     """Lay a grid over a map.
 
-    Whether the places of the grid are free is found out when they are tried.
+    Later tests, when the places of the grid are tried, find out which of them are free.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def is_free(segments: Segments, pose: RigidTransform, reach: float, *, oriented:
     segments : Segments
     pose : RigidTransform
     reach : float
-        How far it sees, metres.
+        Range of the scanner, metres.
     oriented : bool
     """
     seen = scan(segments, pose, Scanner(beams=RAYS, angle_increment=math.tau / RAYS, range_max=reach, sigma=0.0))

@@ -1,1 +1,1 @@
-"""What is doubtful in a map, by itself and with sample scans."""
+"""Doubtful parts of a map, found in the map alone and with sample scans."""

@@ -1,4 +1,4 @@
-"""Checking a map by itself."""
+"""Checking a map without scans."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .tuning import LARGEST, SMALLEST
 
 
 def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bool = True) -> MapCheck:
-    """Look for what is doubtful in a map: its directions, how it was drawn, its size, what of it looks alike.
+    """Look for doubtful parts of a map: its directions, how it was drawn, its size, places that look alike.
 
     Parameters
     ----------
     index : MapIndex
         Built with its directions, whatever they mean.
     deadline : Deadline, optional
-        When it passes, what was found so far is the answer and ``complete`` is False.
+        When it passes, the findings so far are the answer and ``complete`` is False.
     oriented : bool
-        Whether the map says that directions mean something.
+        True when the map states that directions mean something.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def check_map(index: MapIndex, deadline: Deadline | None = None, *, oriented: bo
 
 
 def _directed(sides: Sides, findings: list[Finding]) -> bool | None:
-    """Return what speaks for directions that mean something; None where too little was seen to say."""
+    """Return whether directions mean something; None where findings, or no rays that hit, leave that open."""
     if sides.meaningless:
         return False
     return None if findings or not sides.left.sum() else True

@@ -38,7 +38,7 @@ def judge_samples(samples: Sequence[Sample], *, sigma: float | None, oriented: b
     sigma : float or None
         The map's.
     oriented : bool
-        Whether the map says that directions mean something.
+        True when the map states that directions mean something.
     """
     present: Way = oriented, sigma
     if not samples:
@@ -49,10 +49,10 @@ def judge_samples(samples: Sequence[Sample], *, sigma: float | None, oriented: b
     usable, would_be = (sum(one.trials[way].usable for one in samples if way in one.trials) for way in (present, best))
     scale = _scaled(samples, least=LEAST_SCALE if directed else HIDDEN_SCALE)
     mistakes = [found for found in (_mirrored(samples, present), _reversed(samples), scale) if found is not None]
-    # What is off because of a mistake is no measure of the walls.
+    # Offsets that come from a mistake are no measure of the walls.
     advice = Advice() if mistakes or off is None else Advice(off, directed)
     findings = [found for found in (*mistakes, _moved(samples)) if found is not None]
-    # What is reversed fits either way round, too; and what is not to scale fits by chance, more so without directions.
+    # A reversed map fits either way round, too; and a map to another scale fits by chance, more so without directions.
     if directed != oriented and _reversed(samples) is None and (scale is None or would_be > usable):
         findings.insert(0, _undirected(len(samples), usable, would_be))
     return SampleReport(tuple(findings), advice, usable, usable if advice.oriented is None else would_be)
@@ -85,7 +85,7 @@ def _best_directions(samples: Sequence[Sample], present: Way) -> bool:
 
 
 def _nearest_way(samples: Sequence[Sample], present: Way, directed: bool, off: float | None) -> Way:
-    """Return what was tried and is nearest to walls that are so far off; no sigma at all stands for little."""
+    """Return the way tried whose sigma is nearest to how far walls are off; no sigma at all counts as `LITTLE`."""
     ways = [way for one in samples for way in one.trials if way[0] == directed]
     if off is None or not ways:
         return present
@@ -142,7 +142,7 @@ def _moved(samples: Sequence[Sample]) -> Finding | None:
     if not moves:
         return None
     at = np.array([(one.x, one.y) for one in moves])
-    # Of a turn what is far from the origin moves most: agree about all three at the median.
+    # In a rotation the places far from the origin move most: agree about all three at the median.
     x, y = (float(value) for value in np.median(at, axis=0))
     turn = math.atan2(*(float(np.median([f(one.theta) for one in moves])) for f in (math.sin, math.cos)))
     same = sum(
@@ -160,10 +160,10 @@ def _moved(samples: Sequence[Sample]) -> Finding | None:
 
 
 def _sigma_of(samples: Sequence[Sample], directed: bool) -> float | None:
-    """Return how far walls are off, metres: the root mean square over walls of what the scans saw of each.
+    """Return how far walls are off, metres: the root mean square over walls of the offsets in the scans.
 
-    Where they are thought to be off by little, those that are off by more are left out, and poses give way to the rest:
-    it is taken where they may be off by the most that was tried.
+    If the assumed sigma is small, walls that are off by more are left out, and poses give way to the rest. So the
+    widest sigma that was tried is used.
     """
     seen: dict[int, list[float]] = {}
     for one in samples:

@@ -32,7 +32,7 @@ class Likeness:
     places : tuple of Place
         Those that are similar to others.
     segments : tuple of int
-        What is seen from these.
+        The segments that are seen from these.
     """
 
     viewpoints: int

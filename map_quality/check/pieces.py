@@ -1,4 +1,4 @@
-"""How a map is drawn: short pieces, gaps, overlaps, faces that stand doubled."""
+"""Drawing faults of a map: short pieces, gaps, overlaps, faces that stand doubled."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def drawing_findings(index: MapIndex, near: NearWalls, deadline: Deadline) -> It
 
 @dataclass(frozen=True, slots=True)
 class NearWalls:
-    """Which walls of a map run beside another one: (walls,) flags each.
+    """Flags of the walls of a map that run next to another one: (walls,) flags each.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ def _compare(walls: Records, pairs: Indices, near: NearWalls) -> None:
     (s1, o1), (s2, o2) = places
     low, high = np.maximum(a["begin"], np.minimum(s1, s2)), np.minimum(a["end"], np.maximum(s1, s2))
     slope = (o2 - o1) / np.where(np.abs(s2 - s1) > 1e-9, s2 - s1, 1.0)
-    # The length that both run beside each other, and how far the second lies to the left of the first there, metres.
+    # The length that both run next to each other, and how far the second lies to the left of the first there, metres.
     shared, off = high - low, o1 + slope * (0.5 * (low + high) - s1)
     shorter = np.minimum(a["end"] - a["begin"], b["end"] - b["begin"])
     for_long = (shared > DOUBLE_LENGTH) & (shared > DOUBLE_SHARE * shorter)
@@ -163,7 +163,7 @@ def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterat
 def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
     """Yield a finding if ends nearly meet another segment: at no other end, on no other line, and yet near one."""
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
-    # What is as near as this to its own begin is too short to tell.
+    # A segment whose end is as near as this to its own begin is too short for the test.
     alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
     if not alone.any() or deadline.passed:
         return
@@ -256,7 +256,7 @@ def drawn_sigma(index: MapIndex) -> float | None:
     ends = index.segments.endpoints[: index.directed]
     ends = ends - ends[0, [0, 1, 0, 1]]
     step = next((one for one in STEPS if np.abs(ends - one * np.round(ends / one)).max() < ON_STEP), math.inf)
-    # A caller copies what is advised: to a tenth of a millimetre.
+    # A caller copies the advice: to a tenth of a millimetre.
     return round(step / math.sqrt(12.0), 4) if len(ends) >= MANY_ENDS and step <= LARGEST_PIXEL else None
 
 

@@ -45,7 +45,7 @@ class Size:
     segment_count : int
         As sent.
     walls : int
-        What they come to where collinear ones are one.
+        Number of walls when collinear segments are joined.
     length : float
         Of the walls together, metres.
     diagonal : float
@@ -60,14 +60,14 @@ class Size:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place from which the map shows what it shows elsewhere too.
+    """A place from which the map looks as from another place.
 
     Attributes
     ----------
     pose : RigidTransform
         In the map frame.
     similar_pose : RigidTransform
-        Where it shows about the same.
+        A pose at which the scan looks about the same.
     """
 
     pose: RigidTransform
@@ -83,7 +83,7 @@ class Advice:
     sigma : float or None
         Standard deviation of its lines normal to themselves, metres.
     oriented : bool or None
-        Whether directions of its segments mean anything.
+        True when directions of its segments mean anything.
     """
 
     sigma: float | None = None
@@ -92,7 +92,7 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class MapCheck:
-    """Result of the check of a map by itself.
+    """Result of the check of a map without scans.
 
     Attributes
     ----------

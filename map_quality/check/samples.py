@@ -32,7 +32,7 @@ class Trial:
     score : float
         Nats; 0 where nothing fits.
     offsets : dict of int to float
-        By map segment, how far what was seen of it is off, metres; empty where too little of the scan fits.
+        By map segment, how far its matched scan segments are off, metres. Empty where too little of the scan fits.
     """
 
     usable: bool
@@ -54,9 +54,9 @@ class Sample:
     mistakes : tuple of Mistake
         Without which it would fit much better.
     factor : float or None
-        What its lengths are to be multiplied with to fit better; None where they are right.
+        Factor by which its lengths fit better; None where they are right.
     moved : RigidTransform or None
-        From where it was said to be taken to where it was found, in the map frame; None where either is not known.
+        From its stated pose to the pose where it was found, in the map frame. None where either is not known.
     """
 
     result: AssociationResult
@@ -78,11 +78,11 @@ def try_sample(
         Built with its directions, whatever they mean; its sigma is the map's.
     scan : Scan
     deadline : Deadline
-        What it leaves no time for is not tried.
+        A trial that does not fit before it is skipped.
     oriented : bool
-        Whether the map says that directions mean something.
+        True when the map states that directions mean something.
     said : RigidTransform, optional
-        Where the scan was taken, as its sender believes, map_from_scan.
+        Pose of the scan as its sender states it, map_from_scan.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def _trial(result: AssociationResult) -> Trial:
 
 
 def _factor(context: SearchContext, known: float, causes: Sequence[Cause]) -> float | None:
-    """Return by what a scan is to be multiplied to score clearly more than it does anyhow, `known` nats.
+    """Return the factor of a scan's lengths at which it scores clearly more than unscaled, `known` nats.
 
     Rooms between lines along the middle of walls look too large by as much as the walls are thick, at any scale.
     """

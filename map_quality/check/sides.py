@@ -1,8 +1,8 @@
-"""Whether the directions of a map agree: free space lies on the left of every segment that a ray meets.
+"""Consistency of a map's directions: free space lies on the left of every segment that a ray meets.
 
-A ray that leaves a wall on its left goes through free space, and should meet the next one on its left, too. Where it
-meets a back, one of the two is drawn the wrong way round. To the right of a wall is what it is made of: a ray there
-should meet nothing, or the back of the wall's other face.
+A ray that leaves a wall on its left goes through free space, and should meet the next one on its left, too. If it meets
+a back, one of the two is drawn the wrong way round. To the right of a wall is its material: a ray there should meet
+nothing, or the back of the wall's other face.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ class Sides:
     walls : (k,) indices of the walls that were looked from
     lengths : (k,) metres
     left, right : (k, 2) how many rays met a front, and how many a back, on either side
-    room : (k, 2) how far away what is nearest is on the left, and on the right, metres; inf where nothing is
-    lost : (k,) whether a ray on the left was left within the map: nobody knows what it would have met
+    room : (k, 2) distance of the nearest wall on the left, and on the right, metres; inf where there is none
+    lost : (k,) True where a ray on the left ended within the map without a hit: its hit is not known
     """
 
     walls: np.ndarray[tuple[int], np.dtype[np.intp]]
@@ -91,7 +91,7 @@ class Sides:
 
     @property
     def meaningless(self) -> bool:
-        """Whether what rays meet shows its front and its back about as often, whatever side they leave from."""
+        """Return whether rays meet fronts and backs about as often, on whatever side of a wall they start."""
         return self.contradiction >= MEANINGLESS and not self.reversed
 
     @property
@@ -105,20 +105,20 @@ class Sides:
 
     @property
     def reversed(self) -> bool:
-        """Whether all of the map is the wrong way round: free space is outside of it, or no wider than a wall."""
+        """Return whether the whole map is the wrong way round: free space is outside it, or no wider than a wall."""
         outside = (self.left.sum(axis=1) == 0.0) & (self.right.sum(axis=1) > 0.0) & ~self.lost
         within = (self.room[:, 0] < DOUBLE) & (self.room[:, 1] > 2.0 * DOUBLE)
         return self.share((self.against_left & self.against_right) | outside | within) >= MOST
 
     @property
     def against_left(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether most rays from the side that should be free meet backs, (k,)."""
+        """The walls for which most rays from the side that should be free meet backs, (k,) flags."""
         found: np.ndarray[tuple[int], np.dtype[np.bool_]] = self.left[:, 1] > CONTRADICTED * self.left.sum(axis=1)
         return found
 
     @property
     def against_right(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether most rays from the side that should not be free meet fronts, (k,)."""
+        """The walls for which most rays from the side that should not be free meet fronts, (k,) flags."""
         found: np.ndarray[tuple[int], np.dtype[np.bool_]] = self.right[:, 0] > CONTRADICTED * self.right.sum(axis=1)
         return found
 
@@ -130,8 +130,8 @@ class Sides:
 def look_from_walls(index: MapIndex, both_ways: Flags, deadline: Deadline) -> Sides:
     """Follow rays from both sides of the longest walls of a directed map, as many as the deadline allows.
 
-    Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong: they are not looked from, and to meet
-    one says nothing.
+    Of walls that are drawn `both_ways`, (walls,) flags, none is right or wrong. No rays start from them, and a hit on
+    one is no evidence.
     """
     lengths = index.walls.longest
     longest = np.argsort(-lengths, kind="stable")[:MOST_LOOKED_FROM]

@@ -44,7 +44,7 @@ def conclude(
         Of each scan, as of `try_sample`; None where there was no time for it.
     deadline : Deadline
     oriented : bool
-        Whether the map states that directions mean something.
+        True when the map states that directions mean something.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
         Taken there, in order; some of them, spread over all, are searched.
     deadline : Deadline
     oriented : bool
-        Whether the directions of the map mean something.
+        True when the directions of the map mean something.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def find_thickness(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *
 
 
 def _scores(index: MapIndex, scans: Sequence[Scan], deadline: Deadline, *, oriented: bool) -> Scores:
-    """Try what may be, and what lies beside the best of it; empty where there was nothing to try, or no time."""
+    """Return scores of possible thicknesses and of those next to the best; empty without scans to try, or time."""
     if not scans or index.directed > MOST_LINES_FOR_THICKNESS:
         return {}
     some, faces = scans[:: -(-len(scans) // MOST_FOR_THICKNESS)], _faces(index, oriented=oriented)
@@ -163,12 +163,12 @@ def _best(scores: Scores) -> float:
 
 
 def _beside(change: float) -> tuple[float, float]:
-    """Return what lies a step below and above; rounded, for they are keys."""
+    """Return the changes that are one step smaller and larger; rounded, as keys."""
     return round(change - THICKER_STEP, 3), round(change + THICKER_STEP, 3)
 
 
 def _top(scores: Scores) -> float:
-    """Return where the parabola through the best score and those a step beside it has its top."""
+    """Return the vertex of the parabola through the best score and those a step next to it."""
     best = _best(scores)
     low, high = _beside(best)
     if low not in scores or high not in scores:

@@ -1,22 +1,22 @@
 """Every threshold of the map check, by stage; each with its unit, and where it comes from.
 
-"Geometry" follows from what is measured, "tables" was looked up in plans and drawn worlds: no finding where they are
-right, one where they were spoilt.
+"Geometry" follows from the measured quantity, "tables" was looked up in plans and drawn worlds. The check finds nothing
+where these are right, and something where they were spoilt.
 """
 
 import math
 
 # --- Pieces -----------------------------------------------------------------------------------------------------------
 
-SHORT = 0.1  # m, tables; a wall shorter than that tells a search nothing
-LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between what meets and what is a slit that somebody drew
+SHORT = 0.1  # m, tables; a wall shorter than that is no evidence for a search
+LEAST_GAP, GREATEST_GAP = 0.02, 0.1  # m, tables; between ends that meet and a slit that was drawn on purpose
 MOST_ENDS = 20_000  # that are looked about from, some 10 microseconds each
 ENDS_AT_A_TIME = 5_000  # whose nearest other is sought between two looks at the deadline
 OVERLAP = 0.05  # m, tables; pieces of one line share less than that where they are cut
 PARALLEL = math.sin(math.radians(3.0))  # tables
 SAME_LINE = 0.03  # m, as `MERGE_LATERAL`; lines nearer to each other than that are one
 DOUBLE = 0.3  # m, tables; two faces that look one way, or at each other, are not so near in a building
-DOUBLE_LENGTH = 0.3  # m, and this share of the shorter, tables; that they run beside each other
+DOUBLE_LENGTH = 0.3  # m, and this share of the shorter, tables; over which they run next to each other
 DOUBLE_SHARE = 0.5
 MOST_IN_CELL = 64  # walls of one cell that are compared with each other
 MOST_PAIRS = 16_000_000  # time, some 0.1 microseconds each; a pair counts once for each cell that lists it
@@ -33,12 +33,12 @@ PLACES_ON_A_WALL = (0.25, 0.5, 0.75)  # of its length
 TURNS = tuple(math.radians(a) for a in (-60.0, -20.0, 20.0, 60.0))  # of the rays, from the wall's normal
 OFF_THE_WALL = 1e-3  # m, geometry
 FOLLOWED = 40.0  # m, tables
-TOO_NEAR = 0.05  # m, geometry; what lies nearer is the same wall once more
+TOO_NEAR = 0.05  # m, geometry; a hit that is nearer is the same wall again
 CONTRADICTED = 0.5  # of a wall's rays on one side
-# Of what rays meet. Measured: up to .07 in drawings of plans, .30 in campus plans, .39 in maps that robots made; from
-# .41 on where directions were thrown away.
+# Of hits of rays. Measured: up to 0.07 in drawings of plans, 0.30 in campus plans, 0.39 in maps that robots made; from
+# 0.41 on where directions were thrown away.
 MEANINGLESS = 0.4
-MOST = 0.55  # of the length, measured: .42 at most in plans, from .60 on in most of them the other way round
+MOST = 0.55  # of the length, measured: 0.42 at most in plans, from 0.60 on in most of them the other way round
 
 # --- Likeness ---------------------------------------------------------------------------------------------------------
 
@@ -55,20 +55,20 @@ SMALLEST, LARGEST = 2.0, 3000.0  # m, tables; the diagonal of what robots drive 
 
 # --- Samples ----------------------------------------------------------------------------------------------------------
 
-SIGMAS = (0.05, 0.1, 0.2)  # m, tables; what is tried beside the map's own: half the thickness of walls, or more
+SIGMAS = (0.05, 0.1, 0.2)  # m, tables; tried in addition to the map's own: half the thickness of walls, or more
 WIDEST = max(SIGMAS)
-LITTLE = 0.01  # m, tables; what an estimate comes to where walls are right
+LITTLE = 0.01  # m, tables; the estimate where walls are right
 BETTER_SCALED = 1.05  # times, tables
-LADDER = tuple(1.12**k for k in range(-14, 15) if k)  # .2 to 5, tables; factors by which scans are tried to be off
+LADDER = tuple(1.12**k for k in range(-14, 15) if k)  # 0.2 to 5, tables; factors by which scans are tried to be off
 LADDER_SECONDS = 1.0  # of a scan, small maps take a quarter of that; or as long as all else took
 BETTER_SCORE = 1.15  # times, tables
 BETTER_USABLE = 0.15  # of the scans, tables
-MANY = 0.5  # of the scans that tell anything
-LEAST_SCALE = 0.004  # as `LEAST_STRETCH`; how far a factor is from one that is told
+MANY = 0.5  # of the scans that give evidence
+LEAST_SCALE = 0.004  # as `LEAST_STRETCH`; a factor that is reported differs from one by this
 SAME_FACTOR = 0.0015  # tables; factors no farther apart mean one scale; those of walls too thick differ by room
 HIDDEN_SCALE = 0.08  # tables; as much the thickness of walls may feign where lines run along their middle
 MOVED_METRES, MOVED_RADIANS = 0.2, math.radians(2.0)  # tables; less than that may be the poses that were sent
-LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match for its walls to say how far they are off
+LEAST_SHARE = 0.5  # of a scan's length, tables; that has to match before its walls show how far they are off
 MOST_FOR_THICKNESS, MOST_LINES_FOR_THICKNESS = 10, 20_000  # scans, and segments; time
 THICKER = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4)  # m; how much thicker walls may be than drawn
 THICKER_STEP = 0.05  # m, tables; the score is a parabola about as wide where walls are off by `THICKNESS_SIGMA`

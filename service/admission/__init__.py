@@ -1,5 +1,5 @@
-"""Who is let in.
+"""Admission of requests.
 
-A request is decided upon once, from its head (`Entrance.admit`). What was decided travels with it as a `Ticket`: whose
-key it came with, and its place on the way to a search. The `Gate` takes the ticket for each slot.
+The service decides about a request once, from its head (`Entrance.admit`). The decision travels with the request as a
+`Ticket`: the caller's key, and the place on the way to a search. The `Gate` takes the ticket for each slot.
 """

@@ -1,4 +1,4 @@
-"""Memory that requests, or answers, may take: of all together, and of each who asks."""
+"""Memory that requests or answers may take: a limit for all together and one for each caller."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .fair_queue import Holder
 
 
 class ByteBudget:
-    """Knows how many bytes are held; safe to use from several threads.
+    """Counts the bytes that are held; safe to use from several threads.
 
-    Nobody holds more than half: what one withholds for as long as it may leaves the others room.
+    No holder has more than half: the others have room even while one withholds its part for as long as it may.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class ByteBudget:
 
     @contextmanager
     def account(self, holder: Holder = None) -> Iterator[ByteAccount]:
-        """Give an account to one request; what it took is given back when the block ends."""
+        """Give an account to one request; its bytes are given back when the block ends."""
         account = ByteAccount(self, holder)
         try:
             yield account
@@ -68,7 +68,7 @@ class ByteBudget:
 
 
 class ByteAccount:
-    """What one request holds of the budget.
+    """The bytes that one request holds of the budget.
 
     Attributes
     ----------

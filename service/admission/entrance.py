@@ -1,4 +1,4 @@
-"""Decides from a request's head alone: before its body is read and before the application is asked."""
+"""Decisions from a request's head alone, before its body is read and before the application is called."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .origins import Origins
 from .ticket import Ticket
 
 Head = Mapping[str, Any]
-"""What ASGI calls a scope: method, path, headers, client."""
+"""An ASGI scope: method, path, headers, client."""
 Headers = Sequence[tuple[bytes, bytes]]
 
 
@@ -25,7 +25,7 @@ def search_of(method: str, path: str) -> str | None:
 
 
 class Entrance:
-    """Gives tickets, and sends away who may not come in, and what would have to search while the queue is full.
+    """Gives tickets, and refuses requests without permission, and searches while the queue is full.
 
     Parameters
     ----------
@@ -52,13 +52,13 @@ class Entrance:
         Raises
         ------
         ForeignHostError, ForeignOriginError
-            When it may come from a web page that somebody looks at, and the service has no keys.
+            When the request may come from a web page in a browser, and the service has no keys.
         MissingKeyError, UnknownKeyError
-            When the path asks for a key.
+            When the path requires a key.
         MissingRoleError, ForeignMapError
-            When this key is not for that, or there is no such map for it.
+            When the key lacks the role for the request, or no such map exists for the key.
         BodyTooLargeError
-            When the body is too long by what the head says of it.
+            When the body is too long by the length that the head states.
         QueueFullError, ShareUsedError
             When there is no place for a search.
         """
@@ -85,9 +85,9 @@ class Entrance:
 
 
 def _require(grant: Grant, asked: Asked) -> None:
-    """Raise where a caller may not ask for this."""
+    """Raise where the caller lacks the permission for this request."""
     access = asked.access
-    # What is no route of the table may be one that nobody thought of there.
+    # A path outside the table may belong to a route that is missing there.
     allowed = grant.is_whole if access is None else access.role is None or access.role in grant.roles
     if not allowed:
         raise MissingRoleError(None if access is None else access.role)

@@ -7,7 +7,7 @@
     ├── UnknownKeyError      a key that is none of the service's
     ├── MissingRoleError     a key without the role that the request needs
     ├── ForeignMapError      a map that there is not for this key
-    ├── ForeignHostError     under a name that nobody has said to be the service's
+    ├── ForeignHostError     under a host name that is not allowed
     ├── ForeignOriginError   sent by the page of another site
     ├── NotReadyError        the service does not serve yet, or no longer
     ├── QueueFullError       every place is taken
@@ -21,7 +21,7 @@ from __future__ import annotations
 
 
 class AdmissionError(Exception):
-    """A request is not let in, or has to go; the message says why."""
+    """A request is not let in, or has to go; the message gives the reason."""
 
 
 class MissingKeyError(AdmissionError):
@@ -53,14 +53,14 @@ class MissingRoleError(AdmissionError):
 
 
 class ForeignMapError(AdmissionError):
-    """A map that there is not for this key: whether there is one for others is not told."""
+    """A map that does not exist for this key: the error hides whether one exists for others."""
 
     def __init__(self) -> None:
         super().__init__("no map is stored under this id; GET /v1/maps lists the ids")
 
 
 class ForeignHostError(AdmissionError):
-    """Asked for under a name that nobody has said to be the service's."""
+    """The request names a host that is not among the service's allowed names."""
 
     def __init__(self) -> None:
         super().__init__(

@@ -16,8 +16,8 @@ Waiter = asyncio.Future[None]
 class FairQueue:
     """Waiting requests, one line per holder; the holder that has used the least time is served first.
 
-    A holder counts as active while it has something waiting, running or on its way. One that comes anew starts where
-    the least served of the active ones is: it neither pays for old use nor has credit from the time it was away.
+    A holder counts as active while it has something waiting, running or on its way. A new one starts where the least
+    served of the active ones is. It neither pays for old use nor has credit from the time it was away.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class FairQueue:
 
     @property
     def holders(self) -> int:
-        """How many are active."""
+        """The number of active holders."""
         return len(self._used)
 
     def places_of(self, holder: Holder) -> int:

@@ -92,12 +92,12 @@ class Gate:
 
     @property
     def waiting(self) -> int:
-        """How many wait."""
+        """The number of searches that wait."""
         return self._queue.waiting
 
     @property
     def full(self) -> bool:
-        """Whether everything is taken or spoken for; a holder with less than its share may still be let in."""
+        """Return whether every place is taken or reserved; a holder with less than its share may still be let in."""
         return self.running + self.waiting + self._expected >= self._places
 
     def expect(self, holder: Holder) -> None:
@@ -113,8 +113,8 @@ class Gate:
     def require_place(self, holder: Holder = None) -> None:
         """Refuse a request whose body is still to be read, when there is no place for it.
 
-        A full queue is shared: a holder that has less than its share of the places is let in all the same, and whoever
-        has the most gives up one.
+        A full queue is shared. A holder that has less than its share of the places is let in all the same. The holder
+        with the most gives up one.
 
         Raises
         ------
@@ -133,9 +133,9 @@ class Gate:
         Parameters
         ----------
         heeds : callable
-            Tells whether the function looks at the deadline by now, and returns soon after it. As long as it does not,
-            as while it indexes a map, it is waited for until the deadline and no longer: it goes on, and keeps its
-            slot, for whoever asks next.
+            Returns whether the function looks at the deadline by now, and returns soon after it. As long as it does
+            not, as while it indexes a map, the caller waits for it until the deadline and no longer. The function then
+            goes on and keeps its slot, for the next caller.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class Gate:
         DeadlinePassedError
             When the deadline passes before there is a slot, or before the function heeds it.
         CancelledError
-            When everything is told to give up.
+            When every search is cancelled.
         """
         ticket.arrive()
         await self._enter(deadline, ticket)
@@ -182,7 +182,7 @@ class Gate:
         raise DeadlinePassedError
 
     def cancel_all(self) -> None:
-        """Tell everything that runs to give up, and soon wait no longer for what does not, as indexing a map."""
+        """Cancel everything that runs, and soon wait no longer for functions that do not end, as indexing a map."""
         for deadline in self._deadlines.values():
             deadline.cancel()
         if self._over is not None:

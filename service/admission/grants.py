@@ -1,4 +1,4 @@
-"""What a caller may do: roles, and the maps that it sees; and what each route asks for."""
+"""Permissions of a caller (roles and visible maps), and the permissions that each route requires."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from functools import lru_cache
 from .fair_queue import Holder
 
 GUARDED = "/v1/"
-"""What asks for a key begins so; probes and pages stay open."""
+"""Prefix of the paths that require a key; probes and pages stay open."""
 LONGEST = 256
 """Of a route's path, letters: an id has at most 128."""
 
 
 class Role(StrEnum):
-    """What a key is good for; none includes another."""
+    """A permission of a key; none includes another."""
 
     READ = "read"
     ASSOCIATE = "associate"
@@ -28,15 +28,15 @@ EVERY_ROLE = frozenset(Role)
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a caller may do.
+    """The permissions of a caller.
 
     Attributes
     ----------
     holder : Holder
-        Who it is, as far as shares go.
+        The caller to whom shares of the service count.
     roles : frozenset of Role
     maps : str
-        How the ids of the maps begin that it sees; for it there are no others.
+        Prefix of the ids of the maps that it sees; for the caller no other maps exist.
     """
 
     holder: Holder = None
@@ -45,7 +45,7 @@ class Grant:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is kept from it."""
+        """Return whether the grant has every role and sees every map."""
         return self.roles == EVERY_ROLE and not self.maps
 
     def sees(self, map_id: str) -> bool:
@@ -55,7 +55,7 @@ class Grant:
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """What a route asks for.
+    """The permissions that a route requires.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Access:
     role : Role, or None
         None: any key will do.
     searches : bool
-        Whether it needs a slot at the gate.
+        True when it needs a slot at the gate.
     """
 
     methods: str
@@ -75,8 +75,8 @@ class Access:
     searches: bool = False
 
 
-# A route that is missing here is for whole grants alone, and a test fails. Where two fit, the first counts, as for the
-# router: the path of a map's check is also one of a map.
+# A route that is missing here needs a whole grant, and a test fails. If two fit, the first counts, as for the router:
+# the path of a map's check is also one of a map.
 ROUTES = (
     Access("GET", "/v1/limits", None),
     Access("POST", "/v1/associate", Role.ASSOCIATE, searches=True),
@@ -97,12 +97,12 @@ ROUTES = (
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a request asks for, as far as its head tells.
+    """The access that a request needs, as far as its head shows.
 
     Attributes
     ----------
     access : Access, or None
-        None for what is no route of the table.
+        None for a path outside the table of routes.
     map_id : str, or None
         Of the map in its path.
     """
@@ -112,8 +112,8 @@ class Asked:
 
 
 def asked_of(method: str, path: str) -> Asked:
-    """Return what a request asks for; `path` with its escapes undone."""
-    # Longer ones lead nowhere, and are not kept: whoever has no key can send them, too.
+    """Return the access that a request needs; `path` with its escapes undone."""
+    # Longer paths lead nowhere and are not cached: callers without a key can send them, too.
     return _looked_up(method, path) if len(path) <= LONGEST else Asked()
 
 
@@ -130,7 +130,7 @@ def _looked_up(method: str, path: str) -> Asked:
 def _patterns() -> dict[str, list[tuple[Access, re.Pattern[str]]]]:
     found: dict[str, list[tuple[Access, re.Pattern[str]]]] = {}
     for access in ROUTES:
-        # As the router has it, a line's end behind the path included: what it takes for a route has to be one here.
+        # As the router has it, a line's end behind the path included: each route of the router has to be one here.
         pattern = re.compile(re.escape(access.path).replace(r"\{map_id\}", "(?P<map_id>[^/]+)") + "$")
         for method in access.methods.split():
             found.setdefault(method, []).append((access, pattern))

@@ -27,7 +27,7 @@ Digest = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
 
 
 class KeyFileError(Exception):
-    """The file cannot be used; the message says why, and repeats nothing of it."""
+    """The file cannot be used; the message gives the reason, and repeats nothing of it."""
 
 
 class Key(BaseModel):
@@ -115,7 +115,7 @@ def _read(file: Path) -> tuple[Key, ...]:
     except OSError as error:
         raise KeyFileError(f"{file}: {error.strerror}") from None
     except ValidationError as error:
-        # Whoever wrote a key in the place of its digest does not want to see it in a log.
+        # A key in the place of its digest must not appear in a log.
         where = "; ".join(".".join(map(str, fault["loc"])) + ": " + fault["msg"] for fault in error.errors())
         raise KeyFileError(f"{file}: {where}") from None
     except ValueError:
@@ -123,7 +123,7 @@ def _read(file: Path) -> tuple[Key, ...]:
 
 
 def _state(path: Path) -> object:
-    """Return what tells one content from another without reading it."""
+    """Return values that differ between contents, found without reading them."""
     try:
         stats = [file.stat() for file in _files(path)]
     except (KeyFileError, OSError):

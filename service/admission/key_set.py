@@ -27,7 +27,7 @@ Keys = dict[str | None, jwt.PyJWK]
 
 
 class KeySetError(Exception):
-    """There is no key set to be had; the message says why, and repeats nothing of what was sent."""
+    """No key set is available; the message gives the reason, and repeats nothing of what was sent."""
 
 
 def read_key_set(where: str) -> Keys:
@@ -47,7 +47,7 @@ def read_key_set(where: str) -> Keys:
         told = json.loads(_fetched(where) if "://" in where else _read(Path(where)))
     except KeySetError:
         raise
-    except Exception as error:  # what a server can send is without end, and so are the ways in which it is refused
+    except Exception as error:  # a server can send anything, and fails in as many ways
         raise KeySetError(type(error).__name__) from error
     keys = told.get("keys") if isinstance(told, dict) else None
     if not isinstance(keys, list) or len(keys) > MOST_KEYS:
@@ -86,7 +86,7 @@ def _bounded(content: bytes) -> bytes:
 
 
 def _fetched(url: str) -> bytes:
-    """Return what is under a URL, and under no other that it leads to."""
+    """Return the content of a URL; redirects are refused."""
     with _Watch() as watch:
         opener = urllib.request.build_opener(_NoRedirect, _Http(watch), _Https(watch))
         with opener.open(url, timeout=READ_SECONDS) as answer:

@@ -1,4 +1,4 @@
-"""Who asks: by a key, by a token, or by an address where the service has neither."""
+"""Identification of callers: by a key, by a token, or by an address where the service has neither."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .grants import Grant
 from .key_file import KeyFile
 
 Client = tuple[str, int] | None
-# Whoever can check such a signature cannot make one; "none" and shared secrets are not among them.
+# The key that checks such a signature cannot make one; "none" and shared secrets are not among them.
 ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA")
 
 
 @dataclass(frozen=True, slots=True)
 class Issuer:
-    """Whose tokens are taken.
+    """An issuer whose tokens are accepted.
 
     Attributes
     ----------
     name, audience : str
-        What `iss` and `aud` have to be.
+        Required values of the claims `iss` and `aud`.
     keys : str
         Path or URL of its JSON Web Key Set.
     algorithms : tuple of str
-        Of `ALGORITHMS`; a token's own word on that counts for nothing.
+        Of `ALGORITHMS`; the algorithm that a token names does not count.
     leeway : float
         Seconds that its clock and this one may differ.
     """
@@ -46,10 +46,10 @@ class Issuer:
 
 
 class TokenSource(Protocol):
-    """What checks tokens."""
+    """A checker of tokens."""
 
     def grant(self, token: bytes) -> Grant:
-        """Return what a token may do; raises `UnknownKeyError` where it is none."""
+        """Return the permissions of a token; raises `UnknownKeyError` where it is none."""
 
     def refresh(self) -> None:
         """Look for new keys of the issuer; off the event loop."""
@@ -61,10 +61,10 @@ class Keyring:
     Parameters
     ----------
     keys : sequence of SecretStr
-        That may do everything.
+        Keys with every permission.
     file : KeyFile, or None
     tokens : TokenSource, or None
-        With none of the three whoever comes is let in.
+        Without all three every caller is let in.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Keyring:
         self._guarded = bool(keys) or file is not None or tokens is not None
 
     def grant(self, headers: Iterable[tuple[bytes, bytes]], client: Client = None) -> Grant:
-        """Return what a request may do; where the service has no keys, everything, for the address it comes from.
+        """Return the permissions of a request; where the service has no keys, all, for the address it comes from.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class Keyring:
         key = key.strip()
         if scheme.lower() != b"bearer" or not key:
             raise MissingKeyError
-        # Digests of one length, all of them compared: the time taken tells nothing of the keys.
+        # Digests of one length, all of them compared: the time taken shows nothing of the keys.
         digest = digest_of(key)
         known: list[Grant] = [*self._whole.values(), *(self._file.grants.values() if self._file else ())]
         found = [grant for grant in known if hmac.compare_digest(digest, grant.holder or b"")]
@@ -124,13 +124,13 @@ class Keyring:
 
 
 def digest_of(key: bytes) -> bytes:
-    """Return what is kept of a key."""
+    """Return the digest that is stored of a key."""
     return hashlib.sha256(key).digest()
 
 
 @lru_cache(maxsize=256)
 def address_of(client: Client) -> Holder:
-    """Return who a client is by its address: of IPv6 the network, since one client has all of its addresses."""
+    """Return the holder of an address: of IPv6 the network, since one client has all of its addresses."""
     if client is None:
         return None
     try:

@@ -1,8 +1,8 @@
-"""Who may ask through a browser.
+"""Hosts and origins from which a browser may send requests.
 
-Without keys whatever runs on the operator's machine may use the service, and so might any web page that the operator
-looks at: by a name of its own that it has resolve to the service's address, or by a form or a script that sends without
-looking at the answer. A key keeps both out, since no page knows it.
+Without keys any program on the operator's machine may use the service. So might any web page that the operator opens.
+It may use a name of its own that resolves to the service's address, or a form or a script that sends without reading
+the answer. A key keeps both out, since no page has it.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ LOCAL = frozenset(("localhost", "localhost."))
 
 
 class Origins:
-    """Knows under which hosts the service is asked for.
+    """Check the hosts and origins of requests.
 
     Parameters
     ----------
     hosts : sequence of str
-        Names beside `localhost` and every address.
+        Names in addition to `localhost` and every address.
     guarded : bool
-        Whether the service has keys: then nothing is refused here.
+        True when the service has keys: then nothing is refused here.
     named : sequence of str
-        Origins whose pages may ask.
+        Origins whose pages may send requests.
     """
 
     def __init__(self, hosts: Sequence[str], *, guarded: bool, named: Sequence[str] = ()) -> None:
@@ -37,7 +37,7 @@ class Origins:
         self._guarded = guarded
 
     def require(self, headers: Iterable[tuple[bytes, bytes]]) -> None:
-        """Refuse what the page of another site may have sent.
+        """Refuse requests that the page of another site may have sent.
 
         Parameters
         ----------
@@ -50,7 +50,7 @@ class Origins:
             When the host is neither an address nor a name that is known. Only HTTP/1.0, which no browser speaks, has
             none.
         ForeignOriginError
-            When a browser says that another site's page sends this.
+            When the browser's headers name another site's page as the sender.
         """
         if self._guarded:
             return
@@ -65,7 +65,7 @@ class Origins:
             raise ForeignOriginError
 
     def is_preflight(self, method: str, headers: Iterable[tuple[bytes, bytes]]) -> bool:
-        """Return whether a browser asks what the page of a named origin may send; it has no key for that."""
+        """Return whether this is a browser's preflight request for the page of a named origin; it has no key."""
         if method != "OPTIONS" or not self._named:
             return False
         found = dict(headers)
@@ -91,7 +91,7 @@ def _is_address(name: str) -> bool:
 
 
 def _is_same(origin: str, host: str | None) -> bool:
-    """Return whether a page's origin is the host that it asks, whichever scheme a proxy before it speaks."""
+    """Return whether a page's origin is the host of its request, whichever scheme a proxy before it speaks."""
     try:
         page = urlsplit(origin)
         asked = urlsplit(f"//{host or ''}")

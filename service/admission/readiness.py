@@ -1,4 +1,4 @@
-"""Whether the service takes requests at all."""
+"""Readiness of the service for requests."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from .errors import NotReadyError
 
 
 class Readiness:
-    """Nothing is searched before the kernels are warm; a service that goes down says so before it closes.
+    """Refuse requests before the kernels are warm, and report the end of the service before it closes.
 
     Attributes
     ----------
     warm : bool
-        Whether the kernels are loaded.
+        True when the kernels are loaded.
     draining : bool
-        Whether the service was told to end.
+        True when the service is to end.
     compiled : callable, or None
-        Returns which share of the kernels is compiled, 0 to 1; None before and after that.
+        Returns the compiled fraction of the kernels, 0 to 1; None before and after the compilation.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class Readiness:
 
     @property
     def takes_requests(self) -> bool:
-        """Whether it is neither warming up nor going down."""
+        """Return whether the service is neither warming up nor ending."""
         return self.warm and not self.draining
 
     def require_warm(self) -> None:

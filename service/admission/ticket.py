@@ -1,4 +1,4 @@
-"""What was decided about a request, and its place on the way to a search."""
+"""The decision about a request, and its place on the way to a search."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .fair_queue import Holder
 
 
 class Expecting(Protocol):
-    """Where requests are expected: the gate."""
+    """A gate that expects requests."""
 
     def expect(self, holder: Holder) -> None:
         """Note that a request is on its way, its body complete."""
@@ -26,16 +26,16 @@ class Ticket:
     Parameters
     ----------
     holder : Holder
-        Whose key it came with, or from which address.
+        The key or the address that the request comes from.
     gate : Expecting, or None
-        Where it is on its way to; None for what does not search.
+        The gate that it is on its way to; None for a request that does not search.
     maps : str
-        How the ids of the maps begin that there are for it.
+        Prefix of the ids of the maps that exist for it.
 
     Attributes
     ----------
     admitted : bool
-        Whether it has had a slot: an admitted request is not refused later.
+        True when it has had a slot: an admitted request is not refused later.
     """
 
     __slots__ = ("_announced", "_gate", "admitted", "holder", "maps")
@@ -48,13 +48,13 @@ class Ticket:
         self._announced = False
 
     def announce(self) -> None:
-        """Say that the body is there and the request on its way to the gate."""
+        """Announce to the gate that the body is there and the request on its way."""
         if self._gate is not None and not self._announced:
             self._announced = True
             self._gate.expect(self.holder)
 
     def arrive(self) -> None:
-        """Say that the request is at the gate, or will never come; it is not announced again."""
+        """Note that the request is at the gate, or will never come; it is not announced again."""
         gate, self._gate = self._gate, None
         if gate is not None and self._announced:
             gate.expect_no_longer(self.holder)

@@ -1,8 +1,8 @@
-"""JSON Web Tokens (RFC 7519) of an issuer that the operator names, beside keys.
+"""JSON Web Tokens (RFC 7519) of an issuer that the operator names, in addition to keys.
 
-What a token may do is its `scope` (RFC 9068): ``linefix:read``, ``linefix:associate``, ``linefix:write``. Its claim
-``linefix_maps`` says how the ids of its maps begin. Signatures are asymmetric only: whoever can check one cannot make
-one.
+The claim `scope` (RFC 9068) holds the permissions of a token: ``linefix:read``, ``linefix:associate``,
+``linefix:write``. Its claim ``linefix_maps`` holds the prefix of the ids of its maps. Signatures are asymmetric only:
+the key that checks one cannot make one.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Tokens:
         self._fetched = 0.0
 
     def grant(self, token: bytes) -> Grant:
-        """Return what a token may do.
+        """Return the permissions of a token.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Tokens:
             return next(iter(self._keys.values()))
         found = self._keys.get(key_id) if isinstance(key_id, str) else None
         if found is None:
-            # It may be new: looked for soon, but not for each token that somebody makes up.
+            # The key may be new: it is looked for soon, but not once for each token with an invented id.
             self._next_fetch = min(self._next_fetch, self._last_fetch + SOON_SECONDS)
             raise UnknownKeyError
         return found

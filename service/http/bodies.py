@@ -32,7 +32,7 @@ class Body:
     data : bytearray
     gzipped : bool
     account : ByteAccount
-        Where its bytes are counted, and those that it unpacks to have to be.
+        Account of its bytes, and of those that it unpacks to.
     """
 
     data: bytearray
@@ -52,8 +52,8 @@ class BodyReceiver:
     timeout : float
         Seconds that a request may take to arrive, its head included.
     guarded : bool
-        Whether the service has keys. Without them a POST has to name its media type: one that a browser sends for the
-        page of another site cannot name JSON without asking first.
+        True when the service has keys. Without them a POST has to name its media type. A browser that sends a POST for
+        the page of another site cannot name JSON without a preflight request.
     """
 
     def __init__(self, max_bytes: int, budget: ByteBudget, timeout: float, *, guarded: bool = True) -> None:
@@ -74,9 +74,9 @@ class BodyReceiver:
         arrived : float
             When its first byte came, by the event loop's clock, seconds.
         holder : Holder
-            Who sends it.
+            The sender.
         form : bool
-            Whether it is to be a form with files; else it is to be JSON.
+            True when it is to be a form with files; else it is to be JSON.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Intake:
 
     def __init__(self, receive: Receive, headers: Sequence[tuple[bytes, bytes]]) -> None:
         self._receive = receive
-        # A client that asks before it sends its body has sent nothing yet.
+        # A client that waits for "100 Continue" has sent nothing yet.
         self._unread = any(_announces_body(*field) for field in headers) and not any(
             name == b"expect" for name, _ in headers
         )
@@ -130,7 +130,7 @@ class Intake:
         return message
 
     async def drop_rest(self, most_bytes: int) -> None:
-        """Read what is left and drop it, as far as it comes soon and is not too much."""
+        """Read the rest and drop it, as far as it comes soon and is not too much."""
         if not self._unread:
             return
         dropped = 0
@@ -141,7 +141,7 @@ class Intake:
 
 
 def _is_gzip(request: Request, *, form: bool) -> bool:
-    """Return whether a body is gzip; refuse what by its head is not what is taken."""
+    """Return whether a body is gzip; refuse media types and encodings that are not supported."""
     told = request.headers.get("content-type", FORM if form else JSON)
     media_type = told.split(";")[0].strip().lower()
     if media_type != FORM if form else not _is_json(media_type):

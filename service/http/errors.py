@@ -20,7 +20,7 @@ from collections.abc import Iterable
 
 
 class HttpError(Exception):
-    """A request is wrong as HTTP; the message says how."""
+    """A request is wrong as HTTP; the message names the error."""
 
 
 class NotHttpError(HttpError):

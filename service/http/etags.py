@@ -44,7 +44,7 @@ def demands_of(request: Request) -> Preconditions:
 
 
 def is_conditional(request: Request) -> bool:
-    """Return whether a reader names what it has."""
+    """Return whether a reader names the revisions that it has."""
     return "if-none-match" in request.headers
 
 

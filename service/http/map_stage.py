@@ -30,7 +30,7 @@ async def looking_up(
 ) -> AsyncIterator[InlineMap | FoundMap]:
     """Look a stored map up before its slot at the gate: a database server that hangs delays no other request.
 
-    Its document counts as held until the block ends. `oriented` None is as the map itself says.
+    Its document counts as held until the block ends. `oriented` None: as the map states.
 
     Raises
     ------
@@ -85,8 +85,8 @@ async def ask_store(services: Services, call: Callable[[], T]) -> T:
     Raises
     ------
     StoreError
-        When it cannot do what is asked, or does not answer in `STORE_SECONDS`. What was to be written may have been
-        written all the same.
+        When it cannot complete the call, or does not answer in `STORE_SECONDS`. The data may have been written all
+        the same.
     """
     try:
         async with asyncio.timeout(STORE_SECONDS):

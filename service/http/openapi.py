@@ -39,7 +39,7 @@ _REQUESTS = (
 
 
 def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
-    """Return the OpenAPI document of an application; `guarded` says whether it asks for keys."""
+    """Return the OpenAPI document of an application; `guarded`: its routes require keys."""
     document = get_openapi(
         title=app.title, version=app.version, description=DESCRIPTION, routes=app.routes, tags=app.openapi_tags
     )
@@ -57,9 +57,9 @@ def describe(app: FastAPI, *, guarded: bool) -> dict[str, Any]:
 
 
 class Contract:
-    """The document as it is sent, one copy for all who read it; belongs to one event loop.
+    """The document as it is sent, one copy for all readers; belongs to one event loop.
 
-    It takes some tenths of a second to make: in a thread, when it is asked for first, and never again.
+    It takes some tenths of a second to make: in a thread, on the first request for it, and never again.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Contract:
         self._making: asyncio.Future[bytes] | None = None
 
     async def body(self) -> bytes:
-        """Return it as JSON; those who ask while it is made wait for the same."""
+        """Return it as JSON; requests that arrive while it is made wait for the same."""
         if self._making is None:
             self._making = asyncio.ensure_future(self._threads.run(lambda: encode(self._describe())))
         return await asyncio.shield(self._making)

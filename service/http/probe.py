@@ -1,4 +1,4 @@
-"""Whether the store answers; asked by probes, which may come often and must not wait long."""
+"""State of the store, for probes, which may come often and must not wait long."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class StoreProbe:
         Raises
         ------
         ReadOnlyStoreError, BusyStoreError, StoreAwayError, NotReadyError
-            What is full or damaged is for the callers of maps to know; to a balancer it is all the same.
+            The callers of maps need the kind of failure, full or damaged; a balancer treats all alike.
         """
         if self._looking is None or self._looking.done():
             self._looking = asyncio.ensure_future(self.open())

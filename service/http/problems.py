@@ -41,11 +41,11 @@ class Kind:
     Attributes
     ----------
     code : ProblemCode
-        Stable; what a program looks at.
+        Stable; programs branch on it.
     status : int
     title : str
     raised_as : tuple of exception types
-        What becomes this problem.
+        The exceptions that become this problem.
     """
 
     code: ProblemCode
@@ -183,7 +183,7 @@ def problem_of(error: Exception) -> Problem | None:
 
 
 def headers_of(error: Exception) -> Mapping[str, str]:
-    """Return the headers that say more of an error."""
+    """Return the headers that belong to an error."""
     match error:
         case admission.MissingKeyError():
             return {"WWW-Authenticate": 'Bearer realm="linefix"'}

@@ -19,7 +19,7 @@ from .searching import in_slot_of, unless_hung_up
 
 T = TypeVar("T")
 Reader = Callable[[bytes | bytearray, Limits], T]
-"""From JSON to what was asked for; a function of a module, so that another process can call it."""
+"""A function from JSON to a checked request; a module's function, so that another process can call it."""
 
 SMALL = 16_384  # bytes; smaller bodies are parsed in less time than it takes to hand them to a thread
 

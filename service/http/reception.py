@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from opentelemetry.trace import Span
 
 logger = logging.getLogger("linefix")
-LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would ask again at once
+LATER = 0.05  # s after which a holder that used its share is refused: refused at once it would send again at once
 OTHER = "unmatched"
-STRANGERS_BYTES = 65_536  # of the rest of a body that is dropped of who has shown no key
+STRANGERS_BYTES = 65_536  # of the rest of a body that are dropped, from a caller without a key
 STRANGERS = (MissingKeyError, UnknownKeyError, NotHttpError)
 """Errors that end the connection: nothing more is served on it."""
-NO_HOST = (b"host", b"")  # what the server has in place of a host where none was sent
+NO_HOST = (b"host", b"")  # the server's header in place of a host if none was sent
 CONTROL = frozenset(("Cc", "Zl", "Zp"))  # of Unicode: C0 and C1, DEL, and what separates lines and paragraphs
 ALWAYS = ((b"server", b"linefix"), (b"x-content-type-options", b"nosniff"))
 _HOST = re.compile(rb"[A-Za-z0-9._~%!$&'()*+,;=:\[\]-]*")
@@ -100,7 +100,7 @@ class Reception:
         started = time.perf_counter()
         intake, most_bytes = Intake(receive, scope["headers"]), self._services.settings.max_body_bytes
         status = 0
-        # Whoever can be read can be asked for its headers: the server leaves the body away.
+        # Every path that GET reads answers HEAD, too: the server leaves the body away.
         inner = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
 
         async def send_with_id(message: Message) -> None:

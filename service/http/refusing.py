@@ -1,4 +1,4 @@
-"""What the application answers when something is raised."""
+"""Responses of the application to exceptions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .problems import INTERNAL, RAISED, problem_of
 from .searching import HangUpError
 
 logger = logging.getLogger("linefix")
-CLIENT_CLOSED_REQUEST = 499  # nobody reads it; the log and the counts do
+CLIENT_CLOSED_REQUEST = 499  # not sent to a reader; used in the log and the counts
 
 
 def handle_errors(app: FastAPI) -> None:
@@ -58,7 +58,7 @@ def _own(request: Request, error: Exception) -> Exception:
 
 
 def _methods_of(request: Request) -> list[str]:
-    """Return what the path takes; the framework names the methods of one route only."""
+    """Return the methods of the path; the framework names the methods of one route only."""
     every = [getattr(included, "original_router", None) or included for included in request.app.routes]
     routes = [route for one in every for route in getattr(one, "routes", [one])]
     matching = (route for route in routes if route.matches(request.scope)[0] is not Match.NONE)

@@ -1,7 +1,7 @@
 """Answers that are too large to be handed over in one piece.
 
-What is handed to the server waits in its memory for as long as the client takes to read it. Large answers go piece by
-piece, and what they hold until then is counted: of all together, and of each who asks.
+Data that is handed to the server waits in its memory for as long as the client takes to read it. Large answers go piece
+by piece. The bytes that they hold until then are counted: of all together, and of each caller.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the routes work with: the parts of one application, made by `create_app`."""
+"""The services that the routes use: the parts of one application, made by `create_app`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .bodies import BodyReceiver
 from .probe import StoreProbe
 
 KEY = "services"
-"""Where they are in the state that the application gives to each request."""
+"""Key of the services in the state that the application gives to each request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Services:
         That reading one is held to.
     parse_threads, store_threads, key_threads, issuer_threads : Threads
     traces : Traces, or None
-        Where they are asked for.
+        None where no traces are requested.
     """
 
     settings: Settings
@@ -93,7 +93,7 @@ class Services:
         return self.gate, self.parsing, self.parsing_apart, self.indexing, self.importing
 
     def give_up(self) -> None:
-        """Tell everything that runs to end, and wait no longer for what does not hear."""
+        """Cancel everything that runs, and wait no longer for functions that do not check for it."""
         for gate in self._gates:
             gate.cancel_all()
 

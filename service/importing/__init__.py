@@ -6,5 +6,5 @@
     folders    where the files of one import are put, and when they go
     reader     what runs in it: from a form to a map and a report
     form       multipart/form-data to files and fields
-    fields     fields to what `formats` may be told of a file
+    fields     fields to the options of `formats` for a file
 """

@@ -23,8 +23,8 @@ from .folders import own_folder
 from .reader import NO_ROOM, Bounds
 
 READER = "service.importing.reader"
-LOOK_SECONDS = 0.05  # how often it is looked whether somebody still waits
-# What the environment says to the service alone: keys, where they lie, passwords of databases and of collectors.
+LOOK_SECONDS = 0.05  # between two checks that the caller still waits
+# Variables of the environment for the service alone: keys, their paths, passwords of databases and of collectors.
 PRIVATE = ("LINEFIX_", "PG", "OTEL_")
 SHARED = ("LINEFIX_KERNELS",)
 ANSWER, FAILURE = "answer", "failure"  # files in the folder of one import
@@ -36,14 +36,14 @@ class ReaderFailedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ReadMap:
-    """What came of the files.
+    """The map that was read from the files.
 
     Attributes
     ----------
     map : bytes
         A map file of our own, JSON; not checked yet.
     report : dict
-        What was read, merged, dropped and assumed.
+        The data that was read, merged, dropped and assumed.
     picture : dict or None
         Of the grid that the map comes from.
     """
@@ -62,9 +62,9 @@ class ReadScans:
     scans : bytes
         JSON, an object with a list.
     count : int
-        How many the log has.
+        Number of scans in the log.
     report : dict
-        What was read, merged, dropped and assumed.
+        The data that was read, merged, dropped and assumed.
     """
 
     scans: bytes
@@ -89,7 +89,7 @@ def read_apart(content: bytearray, content_type: str, bounds: Bounds, deadline: 
     ImportingError, InvalidRequestError
         When it is not read.
     CancelledError
-        When nobody waits for it any longer.
+        When no caller waits for it any longer.
     """
     head, line_map = _read(content, content_type, bounds, deadline, scans=False)
     return ReadMap(line_map, head["report"], head["picture"])
@@ -146,7 +146,7 @@ def _require_report(told: dict[str, Any]) -> None:
 
 
 def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadline) -> int:
-    """Run a process to its end and return its status; what it writes is put into `ANSWER` and `FAILURE`.
+    """Run a process to its end and return its status; its output is put into `ANSWER` and `FAILURE`.
 
     They are files, which may not grow beyond what one file may: the process is not relied on to write little.
     """
@@ -180,7 +180,7 @@ def _ended(command: list[str], folder: Path, content: bytearray, deadline: Deadl
 
 
 def _feed(pipe: IO[bytes], content: bytearray) -> None:
-    with suppress(OSError), pipe:  # whoever was to read it may have ended
+    with suppress(OSError), pipe:  # the reading process may have ended
         pipe.write(content)
 
 

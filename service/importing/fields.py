@@ -1,4 +1,4 @@
-"""What may be told of a file beside it: fields of a form, or options of the command line, to options of `formats`."""
+"""Options that describe a file: fields of a form, or options of the command line, to options of `formats`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TRUTHS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no
 
 
 def options_of(fields: Fields) -> ImportOptions:
-    """Return what is said of a file.
+    """Return the import options that the fields of a form state.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def _units(values: Sequence[str]) -> str | float:
     try:
         return _number(values)
     except ValueError:
-        return _text(values)  # a name, which `ImportOptions` knows or refuses
+        return _text(values)  # a name, which `ImportOptions` accepts or refuses
 
 
 def _truth(values: Sequence[str]) -> bool:

@@ -69,7 +69,7 @@ def own_files(names: list[str], map_name: str, folder: Path) -> OwnFiles:
 
 
 def fault_of(error: FormatError, files: OwnFiles) -> Fault:
-    """Say where in the form something is wrong: a file by its number, for what was sent is not repeated."""
+    """Return the fault with its place in the form: a file by its number, since sent names are not repeated."""
     from formats import IncompleteFileError
 
     pointer, number = pointer_of(error.argument), files.number_of(error.argument)

@@ -1,7 +1,7 @@
-"""What runs in the bounded process: a form on stdin to a map, or scans, and a report on stdout.
+"""The program of the bounded process: a form on stdin to a map, or scans, and a report on stdout.
 
-The files are those of strangers, and the libraries that read them are many and large. So this process has no more
-memory and time than it was given and no keys in its environment, and what it says is JSON, which is checked.
+The files come from untrusted senders, and the libraries that read them are many and large. So this process has no more
+memory and time than it was given and no keys in its environment. Its output is JSON, which is checked.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .scans import read_scans
 if TYPE_CHECKING:
     from formats import GridPicture, ImportedMap
 
-MAPPED_BYTES = 1_000_000_000  # of address space beside the memory: libraries, and room that is never used
+MAPPED_BYTES = 1_000_000_000  # of address space in addition to the memory: libraries, and room that is never used
 MOST_OPEN = 64  # files
 NICE = 5  # searches go before it, at three times as much of a core that both want
 FULL = (errno.ENOSPC, errno.EDQUOT)  # disks
@@ -40,7 +40,7 @@ OOM_SCORE = "1000"  # the first to go where the machine's memory ends
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """How much reading one map may take.
+    """Limits of reading one map.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Bounds:
 
 
 def main(told: str, folder: str) -> None:
-    """Read the form on stdin, its files put into a folder; print a report and what was read, or why there is none."""
+    """Read the form on stdin, its files put into a folder; print a report and the content, or the error."""
     asked = orjson.loads(told)
     bounds = Bounds(**asked["bounds"])
     _bind(bounds)
@@ -94,7 +94,7 @@ def _printed(lines: list[dict[str, Any]], most: int) -> bytes:
 
 
 def _bind(bounds: Bounds) -> None:
-    """Take away from this process what it does not need."""
+    """Take away from this process all that it does not need."""
     most = bounds.memory_bytes
     for what, limit in (
         (resource.RLIMIT_DATA, most),
@@ -104,7 +104,7 @@ def _bind(bounds: Bounds) -> None:
         (resource.RLIMIT_NOFILE, MOST_OPEN),
         (resource.RLIMIT_CORE, 0),
     ):
-        with suppress(ValueError, OSError):  # less is allowed already, or the system knows no such limit
+        with suppress(ValueError, OSError):  # less is allowed already, or the system has no such limit
             resource.setrlimit(what, (limit, limit))
     with suppress(OSError):
         os.nice(NICE)
@@ -208,7 +208,7 @@ def picture_json(picture: GridPicture) -> dict[str, Any]:
         image = image.reduce(factor)
     content = io.BytesIO()
     image.save(content, "PNG")
-    # What the last row of a reduced picture has too much lies below the grid.
+    # The excess of the last row of a reduced picture lies below the grid.
     below = (image.height * factor - rows) * picture.resolution
     pose = picture.pose
     return {
@@ -226,7 +226,7 @@ if __name__ == "__main__":
     told, folder, service = sys.argv[1:]
     try:
         main(told, folder)
-    except Exception as error:  # a defect; its kind is told, and nothing of the file
+    except Exception as error:  # a defect; only its kind is printed, nothing of the file
         print(f"{type(error).__name__}", file=sys.stderr, flush=True)
         os._exit(NO_ROOM if isinstance(error, OSError) and error.errno in FULL else 1)
     finally:

@@ -1,4 +1,4 @@
-"""What runs in the bounded process where a log is sent: a form to some of its scans and a report."""
+"""The program of the bounded process for a log: a form to some of its scans and a report."""
 
 from __future__ import annotations
 

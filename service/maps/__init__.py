@@ -1,4 +1,4 @@
-"""Maps kept by id: the store, the cache of those that are indexed, and the way from a request's map to its index."""
+"""Maps stored by id: the store, the cache of those that are indexed, and the way from a request's map to its index."""
 
 from .cache import CachedMap, IndexCache
 from .preconditions import Preconditions

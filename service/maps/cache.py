@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # the store comes without what computes
     from association import Deadline, MapIndex
 
 ALONE = 2  # times the cache; the largest map takes that where its directions mean nothing
-LOOK_SECONDS = 0.05  # after which who waits for another's index looks whether its own client is still there
+LOOK_SECONDS = 0.05  # between two checks, while waiting for another's index, that the own client is still there
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,12 @@ class CachedMap:
 
     @property
     def oriented(self) -> bool:
-        """Whether directions of its segments mean anything; else it is listed both ways."""
+        """Return whether directions of its segments mean anything; else the index lists each segment both ways."""
         return len(self.index.segments) == self.index.directed
 
 
 class IndexCache:
-    """Builds what it does not have; callers that want the same map wait for one build.
+    """Builds missing indices; callers that want the same map wait for one build.
 
     Keys name content, not maps: a map that changes gets another key, so that nothing stale is ever found.
     """
@@ -57,12 +57,12 @@ class IndexCache:
             return key in self._ready
 
     def get(self, key: Hashable, build: Callable[[], CachedMap], deadline: Deadline) -> CachedMap:
-        """Return the map of a key, built by this caller or by the one that asked first.
+        """Return the map of a key, built by this caller or by the first one that requested it.
 
         Raises
         ------
         IndexNotReadyError
-            When the deadline passes, or is cancelled, while the one that asked first still builds it.
+            When the deadline passes, or is cancelled, while the first caller still builds it.
         """
         with self._lock:
             found = self._ready.get(key)
@@ -80,7 +80,7 @@ class IndexCache:
         return self._build(key, promise, build)
 
     def make_room(self, size: int) -> None:
-        """Drop what was used the longest ago until so much more would fit; before something large is built."""
+        """Drop the maps used the longest ago until so much more would fit; before something large is built."""
         with self._lock:
             self._drop_until(self._max_bytes - size)
 
@@ -116,7 +116,7 @@ class IndexCache:
 
 
 def _awaited(promise: Future[CachedMap], deadline: Deadline) -> CachedMap:
-    """Return what another builds, if that is there in time; whoever waits here holds a slot."""
+    """Return the map that another thread builds, if it is there in time; the waiting thread holds a slot."""
     while not deadline.passed:
         left = LOOK_SECONDS if deadline.at is None else deadline.at - time.monotonic()
         done, _ = wait([promise], max(0.0, min(LOOK_SECONDS, left)))

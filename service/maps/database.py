@@ -1,4 +1,4 @@
-"""Connections to the database behind the map store, so set that what is committed stays committed."""
+"""Connections to the database behind the map store, so set that committed data stays committed."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def open_engine(url: URL, *, keeps_statements: bool = False) -> Engine:
     ----------
     url : URL
     keeps_statements : bool
-        Whether SQLite keeps its statements prepared: not where they are given documents. A statement that is kept keeps
-        what it was last given, 15 MB for each and every connection.
+        True when SQLite keeps its prepared statements: not where these take documents. A statement that is kept
+        keeps its last arguments, 15 MB on each connection.
     """
     if url.get_backend_name() == "sqlite":
         # No bound on connections: each is used by one thread, whose number is bounded elsewhere.
@@ -55,7 +55,7 @@ class DatabaseFile:
     ----------
     path : Path
     may_make : bool
-        Whether it is made where there is none: not by who stands in for a process that had it.
+        True when the file is made if it is missing: not for a process that replaces an earlier one.
     """
 
     def __init__(self, path: Path, *, may_make: bool) -> None:
@@ -86,7 +86,7 @@ class DatabaseFile:
 
     @property
     def is_the_same(self) -> bool:
-        """Whether the file is the one that was found last."""
+        """Return whether the file is the one that was found last."""
         try:
             found = os.stat(self._path)
         except OSError:

@@ -1,10 +1,10 @@
-"""Why the store of maps does not do what was asked.
+"""Errors of the store of maps.
 
 ::
 
     StoreError
     ├── UnknownMapError        nothing is stored under the id
-    ├── CorruptMapError        what is stored is damaged
+    ├── CorruptMapError        the stored map is damaged
     ├── RevisionConflictError  the map is not as the writer demands
     ├── StoreFullError         there is no room for it
     ├── ReadOnlyStoreError     nothing can be written
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 
 class StoreError(Exception):
-    """The store does not do what was asked; the message says why, for whoever asked."""
+    """The store does not complete a request; the message gives the caller the reason."""
 
 
 class UnknownMapError(StoreError):
@@ -28,7 +28,7 @@ class UnknownMapError(StoreError):
 
 
 class CorruptMapError(StoreError):
-    """What is stored is damaged."""
+    """The stored map is damaged."""
 
     def __init__(self, message: str = "the stored map does not match its checksum; send it again with PUT") -> None:
         super().__init__(message)

@@ -1,4 +1,4 @@
-"""What the failures of a database mean."""
+"""Meanings of the failures of a database."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ _POSTGRESQL: dict[str, Failure] = {
 
 @contextmanager
 def failures_as_store_errors() -> Iterator[None]:
-    """Turn what a database can refuse into store errors; anything else is a defect and passes through."""
+    """Turn a database's refusals into store errors; anything else is a defect and passes through."""
     try:
         yield
     except NoConnectionError as error:
         raise BusyStoreError from error
     except UnicodeDecodeError as error:
-        # The statements are right: a name that is no text is damage, which Python's driver cannot even tell.
+        # The statements are right: a name that is no text is damage, which Python's driver cannot even report.
         raise damaged() from error
     except DBAPIError as error:
         found = _of_sqlite(error.orig) if isinstance(error.orig, sqlite3.Error) else _of_postgresql(error)

@@ -20,7 +20,7 @@ from .records import MapOutline, MapRecord
 from .store import MapStore
 
 MAX_EXTENT = 1e5  # m
-OVERHEAD = 24_000  # bytes that an index takes beside its arrays, however small these are
+OVERHEAD = 24_000  # bytes that an index takes in addition to its arrays, however small these are
 LONG_SEGMENTS = 2_000  # of a map that takes some milliseconds to be indexed, and
 LONG_BYTES = 100_000  # of the document of one
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
@@ -34,7 +34,7 @@ class FoundMap:
     ----------
     record : MapRecord
     document : bytes, or None
-        What is to be indexed; None where it was in the cache.
+        The document to be indexed; None where the map was in the cache.
     """
 
     record: MapRecord
@@ -60,7 +60,7 @@ class MapLookup:
     def find(self, map_id: str, *, oriented: bool | None) -> FoundMap:
         """Look a stored map up, with its document where it is not indexed yet; runs in a thread that may wait.
 
-        `oriented` None is as the map itself says.
+        `oriented` None: as the map states.
 
         Looked up before every use, so that a change by another worker is never missed.
 
@@ -94,8 +94,8 @@ class MapLookup:
     def indexed(self, asked: InlineMap | FoundMap, *, oriented: bool | None, deadline: Deadline) -> CachedMap:
         """Return a map ready to be searched.
 
-        Whether its directions count makes it another index, with a place of its own in the cache; `oriented` None is as
-        the map itself says. Where another request indexes the same map, that is waited for until the deadline.
+        Oriented and unoriented indices of a map are different ones, each with a place of its own in the cache.
+        `oriented` None: as the map states. If another request indexes the same map, wait for it until the deadline.
 
         Runs off the event loop.
 
@@ -112,7 +112,7 @@ class MapLookup:
         if isinstance(asked, FoundMap):
             directed = is_oriented(oriented, asked.record.oriented)
             return self._cache.get((asked.record, directed), partial(self._read, asked, directed), deadline)
-        # Robots send the same map with every scan: what is in it names it.
+        # Robots send the same map with every scan: its content is its name.
         digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
         directed = is_oriented(oriented, asked.oriented)
         key = digest, asked.sigma, asked.frame_id, directed
@@ -152,7 +152,7 @@ class MapLookup:
 
 
 def outline_of(document: MapDocument) -> MapOutline:
-    """Return what is told of a map that is to be stored.
+    """Return the outline of a map that is to be stored.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a writer demands of the present revision."""
+"""Conditions of a writer on the present revision."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .errors import RevisionConflictError
 
 @dataclass(frozen=True, slots=True)
 class Preconditions:
-    """What a writer demands of the present revision.
+    """Conditions of a writer on the present revision.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""What identifies a map, read on a connection that is kept, by one short statement and without the toolkit.
+"""The identity of a map, read on a connection that stays open, by one short statement and without the toolkit.
 
-It is asked before every use of a cached index, so nothing is remembered: what is read is what is committed by now, in
-whichever process.
+The service reads it before every use of a cached index and caches nothing. The result is the state that is committed by
+now, in whichever process.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class RecordReader:
         connection: Any = opened.driver_connection
         opened.detach()
         if self._on_sqlite:
-            connection.execute("PRAGMA busy_timeout=0")  # whoever asks next waits for writers
+            connection.execute("PRAGMA busy_timeout=0")  # the caller's next attempt waits for writers
         else:
             connection.autocommit = True
         return connection

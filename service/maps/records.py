@@ -1,4 +1,4 @@
-"""What is known of a stored map, and how damage to it shows."""
+"""Properties of a stored map, and how damage to it shows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ABSENT = ""  # the sha256 of a map that was deleted
 
 @dataclass(frozen=True, slots=True)
 class MapRecord:
-    """What identifies the content of a stored map; `oriented` is in it, too, and is needed before it is read."""
+    """The identity of a stored map's content; `oriented` is in the content, too, and is needed before that is read."""
 
     map_id: str
     revision: int
@@ -24,18 +24,18 @@ class MapRecord:
 
 @dataclass(frozen=True, slots=True)
 class MapOutline:
-    """What is told of a map without its content.
+    """The properties of a map without its content.
 
     Attributes
     ----------
     segments : int
-        How many.
+        The number of segments.
     bounds : tuple
         ``min_x, min_y, max_x, max_y``, metres.
     sigma : float, or None
-        Standard deviation of its lines, metres; None where the map says nothing.
+        Standard deviation of its lines, metres; None where the map does not state it.
     oriented : bool, or None
-        Whether directions of its segments mean anything; None where the map says nothing.
+        True when directions of its segments mean anything; None where the map does not state it.
     """
 
     segments: int
@@ -91,7 +91,7 @@ class MapPage:
 
 
 def digest(document: object) -> str:
-    """Return the SHA-256 of a document; of what is no bytes, as damage may leave it, nothing that ever matches."""
+    """Return the SHA-256 of a document; of a value that is no bytes, as after damage, text that never matches."""
     return hashlib.sha256(document).hexdigest() if isinstance(document, bytes) else "damaged"
 
 
@@ -106,7 +106,7 @@ SEALED = (
 def columns_of(record: MapRecord, outline: MapOutline) -> dict[str, Any]:
     """Return a sealed row of `maps`.
 
-    The seal is a SHA-256 of all that the row says: a flipped bit in a revision is found as surely as one in a document.
+    The seal is a SHA-256 of all values of the row. A flipped bit in a revision is found as surely as one in a document.
     """
     # SQLite does not keep the sign of zero.
     numbers = tuple(value + 0.0 for value in outline.bounds)
@@ -121,6 +121,6 @@ def is_sealed(row: Row[Any]) -> bool:
 
 
 def seal(*what: object) -> str:
-    """Return the SHA-256 of what a row says, in this order."""
-    # repr tells 1 from 1.0 from "1", and gives a float to the bit.
+    """Return the SHA-256 of the values of a row, in this order."""
+    # repr distinguishes 1, 1.0 and "1", and gives a float to the bit.
     return hashlib.sha256(repr(what).encode("utf-8", "surrogatepass")).hexdigest()

@@ -29,7 +29,7 @@ VERSIONS = ("0001", "0002", "0003")  # of the migrations; the last is that of th
 BEFORE_ALEMBIC, NEWEST = VERSIONS[0], VERSIONS[-1]
 _version_table = Table(VERSION_TABLE, MetaData(), Column("version_num", String(32), primary_key=True))  # as Alembic's
 _ADVISORY_LOCK = 0x6C696E65666978  # "linefix"
-# Alembic keeps what it migrates in module globals.
+# Alembic stores the subject of a migration in module globals.
 _one_at_a_time = threading.Lock()
 
 metadata = MetaData()
@@ -37,8 +37,8 @@ metadata = MetaData()
 # Compared byte by byte whatever the database's collation, so that the order of a listing is one.
 MAP_ID = String(128).with_variant(String(128, collation="C"), "postgresql")
 
-# What a map is, short enough to be looked at before every search. A deleted map keeps its row, with an empty sha256:
-# its next revision is a new number, so that an old ETag never matches a new map.
+# The properties of a map, short enough to be read before every search. A deleted map keeps its row, with an empty
+# sha256: its next revision is a new number, so that an old ETag never matches a new map.
 maps = Table(
     "maps",
     metadata,
@@ -56,7 +56,7 @@ maps = Table(
     Column("quarantined", Boolean, nullable=False, server_default=false()),
 )
 
-# The content. Id and revision stand here a second time: where damage hides a row of `maps`, this one tells.
+# The content. Id and revision stand here a second time: they remain where damage hides a row of `maps`.
 documents = Table(
     "map_documents",
     metadata,

@@ -34,7 +34,7 @@ T = TypeVar("T")
 BEYOND = "\x7f"  # every letter that an id may have comes before it
 logger = logging.getLogger("linefix")
 
-BYTES_OF_ID = 500  # that an id takes beside its map, about
+BYTES_OF_ID = 500  # that an id takes in addition to its map, about
 SHARE = 0.5  # of all bytes, that maps whose ids begin alike may take: as of memory, no key has more than half
 
 
@@ -45,7 +45,7 @@ class MapStore:
     ----------
     url : URL
     may_make : bool
-        Whether the file of a database of SQLite's is made where there is none.
+        True when a missing file of an SQLite database is made.
     most_bytes : int or None
         That all maps together may take; None for as many as the disk has. Writers at the same time may go beyond it,
         each by the map that it writes.
@@ -66,10 +66,10 @@ class MapStore:
         self._opened = False
 
     def open(self) -> None:
-        """Make sure that the tables exist and are of this version; the other methods do it where nobody has."""
+        """Make sure that the tables exist and are of this version; the other methods do it on their first use."""
         if self._file is not None:
             if self._opened and not self._file.is_the_same:
-                # Connections to a file that was moved away go on with it: what they write nobody would find again.
+                # Connections to a file that was moved away keep using it: later readers would not find their writes.
                 self.close()
             self._file.require()
         upgrade(self._engine, self._writer)
@@ -112,7 +112,7 @@ class MapStore:
             content = {"map_id": map_id, "revision": record.revision, "document": document}
             if not _update(connection, documents, content):
                 connection.execute(insert(documents), content)
-            # Where the tables themselves are damaged rows may not come back as they were written: no commit then.
+            # If the tables themselves are damaged, rows may not come back as they were written: no commit then.
             back = _whole(connection, map_id)
             if _trusted(back) != record or not _matches(back, record):
                 raise CorruptMapError
@@ -134,7 +134,7 @@ class MapStore:
             )
 
     def delete(self, map_id: str, demands: Preconditions) -> None:
-        """Forget a map; the number of its last revision is kept."""
+        """Forget a map; the number of its last revision stays."""
         self._twice(lambda: self._delete(map_id, demands))
 
     def _delete(self, map_id: str, demands: Preconditions) -> None:
@@ -147,7 +147,7 @@ class MapStore:
             connection.execute(delete(documents).where(documents.c.map_id == map_id))
 
     def record(self, map_id: str) -> MapRecord:
-        """Return what identifies the present content; cheap, asked before every use of a cached index."""
+        """Return the record of the present content; cheap, called before every use of a cached index."""
         self._require_open()
         found = self._reader.read(map_id)
         if found is not None:
@@ -156,10 +156,10 @@ class MapStore:
             return _trusted(_row(connection, map_id, select(maps)))
 
     def record_at_once(self, map_id: str) -> MapRecord | None:
-        """Return what identifies the present content where that waits for nobody; None where `record` has to tell.
+        """Return the record of the present content if no wait is needed; None where `record` has to read it.
 
-        A file is read in microseconds, and where another writes at that moment it is not waited for. A server may take
-        any time to answer.
+        A file is read in microseconds; while another process writes to it, this method does not wait. A server may
+        take any time to answer.
         """
         if self._file is None or not self._opened or not self._file.is_the_same:
             return None
@@ -191,7 +191,7 @@ class MapStore:
         """Mark a map as corrupt for all workers, also those that have it indexed, until it is put again."""
         logger.error("map quarantined: it does not match its checksum", extra={"map_id": record.map_id})
         same = (maps.c.map_id == record.map_id, maps.c.revision == record.revision)
-        # Where nothing can be written the checksum goes on refusing it.
+        # If nothing can be written, the checksum still refuses the map.
         with suppress(StoreError), self._writing() as connection:
             connection.execute(update(maps).where(*same).values(quarantined=True))
 
@@ -212,7 +212,7 @@ class MapStore:
             yield connection
 
     def _twice(self, write: Callable[[], T]) -> T:
-        """Write, and once more where the first attempt failed for what may be past."""
+        """Write, and repeat once where the cause of the first failure may have passed."""
         try:
             return write()
         except IntegrityError:
@@ -273,7 +273,7 @@ def _document_revision(connection: Connection, map_id: str) -> Any:
 
 
 def _locked(connection: Connection, map_id: str) -> Row[Any] | None:
-    """Return a map's row, which nobody else can change before the transaction ends."""
+    """Return a map's row, locked against changes until the transaction ends."""
     row: Row[Any] | None = connection.execute(select(maps).where(maps.c.map_id == map_id).with_for_update()).first()
     return row
 
@@ -289,7 +289,7 @@ def _last(connection: Connection, map_id: str, row: Row[Any] | None) -> tuple[in
 
 
 def _update(connection: Connection, table: Table, values: dict[str, Any]) -> bool:
-    """Write over the row of a map; tell whether there was one.
+    """Overwrite the row of a map; return whether there was one.
 
     The values are not part of the statement: SQLAlchemy keeps those, and would keep the first document for good.
     """

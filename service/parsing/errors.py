@@ -3,7 +3,7 @@
 ::
 
     ParsingError
-    ├── NotJsonError      the body is not JSON, or not packed as it says
+    ├── NotJsonError      the body is not JSON, or not packed as its head states
     └── ParserEndedError  the process that parses large bodies has ended meanwhile
 """
 
@@ -11,11 +11,11 @@ from __future__ import annotations
 
 
 class ParsingError(Exception):
-    """Bytes could not be read; the message says why, and repeats nothing of them."""
+    """Bytes could not be read; the message names the reason, and repeats none of them."""
 
 
 class NotJsonError(ParsingError):
-    """The body is not JSON, or not packed as it says."""
+    """The body is not JSON, or not packed as its head states."""
 
 
 class ParserEndedError(ParsingError):

@@ -1,8 +1,8 @@
-"""A process of its own for parsing what is large.
+"""A process of its own for parsing large bodies.
 
-Parsing 15 MB of JSON holds Python's global lock for a fifth of a second in one piece: nothing else of the service would
-answer meanwhile, probes included. What comes back are arrays, which cross as bytes. The memory that a hostile body may
-take is taken there, too.
+Parsing 15 MB of JSON holds Python's global lock for a fifth of a second in one piece. Nothing else of the service would
+answer meanwhile, probes included. The results are arrays, which cross as bytes. The memory that a hostile body may take
+is taken there, too.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ParserProcess:
             self._started()
 
     def call(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Return what a function of a module returns there, or raise what it raises.
+        """Return the result of a module's function there, or raise its exception.
 
         Bytes among the arguments, and in a tuple that comes back, are not copied on the way.
 
@@ -72,7 +72,7 @@ class ParserProcess:
         return answer
 
     def close(self) -> None:
-        """End the process; what it works at is lost."""
+        """End the process; its present work is lost."""
         process = self._process
         if process is not None:
             process.kill()
@@ -133,9 +133,9 @@ def send(connection: Connection, value: Any) -> None:
 
 
 def receive(connection: Connection) -> Any:
-    """Wait for an object; whoever may send here is trusted, since it comes as a pickle.
+    """Wait for an object from a trusted sender, since it comes as a pickle.
 
-    What was a `bytearray` is `bytes`, and arrays cannot be written to.
+    A `bytearray` arrives as `bytes`, and arrays cannot be written to.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def work(connection: Connection) -> None:
             send(connection, (found, error))
         except OSError:
             return
-        function = arguments = found = error = None  # nothing large is kept while this waits
+        function = arguments = found = error = None  # nothing large is held while this waits
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def read_model(model: type[M], data: bytes | bytearray, limits: Limits) -> M:
 
 
 def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, list[BatchItem | RequestError]]:
-    """Return a batch without its scans, and each scan by itself: checked, or why it is none."""
+    """Return a batch without its scans, and each scan separately: checked, or the error that rejects it."""
     asked = read_model(BatchRequest, data, limits)
     items: list[BatchItem | RequestError] = []
     for index, scan in enumerate(asked.scans):
@@ -49,14 +49,14 @@ def read_batch(data: bytes | bytearray, limits: Limits) -> tuple[BatchRequest, l
 
 
 def read_map(data: bytes | bytearray, limits: Limits) -> tuple[MapDocument, bytes]:
-    """Return a map that is to be stored, and the document that is kept of it: what was sent and no more."""
+    """Return a map that is to be stored, and the document to store: the sent fields and no more."""
     asked = read_model(MapDocument, data, limits)
     document = {name: getattr(asked, name) for name in ("segments", "sigma", "oriented", "frame_id", "meta")}
     return asked, encode({name: value for name, value in document.items() if name in asked.model_fields_set})
 
 
 def read_stored(document: bytes) -> MapDocument:
-    """Return a map that was stored; what was checked then is not held to limits that may have changed since."""
+    """Return a map that was stored; it is not held to limits that may have changed since then."""
     return MapDocument.model_validate(orjson.loads(document))
 
 

@@ -21,7 +21,7 @@ def unpack(packed: bytes | bytearray, max_bytes: int, take: Callable[[int], None
     max_bytes : int
         That it may unpack to; more is never held.
     take : callable
-        Told how many bytes more there are, piece by piece; what it raises ends this.
+        Called with the number of further bytes, piece by piece; an exception from it ends this.
 
     Raises
     ------

@@ -34,7 +34,7 @@ logger = logging.getLogger("linefix")
 # For which a search thread waits for Python's global lock while the event loop is busy, each time that it returns from
 # a kernel; by default it is 5 ms.
 SWITCH_SECONDS = 0.001
-GARBAGE = (20_000, 10, 10)  # little of what a request makes is cyclic; by default Python looks after each 700 objects
+GARBAGE = (20_000, 10, 10)  # few objects of a request are cyclic; by default Python looks after each 700 objects
 LOOK_SECONDS = 1.0  # between looks whether the event loop turns
 
 
@@ -50,7 +50,7 @@ def build_worker(settings: Settings, directory: Path) -> FastAPI:
     gc.disable()  # until the service is ready
     part, lock = take_part(directory, settings.workers)
     if settings.workers > 1:
-        forget_worker(str(directory), part.index)  # what a dead one had running; its counts stay
+        forget_worker(str(directory), part.index)  # the running requests of a dead one; its counts stay
         share_counts(str(directory), part.index)
     _end_with_supervisor()
     most_connections(settings.max_connections)

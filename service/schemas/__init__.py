@@ -1,1 +1,1 @@
-"""What the HTTP contract takes and gives, as pydantic models."""
+"""Requests and responses of the HTTP contract, as pydantic models."""

@@ -1,4 +1,4 @@
-"""What an analysis of a map asks, and answers; the answer documents the JSON, is never built while answering."""
+"""Request and answer of an analysis of a map; the answer documents the JSON, is never built while answering."""
 
 from __future__ import annotations
 

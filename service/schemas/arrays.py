@@ -37,7 +37,7 @@ def _refuse(faults: Iterable[tuple[int, str]]) -> PydanticCustomError:
 def _listed(value: Any, info: ValidationInfo, counted: tuple[str, str]) -> list[Any]:
     """Return an array that is within its limit; `counted` are the limit's name in `Limits` and what it counts.
 
-    What was stored is read without limits: they may have changed since.
+    Stored arrays are read without limits: they may have changed since.
     """
     if type(value) is not list:
         raise PydanticCustomError("not_an_array", "expected an array")
@@ -167,7 +167,7 @@ SigmaOrSigmas = Annotated[
 Weights = Annotated[
     Floats,
     PlainValidator(_column_validator(NUMBERS, 0, 1e100, ("pairs", "weights"))),
-    # What is next to 0 and is not 0 the library refuses: its squares would be.
+    # The library refuses values next to 0 that are not 0: their squares would be 0.
     WithJsonSchema({"type": "array", "items": {"anyOf": [{"const": 0}, _number(1e-100, 1e100)]}}),
 ]
 

@@ -1,4 +1,4 @@
-"""What a check of a map answers; documents the JSON, is never built while answering."""
+"""The answer of a check of a map; documents the JSON, is never built while answering."""
 
 from __future__ import annotations
 

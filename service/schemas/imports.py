@@ -1,4 +1,4 @@
-"""What an import takes and answers; documents both, is never built while answering."""
+"""Request and answer of an import; documents both, is never built while answering."""
 
 from __future__ import annotations
 

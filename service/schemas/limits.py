@@ -1,10 +1,10 @@
-"""How much a request may hold."""
+"""Limits of the size of a request."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-MAX_FAULTS = 20  # wrong places that are told of one request
+MAX_FAULTS = 20  # wrong places that are reported of one request
 
 
 @dataclass(frozen=True, slots=True)

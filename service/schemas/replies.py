@@ -1,4 +1,4 @@
-"""What the routes answer; for the documentation, and what the tests hold the answers to."""
+"""Answers of the routes; for the documentation, and for the tests that check the answers against them."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class BatchRequest(Strict):
     """Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else."""
 
     map: AnyMap = Field(description="the map to search, or the id of a stored one")
-    # Each is validated by itself, as `BatchItem`.
+    # Each is validated separately, as `BatchItem`.
     scans: list[Annotated[AnyScan, SkipValidation]] = Field(
         min_length=1, description="scans, each as `scan` of /v1/associate"
     )

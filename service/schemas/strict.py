@@ -30,7 +30,7 @@ class Strict(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _few_unknown(cls, value: Any) -> Any:
-        """Leave out all unknown fields but as many as are told: each would become an error before any is looked at."""
+        """Leave out unknown fields beyond the reported number: each would become an error before any is looked at."""
         if not isinstance(value, dict) or len(value) <= len(cls.model_fields) + MAX_FAULTS:
             return value
         unknown = islice((name for name in value if name not in cls.model_fields), MAX_FAULTS)

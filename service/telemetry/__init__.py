@@ -1,1 +1,1 @@
-"""What an operator sees: counts, the log, and traces."""
+"""Output for an operator: counts, the log, and traces."""

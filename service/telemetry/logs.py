@@ -1,7 +1,7 @@
 """The log: one JSON object a line, on stderr.
 
-Who reads it may be slow, or asleep. The service does not wait for that: lines that find no room are counted, and the
-count is told when there is room again.
+The log's reader may be slow, or stopped. The service does not wait for it: lines that find no room are counted, and
+the count is logged when there is room again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 STDERR = 2
-WAITING_LINES = 4096  # that are kept for a reader who is late
+WAITING_LINES = 4096  # that are buffered for a late reader
 LAST_SECONDS = 0.5  # that an ending process waits for the reader
 _USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName", "color_message"}
 
@@ -64,13 +64,13 @@ class PatientHandler(logging.Handler):
             self.handleError(record)
 
     def flush(self) -> None:
-        """Wait for what was handed over to be written, for a moment."""
+        """Wait for the queued lines to be written, for a moment."""
         give_up = time.monotonic() + LAST_SECONDS
         while self._written < self._handed and self._thread.is_alive() and time.monotonic() < give_up:
             time.sleep(0.002)
 
     def close(self) -> None:
-        """Write what is left and end."""
+        """Write the remaining lines and end."""
         self.flush()
         self._lines.put(None)
         super().close()
@@ -82,7 +82,7 @@ class PatientHandler(logging.Handler):
                 record = logging.LogRecord("linefix", logging.WARNING, "", 0, "lines of the log were lost", None, None)
                 record.count = lost
                 line = self.format(record) + "\n" + line
-            with suppress(OSError):  # nobody reads it any more
+            with suppress(OSError):  # the reader has gone
                 _write(line.encode("utf-8", "backslashreplace") + b"\n")
             self._written += 1
 
@@ -101,6 +101,6 @@ def log_config(level: str) -> dict[str, Any]:
         "formatters": {"json": {"()": JsonFormatter}},
         "handlers": {"stderr": {"class": f"{__name__}.PatientHandler", "formatter": "json"}},
         "root": {"level": level.upper(), "handlers": ["stderr"]},
-        # Numba tells every pass of its compiler at debug, Alembic each start that nothing had to be done.
+        # At debug, Numba logs every pass of its compiler; Alembic logs each start without migrations.
         "loggers": {"numba": {"level": "WARNING"}, "alembic": {"level": "WARNING"}},
     }

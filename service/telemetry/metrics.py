@@ -23,7 +23,7 @@ EXPOSITION_SECONDS = 0.2  # between two texts; one takes 10 ms of the event loop
 
 
 def share_counts(directory: str, index: int) -> None:
-    """Have the counts of this worker kept in files beside those of the others; before any count is made.
+    """Have the counts of this worker kept in files next to those of the others; before any count is made.
 
     A worker that takes the place of another goes on with its files: counts never go down.
     """
@@ -32,7 +32,7 @@ def share_counts(directory: str, index: int) -> None:
 
 
 def forget_worker(directory: str, index: int) -> None:
-    """Take what a dead worker had running and waiting out of the sums; its counts stay."""
+    """Take the running and waiting requests of a dead worker out of the sums; its counts stay."""
     multiprocess.mark_process_dead(index, directory)  # type: ignore[no-untyped-call]
 
 
@@ -63,17 +63,17 @@ class Metrics:
         self.watch("linefix_resident_bytes", "Memory of the workers", _resident_bytes)
 
     def watch(self, name: str, what: str, read: Callable[[], float]) -> None:
-        """Report a number that is read now and then, and whenever this worker is asked."""
+        """Report a number that is read now and then, and on each request to this worker."""
         gauge = Gauge(name, what, registry=self.registry, multiprocess_mode="livesum")
         self._watched.append((gauge, read))
 
     def refresh(self) -> None:
-        """Read what is watched."""
+        """Read the watched values."""
         for gauge, read in self._watched:
             gauge.set(read())
 
     async def refresh_now_and_then(self) -> None:
-        """Read what is watched for the workers that are asked instead of this one."""
+        """Read the watched values, for requests that reach another worker."""
         while True:
             self.refresh()
             await asyncio.sleep(REFRESH_SECONDS)
@@ -96,9 +96,9 @@ class Metrics:
         self.hypotheses.inc(hypotheses)
 
     async def exposition(self) -> bytes:
-        """Return the text that Prometheus reads, as things stand now; however many ask, a few of them in a second.
+        """Return the text for Prometheus, with the present values; however many request it, a few in a second.
 
-        Who asks soon after another waits, together with all who do so meanwhile.
+        A request soon after another waits, together with all that arrive meanwhile.
         """
         if self._text is None:
             self._text = asyncio.ensure_future(self._next_text())
@@ -140,7 +140,7 @@ class RefusalTally:
         self._refused[route, method, code, status] += 1
 
     def report(self) -> None:
-        """Count and log what was refused since the last time."""
+        """Count and log the refusals since the last time."""
         for (route, method, code, status), count in self._refused.items():
             self._metrics.count_refusals(route, method, status, count)
             logger.warning("refused", extra={"route": route, "code": code, "count": count})

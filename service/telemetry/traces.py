@@ -1,4 +1,4 @@
-"""Traces for OpenTelemetry: off, and free, unless the extra ``linefix[otel]`` is there and ``OTEL_`` variables ask."""
+"""Traces for OpenTelemetry: off, and free, unless ``linefix[otel]`` is there and ``OTEL_`` variables request them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def stage(name: str) -> AbstractContextManager[object]:
     tracer = _TRACER.get()
     if tracer is None:
         return nullcontext()
-    # What went wrong is in the log; a collector gets no messages and no tracebacks.
+    # Errors are in the log; a collector gets no messages and no tracebacks.
     return tracer.start_as_current_span(name, record_exception=False, set_status_on_exception=False)
 
 
@@ -79,7 +79,7 @@ class Traces:
             _TRACER.reset(token)
 
     def close(self) -> None:
-        """Send what is left, if the collector takes it soon."""
+        """Send the remaining spans, if the collector takes them soon."""
         # In a thread: the exporter tries again for longer than its timeout.
         flushing = Thread(target=self._provider.force_flush, daemon=True)
         flushing.start()
@@ -87,7 +87,7 @@ class Traces:
 
 
 def traces_of_environment() -> Traces | None:
-    """Return the traces that the ``OTEL_`` variables ask for; None where they ask for none."""
+    """Return the traces that the ``OTEL_`` variables request; None where they request none."""
     asked = any(os.environ.get(name) for name in ENDPOINTS)
     off = os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true" or os.environ.get("OTEL_TRACES_EXPORTER") == "none"
     if not asked or off:

@@ -1,4 +1,4 @@
-"""Analyses of maps: where a robot would know where it is."""
+"""Analyses of maps: places where a robot would not find its pose."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TURN_SECONDS = 0.1  # of the gate, before others have theirs
 
 @dataclass(slots=True)
 class Tally:
-    """What has been found out so far; one per request, filled by turns at the gate.
+    """The results so far; one per request, filled in steps of one slot of the gate.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Tally:
 
     @property
     def done(self) -> bool:
-        """Whether every pose was tried."""
+        """Return whether every pose was tried."""
         return len(self.found) == len(self.analysis.standing.order)
 
 
@@ -58,7 +58,7 @@ def analysis_of(cached: CachedMap, asked: AnalyzeRequest) -> Analysis:
     Raises
     ------
     AnalysisError
-        When the places asked for cannot be had.
+        When the requested places cannot be had.
     InputError
         When a segment of the landmark is too short or too long.
     """
@@ -80,7 +80,7 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
     ParserEndedError
         When it is large and could not be read.
     AnalysisError, InputError
-        When the places asked for cannot be had, or the landmark is none.
+        When the requested places cannot be had, or the landmark is none.
     DeadlinePassedError
         When the deadline has passed before.
     """
@@ -94,7 +94,7 @@ def begin_analysis(lookup: MapLookup, on: InlineMap | FoundMap, asked: AnalyzeRe
 
 
 def take_looks(tally: Tally, deadline: Deadline) -> bool:
-    """Try poses for a turn's time; tell whether any are left.
+    """Try poses for `TURN_SECONDS`; return whether any are left.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def take_looks(tally: Tally, deadline: Deadline) -> bool:
         if deadline.cancelled:
             raise CancelledError
         if deadline.passed:
-            return False  # what was found is no answer: the search was cut
+            return False  # an unfinished result is no answer: the search was cut
         if ended:
             tally.looking = None
             tally.found[number] = verdict

@@ -41,7 +41,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class BatchResult:
-    """What came of one scan of a batch.
+    """The result of one scan of a batch.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Associator:
     ----------
     lookup : MapLookup
     metrics : Metrics
-        Counts verdicts, and what the searches take.
+        Counts verdicts, and the work of the searches.
     """
 
     lookup: MapLookup
@@ -107,7 +107,7 @@ class Associator:
         Raises
         ------
         InputError, InvalidRequestError
-            When the scan is not what the libraries take.
+            When the libraries reject the scan.
         DeadlinePassedError
             When the deadline has passed before the search starts.
         CancelledError
@@ -129,9 +129,9 @@ class Associator:
     def find_for_batch(
         self, target: Target, index: int, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
     ) -> BatchResult:
-        """Find one scan of a batch; raises also what was wrong with the scan itself.
+        """Find one scan of a batch; raises also the errors of the scan itself.
 
-        What cannot be answered is found out here, where it spoils nothing else.
+        An error of one scan is found here, where it spoils nothing else.
         """
         if isinstance(sought, Exception):
             raise sought

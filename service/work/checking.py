@@ -1,4 +1,4 @@
-"""Checks of maps, in steps of one turn at the gate each: the map by itself, each sample scan, the conclusion."""
+"""Checks of maps, in steps of one slot of the gate: the map alone, each sample scan, the conclusion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .job import Done, Job
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A map that is checked by itself, ready for samples.
+    """A map whose own check is done, ready for samples.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Begun:
     cached : CachedMap
         With its directions, whatever they mean.
     oriented : bool
-        Whether the map states that they mean something.
+        True when the map states that they mean something.
     scans : sequence of Scan
         The samples.
     found : MapCheck
@@ -53,7 +53,7 @@ def check(lookup: MapLookup, on: InlineMap | FoundMap, asked: CheckRequest | Non
     ParserEndedError
         When it is large and could not be read.
     InvalidRequestError
-        When one of the samples is not what the libraries take.
+        When the libraries reject one of the samples.
     DeadlinePassedError
         When the deadline has passed before.
     CancelledError

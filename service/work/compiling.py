@@ -21,7 +21,7 @@ def compile_kernels() -> None:
     """Compile every kernel that a first request needs, or wait for another process that does.
 
     The compiler takes several hundred MB. The caller therefore runs this function in a process that ends afterwards and
-    loads the result. Where there is a second core, a second process compiles about half of the kernels.
+    loads the result. If there is a second core, a second process compiles about half of the kernels.
     """
     directory = cache_directory()
     with FileLock((directory or Path(gettempdir())) / "linefix.lock"):

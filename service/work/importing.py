@@ -1,4 +1,4 @@
-"""Maps of other tools once they are read: held to what a map may be, and checked."""
+"""Maps of other tools after reading: checked against the rules of a map, and by the map check."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def index_import(lookup: MapLookup, line_map: InlineMap, deadline: Deadline) -> 
 
 
 def answer_import(index: MapIndex, line_map: InlineMap, read: ReadMap, job: Job) -> Done:
-    """Return a map that could be put as it is, what was done to make it, and what is doubtful in it.
+    """Return a map that could be put as it is, the report of its import, and its doubtful parts.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def answer_import(index: MapIndex, line_map: InlineMap, read: ReadMap, job: Job)
 
 
 def answer_scans(read: ReadScans, job: Job) -> Done:
-    """Return scans that may be sent as they are, and what was done to read them."""
+    """Return scans that may be sent as they are, and the report of reading them."""
     job.watch.lap("read")
     scans = orjson.Fragment(read.scans.removeprefix(b'{"scans":').removesuffix(b"}\n"))
     answer: dict[str, Any] = {"scans": scans, "count": read.count, "report": read.report}

@@ -1,4 +1,4 @@
-"""Request models to what the libraries take."""
+"""Request models to the inputs of the libraries."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def measured_of(scan: MeasuredFields, argument: str = "scan") -> MeasuredSegment
 
 
 def scanned_of(scan: SegmentScan | LaserScan | PointScan | ViewsScan, *, timed: bool = True) -> Scanned:
-    """Return what the robot saw, whatever form it came in.
+    """Return the robot's scan, whatever form it came in.
 
-    Where not `timed`, a motion that is not known during a scan is taken for none.
+    If not `timed`, an unknown motion during a scan counts as none.
     """
     if isinstance(scan, ViewsScan):
         return _of_views(scan, timed=timed)
@@ -100,7 +100,7 @@ def _view_of(view: SegmentView | LaserView | PointView, number: int, *, timed: b
 
 
 def _laser_view(view: LaserView, place: str, *, timed: bool) -> View:
-    """Return what a scanner saw; of one whose motion is not known, the covariance has that of the step and of it."""
+    """Return a scanner's view; without a known motion, the covariance is the sum of the step's and the motion's."""
     pose = transform_of(view.pose)
     seen = replace(range_scan(view.laser, view.twist, place, timed=timed), flipped=view.flipped)
     at = pose
@@ -112,7 +112,7 @@ def _laser_view(view: LaserView, place: str, *, timed: bool) -> View:
 
 
 def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:
-    """Return what is known of the pose before."""
+    """Return the prior of the pose; None without one."""
     if prior is None:
         return None
     if isinstance(prior, SoftPriorFields):
@@ -142,7 +142,7 @@ def association_options_of(options: SearchOptions, *, oriented: bool) -> Associa
 def included_of(
     scan: SegmentScan | LaserScan | PointScan | ViewsScan, options: SearchOptions, scanned: Scanned, frame_id: str
 ) -> Included:
-    """Return what the answer repeats of a request; `frame_id` is the map's."""
+    """Return the fields that the answer repeats of a request; `frame_id` is the map's."""
     parts = frozenset[str](options.include)
     segments = scanned.listed if "segments" in parts else None
     return Included(parts, frame_id, scan.told_frame_id, scan.told_stamp, segments, scanned.starts)
@@ -186,7 +186,7 @@ def scans_of(asked: CheckRequest) -> list[Scan]:
     Raises
     ------
     InvalidRequestError
-        When one is not what the libraries take.
+        When the libraries reject one.
     """
     return [_scan_of(asked, number) for number in range(len(asked.scans))]
 
@@ -199,7 +199,7 @@ def _scan_of(asked: CheckRequest, number: int) -> Scan:
 
 @contextmanager
 def _placed(number: int) -> Iterator[None]:
-    """Say which of the samples it is in which the libraries refuse something."""
+    """Add the number of the sample to the errors of the libraries."""
     try:
         yield
     except InvalidRequestError as error:

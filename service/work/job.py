@@ -1,4 +1,4 @@
-"""A piece of work: for which request, since when, until when, and what came of it."""
+"""A piece of work: its request, its begin, its deadline and its result."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class Stopwatch:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What came of a piece of work.
+    """The result of a piece of work.
 
     Attributes
     ----------
     body : bytes
         The answer as JSON.
     noted : dict
-        What the log is to say of it.
+        Fields for the log.
     """
 
     body: bytes

@@ -1,4 +1,4 @@
-"""The one place that calls `vectorization`: ranges and points to what the search takes."""
+"""The one place that calls `vectorization`: ranges and points to the input of the search."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Scanned:
 def range_scan(laser: Laser, twist: Twist | None, place: str, *, timed: bool = True) -> RangeScan:
     """Return the ranges of a scanner; `place` is the pointer of its scan.
 
-    Where not `timed`, a motion that is not known is taken for none.
+    If not `timed`, an unknown motion counts as none.
     """
     bounds = {
         name: value
@@ -104,7 +104,7 @@ def vectorize_points(
 def view_laser(
     seen: RangeScan, at: RigidTransform, sigma: float | None, viewpoint: Viewpoint, place: str = "/scan"
 ) -> View:
-    """Return what a scanner saw; the single beams stay evidence. `at` is the pose of what it is mounted on."""
+    """Return a scanner's view; the single beams stay evidence. `at` is the pose of the frame it is mounted on."""
     with _placed(f"{place}/laser", (place, place)):
         view = view_of(seen, at, sigma)
     nulls = _nulls_warning(seen.laser)
@@ -134,7 +134,7 @@ def _nulls_warning(laser: LaserScan) -> AssociationWarning | None:
 
 @contextmanager
 def _placed(form: str, places: tuple[str, str]) -> Iterator[None]:
-    """Say where in the request the argument is that the vectorizer refuses."""
+    """Name the place in the request of an argument that the vectorizer rejects."""
     try:
         yield
     except VectorizationError as error:

@@ -27,7 +27,7 @@ def vectorization_of(asked: VectorizeRequest) -> Json:
     Raises
     ------
     InvalidRequestError
-        When it is not what the library takes.
+        When the library rejects it.
     """
     how = asked.options
     options = VectorizationOptions(how.sigma, how.min_points, how.min_length, how.max_gap)

@@ -1,4 +1,4 @@
-"""Compiling, or loading from the cache, what the first request would otherwise wait for."""
+"""Compiling, or loading from the cache, the kernels for which the first request would otherwise wait."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def warm_up_registering() -> None:
         RegistrationOptions(estimator="one_step", evaluate_at=RigidTransform(0.0, 0.0, 0.0)),
     ):
         register(room, MeasuredSegments.from_segments(room), pairs, 0.0, options)
-    # No request needs it, but kernels count as compiled once something of each module is kept.
+    # No request needs it, but kernels count as compiled once something of each module is cached.
     one_by_one = Correspondences.of(room, MeasuredSegments.from_segments(room), pairs)
     assert OneStepSums.of_set(one_by_one, np.ones(len(pairs))).reliability > 0.0
 
@@ -145,7 +145,7 @@ def warm_up_indexing() -> None:
 
 
 def warm_up_explaining() -> None:
-    """Work out the answer to scans that nobody searches for, at a given pose, and what is asked of it afterwards."""
+    """Compute the answer to scans at a given pose, without a search, and the results that are derived from it."""
     index = MapIndex.build(Segments.from_array(ROOM), 0.0)
     for asked, prior, how in _asked():
         context = SearchContext.of(index, asked, prior, how, Deadline())
@@ -167,7 +167,7 @@ def warm_up_searching() -> None:
     symmetric = Segments.from_array(SYMMETRIC_ROOM)
     alone = Scan(MeasuredSegments.from_segments(symmetric), (0.0, 0.0))
     associate(MapIndex.build(symmetric, 0.0), alone, None, AssociationOptions(), Deadline())
-    # Nothing is said of this map, which is not to scale.
+    # This map, which is not to scale, states no sigma.
     too_large = Segments.from_array(1.02 * SYMMETRIC_ROOM)
     associate(MapIndex.build(too_large), alone, None, AssociationOptions(), Deadline())
 
@@ -210,7 +210,7 @@ def room_ranges(angles: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndar
 
 
 def _end_with_the_other() -> None:
-    """End when whoever started this process has ended and so closed its standard input, however that went."""
+    """End when the parent process has ended and so closed this one's standard input, however that went."""
     while os.read(STANDARD_INPUT, 1):
         pass
     os._exit(1)

@@ -70,7 +70,7 @@ async def _answer_all(
 ) -> list[BatchResult]:
     """Search for every scan, as many at once as there are cores; other requests get slots in between.
 
-    What is found counts as held. When that is too much, the rest is not searched for.
+    Answers count as held bytes. Beyond their limit, the remaining scans are not searched.
     """
     results: dict[int, BatchResult] = {}
     todo = iter(enumerate(calls))

@@ -1,4 +1,4 @@
-"""How routes are declared: their errors, bodies and headers in OpenAPI, and routes without FastAPI's own reading."""
+"""Declaration of routes: their errors, bodies and headers in OpenAPI, and routes without FastAPI's own reading."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
 
 
 def takes(model: type[BaseModel], examples: dict[str, Any]) -> dict[str, Any]:
-    """Return the documentation of a body that the route reads by itself."""
+    """Return the documentation of a body that the route itself reads."""
     return {
         "requestBody": {
             "required": True,

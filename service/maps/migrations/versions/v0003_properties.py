@@ -1,6 +1,6 @@
-"""The properties of a map beside what identifies it: its sigma, and whether directions mean anything.
+"""The properties of a map in addition to its identity: its sigma, and whether directions mean anything.
 
-They are in the document; here they are told without reading it.
+The document holds them; these columns give them without reading it.
 """
 
 from contextlib import suppress
@@ -18,7 +18,7 @@ OLD = ("map_id", "revision", "sha256", "segments", "min_x", "min_y", "max_x", "m
 
 
 def upgrade() -> None:
-    """Add the columns and seal the rows anew; a row that was damaged stays so."""
+    """Add the columns and seal the rows again; a row that was damaged stays so."""
     op.add_column("maps", sa.Column("sigma", sa.Float, nullable=True))
     op.add_column("maps", sa.Column("oriented", sa.Boolean, nullable=True))
     maps = sa.table("maps", *(sa.column(name) for name in (*OLD, "sigma", "oriented", "seal")))
