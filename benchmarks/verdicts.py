@@ -1,4 +1,4 @@
-"""The pictures of ``docs/verdict.md``: small scenes, searched when they are drawn, titled by what came of them.
+"""The pictures of ``docs/explanation/verdict.md``: small scenes, searched when they are drawn, titled by what came of them.
 
 ``python -m benchmarks.verdicts`` writes them to ``docs``.
 """

@@ -16,7 +16,8 @@ NONE = np.zeros(0)
 def answers(share: np.ndarray, deviation: np.ndarray, right: np.ndarray) -> list[Example]:
     return [
         Example(
-            SEGMENTS, "drawn", "clean", "world", USUAL._replace(share=float(s), deviation=float(d)), NONE, NONE,
+            SEGMENTS, "drawn", "clean", "world",
+            USUAL._replace(inlier_fraction=float(s), deviation=float(d)), NONE, NONE,
             bool(r), degenerate=False, told=not r,
         )
         for s, d, r in zip(share, deviation, right, strict=True)
@@ -31,7 +32,7 @@ def drawn(slope: float, count: int = 4000) -> list[Example]:
 
 
 def task(bends: tuple[float, ...]) -> Task:
-    return Task("cautious", 1.0, MODELS["cautious"], ("constant", "share", "deviation"), bends)
+    return Task("cautious", 1.0, MODELS["cautious"], ("constant", "inlier_fraction", "deviation"), bends)
 
 
 def slopes(curve: Curve) -> Sequence[float]:
@@ -40,15 +41,15 @@ def slopes(curve: Curve) -> Sequence[float]:
 
 def test_the_fit_finds_the_odds_that_answers_were_drawn_with() -> None:
     found = fit(drawn(6.0), task(()), 1.0).model.curves
-    assert found["share"].slope == pytest.approx(6.0, rel=0.1)
+    assert found["inlier_fraction"].slope == pytest.approx(6.0, rel=0.1)
     assert found["constant"].slope == pytest.approx(-2.0, abs=0.3)
     assert abs(found["deviation"].slope) < 1.5  # of 0.2 that it may be: less than 0.3 nats
 
 
 def test_a_curve_never_falls_where_its_feature_speaks_for_an_answer() -> None:
     found = fit(drawn(-6.0), task((0.2, 0.5, 0.8)), 1.0).model.curves
-    assert len(found["share"].bends) == 3
-    assert slopes(found["share"]) == pytest.approx([0.0] * 4, abs=1e-12)
+    assert len(found["inlier_fraction"].bends) == 3
+    assert slopes(found["inlier_fraction"]) == pytest.approx([0.0] * 4, abs=1e-12)
 
 
 def test_strangers_that_nobody_could_tell_teach_nothing() -> None:
@@ -66,7 +67,7 @@ def test_a_curve_follows_odds_that_bend() -> None:
     share = rng.uniform(0.0, 1.0, 6000)
     logit = -1.0 + 8.0 * np.maximum(0.0, share - 0.5)
     found = fit(answers(share, 0.0 * share, rng.uniform(size=6000) < 1.0 / (1.0 + np.exp(-logit))), task((0.5,)), 1.0)
-    below, above = slopes(found.model.curves["share"])
+    below, above = slopes(found.model.curves["inlier_fraction"])
     assert below == pytest.approx(0.0, abs=0.8)
     assert above == pytest.approx(8.0, rel=0.1)
 
@@ -76,9 +77,9 @@ def test_a_pair_is_found_where_both_features_have_to_speak() -> None:
     share, deviation = rng.uniform(0.0, 1.0, 6000), rng.uniform(0.0, 0.2, 6000)
     logit = -2.0 + 5.0 * np.minimum(share, 1.0 - deviation / 0.2)
     scans = answers(share, deviation, rng.uniform(size=6000) < 1.0 / (1.0 + np.exp(-logit)))
-    both = ("least", "+share", "-deviation"), ("most", "+share", "-deviation")
+    both = ("least", "+inlier_fraction", "-deviation"), ("most", "+inlier_fraction", "-deviation")
     least, most = fit(scans, replace(task(()), pairs=both), 1.0).model.pairs
-    assert (least.kind, least.first, least.second) == ("least", "share", "deviation")
+    assert (least.kind, least.first, least.second) == ("least", "inlier_fraction", "deviation")
     assert least.nats > 3.0 > 10.0 * most.nats >= 0.0
     assert least.from_to[0] == pytest.approx((0.05, 0.95), abs=0.02)
     assert least.from_to[1] == pytest.approx((0.19, 0.01), abs=0.01)
@@ -87,7 +88,7 @@ def test_a_pair_is_found_where_both_features_have_to_speak() -> None:
 def test_a_pair_never_takes_from_what_speaks_for_an_answer() -> None:
     share, other = np.tile([0.0, 1.0], 500), np.repeat([0.0, 0.2], 500)
     scans = answers(share, other, (share < 0.5) | (other > 0.1))
-    (pair,) = fit(scans, replace(task(()), pairs=(("least", "+share", "-deviation"),)), 1.0).model.pairs
+    (pair,) = fit(scans, replace(task(()), pairs=(("least", "+inlier_fraction", "-deviation"),)), 1.0).model.pairs
     assert pair.nats == pytest.approx(0.0, abs=1e-9)
 
 

@@ -138,4 +138,4 @@ def test_a_server_checks_stored_maps_alone(linefix: Linefix, service: RunningSer
 
 
 def test_an_id_is_one(linefix: Linefix) -> None:
-    assert "an id is" in refused(linefix("map", "put", "a/b", "floor.json"), 2)
+    assert "the id is not valid" in refused(linefix("map", "put", "a/b", "floor.json"), 2)

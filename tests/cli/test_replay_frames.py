@@ -138,7 +138,7 @@ def scan(mount: RigidTransform | None, pose: RigidTransform | None = None) -> Lo
 def test_one_scan_without_a_mount_among_others_is_not_taken() -> None:
     frames = Frames(None)
     assert frames.taken(scan(MOUNT)).mount == MOUNT
-    with pytest.raises(RefusedError, match="does not say where laser was"):
+    with pytest.raises(RefusedError, match="has no mount of laser at this time"):
         frames.taken(scan(None))
     of_laser = Frames(None)
     assert of_laser.taken(scan(None)).mount is None

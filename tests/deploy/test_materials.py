@@ -125,7 +125,7 @@ def test_the_command_line_needs_no_part_of_one_system() -> None:
 import sys
 for name in ("fcntl", "grp", "pwd", "resource", "termios", "uvloop"):
     sys.modules[name] = None
-import registration, vectorization, association, simulation, analysis, formats, fleet, linefix, ros2
+import registration, vectorization, association, simulation, formats, map_quality, batch, linefix, ros2
 import cli.program
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)

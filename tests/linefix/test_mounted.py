@@ -118,5 +118,5 @@ def test_two_scanners_are_one_scan() -> None:
 
 
 def test_the_documented_loop_is_the_one_that_is_tested() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "tutorials" / "python.md").read_text()
     assert "linefix.locate(index, logged)" in text

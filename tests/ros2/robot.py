@@ -26,6 +26,7 @@ LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces></General>"
     "<Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
+START_SECONDS = 120.0  # in which the process of the node has to start
 PATIENCE = 60.0  # s for what has to come about
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
@@ -96,8 +97,10 @@ def bridge(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
             [sys.executable, "-c", program, *arguments], cwd=ROOT, env=dict(os.environ), stderr=log
         )
         try:
-            while b"listening" not in os.pread(log.fileno(), 100_000, 0):
-                assert process.poll() is None, os.pread(log.fileno(), 100_000, 0)
+            until = time.monotonic() + START_SECONDS
+            while b"subscribed to" not in (said := os.pread(log.fileno(), 100_000, 0)):
+                assert process.poll() is None, said
+                assert time.monotonic() < until, said
                 time.sleep(0.1)
             yield process
             if process.poll() is None:

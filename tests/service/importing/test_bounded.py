@@ -142,7 +142,7 @@ def test_files_of_a_service_that_was_killed_are_removed_by_the_next_import(tmp_p
 def test_the_process_that_reads_removes_the_files_when_its_service_was_killed(tmp_path: Path) -> None:
     folder = tmp_path / f"{PREFIX}own"
     folder.mkdir()
-    told = orjson.dumps({"bounds": asdict(BOUNDS), "content_type": TYPE}).decode()
+    told = orjson.dumps({"bounds": asdict(BOUNDS), "content_type": TYPE, "scans": False}).decode()
     # What starts it, and is killed as the service would be while it waits for the form.
     command = command_of("service.importing.reader", told, str(folder))
     starting = "import os, subprocess, sys; subprocess.Popen([*sys.argv[1:], str(os.getpid())]).wait()"
