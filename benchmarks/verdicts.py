@@ -1,4 +1,4 @@
-"""The pictures of ``docs/explanation/verdict.md``: small scenes that are searched when they are drawn, with their verdicts.
+"""The pictures of ``docs/explanation/verdict.md``: small scenes, searched when drawn, titled with their verdicts.
 
 ``python -m benchmarks.verdicts`` writes them to ``docs``.
 """
