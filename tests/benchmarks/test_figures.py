@@ -13,7 +13,7 @@ MEASURED = re.compile(
     r"(?<![\w.])\d[\d,.]* (?:ms\b|of [\d,]{2,}|requests per second|scans per second)"
     r"|(?<![\w.])\d+\.\d+ ?%|(?<![\w.,])[\d.,]{2,} MB"
 )
-# What looks like a figure and is a limit, a default, an example or a property of the method.
+# Text that looks like a figure and is a limit, a default, an example or a property of the method.
 SETTINGS = {
     "README.md": ["99.4 %", "0.6 %", "99.97 %"],
     "docs/guides/deployment.md": ["112 MB"],

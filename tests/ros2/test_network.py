@@ -31,7 +31,7 @@ class Machine:
 
     @property
     def packets(self) -> int:
-        """How many packets it has sent over the cable."""
+        """Return the number of packets that it has sent over the cable."""
         found = subprocess.run(self.command("ip", "-s", "-o", "link", "show", "cable"), capture_output=True, text=True)
         words = found.stdout.split()
         return int(words[words.index("TX:") + 9])  # after the header of seven words and the bytes

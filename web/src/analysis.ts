@@ -1,4 +1,4 @@
-// Where localization fails on the map: the analysis, which the plan shows as a heat map.
+// The analysis of a map: a heat map on the plan shows where localization fails.
 
 import { analyze } from "./api";
 import { asStored, changed, kept, onChange, state, type Shown } from "./state";

@@ -8,7 +8,7 @@ import { showProblem, showWaiting } from "./verdict";
 
 const NEAR = { radius: 1, angle: Math.PI / 6 };
 const AS_WELL = 5; // nats, as in association/words.py: within them another pose fits about as well
-const AGAIN = 1000; // ms until a service is asked again that is not ready yet
+const AGAIN = 1000; // ms until the next request to a service that is not ready yet
 let running: AbortController | null = null;
 let due = 0;
 

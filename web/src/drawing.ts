@@ -16,7 +16,7 @@ export const KINDS = ["usable", "ambiguous", "degenerate", "no_match"];
 export let colours: Record<string, string> = {};
 let frame = 0;
 export const HANDLE = 46; // px from the robot to its handle
-const SMALLEST = 14; // px; a smaller ellipse is drawn larger, and the legend says so
+const SMALLEST = 14; // px; a smaller ellipse is drawn larger, which the legend states
 
 export function readColours(): void {
   const style = getComputedStyle(document.documentElement);

@@ -91,7 +91,7 @@ function take(name: string, text: string): void {
   } else if ("ranges" in fields) takeScan({ laser: fields } as unknown as Scan);
   else if ("laser" in fields || "points" in fields) takeScan(fields as Scan);
   else if ("segments" in fields) {
-    // Both are lists of segments: the name of a scan says so, or fields that only scans have.
+    // Both are lists of segments. A scan is recognized by its name, or by fields that only scans have.
     if (/scan/i.test(name) || "viewpoint" in fields || "stamp" in fields || "points" in fields) takeScan(fields as Scan);
     else takeMap(fields as unknown as MapDocument);
   } else throw new Error(`${name} is neither a map nor a scan. Expected segments, points, laser or ranges.`);

@@ -1,4 +1,4 @@
-// What lies under the walls: the picture of an imported grid, and a grid of metres with its scale bar.
+// The ground under the walls: the picture of an imported grid, and a grid of metres with its scale bar.
 
 import { state } from "./state";
 import { toMetres, toPixels, view } from "./view";

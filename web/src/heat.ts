@@ -47,7 +47,7 @@ function freePart({ x, y }: Pose, half: number, walls: Segment[]): [number, numb
     .map(([a, b, c, d]): Segment => [a - x, b - y, c - x, d - y]);
   const lines = [...corners, ...near];
   const angles = lines.flatMap(([a, b, c, d]) => [Math.atan2(b, a), Math.atan2(d, c)].flatMap((at) => [at - ASIDE, at + ASIDE]));
-  // Where a wall leaves the square, the outline bends, too.
+  // The outline also bends at a wall that leaves the square.
   for (const wall of near) for (const side of corners) angles.push(...crossing(wall, side));
   return angles.sort((a, b) => a - b).map((at) => {
     const [dx, dy] = [Math.cos(at), Math.sin(at)];

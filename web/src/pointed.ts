@@ -1,4 +1,4 @@
-// What is under the mouse, in words.
+// The text for the object under the mouse.
 
 import { sentSegments } from "./drawing";
 import { distance, placed, wrap } from "./geometry";

@@ -35,7 +35,7 @@ function whatAt(px: number, py: number, factor = 1): Grip {
   return Math.hypot(px - rx, py - ry) < factor * GRIP ? "robot" : "plan";
 }
 
-// One finger beside the robot scrolls the page. One on the robot drags it, and two move and zoom the plan.
+// One finger away from the robot scrolls the page. One on the robot drags it, and two move and zoom the plan.
 canvas.addEventListener(
   "touchstart",
   (event) => {

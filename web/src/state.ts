@@ -1,4 +1,4 @@
-// What is on the page. Modules read it; `changed` has the page drawn again.
+// The state of the page. Modules read it; `changed` draws the page again.
 
 import type { Alternative, Analysis, Answer, Example, LogLine, MapDocument, Place, Pose, Scan, Segment } from "./types";
 

@@ -325,6 +325,15 @@ class SamplesAnswer(TypedDict):
     scans: list[SampleAnswer]
 
 
+class ScansTimingAnswer(TypedDict):
+    """
+    Duration of reading a log, milliseconds.
+    """
+
+    read: float
+    total: float
+
+
 class SearchAnswer(TypedDict):
     """
     Statistics of the search.
@@ -672,6 +681,16 @@ class CriticalWallAnswer(TypedDict):
     displacement: float
 
 
+class GridPictureAnswer(TypedDict):
+    """
+    The grid that a map comes from, as a picture.
+    """
+
+    png: str
+    pose: PoseAnswer
+    resolution: float
+
+
 class MapList(TypedDict):
     """
     One page of maps, by id.
@@ -705,6 +724,18 @@ class RegisterAnswer(TypedDict):
     diagnostics: RegistrationDiagnosticsAnswer
     request_id: str
     timing_ms: TimingAnswer
+
+
+class ScansAnswer(TypedDict):
+    """
+    Scans of a log.
+    """
+
+    scans: list[Any]
+    count: int
+    report: ReportAnswer
+    request_id: str
+    timing_ms: ScansTimingAnswer
 
 
 class VectorizeAnswer(TypedDict):
@@ -1020,37 +1051,6 @@ class BatchResult(TypedDict):
     status_code: int
     result: NotRequired[FoundAnswer | None]
     problem: NotRequired[Problem | None]
-
-
-class GridPictureAnswer(TypedDict):
-    """
-    The grid that a map comes from, as a picture.
-    """
-
-    png: str
-    pose: PoseAnswer
-    resolution: float
-
-
-class ScansTimingAnswer(TypedDict):
-    """
-    Duration of reading a log, milliseconds.
-    """
-
-    read: float
-    total: float
-
-
-class ScansAnswer(TypedDict):
-    """
-    Scans of a log.
-    """
-
-    scans: list[Any]
-    count: int
-    report: ReportAnswer
-    request_id: str
-    timing_ms: ScansTimingAnswer
 
 
 class ImportAnswer(TypedDict):

@@ -192,7 +192,7 @@ async def test_a_full_queue_is_looked_at_for_the_key_that_comes() -> None:
         door.ask("POST", "/v1/associate", key("open")).announce()
         with pytest.raises(ShareUsedError):
             door.ask("POST", "/v1/associate", key("sesame"))
-        # What is wrong with a key is told before anything of the queue.
+        # A wrong key is reported before a full queue.
         with pytest.raises(UnknownKeyError):
             door.ask("POST", "/v1/associate", key("wrong"))
 

@@ -45,7 +45,7 @@ async def test_old_use_is_forgotten_with_whoever_has_nothing_left() -> None:
     assert queue.holders == 2
     queue.expect_no_longer(A)
     assert (queue.holders, queue.places_of(A), queue.places_of(B)) == (1, 0, 1)
-    # A comes back where B is, and the next after it is whoever has stood in front for longest.
+    # A returns to the place of B, and the next after it is the holder that has been in front for longest.
     of_a, of_b = joined(queue, A, B)
     assert [queue.next(anyone), queue.next(anyone)] == [of_a, of_b]
 
@@ -94,7 +94,7 @@ async def test_a_fixed_turn_is_never_taken() -> None:
     queue = FairQueue()
     fixed = [queue.join(A, fixed=True) for _ in range(3)]
     (loose,) = joined(queue, B)
-    # Not A, who has the most places but none that could be taken.
+    # Not A, which has the most places but none that could be taken.
     assert queue.take_from_the_greediest(0) is loose
     assert queue.take_from_the_greediest(0) is None
     queue.join(A, fixed=False)

@@ -41,7 +41,7 @@ async def test_never_more_at_once_than_slots_and_the_rest_in_order() -> None:
         answers = await asyncio.gather(*(gate.ask(lambda n=n: work(n)) for n in range(10)))  # type: ignore[misc]
         assert answers == list(range(10))
         assert most == 2
-        # Which thread of two is the first to say that it works is up to the system.
+        # The system decides which of two threads is the first to start.
         assert [sorted(order[i : i + 2]) for i in range(0, 10, 2)] == [[i, i + 1] for i in range(0, 10, 2)]
         assert (gate.running, gate.waiting) == (0, 0)
 
@@ -210,7 +210,7 @@ async def test_what_fails_after_its_caller_has_left_is_not_reported_as_a_defect(
         await asyncio.wait({asked})
         gate.release.set()
         await until(lambda: gate.running == 0)
-        # asyncio reports what nobody looked at when it is forgotten.
+        # asyncio reports an exception that was never retrieved.
         gate.asked.clear()
         del asked
         gc.collect()

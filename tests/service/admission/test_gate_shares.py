@@ -27,7 +27,7 @@ async def test_a_full_queue_is_shared_between_keys() -> None:
         for given_up in (greedy[3], greedy[2]):
             with pytest.raises(ShareUsedError):
                 await given_up
-        # Now each has its half: neither gets more, and both are told so.
+        # Now each has its half: neither gets more, and both are refused.
         for holder in (b"greedy", b"modest"):
             with pytest.raises(ShareUsedError):
                 gate.require_place(holder)
@@ -86,7 +86,7 @@ async def test_parts_of_what_was_let_in_are_never_taken_away() -> None:
 
 @in_loop
 async def test_the_only_place_of_another_is_not_taken() -> None:
-    """What nobody may take fills the gate; who has one place does not lose it to one that has none."""
+    """Searches that no holder may start fill the gate. A holder of one place does not lose it to one that has none."""
     async with gate_of(1, 5) as gate:
         batch = Ticket(b"batch")
         await gate.ask_with(batch, lambda: 0)
@@ -113,7 +113,7 @@ async def test_who_is_expected_has_a_place_until_it_comes() -> None:
         with pytest.raises(QueueFullError):
             gate.require_place()
         for ticket in coming:
-            # Who was let in is not sent away at the gate, though another is still on the way.
+            # An admitted request is not refused at the gate, although another one is still on the way.
             assert await gate.ask_with(ticket, lambda: 1) == 1
         assert not gate.full
 

@@ -1,4 +1,4 @@
-"""What tests of the page share: waiting for a verdict, and what is drawn at a place of the plan."""
+"""Functions that tests of the page share: waiting for a verdict, and the colours at a place of the plan."""
 
 from __future__ import annotations
 

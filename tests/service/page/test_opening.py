@@ -1,4 +1,4 @@
-"""How the page opens, and what may be opened on it."""
+"""The page opens with an example, and opens files."""
 
 from __future__ import annotations
 

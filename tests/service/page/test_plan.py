@@ -1,4 +1,4 @@
-"""What is drawn on the plan, and what the legend says of it."""
+"""The drawing of the plan, and its legend."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses are estimated as by the twin, which solves every set of pairs from nothing."""
+"""Poses are estimated as by the reference, which solves every set of pairs from the start."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A prior's score of a pose is that of its twin."""
+"""A prior's score of a pose is that of the reference."""
 
 from __future__ import annotations
 

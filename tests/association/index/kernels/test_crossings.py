@@ -1,4 +1,4 @@
-"""Runs that cross are found, and listed where a scan segment would lie on each, as the twins do it."""
+"""Wall chains that cross are found, and listed where a scan segment would lie on each, as by the reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The best poses are those that their twin stores."""
+"""The best poses are those that the reference stores."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def offered(prior: Prior | None, poses: list[RigidTransform], scores: list[float
 
 
 def test_only_poses_that_are_worth_it_are_kept() -> None:
-    """A score of 0 is none; below 65 % of the best there is no rival; the best value is kept up to date."""
+    """A score of 0 is none; below 65 % of the best there is no alternative; the best value is kept up to date."""
     far = [pose(float(k)) for k in range(4)]
     found, best = offered(None, far, [0.0, 10.0, 6.4, 6.6])
     assert found["score"].tolist() == [10.0, 6.6]

@@ -246,7 +246,7 @@ def test_what_a_base_proposes_is_refined_and_kept(seed: int) -> None:
 
 @given(SEEDS)
 @example(74845286)  # where a consensus set loses all its pairs
-@example(1)  # where pairs come in the last round that are worth nothing
+@example(1)  # where pairs of no gain come in the last round
 @settings(max_examples=4, deadline=None)
 def test_a_segment_slides_along_every_wall(seed: int) -> None:
     d = drawn(seed, radius=6.0)

@@ -1,4 +1,4 @@
-"""Hypotheses are scored as the twins do it."""
+"""Hypotheses are scored as by the reference."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_score_hypotheses(seed: int) -> None:
         work.spreads[:], _ = gates_about(d.scan, variance, np.zeros(2), 0.0, GATES)
         work.later[:] = d.scan["later_gain"]
     else:
-        question.terms["gates"]["least_overlap"] = 0.4  # a midpoint may then be off the map: the raster knows nothing
+        question.terms["gates"]["least_overlap"] = 0.4  # a midpoint may then be off the map: the raster has no entry
     gates = question.terms["gates"]
     places = [d.near(0.3, 3.0, 3.0), d.near(0.1, 0.5, 0.5), d.near(), d.at, d.near(0.1, 0.5, 0.5)]
     best_value = d.rng.uniform(0.0, 1.0) * d.scan["gain"].sum()

@@ -1,4 +1,4 @@
-"""The search goes from base to base as its twin does, and ends when nothing can have been missed."""
+"""The search goes from base to base as the reference does, and ends when nothing can have been missed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SPACING, FRACTION = 2.0, 0.7  # of slides, m; of the best value that parallel se
 
 @dataclass(frozen=True)
 class Effort:
-    """How far a search goes: the probability of having missed a set, the value that ends it, the order of bases."""
+    """Limits of a search: the probability of having missed a set, the value that ends it, the order of bases."""
 
     allowed: float
     enough: float = math.inf
@@ -115,7 +115,7 @@ def end_of(d: Drawn, effort: Effort) -> tuple[End, Records]:
 
 
 def assert_ends_alike(d: Drawn, effort: Effort) -> End:
-    """Compare with the twin."""
+    """Compare with the reference."""
     end, _ = end_of(d, effort)
     assert astuple(end) == pytest.approx(astuple(expected_end(d, effort)))
     return end
@@ -124,7 +124,7 @@ def assert_ends_alike(d: Drawn, effort: Effort) -> End:
 @given(SEEDS)
 @settings(max_examples=12, deadline=None)
 def test_search_bases(seed: int) -> None:
-    """It ends where its twin does and for the same reason."""
+    """It ends where the reference does and for the same reason."""
     d = drawn(seed, radius=8.0, clutter=seed % 4)
     for allowed in (-1.0, 0.0, 0.02, 0.3):
         assert_ends_alike(d, Effort(allowed))
@@ -202,7 +202,7 @@ def test_a_search_does_what_its_parts_do_one_after_the_other(seed: int) -> None:
 
 
 def test_a_search_that_has_to_end_finds_nothing() -> None:
-    """And says so, before the first base."""
+    """And it returns that reason before the first base."""
     d = drawn(3, radius=8.0)
     limits = record(LIMITS, allowed=0.0, spacing=SPACING, slides_fraction=FRACTION, stored=STORED)
     statistics, by = record(STATISTICS), drawn_by(3, d, by_chance=False)
