@@ -3,7 +3,7 @@
 import { checkMap, deleteMap, getMap, listMaps, putMap } from "./api";
 import { askSoon } from "./asking";
 import { kept, setMap, state } from "./state";
-import { showAll } from "./scene";
+import { isLatest, showAll, supersede } from "./scene";
 import { list } from "./verdict";
 
 const box = document.querySelector<HTMLDetailsElement>("#stored")!;
@@ -62,7 +62,10 @@ function row(id: string, segments: number): HTMLLIElement {
 }
 
 async function use(id: string): Promise<void> {
-  setMap(await getMap(id), id);
+  const mine = supersede();
+  const map = await getMap(id);
+  if (!isLatest(mine)) return;
+  setMap(map, id);
   showAll(`The stored map ${id}.`);
   askSoon();
 }

@@ -202,6 +202,7 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     page.goto("/")
     page.locator("#stored summary").click()
     page.get_by_role("button", name="Open page-rectangle").click()
+    expect(page.locator("#about")).to_have_text("The stored map page-rectangle.")
     page.get_by_label("simulate the scan").check()
     verdict(page, "ambiguous")
     page.get_by_label("add a box").check()
@@ -234,6 +235,27 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     verdict(page, "usable")
     assert client.get("/v1/maps/page-rectangle").json()["segments"] == rectangle["segments"]
     client.delete("/v1/maps/page-rectangle")
+
+
+def test_an_example_that_arrives_late_does_not_replace_the_map_that_was_opened(page: Page, client: httpx.Client) -> None:
+    walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
+    client.put("/v1/maps/page-chosen", json=walls).raise_for_status()
+    on_the_way: list[Route] = []
+    page.route("**/page/examples/*.json", lambda route: on_the_way.append(route))
+    with page.expect_request("**/page/examples/*.json"):
+        page.goto("/")
+    page.locator("#stored summary").click()
+    page.get_by_role("button", name="Open page-chosen").click()
+    about = page.locator("#about")
+    expect(about).to_have_text("The stored map page-chosen.")
+    with page.expect_response("**/page/examples/*.json") as arrived:
+        on_the_way[0].continue_()
+    arrived.value.finished()
+    page.get_by_label("simulate the scan").check()
+    verdict(page, "usable")
+    expect(about).to_have_text("The stored map page-chosen.")
+    page.unroute("**/page/examples/*.json")
+    client.delete("/v1/maps/page-chosen")
 
 
 def test_a_virtual_robot_waits_for_its_map(page: Page, client: httpx.Client) -> None:
@@ -311,6 +333,7 @@ def test_stored_maps(page: Page, client: httpx.Client) -> None:
     expect(page.locator("#findings")).to_contain_text("page-flat is stored")
     assert client.get("/v1/maps/page-flat").status_code == 200
     page.get_by_role("button", name="Open page-flat").click()
+    expect(page.locator("#about")).to_have_text("The stored map page-flat.")
     expect(page.locator("#about")).to_have_text("The stored map page-flat.")
     page.get_by_role("button", name="Check page-flat").click()
     expect(page.locator("#findings")).not_to_contain_text("Checking", timeout=30_000)
