@@ -95,7 +95,7 @@ def _incomplete(context: SearchContext) -> str:
             "The deadline ended the search; a better pose may have been missed. Extend the deadline, or send a prior."
         )
     return (
-        f"Up to {context.index.most_near} walls lie in one place of the map, too many to trace lines of sight: a "
+        f"Up to {context.index.most_near} walls lie in one place of the map, too many to compute lines of sight: a "
         "wrong pose may score too high. Remove repeated and overlapping segments from the map."
     )
 

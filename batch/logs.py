@@ -176,7 +176,7 @@ class _Reading:
                 if note.code in UNUSABLE:
                     yield from ({"error": note.message} for _ in range(note.count))
         except InputError as error:
-            yield {"error": f"the log could not be read any further: {error}"}
+            yield {"error": f"the rest of the log cannot be read: {error}"}
 
     def notes(self) -> list[dict[str, Any]]:
         """Return the assumptions and the omissions so far."""
@@ -215,7 +215,7 @@ def _checked(path: Path) -> pq.FileMetaData:
     try:
         metadata = pq.read_metadata(path)
     except (pa.ArrowException, OSError) as error:
-        raise UnreadableScansError(f"is no Parquet file: {error}", argument=str(path)) from None
+        raise UnreadableScansError(f"is not a Parquet file: {error}", argument=str(path)) from None
     schema = metadata.schema.to_arrow_schema()
     wrong = next((told for told in _faults(schema)), None)
     if wrong is not None:
@@ -227,7 +227,7 @@ def _faults(schema: pa.Schema) -> Iterator[str]:
     if not any(name in schema.names for name in FORMS):
         yield f"expected a column {' or '.join(FORMS)}, got {', '.join(schema.names) or 'none'}"
     if "ranges" in schema.names:
-        yield from (f"expected a column {name} beside ranges" for name in LASER if name not in schema.names)
+        yield from (f"expected a column {name} in addition to ranges" for name in LASER if name not in schema.names)
     for field in schema:
         kind = field.type
         listed = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)

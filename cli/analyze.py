@@ -195,9 +195,12 @@ def _rows(answer: Json) -> Iterator[tuple[str, str]]:
     counts = answer["summary"]
     share = 100.0 * counts["usable"] / counts["places"] if counts["places"] else 0.0
     yield "places", f"{counts['places']} poses, {answer['spacing']:g} m apart, {counts['not_free']} more are not free"
-    yield "usable", f"{counts['usable']} ({share:.0f} %), simulated without people and furniture that the map lacks"
+    yield (
+        "usable",
+        f"{counts['usable']} ({share:.0f} %), simulated without people, and without furniture that is not on the map",
+    )
     if counts.get("resolved_within") is not None:
-        yield "driven", f"{counts['resolved_within']} are usable at once or on the way"
+        yield "driven", f"{counts['resolved_within']} are usable at once or after a drive"
     if counts.get("usable_with_landmark") is not None:
         yield "landmark", f"{counts['usable_with_landmark']} usable with the landmark"
     for status in ("ambiguous", "degenerate", "no_match"):

@@ -71,6 +71,6 @@ def server_at(url: str) -> Server:
         from .server import Server
     except ModuleNotFoundError as error:
         raise RefusedError(
-            f"--server needs {error.name}: pip install ./clients/python from the sources of Linefix, or leave it out"
+            f"--server needs {error.name}: in a checkout, pip install ./clients/python, or omit --server"
         ) from None
     return Server(url, os.environ.get(KEY) or None)

@@ -107,7 +107,9 @@ def _engine(chosen: WorkerOptions) -> Engine | None:
 
     if chosen.ray:
         if chosen.workers is not None:
-            raise WrongUseError("--workers: not possible with --ray, which uses all cores of the cluster; leave it out")
+            raise WrongUseError(
+                "--workers: not possible with --ray, which uses all cores of the cluster; omit --workers"
+            )
         return OnRay()
     return None if chosen.workers is None else Processes(chosen.workers)
 

@@ -57,7 +57,9 @@ class NoSuchMapError(RefusedError):
     """
 
     def __init__(self, name: str) -> None:
-        super().__init__(f"{name}: no such file, and no map is stored under this id; linefix map list names those")
+        super().__init__(
+            f"{name}: no such file, and no map is stored under this id; linefix map list shows the stored maps"
+        )
 
 
 class NoServerError(CommandError):

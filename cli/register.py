@@ -41,5 +41,5 @@ def register(
         return
     found = answer["diagnostics"]
     chi2 = "none" if found["chi2"] is None else f"{found['chi2']:.2f}"
-    fit = f"{found['n']} pairs, chi2 {chi2} at {found['dof']} degrees of freedom"
+    fit = f"{found['pairs']} pairs, chi2 {chi2} at {found['dof']} degrees of freedom"
     print_rows([*verdict_rows(answer), ("fit", fit)])

@@ -76,7 +76,7 @@ class Server:
         if map_id is None:
             raise WrongUseError(
                 "found a map file, expected the id of a stored map with --server; "
-                "store it with linefix map put, or leave --server out"
+                "store it with linefix map put, or omit --server"
             )
         return self._answer(schema.CheckAnswer, Asked(map_id), self._client.check_map, map_id, samples)
 
@@ -136,8 +136,7 @@ class Server:
             if error.__cause__ is None:  # a server answers, though none of Linefix
                 raise NoServerError(f"{str(error).removesuffix('; check the URL')}; check the URL") from None
             raise NoServerError(
-                f"no server responds at {self._url}: {error.__cause__}; start one with linefix serve, "
-                "or leave --server out"
+                f"no server responds at {self._url}: {error.__cause__}; start one with linefix serve, or omit --server"
             ) from None
         except ValueError as error:  # such as a number that JSON cannot have
             raise WrongUseError(f"not sent: {error}") from None

@@ -1,4 +1,4 @@
-"""Film the page for the README: ``python -m examples.animation`` writes ``docs/page.gif`` and ``docs/page.png``.
+"""Film the page for the README: ``python -m examples.animation`` writes ``docs/page.gif``.
 
 It starts the service, or takes the one whose URL is given, and opens the page in chromium, or in the browser that
 `LINEFIX_TEST_CHROMIUM` names. It drags the robot from one of three equal rooms to the corridor and into another room.
@@ -44,7 +44,7 @@ class Frame:
 
 
 def main() -> int:
-    """Write the pictures."""
+    """Write the animation."""
     chromium = os.environ.get("LINEFIX_TEST_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         print("no chromium is installed; install one, or name it in LINEFIX_TEST_CHROMIUM", file=sys.stderr)
@@ -54,7 +54,6 @@ def main() -> int:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         frames = filmed(browser, url)
         browser.close()
-    frames[0].picture.save(DOCS / "page.png", optimize=True)
     first, *others = reduced([one.picture for one in frames])
     path = DOCS / "page.gif"
     durations = [one.shown for one in frames]

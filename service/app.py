@@ -241,7 +241,7 @@ async def _fetch_first_keys(services: Services) -> None:
 
 async def _compile(services: Services) -> None:
     """Compile the kernels in a process that ends with it, and log the progress."""
-    logger.info("compiling the kernels, which takes about a minute; later starts load them from the cache")
+    logger.info("compiling the kernels, which takes one to two minutes; later starts load them from the cache")
     services.readiness.compiled = compiled_fraction
     logging_progress = asyncio.create_task(_log_progress())
     try:

@@ -37,7 +37,7 @@ def serve(arguments: Sequence[str]) -> int:
         print(f"linefix: {error}", file=sys.stderr)
         return 2
     for name in unknown_settings():
-        print(f"linefix: {name} in the environment is no setting", file=sys.stderr)
+        print(f"linefix: {name} in the environment is not a setting", file=sys.stderr)
     return run(settings)
 
 
@@ -80,5 +80,5 @@ def cannot_keep_maps(settings: Settings) -> str | None:
         make_file(kept)
     except OSError as error:
         if error.errno not in AILING_DISK:
-            return f"no maps can be kept in {kept.parent}: {error.strerror}"
+            return f"maps cannot be stored in {kept.parent}: {error.strerror}"
     return None

@@ -184,7 +184,7 @@ class Settings(BaseSettings):
         stripped = (part.strip() if isinstance(part, str) else part for part in parts)
         found = tuple(part for part in stripped if part != "")
         if parts and not found:
-            raise ValueError("found only blanks; leave it empty for none")
+            raise ValueError("found only spaces, expected a value; for none, leave it empty")
         if any(isinstance(part, str) and not _PRINTABLE.fullmatch(part) for part in found):
             raise ValueError(
                 "found a space, or a character that HTTP headers cannot contain; expected keys of printable ASCII"

@@ -38,7 +38,7 @@ def check(
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say what is doubtful in a map; beside scans taken there, also whether they fit better mirrored, scaled, moved."""
+    """Report possible errors of a map; with scans, also whether they fit better mirrored, scaled or moved."""
     scans, logged = (
         [read_scan(name) for name in scan or []],
         [] if log is None else samples_of(log, topic, tf_namespace),
@@ -78,11 +78,11 @@ def check_rows(found: Json) -> list[tuple[str, str]]:
     if not found["findings"]:
         rows.append(("finding", "none"))
     advice = {name: value for name, value in found["advice"].items() if value is not None}
-    rows += [("advice", f'put it with "{name}": {str(value).lower()}') for name, value in advice.items()]
+    rows += [("advice", f'store the map with "{name}": {str(value).lower()}') for name, value in advice.items()]
     samples = found.get("samples")
     if samples is not None:
         tried = sum(one["status"] is not None for one in samples["scans"])
-        rows.append(("scans", f"{samples['usable']} of {tried} usable, {samples['usable_as_advised']} as advised"))
+        rows.append(("scans", f"{samples['usable']} of {tried} usable; with the advice {samples['usable_as_advised']}"))
         if tried < len(samples["scans"]):
             rows.append(("note", f"the time limit ended the check before {len(samples['scans']) - tried} more scans"))
     elif not found["complete"]:

@@ -39,7 +39,9 @@ class SaidOfFile:
     ] = None
     point: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="X Y", help="A free place in metres; the directions of walls follow from it."),
+        typer.Option(
+            metavar="X Y", help="A free place in metres; the directions of the walls around it are derived from it."
+        ),
     ] = None
     drawn: Annotated[
         str | None,
@@ -129,10 +131,10 @@ def import_map(
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Read a map of another tool, say what was made of it and what is doubtful in it, and write it as a map file."""
+    """Read a map of another tool, report what was read and what is doubtful, and write it as a map file."""
     if log is not None and server is not None:
         raise WrongUseError(
-            "--log: not possible with --server; leave --server out, and store the map with linefix map put afterwards"
+            "--log: not possible with --server; omit --server, and store the map with linefix map put afterwards"
         )
     answer = imported(file, said, server)
     if log is not None:

@@ -140,7 +140,7 @@ def _by_thresholds(
 
 def _note_unknown(grid: Grid, found: UnknownLevels, counts: Counts, parted: int, notes: Notes) -> None:
     """Note which levels are taken as unknown against the thresholds of the file, and which might be and are not."""
-    option = "set the option unknown to none, or to the grey value of unknown cells, where this is wrong"
+    option = "set the option unknown to none, or to the grey value of unknown cells, if this is wrong"
     for spike in found.spikes if grid.unknown is None else ():
         occupancy = spike / (LEVELS - 1)
         kind = "free" if occupancy < grid.free_below else "occupied" if occupancy > grid.occupied_above else None
@@ -155,7 +155,7 @@ def _note_unknown(grid: Grid, found: UnknownLevels, counts: Counts, parted: int,
         kind = "occupied" if level > parted else "free"
         notes.add_assumed(
             "unknown_grey",
-            f"cells of {grid.named(level)} are {kind}, and no others are, but many tools write this value for "
+            f"cells of {grid.named(level)} are the only ones that are {kind}, but many tools write this value for "
             f"unknown cells; {option}",
             int(counts[level]),
         )

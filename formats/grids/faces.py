@@ -89,7 +89,7 @@ def find_faces(grid: Grid, notes: Notes, name: str) -> Segments:
         )
     if points > 0:
         notes.add_dropped(
-            "short_pieces", f"cell borders on no straight line of at least {LEAST_LENGTH:g} cells", points
+            "short_pieces", f"cell borders outside of straight lines of at least {LEAST_LENGTH:g} cells", points
         )
     notes.add_assumed("surface", f"wall surfaces are assumed {depth:.2f} cells behind the border of the free cells")
     return Segments.from_array(_placed(np.vstack(found), grid))

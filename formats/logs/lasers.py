@@ -47,16 +47,14 @@ def laser_of(message: Message, notes: Notes) -> LaserScan:
     scan = LaserScan(first, step, ranges, low, high)
     if not np.isfinite(scan.cleaned).any() and np.isfinite(ranges).any():
         told = f"range_min {low:g} m and range_max {high:g} m"
-        notes.add_assumed("no_range_within", f"scans with no range between {told}, such as the last", 1)
+        notes.add_assumed("no_range_within", f"scans without any range between {told}", 1)
     return scan
 
 
 def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:
     """Return the limits of valid ranges, metres; 0 and infinity where a field is not set."""
     if not 0.0 <= low < MAX_LENGTH:
-        notes.add_assumed(
-            "range_min", f"scans whose range_min is {low:g} m, which is not a distance; 0 m is assumed", 1
-        )
+        notes.add_assumed("range_min", f"scans whose range_min is {low:g} m, expected at least 0 m; 0 m is assumed", 1)
         low = 0.0
     if low < high <= MAX_LENGTH:
         return low, high
@@ -64,6 +62,6 @@ def _limits(low: float, high: float, notes: Notes) -> tuple[float, float]:
         told = f"scans whose range_max is {high:g} m and range_min {low:g} m; both are ignored"
         low = 0.0
     else:
-        told = f"scans whose range_max is {high:g} m, which does not say how far the laser sees"
+        told = f"scans whose range_max is {high:g} m, which is not a possible range of the laser"
     notes.add_assumed("range_max", f"{told}; infinite ranges count as unknown, not as free space", 1)
     return low, math.inf

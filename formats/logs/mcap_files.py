@@ -102,7 +102,7 @@ class McapFile:
         found = []
         if self._cut:
             readable = sum(connection.msgcount for connection in self.connections)
-            said = f"{self.name} ends early, as where the recorder was killed: what comes before is read; messages"
+            said = f"{self.name} ends early, as after a killed recorder, and is read up to there; messages"
             found.append(("cut_off", said, readable))
         if self._broken:
             found.append(("broken_chunks", "broken chunks of an mcap, left out with their messages", len(self._broken)))

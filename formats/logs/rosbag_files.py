@@ -37,7 +37,7 @@ class RosbagFile:
         first = path.suffix.lower() == ".bag"
         if not first and any(letter in str(path) for letter in IN_A_URI):
             raise UnsupportedFormatError(
-                f"has one of the characters {' '.join(IN_A_URI)} in its path, which SQLite does not take; rename it",
+                f"has one of the characters {' '.join(IN_A_URI)} in its path, which SQLite does not accept; rename it",
                 argument=self.name,
             )
         self._log = path.with_name(path.name + "-wal")
@@ -56,7 +56,7 @@ class RosbagFile:
     def remarks(self) -> list[tuple[str, str, int]]:
         """Code, sentence and count of each part of the file that cannot be read."""
         if self._log.is_file() and self._log.stat().st_size:
-            said = f"{self._log.name} next to {self.name}, as of a recorder that was killed, is not read: "
+            said = f"{self._log.name} next to {self.name} is left from a killed recorder and is not read: "
             said += "sqlite3 FILE 'pragma wal_checkpoint' puts its messages into the .db3"
             return [("write_ahead_log", said, 0)]
         return []

@@ -121,5 +121,5 @@ def none_usable(name: str, notes: Notes, reason: str) -> MalformedFileError:
         Why the first scan cannot be used; empty where none could be decoded.
     """
     count = sum(notes.dropped[code].count for code in UNUSABLE if code in notes.dropped)
-    why = f"; the first of them: {reason}" if reason else ", for none can be decoded"
+    why = f"; the first of them: {reason}" if reason else ", because none can be decoded"
     return MalformedFileError(f"none of its {count} scans can be used{why}", argument=name)

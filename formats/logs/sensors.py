@@ -220,13 +220,13 @@ class Sensors:
         base = base_of(moving[0]) or frame if moving else base_of(paths[0] if paths else []) or frame
         why = f"{shown(base)} does not move in {shown(moving[0][-1])}" if moving else f"no frame is above {shown(base)}"
         self._notes.add_assumed(
-            "no_odometry", f"no odometry was found: {why}, and no Odometry message is of this robot"
+            "no_odometry", f"no odometry was found: {why}, and there is no Odometry message of this robot"
         )
 
     def _note_messages(self, found: Odometry, others: list[str]) -> None:
         if others:
             self._notes.add_assumed(
-                "odometry", f"odometry is that of {shown(found.source)}; not of {', '.join(map(shown, others))}"
+                "odometry", f"odometry is that of {shown(found.source)}; not used: {', '.join(map(shown, others))}"
             )
         if found.stands:
             self._notes.add_assumed("odometry_stands", f"the robot never moves according to {shown(found.source)}")

@@ -28,7 +28,7 @@ def scan_connections(bag: Bag, topic: str | None, notes: Notes) -> list[Connecti
     others = [one for one in sorted(counts) if one != chosen]
     if topic is None and others:
         told = ", ".join(map(shown, others))
-        notes.add_assumed("topic", f"LaserScan of {shown(chosen)}, which has most messages; not of {told}")
+        notes.add_assumed("topic", f"LaserScan of {shown(chosen)}, which has most messages; not used: {told}")
     return [one for one in bag.connections(SCAN) if one.topic == chosen]
 
 

@@ -53,7 +53,9 @@ class Reach:
         walls = np.zeros(shape, dtype=bool)
         counts = np.ceil(segments.lengths / (0.5 * cell)).astype(np.int64) + 1
         if counts.sum() > MOST_STEPS:
-            raise AnalysisError("this map is too large for that", argument="point")
+            raise AnalysisError(
+                "expected a smaller map for an analysis from a point; omit the point, or cut the map", argument="point"
+            )
         which = np.repeat(np.arange(len(segments)), counts)
         first = np.cumsum(counts) - counts
         share = (np.arange(len(which)) - first[which]) / np.maximum(counts[which] - 1, 1)
@@ -62,13 +64,13 @@ class Reach:
         walls[columns, rows] = True
         start = np.asarray(point, dtype=np.float64)
         if not ((start >= low) & (start <= high)).all():
-            raise AnalysisError("expected a place on the map", argument="point")
+            raise AnalysisError("expected a place on the map, found one outside", argument="point")
         from scipy import ndimage  # takes a twentieth of a second to load, and only this needs it
 
         labels, _ = ndimage.label(~walls)
         label = labels[tuple(_cells(start[None], low, cell)[0])]
         if label == 0:
-            raise AnalysisError("expected a free place, this is on a wall", argument="point")
+            raise AnalysisError("expected a free place, found one on a wall", argument="point")
         return cls(low, cell, labels == label)
 
     def includes(self, places: Floats) -> NDArray[np.bool_]:

@@ -83,7 +83,7 @@ def standing_places(
     headings = robot.headings
     if counts[0] * counts[1] * len(headings) > MOST:
         least = math.sqrt(width * height * len(headings) / MOST)
-        raise AnalysisError(f"too fine for this map: with {least:.1f} m it can be done", argument="spacing")
+        raise AnalysisError(f"expected at least {least:.1f} m on this map, found {spacing:g} m", argument="spacing")
     # Centred: as far from the box on the left as on the right.
     xs, ys = (
         edge + 0.5 * (side - (count - 1) * spacing) + spacing * np.arange(count)

@@ -135,17 +135,17 @@ def _doubled(index: MapIndex, near: NearWalls) -> Iterator[Finding]:
         found = segments_of(index, near.doubled)
         yield Finding(
             "doubled_faces",
-            f"{len(found)} segments run less than {100.0 * DOUBLE:g} cm next to another that faces the same way, or "
-            "faces them. Either one face of a wall is drawn twice, or free space is drawn inside of it. A scan of the "
-            "wall fits both. Keep one of them.",
+            f"{len(found)} segments lie less than {100.0 * DOUBLE:g} cm from a parallel segment that faces the same "
+            "way, or faces them. Either one face of a wall is drawn twice, or the inside of a wall is drawn as free "
+            "space. A scan fits both segments. Keep one of them.",
             found,
         )
     if near.opposite.any():
         found = segments_of(index, near.opposite)
         yield Finding(
             "both_ways",
-            f"{len(found)} segments lie on another that runs the opposite way: walls without thickness. Scans from "
-            "both sides fit better if the two faces are drawn apart by the thickness of the wall.",
+            f"{len(found)} segments lie on another segment of the opposite direction: these walls have no thickness. "
+            "Scans from both sides fit better if the distance of the two faces is the thickness of the wall.",
             found,
         )
 

@@ -179,17 +179,16 @@ def direction_findings(index: MapIndex, sides: Sides) -> Iterator[Finding]:
     if sides.reversed:
         yield Finding(
             "reversed",
-            "Free space seems to lie on the right of the segments, or outside of the drawing; expected is their left. "
+            "Free space seems to lie on the right of the segments, or outside of the drawing; expected on their left. "
             "Exchange begin and end of every segment.",
         )
     elif sides.meaningless:
         either = sides.against_left | sides.against_right
         yield Finding(
             "mixed_directions",
-            f"Directions contradict one another: {100.0 * sides.contradiction:.0f} % of the rays from the left of "
-            "segments meet a right side, or from their right a left side. Where lines are centre lines of walls, or "
-            "have "
-            'no directions, set "oriented": false.',
+            f"Directions contradict one another: {100.0 * sides.contradiction:.0f} % of the rays between segments "
+            "start on a left side and end on a right side, or the reverse. If the lines are centre lines of walls, or "
+            'have no directions, set "oriented": false.',
             segments_of(index, sides.walls[either]),
         )
     elif wrong.any():

@@ -83,8 +83,10 @@ class Tokens:
             self._next_fetch = time.monotonic() + SOON_SECONDS
             if self._keys and now - self._fetched > LONGEST_SECONDS:
                 self._keys = {}
-                logger.error("tokens are refused from now on: the issuer's keys are %g h old", LONGEST_SECONDS / 3600.0)
-            logger.error("the issuer's keys cannot be had: %s", error)
+                logger.error(
+                    "tokens are rejected from now on, because the issuer's keys are %g h old", LONGEST_SECONDS / 3600.0
+                )
+            logger.error("the issuer's keys cannot be fetched: %s", error)
             return
         self._fetched = now
         if not self._keys:

@@ -16,8 +16,8 @@ from ..schemas.encoding import encode
 from ..threads import Threads
 
 DESCRIPTION = """
-Lays the line segments of a scan on those of a map and says where the scan was taken, how sure that is, and when it
-cannot be told.
+Finds the pose of a laser scan on a map of line segments. Each answer has a flag `usable`; where it is false, `reasons`
+has the causes.
 
 * Metres, radians, counter-clockwise. `pose` is the scan frame's pose in the map frame:
   `p_map = R(theta) p_scan + [x, y]`.

@@ -189,7 +189,7 @@ Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
 
 
 class Twist(Strict):
-    """How a sensor moves while it scans: a constant velocity in its own frame."""
+    """Constant velocity of a sensor during a scan, in its own frame."""
 
     vx: Speed = Field(description="m/s")
     vy: Speed = Field(0.0, description="m/s")

@@ -47,7 +47,7 @@ class TimingAnswer(Answer):
     decode: Milliseconds = Field(
         description="from the arrival of the body until the search: reading, waiting, indexing"
     )
-    search: Milliseconds = Field(description="the search, or what the request asks for in its place")
+    search: Milliseconds = Field(description="the search, or the other computation of this request")
     total: Milliseconds = Field(description="from the arrival of the body until the answer is written")
 
 
@@ -168,7 +168,7 @@ class AssociationDiagnosticsAnswer(RegistrationDiagnosticsAnswer):
         description="`score` minus that of the best other pose, nats; null: no other pose above "
         "`search.complete_above` of `score`"
     )
-    significance: float = Field(description="probability of a score as high by chance; small is good")
+    significance: float = Field(description="probability that random walls reach this score; a small value is good")
     critical_wall: CriticalWallAnswer | None = Field(
         description="the wall whose removal would move the pose most, or make it unobservable"
     )
@@ -179,15 +179,15 @@ class SearchAnswer(Answer):
 
     complete: bool = Field(description="false when deadline or budget ended it early")
     exhaustive: bool = Field(description="whether every pair of segments was tried; true only for a complete search")
-    confidence: float = Field(description="reached probability that no better pose was missed")
+    confidence: float = Field(description="probability that the search missed no better pose")
     bases: Index = Field(description="bases that were tried")
     hypotheses: Index = Field(description="poses that the bases proposed")
     verified: Index = Field(description="poses that were scored completely")
     seed: int = Field(description="value of the option")
     sampling: Literal["ordered", "random"] = Field(description="value of the option")
     complete_above: float = Field(
-        description="fraction of the best score above which no pose was missed whose matches agree within their "
-        "tolerances; 1 for an incomplete search"
+        description="no pose above this fraction of the best score was missed, if its correspondences agree within "
+        "their tolerances; 1 for an incomplete search"
     )
 
 

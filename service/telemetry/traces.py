@@ -98,7 +98,9 @@ def traces_of_environment() -> Traces | None:
         from opentelemetry.sdk.trace import TracerProvider
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
     except ModuleNotFoundError:
-        logger.warning('OTEL_ variables enable traces, but OpenTelemetry is missing: pip install "linefix[otel]"')
+        logger.warning(
+            'OTEL_ variables enable traces, but OpenTelemetry is missing: in a checkout, pip install ".[otel]"'
+        )
         return None
     named = {} if os.environ.get("OTEL_SERVICE_NAME") else {SERVICE_NAME: "linefix"}
     # At the end of the process it would wait for a collector that is away.

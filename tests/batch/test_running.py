@@ -138,7 +138,7 @@ def test_a_log_that_breaks_off_has_a_row_that_says_so(tmp_path: Path) -> None:
     log = write_log(tmp_path / "a.parquet", 2)
     associate_many([tmp_path / "broken.mcap", log], write_room(tmp_path), tmp_path / "out.parquet", SMALL, Here())
     first, *rest = rows(tmp_path / "out.parquet")
-    assert "could not be read any further" in first["error"]
+    assert "the rest of the log cannot be read" in first["error"]
     assert [row["status"] for row in rest] == ["ok", "ok"]
 
 
@@ -248,7 +248,7 @@ def test_what_is_not_there_is_refused_beforehand(tmp_path: Path) -> None:
     with pytest.raises(UnreadableScansError, match=r"gone\.parquet"):
         associate_many([tmp_path / "gone.parquet"], room, out, SMALL, Here())
     (tmp_path / "a.parquet").write_text("no Parquet")
-    with pytest.raises(UnreadableScansError, match="is no Parquet file"):
+    with pytest.raises(UnreadableScansError, match="is not a Parquet file"):
         associate_many([tmp_path / "a.parquet"], room, out, SMALL, Here())
     (tmp_path / "empty").mkdir()
     with pytest.raises(UnreadableMapsError, match="holds no map"):

@@ -71,6 +71,12 @@ def test_register_takes_pairs(linefix: Linefix, folder: Path) -> None:
     assert (answer["status"], answer["diagnostics"]["pairs"]) == ("ok", 4)
 
 
+def test_register_prints_the_fit(linefix: Linefix, folder: Path) -> None:
+    ended = linefix("register", "room.json", "scan.json", "--pairs", "pairs.json")
+    assert ended.code == 0, ended.err
+    assert "4 pairs, chi2 " in ended.out
+
+
 def test_what_vectorize_writes_is_a_scan(linefix: Linefix, folder: Path) -> None:
     assert linefix("vectorize", "points.json", "--out", "found.json").code == 0
     found = json.loads((folder / "found.json").read_text())

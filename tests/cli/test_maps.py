@@ -130,7 +130,7 @@ def test_how_thick_walls_are_is_found_from_a_log(linefix: Linefix, folder: Path)
     assert "finding  mirrored" not in told  # though scans that fit badly fit a little better so
     assert re.search("finding  thickness: The scans fit better if walls are (19|20) cm thinner", told)
     assert "of 5 usable" in told
-    assert "leave --server out" in refused(linefix(*asked, "--server", "http://127.0.0.1:9"), 2)
+    assert "omit --server" in refused(linefix(*asked, "--server", "http://127.0.0.1:9"), 2)
 
 
 def test_a_server_checks_stored_maps_alone(linefix: Linefix, service: RunningService) -> None:

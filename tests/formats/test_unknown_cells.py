@@ -205,7 +205,7 @@ def test_a_usual_value_that_is_the_lightest_or_the_darkest(
     if kind is None:
         assert (walls(found), counts(found)) == (THREE_WALLS, CELLS)
     else:
-        assert f"{kind}, and no others are" in assumed(found)["unknown_grey"]
+        assert f"are the only ones that are {kind}" in assumed(found)["unknown_grey"]
         assert "option unknown" in assumed(found)["unknown_grey"]
 
 

@@ -598,7 +598,7 @@ class StoredMap(TypedDict):
 
 class Twist(TypedDict):
     """
-    How a sensor moves while it scans: a constant velocity in its own frame.
+    Constant velocity of a sensor during a scan, in its own frame.
     """
 
     vx: float

@@ -259,4 +259,4 @@ def test_a_key_that_was_taken_back_is_refused_whatever_the_issuer_does(
             assert client.get("/v1/maps").status_code == 200
             keys.write_text(key_lines("other", ["read"]))
             until(lambda: client.get("/v1/maps").status_code == 403)
-        assert "the issuer's keys cannot be had" in running.log() or answer is not silent
+        assert "the issuer's keys cannot be fetched" in running.log() or answer is not silent
