@@ -5,8 +5,10 @@ commit, date and machine. A document quotes a figure and names it in a comment b
 
     right in 95 %<!--= localization: scan: right first --> of the scans
 
-``--check`` lists the figures in documents that are not in the file or differ from it. ``--write`` corrects them, with
-as many digits as the document has.
+A page for developers has whole runs as tables, between ``<!-- table: RUN -->`` and ``<!-- end -->``.
+
+``--check`` lists the figures and tables in documents that are not in the file or differ from it. ``--write`` corrects
+them, figures with as many digits as the document has.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ NUMBER = r"\d[\d,]*(?:\.\d+)?"
 QUOTED = re.compile(
     rf"(?P<shown>{NUMBER}(?: of {NUMBER})?)(?P<unit> ?[%a-zA-Z]*)<!--= (?P<run>[\w-]+): (?P<what>[^>]+?) -->"
 )
+TABLE = re.compile(r"(?<=<!-- table: )(?P<run>[\w-]+) -->\n(?P<body>.*?)(?=<!-- end -->)", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,37 @@ def documents() -> list[Path]:
     """Return the documents for users; those for developers quote runs of their own."""
     pages = [path for path in (ROOT / "docs").rglob("*.md") if "dev" not in path.relative_to(ROOT).parts]
     return [ROOT / "README.md", *sorted(pages)]
+
+
+def pages_with_tables() -> list[Path]:
+    """Return the documents that may have tables of whole runs."""
+    return sorted((ROOT / "docs" / "dev").glob("*.md"))
+
+
+def table(run: dict[str, Any]) -> str:
+    """Return a run as a table, with its origin in a line above it."""
+    origin = f"`{run['command']}`, commit `{run['commit']}`, {run['date']}. {run['machine']}; load: {run['load']}."
+    rows = "".join(f"| {what} | {measured} |\n" for what, measured in run["figures"].items())
+    return f"\n{origin}\n\n| what | measured |\n|---|---|\n{rows}\n"
+
+
+def wrong_tables(document: Path, runs: dict[str, Any]) -> Iterator[str]:
+    """Give what is wrong with the tables of a document."""
+    where = document.relative_to(ROOT)
+    for found in TABLE.finditer(document.read_text()):
+        if found["run"] not in runs:
+            yield f"{where}: the file has no run {found['run']}"
+        elif found["body"] != table(runs[found["run"]]):
+            yield f"{where}: the table of {found['run']} differs from the file"
+
+
+def rewrite_tables(document: Path, runs: dict[str, Any]) -> None:
+    """Fill the tables of a document from the file."""
+
+    def filled(found: re.Match[str]) -> str:
+        return f"{found['run']} -->\n{table(runs[found['run']])}" if found["run"] in runs else found[0]
+
+    document.write_text(TABLE.sub(filled, document.read_text()))
 
 
 def results(path: Path = RESULTS) -> dict[str, Any]:
@@ -143,14 +177,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.figures", description=__doc__)
     chosen = parser.add_mutually_exclusive_group(required=True)
     chosen.add_argument(
-        "--check", action="store_true", help="list figures that are not in the file or differ; exit code 1"
+        "--check", action="store_true", help="list figures and tables that are not in the file or differ; exit code 1"
     )
-    chosen.add_argument("--write", action="store_true", help="correct figures that differ")
+    chosen.add_argument("--write", action="store_true", help="correct figures and tables that differ")
     runs = results()
     if parser.parse_args().write:
         for document in documents():
             rewrite(document, runs)
+        for page in pages_with_tables():
+            rewrite_tables(page, runs)
     faults = [fault for document in documents() for quote in quotes(document) if (fault := wrong(quote, runs))]
+    faults += [fault for page in pages_with_tables() for fault in wrong_tables(page, runs)]
     print("\n".join(faults) or "all figures are those of the file")
     sys.exit(bool(faults))
 

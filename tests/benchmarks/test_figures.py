@@ -7,7 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.figures import QUOTED, ROOT, Quote, documents, expected, quotes, results, rewrite, wrong
+from benchmarks.figures import (
+    QUOTED,
+    ROOT,
+    Quote,
+    documents,
+    expected,
+    pages_with_tables,
+    quotes,
+    results,
+    rewrite,
+    rewrite_tables,
+    wrong,
+    wrong_tables,
+)
 
 MEASURED = re.compile(
     r"(?<![\w.])\d[\d,.]* (?:ms\b|of [\d,]{2,}|requests per second|scans per second)"
@@ -82,3 +95,29 @@ def test_a_figure_that_differs_is_found_and_corrected(tmp_path: Path, monkeypatc
     ]
     rewrite(page, runs)
     assert page.read_text().startswith("right in 91 %<!--")
+
+
+@pytest.mark.parametrize("page", pages_with_tables(), ids=lambda path: path.name)
+def test_tables_are_those_of_the_file(page: Path) -> None:
+    assert list(wrong_tables(page, results())) == []
+
+
+def test_some_page_has_tables() -> None:
+    assert any("<!-- table: localization -->" in page.read_text() for page in pages_with_tables())
+
+
+def test_a_table_that_differs_is_found_and_filled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.figures.ROOT", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(
+        "before\n<!-- table: plans -->\n| right | 0.95 |\n<!-- end -->\n<!-- table: gone -->\n<!-- end -->\n"
+    )
+    run = {"command": "c", "commit": "abc", "date": "d", "machine": "m", "load": "l", "figures": {"right": "0.912"}}
+    runs = {"plans": run}
+    expected_faults = ["page.md: the table of plans differs from the file", "page.md: the file has no run gone"]
+    assert list(wrong_tables(page, runs)) == expected_faults
+    rewrite_tables(page, runs)
+    assert "| right | 0.912 |\n" in page.read_text()
+    assert "| right | 0.95 |" not in page.read_text()
+    assert page.read_text().startswith("before\n")
+    assert list(wrong_tables(page, runs)) == expected_faults[1:]
