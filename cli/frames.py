@@ -63,13 +63,13 @@ class Frames:
         mount = one.mount
         if mount is None:
             self.name, self.of_laser = one.frame_id or "laser", True
-            self.told = f"of {self.name}, the laser; set --mount X Y THETA for those of the robot"
+            self.told = f"of the laser (frame {self.name}); set --mount X Y THETA for those of the robot"
             return
         self.name = one.base_frame
         by = "from --mount" if self.given is not None else "from the log"
         way = "upside down " if one.flipped else ""
         where = f"({mount.x:.3f}, {mount.y:.3f}) m, {math.degrees(mount.theta):.1f} degrees"
-        self.told = f"of {self.name}, the robot, with {one.frame_id} mounted {way}at {where}, {by}"
+        self.told = f"of the robot (frame {self.name}), with {one.frame_id} mounted {way}at {where}, {by}"
 
 
 def odometry_of(one: LoggedScan) -> RigidTransform | None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from examples.running import running_service
 
 HERE = Path(__file__).parent
-ANSWER = "ok true 0.998"
+ANSWER = "ok true 0.999"
 JSON = {"Content-Type": "application/json"}
 QUICKTYPE = (
     "--src-lang schema --lang c++ --namespace linefix --top-level Exchange --no-boost --hide-null-optional "

@@ -56,7 +56,7 @@ def test_poses_are_those_of_the_robot_where_the_log_has_its_mount(
         assert_at(line, pose.compose(MOUNT.inverse()))
     first = [float(number) for number in (folder / "poses.tum").read_text().split()[:3]]
     assert first[1:] == pytest.approx([usable[0][0]["pose"]["x"], usable[0][0]["pose"]["y"]])
-    assert "of robot, the robot, with ROBOTLASER1 mounted at (0.400, -0.200) m, 68.8 degrees, from the log" in (
+    assert "of the robot (frame robot), with ROBOTLASER1 mounted at (0.400, -0.200) m, 68.8 degrees, from the log" in (
         ended.err
     )
 
