@@ -46,9 +46,9 @@ class Image:
     config : dict
         User, environment, entry point.
     files : dict
-        What stands in the last layer that has it, by path without a leading slash.
+        Content of the last layer with each path, by path without a leading slash.
     layers : list of (str, int)
-        What made each layer, and the bytes of its files.
+        Command of each layer, and the bytes of its files.
     """
 
     config: dict[str, Any]
@@ -102,7 +102,7 @@ def read(path: Path) -> Image:
 
 
 def _hidden(files: dict[str, Any], name: str) -> bool:
-    """Take out what a mark of a layer says is gone; tell whether it was such a mark."""
+    """Remove what a mark of a layer removes; return whether it was such a mark."""
     folder, _, last = name.rpartition("/")
     if not last.startswith(".wh."):
         return False

@@ -1,6 +1,6 @@
-"""What the service is made of: a bill of materials (CycloneDX) and the licences, of the packages that it runs with.
+"""Bill of materials of the service (CycloneDX), and the licences of its packages.
 
-    python .ci/materials.py [BILL [PYTHON]]    of this Python's packages into out/sbom.json, if nothing else is said
+    python .ci/materials.py [BILL [PYTHON]]    of this Python's packages into out/sbom.json, by default
 
 Fails where there is nothing to check, where a pinned package is not installed in that version, and where one is under
 the GPL or AGPL or does not say. The LGPL is let through: such a package stays one that can be exchanged.

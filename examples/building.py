@@ -30,7 +30,7 @@ class Case:
     Attributes
     ----------
     title : str
-        Where the robot stands, in words.
+        Place of the robot, in words.
     expected : str
         The status that is the honest answer.
     truth : RigidTransform or None

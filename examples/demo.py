@@ -42,7 +42,7 @@ def main() -> int:
 
 
 def ask(url: str, case: Case) -> Exhibit:
-    """Post a scan and print the answer beside the truth."""
+    """Post a scan and print the answer next to the truth."""
     answer = call(url, "POST", "/v1/associate", {"map": {"map_id": "demo"}, "scan": as_laser(case.scan)})
     print(f"{case.title}: {answer['status']}, {'usable' if answer['usable'] else 'not usable'}")
     print(f"  in words {verdict_in_words(answer)}")

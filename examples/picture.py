@@ -150,7 +150,7 @@ def _robot(axes: Any, pose: RigidTransform, colour: str, edge: str = "white", la
 
 
 def _number(axes: Any, ends: Floats, sensor: Floats, number: int, *, outward: bool = False) -> None:
-    """Write a correspondence's number beside its scan segment, near its middle, on the sensor's side or the other."""
+    """Write a correspondence's number next to its scan segment, near its middle, on the sensor's side or the other."""
     (x, y), at = ends[1] - ends[0], ends[0] + 0.42 * (ends[1] - ends[0])
     normal = np.array([-y, x]) / math.hypot(x, y)
     if ((sensor - at) @ normal > 0.0) == outward:

@@ -24,7 +24,7 @@ class StartError(Exception):
 
 
 def free_port() -> int:
-    """Return a port that nobody listens on, below those that clients are given: none of them takes it meanwhile."""
+    """Return a free port below those that the system gives to clients."""
     while True:
         port = random.SystemRandom().randrange(10_000, 32_000)
         with socket.socket() as probe, suppress(OSError):

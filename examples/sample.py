@@ -37,7 +37,7 @@ BOXES = 5
 
 
 def main() -> None:
-    """Write the files, and say what they are."""
+    """Write the files and print their names."""
     parser = argparse.ArgumentParser(prog="python -m examples.sample", description="Write a map and a drive to try.")
     parser.add_argument("folder", nargs="?", type=Path, default=Path("out"), help="where to, by default out")
     folder: Path = parser.parse_args().folder

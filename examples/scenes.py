@@ -33,7 +33,7 @@ class Scene:
     title, about : str
         For people: what it is, and what there is to see.
     walls, boxes : (n, 4)
-        What the map shows, and what only the robot sees; metres.
+        Walls of the map, and objects that only the robot sees; metres.
     pose : RigidTransform
         map_from_scan.
     range_max : float

@@ -1,4 +1,4 @@
-"""An answer in words, beside the truth."""
+"""An answer in words, next to the truth."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from .sweep import sweep
 from .unknown import basin, unknown
 from .unreliable import unreliable
 
-# What is timed comes first, while nothing else runs.
+# Timed experiments come first, while nothing else runs.
 EXPERIMENTS: dict[str, Callable[[Plan, Runner, Path], None]] = {
     "constant_time": constant_time,
     "precision": precision,

@@ -1,4 +1,4 @@
-"""What it costs to add one pair to the sums of N others, beside summing anew (Sec. 3.5)."""
+"""Time to add one pair to the sums of N others, and to sum all of them again (Sec. 3.5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the error falls with the points where many walls are short: with all segments, and with long ones only."""
+"""Error over the number of points with many short walls: for all segments, and for long ones only."""
 
 from __future__ import annotations
 

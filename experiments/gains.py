@@ -1,4 +1,4 @@
-"""Tab. 1 and 2: what weighting gains, and how far the ambiguity tells the error; beside the paper's numbers."""
+"""Tab. 1 and 2: what weighting gains, and how far the ambiguity tells the error; next to the paper's numbers."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ COLOURS = {"paper": GREY, "vectorized": BLUE, "cut at the true corners": ORANGE}
 
 
 def gain_table(sources: Mapping[str, Sequence[Trials]], out: Path) -> None:
-    """Write Tab. 1 for each source of segments beside the paper's."""
+    """Write Tab. 1 for each source of segments next to the paper's."""
     columns = {source: {name: gain(of_world(trials, name)) for name in NAMES} for source, trials in sources.items()}
     rows: list[Sequence[Cell]] = []
     figure = new_figure(10.0, 5.6)
@@ -58,7 +58,7 @@ def correlations(all_trials: Sequence[Trials], name: str) -> dict[str, dict[str,
 
 
 def correlation_table(sources: Mapping[str, Sequence[Trials]], out: Path) -> None:
-    """Write Tab. 2, over scans and over the means of poses, beside the paper's."""
+    """Write Tab. 2, over scans and over the means of poses, next to the paper's."""
     found = {(source, name): correlations(trials, name) for source, trials in sources.items() for name in NAMES}
     series: dict[str, dict[str, list[float]]] = {"paper": {what: list(v) for what, v in TAB_2.items()}}
     for source in sources:

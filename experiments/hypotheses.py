@@ -1,4 +1,4 @@
-"""What Tabs. 1 and 2 depend on: each thing that the paper leaves open, changed by itself."""
+"""Effect on Tabs. 1 and 2 of each choice that the paper leaves open, changed separately."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ LEAST_STEP = 1e-7  # m and rad
 
 @dataclass(frozen=True, slots=True)
 class Aligned:
-    """Where it ended.
+    """The final pose.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Aligned:
         map_from_scan.
     iterations : int
     converged : bool
-        Whether it came to rest before `MAX_ITERATIONS`.
+        True if it converged before `MAX_ITERATIONS`.
     """
 
     pose: RigidTransform

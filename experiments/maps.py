@@ -47,7 +47,7 @@ def draw_dispersion(axes: Axes, trials: Trials, estimator: str, magnified: float
     trials : Trials
     estimator : str
     magnified : float
-        How many times their size, and their distance from the truth, are drawn.
+        Factors by which their size, and their distance from the truth, are drawn.
     """
     off = trials.errors[:, :, trials.of(estimator)]
     for pose, fixed, errors in zip(poses(trials.condition.world), trials.fixed, off, strict=True):

@@ -16,7 +16,7 @@ from .running import Runner
 Floats = NDArray[np.float64]
 
 EXAMPLES = ((0.0, 0.0, 90.0), (90.0, 0.0, 0.0), (10.0, 10.0, 10.0))  # degrees
-# The paper says that "one of the corresponding line segments" was turned. Which angles that are can be read as:
+# The paper states that "one of the corresponding line segments" was turned. Which angles that are can be read as:
 CASES = {
     "one pair of 3 turned": np.arange(3) == 2,
     "every third pair of 12 turned": np.arange(12) % 3 == 2,

@@ -21,7 +21,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How scans are taken, cut into segments, paired and registered.
+    """Settings of scans, of their segments, pairs and registration.
 
     The defaults are the experiment; other values test what its numbers depend on, for the paper does not say.
 
@@ -41,7 +41,7 @@ class Setup:
         Where the scan frame has its origin when the scan is registered: at the sensor, amid the scan's segments, or
         where the map has its own (the scan laid on the map by the true pose first).
     places : "path" or "scattered"
-        Where the scans are taken.
+        Poses of the scans.
     """
 
     cut: Literal["vectorizer", "walls"] = "vectorizer"
@@ -66,9 +66,9 @@ class Measurement:
     points : (k, 2)
         The raw points, metres.
     seen : SimulatedScan
-        What the scanner gave.
+        Ranges of the scanner.
     found : Vectorization or None
-        What the vectorizer said; None where it was not asked.
+        Result of the vectorizer; None if it was not called.
     """
 
     measured: MeasuredSegments

@@ -1,4 +1,4 @@
-"""How much is run."""
+"""Number of runs of each experiment."""
 
 from __future__ import annotations
 

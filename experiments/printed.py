@@ -1,6 +1,6 @@
 """The paper's equations as they are printed, to see what they give; nothing else uses them.
 
-What is wrong with each is told in the docstrings; `registration.one_step` has them right.
+What is wrong with each is reported in the docstrings; `registration.one_step` has them right.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def translation(pairs: Correspondences, reading: Reading) -> Floats:
 
 
 def rotation(pairs: Correspondences, reading: Reading) -> float:
-    """Average the angles by Alg. 1, or where Eq. (15) is asked for by that; all weights 1, radians."""
+    """Average the angles by Alg. 1, or by Eq. (15); all weights 1, radians."""
     if reading.eq15:
         d, s = pairs.directions, pairs.map_directions
         across = np.einsum("ij,ij->i", pairs.map_normals, d).sum()

@@ -1,4 +1,4 @@
-"""What is lost before an estimator sees a segment: the likelihood of all raw beams, whose walls are known."""
+"""Loss by the extraction of segments: the likelihood of all raw beams, whose walls are known."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class Runner:
-    """Where work is done; build with `runner`."""
+    """Pool of processes for the work; build with `runner`."""
 
     progress: Progress
     pool: Executor | None

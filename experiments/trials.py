@@ -28,7 +28,7 @@ PAPERS = ("unweighted", "weighted")
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What is scanned, and how.
+    """Environment and settings of the scans.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trials:
-    """What came of a condition: arrays over pose, scan and, where it says e, estimator; nan where there is no answer.
+    """Results of a condition: arrays over pose, scan and, where it says e, estimator; nan where there is no answer.
 
     Attributes
     ----------
@@ -78,9 +78,9 @@ class Trials:
     reliability : (poses, scans, e)
         Eq. (28).
     pairs : (poses, scans)
-        How many were registered.
+        Number of registered scans.
     fixed : (poses, scans)
-        Whether the pairs fix the pose, as the joint estimator sees it.
+        True if the pairs fix the pose, by the joint estimator.
     bounds : (poses, 3, 3)
         Cramer-Rao bounds, units and radians.
     """

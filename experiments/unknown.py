@@ -38,7 +38,7 @@ class Found:
     bounds : (float, float)
         Variances of position and heading that no estimator with known correspondences beats.
     usable : bool
-        What the search says of its answer.
+        Verdict of the search.
     milliseconds : (float, float)
         Processor time of search and ICP.
     """
@@ -66,7 +66,7 @@ def _error(pose: RigidTransform | None, truth: RigidTransform) -> tuple[float, f
 
 
 def search(name: str, scan: Measurement) -> tuple[RigidTransform | None, bool]:
-    """Search for a scan anywhere in its environment: the pose and whether it is said to be usable."""
+    """Search for a scan anywhere in its environment: the pose and whether it is usable."""
     if scan.found is None:
         raise ValueError("the search takes a vectorized scan")
     answer = associate(_index(name), Scan(scan.measured, (0.0, 0.0), scan.found.beams))
@@ -144,7 +144,7 @@ def _over_bound(found: Sequence[Found], method: str) -> tuple[float, float]:
 def _basin(job: tuple[str, float, float, int, int]) -> tuple[float, float]:
     """Start ICP off the truth by a distance in any direction and an angle either way; return how often it comes home.
 
-    And how often the search does, which does not know of the start.
+    The same for the search, which does not use the start.
     """
     name, distance, angle, scans, seed = job
     rng = np.random.default_rng([seed, NAMES.index(name), 77])

@@ -65,7 +65,7 @@ class SettingsError(Exception):
 
 
 class Settings(BaseSettings):
-    """How the service runs."""
+    """Settings of the service."""
 
     model_config = SettingsConfigDict(
         env_prefix="LINEFIX_",

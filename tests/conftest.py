@@ -60,7 +60,7 @@ def patient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService
 
 @pytest.fixture(scope="session")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    """One that asks for a key, `sesame` or `open`."""
+    """One that requests a key, `sesame` or `open`."""
     with running(tmp_path_factory.mktemp("guarded"), keys="sesame,open") as started:
         yield started
         assert "sesame" not in started.log()

@@ -1,4 +1,4 @@
-"""Slow and obviously right twins of the kernels: one pair at a time, straight from the definitions."""
+"""Slow and obviously right references of the kernels: one pair at a time, straight from the definitions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the documents point at is there: links, files, modules, targets, tests."""
+"""The links, files, modules, targets and tests that the documents name exist."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ class Strict(BaseModel):
 
 
 class Answer(BaseModel):
-    """What is answered: documents the JSON, is never built while answering."""
+    """Model of an answer: documents the JSON, is never built for an answer."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)  # seldom asked for
 

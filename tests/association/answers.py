@@ -139,7 +139,7 @@ def answer_with(
 
 
 def explanations_of(answer: Answer | None, *others: ConsensusSet, complete: bool = True) -> Explanations:
-    """Return an answer beside other explanations; those within the window first, the best first."""
+    """Return an answer next to other explanations; those within the window first, the best first."""
     own = () if answer is None else (answer.best,)
     listed = sorted((*own, *others), key=lambda one: (not one.inside, -one.posterior))
     return Explanations(tuple(listed), answer, SearchReport(complete, False, 0.9999, 12, 34, 5, 0, "ordered", 0.75))

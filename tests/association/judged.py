@@ -1,4 +1,4 @@
-"""Answers whose verdict changes without a jump, beside what the twin says of them by models that are not fitted."""
+"""Answers whose verdict changes without a jump, and the verdict of the reference, by models that are not fitted."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ PLAIN: dict[str, dict[str, list[float]]] = {
 def judged_by(models: dict[str, dict[str, list[float]]], **bars: float) -> Iterator[None]:
     """Let these models decide, and these bars in place of those of `association.verdict`.
 
-    Without the second look at the rivals, which scores them anew: these are made by hand.
+    Without the second look at the alternatives, which scores them again: these are made by hand.
     """
     usual = USUAL._replace(deviation=USUAL_DEVIATION)
     with pytest.MonkeyPatch.context() as patch:
@@ -79,11 +79,11 @@ def judged_by(models: dict[str, dict[str, list[float]]], **bars: float) -> Itera
 
 
 class Numbers(NamedTuple):
-    """What an answer depends on without a jump.
+    """Numbers on which an answer depends continuously.
 
     Attributes
     ----------
-    score, rival : nats, of the best and of its first rival
+    score, rival : nats, of the best and of its first alternative
     share : of the scan's length that is matched
     agreement : share of directions
     misfit
@@ -92,7 +92,7 @@ class Numbers(NamedTuple):
     moves : by how much the pose would move without one wall, metres
     read, passed : shares of the beams
     wall_error : of the walls, as it turned out, metres
-    cost : of the rivals, over that of the best
+    cost : of the alternatives, over that of the best
     """
 
     score: float = 110.0
@@ -123,7 +123,7 @@ class Drawn:
     matched : int
         Of 8 segments.
     beyond : tuple of (score, inside)
-        Of the other rivals, over that of the first.
+        Of the other alternatives, over that of the first.
     prior : float
         What it says of the best.
     degenerate, thin, complete : bool
@@ -156,7 +156,7 @@ class Drawn:
         chance = 10.0**n.chance
         answer = answer_with(best, registered, estimated=estimated, agreement=n.agreement, significance=chance)
         scores = [(n.rival, True), *((n.rival + more, inside) for more, inside in self.beyond)]
-        # Within the window the best has the greatest value, whatever the prior says of a rival.
+        # Within the window the best has the greatest value, whatever the prior says of an alternative.
         others = [
             ranked(
                 s, min(0.0, best.posterior - s) if inside else 0.0, inside=inside, chi_square=best.chi_square + n.cost

@@ -1,4 +1,4 @@
-"""Between plain values, which the twins speak in, and the records that kernels are handed."""
+"""Between plain values, which the references speak in, and the records that kernels are handed."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def test_workspaces_have_a_place_for_every_segment() -> None:
 
 
 def test_gates() -> None:
-    """A tolerance that is asked for is the gate, whatever the sigmas are; all or nothing of a segment is nearly so."""
+    """A requested tolerance is the gate for all sigmas; all or nothing of a segment is nearly so."""
     usual = record(
         GATES,
         sigmas=GATE_SIGMAS,
@@ -152,7 +152,7 @@ def along_rays(walls: int) -> MapIndex:
 
 def test_rays_are_not_followed_along_more_walls_than_can_be_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bound grows with the rays, with how far they go, and with the walls in one place."""
-    monkeypatch.setattr("association.context.MOST_LOOKED_AT", 1_000)  # where it is told what a ray passes
+    monkeypatch.setattr("association.context.MOST_LOOKED_AT", 1_000)  # lines of sight are not traced then
     few, many = along_rays(100), along_rays(10_000)
     near = scan_of([[1.0, -1.0, 1.0, 1.0]], viewpoint=(0.0, 0.0))
     far = scan_of([[30.0, -1.0, 30.0, 1.0]], viewpoint=(0.0, 0.0))

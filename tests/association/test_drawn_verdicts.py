@@ -1,4 +1,4 @@
-"""The verdict on drawn answers is that of the twin, and changes where the twin's does."""
+"""The verdict on drawn answers is that of the reference, and changes where the reference's does."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def assert_same(one: AssociationResult, other: AssociationResult) -> None:
 
 
 def assert_same_place(one: AssociationResult, other: AssociationResult) -> None:
-    """Compare what is said of the best explanation alone."""
+    """Compare the numbers of the best explanation alone."""
     assert (other.pose is None) == (one.pose is None)
     assert (other.diagnostics is None) == (one.diagnostics is None)
     if one.diagnostics is not None and other.diagnostics is not None:
@@ -300,7 +300,7 @@ def test_a_wall_that_is_drawn_whole_and_in_pieces_is_one_wall() -> None:
 
 @pytest.mark.parametrize("on_map", [True, False])
 def test_a_reversed_copy_is_no_second_witness_where_directions_mean_nothing(on_map: bool) -> None:
-    """Whether the map says so or the options do."""
+    """The map states it, or the options do."""
     index = MapIndex.build(Segments.from_array(LOBBY), oriented=not on_map)
     corner = seen(LOBBY, pose(3.0, 1.0, 0.4), noise=0.01, cut=0.6, seed=5)[0][:3]
     copies = np.vstack([corner, corner[:2, [2, 3, 0, 1]]])

@@ -40,7 +40,7 @@ def test_the_answer_is_the_best_within_the_window() -> None:
 
 
 def test_nothing_within_the_window_is_no_answer() -> None:
-    """What was found outside is told."""
+    """Poses outside of the prior are reported."""
     explanations = search_and_explain(context_of(ROOM_INDEX, SCAN, HardPrior(pose(-30.0, 0.0), 0.5, 0.3)))
     assert explanations.answer is None
     assert len(explanations.ranked) > 0

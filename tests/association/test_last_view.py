@@ -23,7 +23,7 @@ STEP = np.diag([0.02**2, 0.02**2, 0.02**2])
 
 
 def look(at: RigidTransform, *, clutter: int = 0, seed: int = 5, with_beams: bool = False) -> Scan:
-    """Return what is seen of ROOM, and of things that are on no map, from beside INSIDE."""
+    """Return what is seen of ROOM, and of things that are on no map, from next to INSIDE."""
     there = INSIDE.compose(at)
     ends = seen(ROOM, there, noise=0.005, clutter=clutter, seed=seed)[0]
     return scan_of(ends, viewpoint=(0.0, 0.0), beams=beams_of(INDEX, there) if with_beams else None)

@@ -1,4 +1,4 @@
-"""What a search may be asked, and what it refuses."""
+"""Options of a search, and those that it rejects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was known before the search: it tells equal places apart, it may be wrong, and it is never fused."""
+"""Priors: they separate equal places, may be wrong, and are never fused."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_contradicted_prior_is_told_and_never_usable() -> None:
 
 
 def test_a_usable_answer_lies_within_its_window() -> None:
-    """What is registered may leave a window that is narrower than the noise: then it is told, and not usable."""
+    """A registered pose may leave a window that is narrower than the noise: it is returned, and not usable."""
     usable = told = 0
     for seed in range(40):
         endpoints, _ = seen(ROOM, INSIDE, noise=0.03, seed=seed)

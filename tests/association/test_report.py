@@ -1,4 +1,4 @@
-"""What a caller gets is what was found and concluded, in the map frame and by the caller's own indices."""
+"""The report has the result in the map frame, with the indices of the caller."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def given_answer() -> Answer:
 
 
 def told(answer: Answer | None, verdict: Verdict = SURE, **options: Any) -> AssociationResult:
-    """Report an answer beside another explanation."""
+    """Report an answer next to another explanation."""
     context = context_of(ROOM_INDEX, SCAN, **options)
     return report(context, explanations_of(answer, ranked(60.0)), verdict)
 
@@ -179,7 +179,7 @@ def test_without_a_probability_to_share_the_others_have_none(verdict: Verdict) -
 
 
 def test_what_is_not_usable_has_its_other_poses() -> None:
-    """They are counted in the sentence, whatever is asked for."""
+    """They are counted in the message, whatever `include` names."""
     result = answer_of(index_of(equal_rooms(3)), scan_of(seen(ROOM, INSIDE)[0]), parts=())
     assert not result.usable
     assert len(result.alternatives) == 2
@@ -209,7 +209,7 @@ def test_the_estimator_chooses_whose_sums_score_and_the_joint_ones_judge() -> No
     joint, one_step = (answer_of(index_of(equal_rooms(2)), scan, estimator=name) for name in ("joint", "one_step"))
     assert joint.diagnostics is not None
     assert one_step.diagnostics is not None
-    # The paper's pose costs more, by how much is the same in the twin.
+    # The paper's pose costs more, by how much is the same in the reference.
     lost = joint.diagnostics.score - one_step.diagnostics.score
     assert 1e-3 < lost < 5.0
     assert [j.score - o.score for j, o in zip(joint.alternatives, one_step.alternatives, strict=True)] == [
@@ -347,7 +347,7 @@ def test_segments_that_show_their_back_are_told() -> None:
 
 
 def test_a_segment_of_a_view_faces_the_sensor_of_that_view() -> None:
-    """Whatever the others look at; one without a viewpoint shows nobody its back."""
+    """Segments without a viewpoint never face away."""
     room, pillar = SQUARE, np.array([[2.2, 3.0, 2.2, 2.0], [2.0, 2.0, 2.0, 3.0]])  # its faces to the right and left
     right, left = pose(4.0, 2.5), pose(1.0, 2.5)
     ends = [seen(np.vstack([room, face]), at)[0] for face, at in zip(pillar[:, None], (right, left), strict=True)]

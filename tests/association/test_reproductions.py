@@ -27,7 +27,7 @@ def runner_up(result: AssociationResult) -> float:
     return result.diagnostics.runner_up
 
 
-# A corner with a doorpost beside it, and what was seen of them.
+# A corner with a doorpost next to it, and what was seen of them.
 CORNER_WITH_POST = np.array(
     [
         [23.0, 30.77, 23.0, 34.56],

@@ -1,4 +1,4 @@
-"""Where a map is off by a factor the pose is where the map has it, the covariance says so, and a warning tells it."""
+"""Maps with a scale error: pose in the map as sent, covariance with the factor, and a warning."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def squared_error(result: AssociationResult, truth: RigidTransform) -> float:
 
 @pytest.mark.parametrize("factor", [0.98, 0.99, 1.01, 1.02])
 def test_the_pose_is_where_the_map_has_it(factor: float) -> None:
-    """Its covariance holds: 3 is the mean, 16.3 the quantile of .1 %."""
+    """Its covariance holds: 3 is the mean, 16.3 the quantile of 0.1 %."""
     for seed in range(6):
         found = answer(factor * WALLS, seed)
         assert found.usable
@@ -90,7 +90,7 @@ def test_the_pose_is_where_the_map_has_it(factor: float) -> None:
 
 
 def test_pose_and_covariance_are_those_of_the_similarity() -> None:
-    """What is not known of the factor is in the covariance, and the residuals are those at that pose."""
+    """The covariance includes the error of the factor, and the residuals are those at that pose."""
     context = context_of(index_of(1.02 * WALLS), SCAN)
     found = search_to_scale(context)
     one = found.explanations.answer
@@ -127,7 +127,7 @@ def test_a_factor_that_is_too_great_is_a_doubt(factor: float, deviation: float, 
 
 @pytest.mark.parametrize("factor", [1.045, 1.055])
 def test_no_answer_is_usable_that_hides_a_greater_factor(factor: float) -> None:
-    """A pose makes up for part of it: such answers were usable, .1 to .3 m off with 2 cm stated."""
+    """A pose makes up for part of it: such answers were usable, 0.1 to 0.3 m off with 2 cm stated."""
     index, told_of = index_of_floor(factor * faces()), 0
     for truth, sent in sampled(30):
         for one in (sent, Scan(sent.measured, sent.viewpoint, None)):
@@ -198,7 +198,7 @@ def test_exact_views_are_put_to_scale_together(latest_first: bool) -> None:
 
 
 def test_views_that_are_not_exact_are_as_they_were_sent() -> None:
-    """What odometry does not know of them may be a factor as well."""
+    """Their odometry error may be a scale factor as well."""
     ends = seen(WALLS, AT, noise=0.01, seed=1, radius=12.0)[0]
     spread = np.diag([0.02**2, 0.02**2, 0.02**2])
     views = [

@@ -1,4 +1,4 @@
-"""What is strange about a scan is told, and ordinary scans are told nothing of."""
+"""Unusual scans have warnings, ordinary scans have none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawn worlds with known answers, and an honest verdict: twins, slides, other buildings and nothing at all."""
+"""Drawn worlds with known answers: similar places, slides, other buildings and nothing at all."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_equal_rooms(rooms: int) -> None:
 
 
 def test_one_of_two_equal_rooms_lacks_a_wall() -> None:
-    """What the scan shows of that wall tells the rooms apart."""
+    """The visible part of that wall separates the rooms."""
     at = pose(3.0, 2.0, 0.3)
     scan = scan_of(seen(ROOM, at, noise=0.01, seed=1)[0])
     result = answer_of(index_of(equal_rooms(2)[:-1]), scan)
@@ -63,7 +63,7 @@ def test_one_of_two_equal_rooms_lacks_a_wall() -> None:
 
 
 def test_parallel_walls_at_distances_of_their_own() -> None:
-    """Which of five parallel walls are seen is told by what lies between them; where along them is open."""
+    """The gaps decide which of five parallel walls are seen; the position along them is unobservable."""
     heights = [0.0, 2.0, 5.0, 9.0, 14.0]
     walls = np.array([[0.0, y, 30.0, y] if k % 2 == 0 else [30.0, y, 0.0, y] for k, y in enumerate(heights)])
     at = pose(15.0, 7.0, 0.2)

@@ -1,4 +1,4 @@
-"""What workers are given to do in these tests; they import it by its name."""
+"""Tasks of the workers in these tests; they import it by its name."""
 
 from __future__ import annotations
 

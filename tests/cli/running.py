@@ -13,7 +13,7 @@ from cli.entry import run
 
 @dataclass(frozen=True)
 class Ended:
-    """What came of a command."""
+    """Result of a command."""
 
     code: int
     out: str
@@ -21,7 +21,7 @@ class Ended:
 
 
 class Linefix:
-    """Runs commands in a folder, with a store of its own; whatever happens, nobody reads a traceback."""
+    """Runs commands in a folder, with a store of its own; whatever happens, no one reads a traceback."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
         self._capsys = capsys

@@ -32,7 +32,7 @@ def shown() -> dict[str, str]:
     found: dict[str, str] = {}
     for document in sorted(DOCUMENTS):
         text = document.read_text().replace("\\\n", " ")
-        # What is quoted may be broken where a line ends.
+        # A quoted text may be broken at the end of a line.
         text = re.sub(r"`linefix[^`]*`", lambda match: match[0].replace("\n", " "), text)
         for quoted, line in SHOWN.findall(text):
             command = " ".join(shlex.split(quoted or line, comments=True)).partition(" >")[0]

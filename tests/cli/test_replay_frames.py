@@ -1,4 +1,4 @@
-"""linefix replay: whose poses are told, and logs of which some cannot be taken."""
+"""linefix replay: whose poses are informed, and logs of which some cannot be taken."""
 
 from __future__ import annotations
 

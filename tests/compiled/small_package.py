@@ -35,7 +35,7 @@ print(outer(1.0), sum(outer.stats.cache_hits.values()), compiled.cache_directory
 
 @dataclass(frozen=True)
 class Ran:
-    """What a process printed that ran the kernel of the small package."""
+    """Output of a process that ran the kernel of the small package."""
 
     answer: float
     loaded: bool

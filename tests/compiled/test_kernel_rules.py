@@ -1,4 +1,4 @@
-"""What every kernel keeps to, read from its source; see ``registration/layout.py`` and ``kernels/records.py``."""
+"""Rules of every kernel, tested in its source; see ``registration/layout.py`` and ``kernels/records.py``."""
 
 from __future__ import annotations
 

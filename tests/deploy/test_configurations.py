@@ -1,4 +1,4 @@
-"""What is in deploy/: read as those who use it do, and run where the program is there."""
+"""Files in deploy/: read as their programs read them, and run if the program is installed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is looked for in a built image is found: archives of a small image, right and wrong."""
+"""The check of a built image finds each fault: archives of a small image, right and wrong."""
 
 from __future__ import annotations
 

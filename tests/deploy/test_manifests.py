@@ -1,4 +1,4 @@
-"""What is deployed: valid by the schemas, in step with the service, and with no more rights than it needs."""
+"""Manifests: valid by the schemas, consistent with the service, and with the least rights."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may be part of the service, and that nothing passes unseen."""
+"""Licences that the service may contain; no package is skipped."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_what_the_image_is_made_of_is_pinned_by_hash(name: str) -> None:
 
 
 def test_an_audit_that_reaches_nothing_fails(tmp_path: Path) -> None:
-    """As pip-audit does then: it says that everything was skipped, and that all is well."""
+    """As pip-audit then prints: everything was skipped, and no vulnerability was found."""
     blind = tmp_path / "pip-audit"
     blind.write_text('#!/bin/sh\necho \'{"dependencies": [{"name": "pyyaml", "skip_reason": "not found"}]}\'\n')
     blind.chmod(0o755)

@@ -1,4 +1,4 @@
-"""The wheel: the same whoever builds it, and nothing in it but the packages."""
+"""The wheel: the same anyone who builds it, and nothing in it but the packages."""
 
 from __future__ import annotations
 

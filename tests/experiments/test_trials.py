@@ -149,7 +149,7 @@ def test_the_joint_estimator_does_not_care_for_the_origin_and_the_papers_does():
         np.testing.assert_allclose(found[origin].errors[:, :, joint], found["sensor"].errors[:, :, joint], atol=1e-6)
         papers = found["sensor"].of("unweighted")
         assert np.abs(found[origin].errors[:, :, papers] - found["sensor"].errors[:, :, papers]).max() > 0.1
-    # Rotation is found first, and knows of no origin.
+    # Rotation is estimated first, independent of the origin.
     heading = [found[o].errors[:, :, 0, 2] for o in ("sensor", "map")]
     np.testing.assert_allclose(*heading, atol=1e-9)
 
@@ -157,7 +157,7 @@ def test_the_joint_estimator_does_not_care_for_the_origin_and_the_papers_does():
 def test_the_joint_estimator_reaches_the_bound_where_the_papers_does_not():
     trials = run(Condition("CutSquare", 300, 3.0, 40, 1, CORNERS, ALL))
     position, heading = over_bound(trials, "joint")
-    # A plain total least squares line does not know that noise along the ray counts with the cosine of incidence.
+    # A plain total least squares line does not weigh noise along the ray by the cosine of incidence.
     assert 0.9 < position < 1.2
     assert 0.9 < heading < 1.2
     assert over_bound(trials, "unweighted")[0] > 1.3

@@ -22,7 +22,7 @@ from tests.service.conftest import LOCAL, empty_database
 
 NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/bin:/opt/homebrew/bin")
 
-# As deploy/compose.yaml has it, without root: what a replica cannot answer another one is asked, once for each.
+# As deploy/compose.yaml has it, without root: a request that a replica cannot answer goes to the next one, once each.
 CONF = """
 daemon off;
 worker_processes 1;
@@ -157,7 +157,7 @@ def replicas(folder: Path, count: int = 3, **settings: object) -> Iterator[Repli
 @contextmanager
 def _proxy(folder: Path, services: list[RunningService]) -> Iterator[str]:
     port = free_port()
-    # None is ever left out: where all answer 503 that is what clients are to be told, not that nobody is there.
+    # No replica is ever left out: if all answer 503, clients get this 503, not a 502.
     servers = " ".join(f"server 127.0.0.1:{one.port} max_fails=0;" for one in services)
     conf = folder / "nginx.conf"
     conf.write_text(CONF.format(folder=folder, servers=servers, port=port, repeats="non_idempotent"))

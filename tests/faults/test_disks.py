@@ -65,7 +65,7 @@ def test_a_full_disk_loses_nothing(start_service: Callable[..., Any], disk: Path
     for answer in refused:
         assert (answer.status_code, answer.json()["code"]) == (507, "storage_full")
     check(client, kept)
-    # What is there already is not harmed by a write over it, either.
+    # A failed write over a stored map does not change it, either.
     for _ in range(3):
         assert put("m", large(0, 2000)).status_code == 507
     check(client, kept)

@@ -22,7 +22,7 @@ CALLERS = 4
 
 
 class Caller(threading.Thread):
-    """Sends requests on new connections until nobody listens any more."""
+    """Sends requests on new connections until no one listens any more."""
 
     def __init__(self, url: str, name: str) -> None:
         super().__init__()

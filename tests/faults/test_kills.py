@@ -23,7 +23,7 @@ State = tuple[int, int] | None  # revision and number of the content, None for n
 
 @dataclass
 class Writer:
-    """Puts and deletes maps of its own, and remembers what it was told of them."""
+    """Puts and deletes maps of its own, and stores the answers."""
 
     name: str
     draw: random.Random
@@ -63,7 +63,7 @@ class Writer:
         self.acknowledged += 1
 
     def check(self, client: httpx.Client) -> int:
-        """Compare what is stored with what was told; return how many acknowledged writes are lost."""
+        """Compare the stored maps with the answers; return the number of acknowledged writes that are lost."""
         lost = 0
         for number in range(MAPS_EACH):
             name = f"{self.name}-{number}"

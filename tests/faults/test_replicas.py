@@ -21,7 +21,7 @@ CLIENTS = 4
 
 @dataclass
 class Load:
-    """What came of the requests of some clients that ask without pause."""
+    """Results of the requests of clients that send without pause."""
 
     url: str
     statuses: list[tuple[int, str]] = field(default_factory=list)
@@ -35,7 +35,7 @@ class Load:
                 self._note(lambda: client.post("/v1/associate", json=STORED))
 
     def write(self) -> None:
-        """Put a map; whoever answers next has to know that revision."""
+        """Put a map; the next answer of any replica must have this revision."""
         number = 0
         with client_of(self.url) as client:
             while not self.enough.is_set():

@@ -1,4 +1,4 @@
-"""What is acknowledged has been synced before: a kill cannot show that, the system calls do."""
+"""Acknowledged writes were synced before: a kill cannot show that, the system calls do."""
 
 from __future__ import annotations
 

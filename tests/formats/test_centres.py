@@ -1,4 +1,4 @@
-"""Drawings of walls by their centre lines: that they are, how thick the walls are, and what is said of it."""
+"""Drawings of walls by their centre lines: that they are, how thick the walls are, and what is stated of it."""
 
 from __future__ import annotations
 

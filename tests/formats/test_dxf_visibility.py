@@ -1,4 +1,4 @@
-"""What AutoCAD does not show of a DXF is no wall: layers that are off or frozen, blocks on them, invisible entities."""
+"""Parts of a DXF that AutoCAD hides are no walls: layers off or frozen, blocks on them, invisible entities."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def plan(*layers: str) -> Document:
 
 
 def lengths(tmp_path: Path, document: Document) -> list[float]:
-    """Lengths of the lines that are read beside the room, decimetres."""
+    """Lengths of the lines that are read next to the room, decimetres."""
     path = tmp_path / "plan.dxf"
     document.saveas(path)
     found = sorted(round(10 * length) for length in read_map(path, ALL).map.segments.lengths)
@@ -88,7 +88,7 @@ def test_a_hidden_reference_within_a_block(tmp_path: Path, how: str, left: list[
 
 @pytest.mark.parametrize("how", ["frozen", "off"])
 def test_a_hidden_layer_0(tmp_path: Path, how: str) -> None:
-    """What is on layer 0 of a block is on the layer of its reference, and hidden where that is layer 0 itself."""
+    """An entity on layer 0 of a block is on the layer of its reference, and hidden where that is layer 0 itself."""
     document = plan("SHOWN")
     document.blocks.new("DESK").add_line((0, 0), (1, 0))
     document.modelspace().add_line((0, 1), (2, 1))

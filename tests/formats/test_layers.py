@@ -1,4 +1,4 @@
-"""Which layers of a drawing are taken for walls where nobody says it."""
+"""Which layers of a drawing are taken for walls where no one states it."""
 
 from __future__ import annotations
 

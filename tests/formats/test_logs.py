@@ -79,7 +79,7 @@ def test_broken_lines_are_dropped_and_counted(tmp_path: Path) -> None:
     assert len(list(log)) == 1
     counts = {n.code: n.count for n in log.report.dropped}
     assert counts == {"broken_line": 4, "other_lines": 1}
-    assert len(list(log)) == 1  # once more from the beginning
+    assert len(list(log)) == 1  # read again from the beginning
     assert {n.code: n.count for n in log.report.dropped} == counts
 
 

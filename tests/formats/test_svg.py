@@ -20,7 +20,7 @@ def read(tmp_path: Path, inner: str, attributes: str = 'viewBox="0 0 40 20"') ->
 
 
 def lines(tmp_path: Path, inner: str, attributes: str = 'viewBox="0 0 40 20"') -> list[list[float]]:
-    """Read the lines beside one that is always there; y as in the file."""
+    """Read the lines next to one that is always there; y as in the file."""
     found = read(tmp_path, inner + BASE, attributes).map.segments.endpoints * [1, -1, 1, -1]
     rows: list[list[float]] = (np.round(found, 3) + 0.0).tolist()
     rows.remove([0, 0, 9, 0])

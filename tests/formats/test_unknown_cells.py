@@ -147,7 +147,7 @@ def test_kinds_of_pictures(tmp_path: Path, drawn: object, said: str) -> None:
 
 @pytest.mark.parametrize("kind", ["L", "I;16"])
 def test_a_transparent_grey_value(tmp_path: Path, kind: str) -> None:
-    """A PNG may say that one grey value is transparent: here 254, which would be free."""
+    """A PNG may state that one grey value is transparent: here 254, which would be free."""
     up = np.where(sheet() == UNKNOWN, 254, np.where(sheet() == FREE, 255, 0)).astype(np.uint8)
     picture = Image.fromarray(up if kind == "L" else up.astype(np.uint16))
     if kind == "I;16":

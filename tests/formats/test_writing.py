@@ -1,4 +1,4 @@
-"""What is written is read back as it was; pictures show walls and their free sides."""
+"""Written files are read back unchanged; pictures show walls and their free sides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `linefix` names, and that it works as its docstrings say."""
+"""Names of `linefix`, which work as their docstrings state."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_types_are_told_to_whoever_imports_it(package: str) -> None:
 
 
 def test_it_is_there_without_the_libraries_of_formats() -> None:
-    """And says which extra is missing where a file is to be read."""
+    """The error names the extra that is missing for a file."""
     program = (
         "import sys; sys.modules['ezdxf'] = sys.modules['rosbags'] = None\n"
         "import linefix\n"

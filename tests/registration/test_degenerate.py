@@ -1,4 +1,4 @@
-"""Sets that fix no unique transform, and what is said of them."""
+"""Sets that fix no unique transform, and what is stated of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The kernels of the sums do what their slow twins do."""
+"""The kernels of the sums do what their slow references do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernels that gather pairs, and those of small matrices, give what their twins do."""
+"""Kernels that gather pairs, and those of small matrices, give what their references do."""
 
 from __future__ import annotations
 

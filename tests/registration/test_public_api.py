@@ -1,4 +1,4 @@
-"""Every public name is there and says what it is."""
+"""Every public name is there and states what it is."""
 
 from __future__ import annotations
 

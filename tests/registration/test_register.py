@@ -104,7 +104,7 @@ def test_residuals_weights_and_diagnostics_in_closed_form() -> None:
 def test_what_is_seen_of_one_map_segment_has_two_points_at_least(
     ends: list[list[float]], points: list[float] | None, variances: list[float]
 ) -> None:
-    """Together, where nobody counted them; another map segment is another matter."""
+    """Together, if they have no point counts; another map segment is separate."""
     map_segments = Segments.from_array([[0, 0, 2, 0], [2, 0, 2, 2]])
     seen = Segments.from_array([*ends, [2, 1, 2, 1.03]])
     counts = None if points is None else [*points, 3.0]
@@ -285,7 +285,7 @@ def test_no_weight_and_no_sigma_breaks_a_number(sigma: float, weights: Any, esti
 def test_ambiguity_of_parallel_lines_keeps_its_digits_far_out(
     estimator: Estimator, dx: int, dy: int, size: int, away: tuple[int, int], along: int, across: float
 ) -> None:
-    """The pose that is told may be far from the one that is asked about, and fits as well.
+    """The returned pose may be far from the other one, and fits as well.
 
     All coordinates are exact, so that the answer is: each of three lines is off by as much as the pose is, across them.
     """

@@ -1,4 +1,4 @@
-"""What `register` refuses, with the argument and the index at fault."""
+"""Input that `register` rejects, with the argument and the index at fault."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the joint estimator promises of accuracy and of its own covariance."""
+"""Accuracy and covariance of the joint estimator."""
 
 from __future__ import annotations
 

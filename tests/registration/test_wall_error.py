@@ -1,4 +1,4 @@
-"""Where nobody knows how far a map is off, the covariance holds all the same."""
+"""The covariance holds for a map of unknown error, too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tests of the bridge share."""
+"""Fixtures of the tests of the bridge."""
 
 from __future__ import annotations
 

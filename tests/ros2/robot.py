@@ -1,4 +1,4 @@
-"""The bridge in a process of its own, and a robot beside it: both over loopback."""
+"""The bridge in a process of its own, and a robot next to it: both over loopback."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class Robot:
         self.diagnostics = Subscription(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
 
     def until(self, heard: Subscription[Any], play: Callable[[], None], wanted: Callable[[Any], bool] = bool) -> Any:
-        """Play again and again until something wanted is heard; return it."""
+        """Play again and again until something wanted is received; return it."""
         ends = time.monotonic() + PATIENCE
         while time.monotonic() < ends:
             play()

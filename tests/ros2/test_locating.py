@@ -27,7 +27,7 @@ MOUNT = linefix.RigidTransform(0.3, -0.1, 2.0)
 def seen(*, flipped: bool = False) -> messages.LaserScan:
     ranges = linefix.simulation.scan(WALLS, TRUTH, SCANNER, np.random.default_rng(3)).ranges
     first, step = SCANNER.angle_min, SCANNER.angle_increment
-    if flipped:  # its own counter-clockwise is clockwise for whoever looks from above
+    if flipped:  # its own counter-clockwise is clockwise for anyone who looks from above
         first, ranges = -(first + 719 * step), ranges[::-1]
     return message(ranges.tolist(), first, step, range_max=30.0)
 

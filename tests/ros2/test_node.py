@@ -1,4 +1,4 @@
-"""The bridge hears a robot that plays a bag, and says where it is."""
+"""The bridge receives a robot that plays a bag, and says where it is."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def mounts() -> messages.TFMessage:
 
 
 def seen(name: str, second: int, *, moved: bool = True) -> messages.LaserScan:
-    """Return what a scanner sees; that behind before the robot has `moved` on to where it is asked about."""
+    """Return what a scanner sees; the rear one before the robot has `moved` on."""
     then = MAP_FROM_BASE.compose(DRIVEN.inverse()) if name == "back" and moved else MAP_FROM_BASE
     truth = then.compose(FRONT if name == "front" else BACK)
     rng = np.random.default_rng(second)
@@ -123,7 +123,7 @@ def test_odometry_is_interpolated_and_forgotten() -> None:
     half = told.step(begin, end)
     assert half is not None
     assert (half.x, half.y, half.theta) == pytest.approx((0.5, 0.0, 0.2))
-    assert told.step(begin, messages.Time(7, 0)) is None  # nobody said for a second
+    assert told.step(begin, messages.Time(7, 0)) is None  # no odometry for a second
     told.take(odometry(2, 0, HERE))  # the clock went back
     assert told.step(begin, end) is None
     broken = messages.Odometry()

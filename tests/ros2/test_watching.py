@@ -1,4 +1,4 @@
-"""Whether the localizer of a robot is where the scans find the robot."""
+"""The pose of the localizer is compared with that of the scans."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def store_hard_map(running: RunningService, workers: int = 1) -> None:
     brief = searched_for(0.1)
 
     def is_indexed() -> bool:
-        # Over a new connection: any worker may take it. One that still indexes when the time is over says so, and
+        # Over a new connection: any worker may take it. One that still indexes when the time is over states it, and
         # has no place for another as long as it does.
         with client_of(running.url) as client:
             status = client.post("/v1/associate", content=brief).status_code
@@ -53,7 +53,7 @@ def slow_to_index(walls: int) -> bytes:
 
 @contextmanager
 def searching(running: RunningService) -> Iterator[None]:
-    """Have the hard map searched for as long as the block takes; then whoever asked for that hangs up."""
+    """Have the hard map searched for as long as the block takes; then its client hangs up."""
     body = searched_for(30.0)
     with running.connection() as connection:
         connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(body) + body)

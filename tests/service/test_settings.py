@@ -71,7 +71,7 @@ def test_no_more_workers_than_searches() -> None:
 
 @pytest.mark.parametrize("value", [" ", ",", "  , ", "two words", "caf\xe9", "a\tb"])
 def test_keys_that_nobody_could_send_are_refused(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    """Blank ones left a service that nobody could use, or that everybody could."""
+    """Blank keys made a service unusable, or open to all clients."""
     monkeypatch.setenv("LINEFIX_KEYS", value)
     with pytest.raises(SettingsError, match="keys"):
         read_settings([])

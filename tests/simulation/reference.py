@@ -1,4 +1,4 @@
-"""Slow, obviously right twins of ``simulation/kernels/``."""
+"""Slow, obviously right references of ``simulation/kernels/``."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ Numbers = list[float]
 
 
 def mark(*arrays: ArrayLike) -> Numbers:
-    """Return how many numbers there are, and sums of them by weights that tell where each of them stands."""
+    """Return how many numbers there are, and sums of them by weights of their positions."""
     flat = np.concatenate([np.nan_to_num(np.asarray(a, dtype=float), posinf=1e3).ravel() for a in arrays])
     k = np.arange(len(flat))
     return [float(len(flat)), *(round(float(flat @ np.cos(pace * k)), 4) for pace in (0.0, 0.37, 1.1))]

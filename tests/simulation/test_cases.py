@@ -12,7 +12,7 @@ from simulation.places import distances
 
 
 def shown(case: Case) -> Floats:
-    """What the declared scanner would measure from the truth in the map, without noise; 1e4 where there is nothing."""
+    """Ranges of the declared scanner at the true pose in the map, without noise; 1e4 where there is nothing."""
     assert case.truth is not None
     return np.minimum(1e4, scan(case.map, case.truth, replace(case.scanner, sigma=0.0)).true_ranges)
 

@@ -1,4 +1,4 @@
-"""Slow, obviously right twins of the kernels in ``vectorization/``."""
+"""Slow, obviously right references of the kernels in ``vectorization/``."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ async def livez() -> Response:
     summary="Report whether the service is ready for requests",
 )
 async def readyz(request: Request) -> Response:
-    """Answer 200 once the kernels are warm and the store answers, and until the service is told to end."""
+    """Answer 200 while the kernels are loaded, the store responds, and the service is not shutting down."""
     services = services_of(request.scope)
     services.readiness.require_all()
     await services.probe.check()

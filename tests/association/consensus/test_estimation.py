@@ -26,7 +26,7 @@ def estimated(index: MapIndex, ends: Floats) -> EstimatedPose:
 
 
 def unknown(walls: Floats) -> MapIndex:
-    """Index a map of which nobody says how good it is."""
+    """Index a map without a sigma."""
     return MapIndex.build(Segments.from_array(walls))
 
 
@@ -79,5 +79,5 @@ def test_a_wall_across_makes_them_fixed() -> None:
 
 @pytest.mark.parametrize("sigma", [0.0, 0.1, 0.3])
 def test_a_map_that_is_far_off_does_not_make_walls_parallel(sigma: float) -> None:
-    """What one wall of a room shows of its angle does not get worse by where the wall is."""
+    """The angle information of a wall does not depend on its place."""
     assert not estimated(index_of(ROOM, sigma), seen(ROOM, INSIDE, noise=0.02, seed=1)[0]).parallel

@@ -193,7 +193,7 @@ def test_beams_count_in_the_score_and_move_the_pose(unknown: int) -> None:
 
 
 def test_beams_that_pass_through_walls_speak_against_a_pose() -> None:
-    """A room and its twin with a screen, before which and behind which the beams end."""
+    """A room and a similar one with a screen, before which and behind which the beams end."""
     index = index_of(np.vstack([equal_rooms(2), [[19.5, 0.5, 19.5, 3.8]]]))
     context = context_of(index, scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE)))
     found = ranked_at(context, room(1), room(0))
@@ -312,7 +312,7 @@ def test_what_the_deadline_leaves_unranked_is_said(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("beams", [True, False])
 def test_where_no_ray_can_be_followed_the_answer_is_not_usable(beams: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The pose is that of the segments; what speaks against it nobody looked at."""
+    """The pose is that of the segments; evidence against it was not computed."""
     index = index_of(ROOM)
     scan = scan_of(ENDPOINTS, viewpoint=(0.0, 0.0), beams=beams_of(index, INSIDE) if beams else None)
     assert associate(index, scan).usable

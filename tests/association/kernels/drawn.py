@@ -1,4 +1,4 @@
-"""What the kernels are tried on: scans of a maze, drawn by seed, with the pose they were taken from."""
+"""Input for kernels: scans of a maze, drawn by seed, with their poses."""
 
 from __future__ import annotations
 

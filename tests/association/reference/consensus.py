@@ -49,7 +49,7 @@ class Pairs:
     ) -> Pairs:
         """Take the scan lines on a wall; `held` (n,) is the wall of each or -1.
 
-        The errors of walls are correlated by their ties; the line that a scan line lies on is beside its wall by its
+        The errors of walls are correlated by their ties; the line that a scan line lies on is off its wall by its
         shift, (n,).
         """
         on = np.asarray(held) >= 0
@@ -115,7 +115,7 @@ def correlations(wall: Integers, walls: Records, ties: Floats | None) -> Floats:
 
 @dataclass(frozen=True)
 class Solved:
-    """Where pairs cost least, held by the spring to where the search began."""
+    """Pose of least cost of the pairs, held by the spring to the start of the search."""
 
     pose: RigidTransform
     information: Floats
@@ -170,7 +170,7 @@ def score_pairs(scan: Records, at: RigidTransform, place: Place, wall_variance: 
 
 @dataclass(frozen=True)
 class Refined:
-    """What comes of a pose.
+    """Consensus set of a pose.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Refined:
 def refine(
     scan: Records, start: RigidTransform, spread: Floats, place: Place, gates: Records, model: Records, rounds: int
 ) -> Refined:
-    """Match and solve anew from nothing in every round; `start` has the covariance `spread`."""
+    """Match and solve again from nothing in every round; `start` has the covariance `spread`."""
     variance = float(model["wall_variance"][0])
     pose, covariance = start, spread
     held, cost, information, free = np.full(len(scan), -1), 0.0, np.zeros((3, 3)), False

@@ -102,7 +102,7 @@ def _span(wall: Record, middle: Floats) -> tuple[float, float]:
 def _followed(
     walls: Records, w: int, middle: Floats, d: Floats, length: float, gate: float, sign: float, reach: float
 ) -> tuple[float, list[tuple[float, float]]]:
-    """Return by how much more is covered that way, as far as it is to the good, and the parts with how far beside."""
+    """Return by how much more is covered that way, as far as it is to the good, and the parts with their offset."""
     half, counts, net = 0.5 * length, 1.0, 0.0
     parts: list[tuple[float, float]] = []
     best: tuple[float, list[tuple[float, float]]] = 0.0, []

@@ -81,7 +81,7 @@ def plan_bases(scan: Records, count: int, chains: Walls, area: float) -> list[Ba
 def order_of(bases: list[Base], fade: float, at_most: list[float]) -> list[int]:
     """Return the bases in the order in which they are taken: each use of a segment adds `fade` to its others' merit.
 
-    What a base is worth it is not asked before it may be worth `TIMES_BETTER` what another is.
+    The merit of a base is not computed before its bound is `TIMES_BETTER` that of another base.
     """
     left, uses, order, asked = list(range(len(bases))), dict.fromkeys(range(1000), 0), [], set()
     while left:
@@ -100,7 +100,7 @@ def order_of(bases: list[Base], fade: float, at_most: list[float]) -> list[int]:
 
 
 def fewest_segments(best_gains: list[float], beyond: float, needed: float) -> int:
-    """Return how many of the largest gains, with all beyond, come to what is needed; two at least."""
+    """Return how many of the largest gains, with all beyond, reach what is needed; two at least."""
     enough = [m for m in range(len(best_gains) + 1) if beyond + sum(best_gains[:m]) >= needed]
     return max(2, min(enough, default=len(best_gains)))
 
@@ -127,7 +127,7 @@ def least_freedom_sorted(scan: Records, needed: float) -> float:
 def missed_share(orders: np.ndarray, gains: np.ndarray, bases: list[Record], needed: float) -> float:
     """Return of the sampled sets the share that holds none of the bases.
 
-    They are the first two and more of each order that come to what is needed, where all of it does.
+    They are the first two and more of each order that reach what is needed, where all of it does.
     """
     missed, pairs = 0, [{int(base["sliding"]), int(base["crossing"])} for base in bases]
     for order in orders.tolist():

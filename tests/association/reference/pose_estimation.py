@@ -81,7 +81,7 @@ def estimated_variance(at: Moved, scan: Records, held: Integers, walls: Records,
 
 @dataclass(frozen=True)
 class Hinge:
-    """What a pose would be without a wall."""
+    """A pose without one of its walls."""
 
     wall: int
     moves: float

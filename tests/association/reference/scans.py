@@ -81,7 +81,7 @@ def _join(measured: MeasuredSegments, line: Record) -> None:
     new = new_lengths(_spans(segments, segments.directions[0], segments.midpoints[0]))
     points = measured.point_counts * new / segments.lengths  # behind what overlaps those that were seen longest count
     mean, moment = _moments(measured, points)
-    if len(segments) == 1:  # of which the points may lie beside it
+    if len(segments) == 1:  # of which the points may lie next to it
         d = segments.directions[0]
         line["x"], line["y"] = segments.midpoints[0]
         line["length"] = segments.lengths[0]

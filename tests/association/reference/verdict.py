@@ -40,7 +40,7 @@ def worth(one: ConsensusSet) -> float:
 
 
 def evidence(answer: Answer, rivals: list[ConsensusSet], temperature: float) -> float:
-    """Sum what the rivals weigh beside the best, at most one each."""
+    """Sum what the alternatives weigh next to the best, at most one each."""
     least = worth(answer.best)
     total = 0.0
     for rival in rivals:
@@ -131,7 +131,7 @@ def logistic(x: float) -> float:
 
 @dataclass(frozen=True)
 class Judged:
-    """What the verdict should say, and the chances behind it; see `association.verdict`.
+    """The expected verdict with its probabilities; see `association.verdict`.
 
     `asked` says whether the scan had to be compared with the mirrored one, `mirrored` whether that fits better.
     """
@@ -218,7 +218,7 @@ def cautious_of(context: SearchContext, models: Mapping[str, Document]) -> Docum
 def _chances(
     context: SearchContext, explanations: Explanations, models: Mapping[str, Document], usual_deviation: float
 ) -> Judged:
-    """Return the chances before the mirrored scan is asked; the rest is filled in later."""
+    """Return the chances before the search of the mirrored scan; the rest is filled in later."""
     answer = explanations.answer
     assert answer is not None
     rivals = [one for one in explanations.ranked if one is not answer.best and one.inside]

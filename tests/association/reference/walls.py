@@ -15,7 +15,7 @@ from .geometry import point
 def collinear_groups(ends: Floats, max_gap: float, max_lateral: float, max_angle: float) -> list[int]:
     """Compare every piece with the begin of every other; label by the lowest index that links lead to.
 
-    One that begins along another has to end beside its line, too.
+    One that begins along another has to end next to its line, too.
     """
     count = len(ends)
     label = list(range(count))

@@ -45,7 +45,7 @@ STEP = np.diag([0.02**2, 0.02**2, 0.02**2])
 
 
 def view_at(at: RigidTransform, true: RigidTransform | None = None, covariance: Floats | None = None) -> View:
-    """Return what is seen of ROOM from beside INSIDE, and where that is said to have been."""
+    """Return a scan of ROOM from next to INSIDE, with its stated viewpoint."""
     ends = seen(ROOM, INSIDE.compose(true or at), noise=0.005, seed=5)[0]
     return View(scan_of(ends, viewpoint=(0.0, 0.0)), at, covariance)
 
@@ -77,7 +77,7 @@ def test_a_scan_split_into_two_views_answers_as_one() -> None:
 
 
 def test_what_two_views_see_is_one_piece_of_evidence() -> None:
-    """Walls of the map, and things that are on none: the same twice is not worth more."""
+    """Walls of the map, and things that are on none: the same object twice does not count more."""
     clutter = np.vstack([ENDS, seen(ROOM, INSIDE, clutter=3, seed=9)[0][-3:]])
     once = context_of(INDEX, scan_of(clutter))
     twice = context_of(INDEX, assemble([View(scan_of(clutter)), View(scan_of(clutter))]))

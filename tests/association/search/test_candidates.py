@@ -218,9 +218,9 @@ def missed(index: MapIndex, scan: Scan, bases: int, fewest: int) -> float:
 
 @pytest.mark.parametrize("confidence", [0.5, 0.9, 0.99])
 def test_the_confidence_is_the_share_of_sets_that_cannot_have_been_missed(confidence: float) -> None:
-    """Six walls of four metres and more among twelve segments, each worth 14 nats.
+    """Six walls of four metres and more among twelve segments, each with a gain of 14 nats.
 
-    They score 73.6 nats, a rival has three quarters of that, 55.2, and its freedom takes 5.2 nats at least: it gains
+    They score 73.6 nats, an alternative has three quarters of it, 55.2. Its freedom takes 5.2 nats at least: it gains
     more than four of them, so that it has five.
     """
     index, scan = twelve()
@@ -231,7 +231,7 @@ def test_the_confidence_is_the_share_of_sets_that_cannot_have_been_missed(confid
 
 
 def test_where_beams_are_to_decide_more_is_kept() -> None:
-    """A room whose twin lacks a wall scores 0.6 of it: no rival by segments, yet worth a look by beams."""
+    """A room whose similar place lacks a wall scores 0.6 of it: an alternative by beams, not by segments."""
     twin = ROOM[[0, 1, 3, 6, 7]] + np.tile([20.0, 0.0], 2)
     index = index_of(np.vstack([ROOM, twin]))
     endpoints = seen(ROOM, INSIDE)[0]

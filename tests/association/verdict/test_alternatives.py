@@ -23,7 +23,7 @@ SCAN = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
 
 
 def explained(seed: int, sigma: float | None = None) -> tuple[SearchContext, Answer, tuple[ConsensusSet, ...]]:
-    """Explain a scan of one of two equal rooms, of which each wall is drawn 5 cm off by itself."""
+    """Explain a scan of one of two equal rooms, each wall of which is drawn 5 cm off."""
     rooms = Segments.from_array(equal_rooms(2))
     errors = np.random.default_rng(seed).normal(0.0, 0.05, len(rooms))
     walls = rooms.endpoints + np.tile(errors[:, None] * rooms.normals, 2)
@@ -45,7 +45,7 @@ def test_a_twin_that_fits_worse_by_centimetres_is_a_twin() -> None:
 
 
 def test_that_the_answer_fits_well_shows_not_that_walls_are_where_they_are_drawn() -> None:
-    """Of many twins one always fits well, and seems to show that the map is exact."""
+    """Of many similar places one always fits well, and seems to show that the map is exact."""
     context, answer, rivals = explained(0)
     well = replace(answer, estimated=replace(answer.estimated, wall_sigma=0.001))
     assert probability_among(compare_alternatives(answer.best, rivals)) > 0.95

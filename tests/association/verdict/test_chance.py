@@ -127,7 +127,7 @@ def test_what_comes_nowhere_near_the_answer_is_not_looked_for(walls: Floats) -> 
 
 
 def test_a_null_that_comes_to_less_than_is_asked_about_is_none() -> None:
-    """One that comes to as much is told as it is."""
+    """A value at the limit is reported unchanged."""
     context, answer = best_of(LOBBY, CORNER)
     null = find_null_score(context, answer.best)
     share = null.score / answer.best.score

@@ -172,7 +172,7 @@ def test_twins_share_the_chance() -> None:
 
 @pytest.mark.parametrize(("cost", "lead"), [(0.0, 11.99), (6.0, 6.26), (60.0, 1.40)])
 def test_the_farther_walls_are_off_the_less_centimetres_tell_rivals_apart(cost: float, lead: float) -> None:
-    """A rival that explains 10 nats less at a cost of 20 more, beside an answer whose walls fit well, or badly.
+    """An alternative that explains 10 nats less at a cost of 20 more, next to an answer whose walls fit well, or badly.
 
     With 8 matches, and 2 walls for what was supposed: ``10 - 20 / 2 + 5 log((cost + 22) / (cost + 2))``.
     """

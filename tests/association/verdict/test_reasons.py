@@ -1,4 +1,4 @@
-"""Why an answer is not usable is told where it is so, and only there, the weightiest first."""
+"""Why an answer is not usable is reported where it is so, and only there, the weightiest first."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def test_a_corner_is_too_little() -> None:
 
 @pytest.mark.usefixtures("fitted")
 def test_a_scan_of_another_building_is_elsewhere() -> None:
-    """Most of it does not fit, wherever it is laid: most are told so, and none is usable."""
+    """Most of it does not fit, wherever it is laid: most have this reason, and none is usable."""
     told = 0
     for seed in range(2, 18):
         ends = seen(maze(seed), pose(15.0, 14.0, 0.5), noise=0.01, radius=7.0, seed=seed)[0]

@@ -1,4 +1,4 @@
-"""How likely chance scores as high."""
+"""Probability that random walls score as high."""
 
 from __future__ import annotations
 

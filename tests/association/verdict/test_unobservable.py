@@ -73,7 +73,7 @@ def placed(index: MapIndex, endpoints: Floats, prior: SoftPrior | HardPrior | No
     return found
 
 
-# Three walls, the second one 10 m farther on than the first; seen 0.8 m beside the first as 2 or 3 m of each.
+# Three walls, the second one 10 m farther on than the first; seen 0.8 m next to the first as 2 or 3 m of each.
 WALLS = np.array([[0.0, 0.0, 30.0, 0.0], [40.0, 2.0, 10.0, 2.0], [12.0, 5.0, 28.0, 5.0]])
 SEEN = np.array([[-1.0, -0.8, 2.0, -0.8], [6.0, 1.2, 4.0, 1.2], [1.0, 4.2, 3.0, 4.2]])
 

@@ -54,7 +54,7 @@ def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar
         assert leading(low, with_beams=with_beams).verdict.status is Status.AMBIGUOUS
         usable = leading(high, with_beams=with_beams).verdict
     assert usable.usable
-    # At the limit a twin that is so far behind takes from the chance what is left of it.
+    # At the limit a similar place that is so far behind takes from the chance what is left of it.
     share = 1.0 / (1.0 + math.exp(-high / tuning.ALTERNATIVE_TEMPERATURE))
     chance = share / (1.0 + math.exp(3.0 - 0.2 * high))
     assert chance == pytest.approx(bar)
@@ -62,7 +62,7 @@ def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar
 
 
 def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is said to be 40 nats behind, and is at the same place: scored anew, it is worth as much.
+    """Its stated score is 40 nats less, at the same place: scored again, it counts as much.
 
     Only what would be usable is looked at again.
     """
@@ -78,7 +78,7 @@ def test_a_rival_that_a_second_look_finds_as_good_is_a_twin(monkeypatch: pytest.
 
 
 def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
-    """By a prior that likes the place little, it leads by less than twins do, but there is none."""
+    """By a prior that likes the place little, it leads by less than similar places do, but there is none."""
     best, other = ranked(9.0, prior=-4.0), ranked(8.0, prior=-4.0, at=pose(9.0, 9.0))
     with judged_by({**SURE, "cautious": {"constant": [-1.5], "lead": [0.2]}}):
         alone, beside = (judge(room(), explanations_of(answer_with(best), *others)) for others in ((), (other,)))
@@ -89,7 +89,7 @@ def test_alone_an_answer_has_no_twin_however_little_it_is_worth() -> None:
 
 
 def test_the_probability_is_that_for_scans_of_the_map() -> None:
-    """Where other buildings are reckoned with decides whether it is usable, and is not told."""
+    """The cautious probability decides whether the answer is usable, and is not returned."""
     with judged_by({**SURE, "probability": {"constant": [3.0]}, "cautious": {"constant": [0.0]}}):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.AMBIGUOUS, False)
@@ -108,7 +108,7 @@ def test_twins_share_both_probabilities() -> None:
 
 @pytest.mark.parametrize(("explained", "status"), [(0.031, Status.AMBIGUOUS), (0.029, Status.NO_MATCH)])
 def test_what_explains_the_scan_no_better_than_other_buildings_is_no_match(explained: float, status: Status) -> None:
-    """Neither a twin beside it nor a loose position makes it one; those are other questions."""
+    """Neither a similar place next to it nor a loose position makes it one; those are other questions."""
     constant = math.log(explained / (1.0 - explained))
     loose = {"constant": [constant], "deviation": [-100.0, 0.03, 0.0]}
     loose["constant"] = [constant + 100.0 * 0.03]
@@ -178,7 +178,7 @@ def asked_of(one: Drawn, monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It costs a search: not where a twin, a free direction, the prior or either probability forbids it already."""
+    """It costs a search: not if a similar place, a free direction, the prior or a probability forbids it already."""
     sure = leading(40.0)
     most = tuning.NULL_FRACTIONS[-1]
     assert asked_of(sure, monkeypatch) == [most], "no other null takes anything from it"
@@ -189,7 +189,7 @@ def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatc
     monkeypatch.setattr(probabilities, "probability_with_loose_walls", lambda *_: 0.92)
     for probable, asked in ((0.93, [0.0]), (0.91, [most])):
         with judged_by(SURE, USABLE_PROBABILITY=probable):
-            assert asked_of(sure, monkeypatch) == asked, "it is not usable all the same, and the reasons are told by it"
+            assert asked_of(sure, monkeypatch) == asked, "it is still not usable, and the reasons use it"
     monkeypatch.undo()
     better = Drawn(room(prior=AROUND), LIKELY, beyond=((LIKELY.score - LIKELY.rival + 10.0, False),))
     loose = replace(sure, numbers=LIKELY._replace(deviation=0.51))
@@ -356,7 +356,7 @@ def test_the_window_is_that_of_the_family_member_that_is_answered() -> None:
 
 
 def test_margin_and_runner_up() -> None:
-    """Both by value, and of rivals within the window."""
+    """Both by value, and of alternatives within the window."""
     best, outside = answer_with(ranked(80.0, -2.0)), ranked(79.0, inside=False)
     got = judge(room(), explanations_of(best, ranked(60.0, -3.0), ranked(40.0), outside))
     assert [got.margin, got.runner_up] == pytest.approx([21.0, 57.0 / 78.0])

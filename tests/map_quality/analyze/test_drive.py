@@ -1,4 +1,4 @@
-"""How far a robot drives until it knows, and what something more on the map would do, in drawn worlds."""
+"""Distance until a pose is usable, and the effect of a landmark, in drawn worlds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What hangs together on a map, beside what its rooms say."""
+"""Connected places of a map, compared with its rooms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is doubtful in a map is found where it is, and not where nothing is."""
+"""Doubtful parts of a map are found, and nothing in maps without them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What sample scans say of their map: what was done to it, and nothing where nothing was."""
+"""Sample scans reveal changes of their map, and nothing in an unchanged map."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOVE = RigidTransform(-1.0, 2.0, 0.3)
 
 
 def told(walls: Floats, *, oriented: bool = True, moved: RigidTransform | None = None) -> SampleReport:
-    """Judge the samples in a map; `moved` is what was done to the poses that they are said to be taken from."""
+    """Judge the samples in a map; `moved` is applied to their stated poses."""
     index = index_of(walls)
     samples = [
         try_sample(
@@ -125,7 +125,7 @@ def test_walls_too_thick_or_too_thin_are_no_scale(drawn: float) -> None:
 
 @pytest.mark.parametrize("factor", [1.0, 1.02])
 def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None:
-    """What is off by 2 % is put to scale in both; the check still says that it is off."""
+    """What is off by 2 % is put to scale in both; the check still states that it is off."""
     index = index_of(factor * faces())
     asked = [associate(index, scan).usable for _, scan in sampled()]
     samples = [try_sample(index, scan, Deadline(), oriented=True) for _, scan in sampled()]

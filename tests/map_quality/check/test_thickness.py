@@ -1,4 +1,4 @@
-"""How thick walls are is found from scans, whatever they were drawn as."""
+"""Scans reveal the thickness of walls, however they were drawn."""
 
 from __future__ import annotations
 

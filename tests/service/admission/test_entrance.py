@@ -1,4 +1,4 @@
-"""What is decided from a request's head."""
+"""Decisions from the head of a request."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def length(count: int) -> list[tuple[bytes, bytes]]:
 
 
 def test_what_needs_a_turn_at_the_gate() -> None:
-    """Counted under a route that nobody can make more of: without the id of a map."""
+    """Counted under its route, without the id of a map."""
     for path in SEARCHING:
         assert search_of("POST", path) == path
         assert search_of("GET", path) is None

@@ -1,4 +1,4 @@
-"""Who may search: slots, queue, deadlines, and those who leave."""
+"""Slots for searches: queue, deadlines, and clients that leave."""
 
 from __future__ import annotations
 

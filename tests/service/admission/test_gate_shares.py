@@ -1,4 +1,4 @@
-"""Who may search where several want to: places and turns by key, and those who are on their way."""
+"""Slots for several clients: places and order by key, and requests that are being read."""
 
 from __future__ import annotations
 

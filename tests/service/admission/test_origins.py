@@ -1,4 +1,4 @@
-"""Who may ask through a browser."""
+"""Requests from browsers."""
 
 from __future__ import annotations
 

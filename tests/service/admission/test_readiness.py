@@ -1,4 +1,4 @@
-"""Whether the service takes requests at all."""
+"""Readiness of the service for requests."""
 
 from __future__ import annotations
 

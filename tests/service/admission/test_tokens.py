@@ -189,7 +189,7 @@ def test_a_new_key_is_looked_for_but_not_for_each_token(monkeypatch: pytest.Monk
         assert checks.grant(old.token().encode()).roles
         site.text = new.key_set()
         checks.refresh()
-        assert site.asked == 1  # nobody has asked for another
+        assert site.asked == 1  # the key set was read once
         for _ in range(20):
             with pytest.raises(UnknownKeyError):
                 checks.grant(new.token().encode())

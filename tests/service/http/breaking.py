@@ -1,4 +1,4 @@
-"""What in a contract breaks clients that were written against an older one.
+"""Changes of a contract that break clients of an older one.
 
 A client sends what requests describe and reads what answers do. So of a request nothing may be asked for that was not,
 and nothing refused that was taken; of an answer nothing may be missing that was there.
@@ -80,7 +80,7 @@ def _answered(place: str, old: Schema, new: Schema) -> Iterator[str]:
             yield from _answered(f"{place}.{name}", properties[name], others[name])
     for name in sorted((set(old.get("required", ())) - set(new.get("required", ()))) & set(others)):
         yield f"{place}: {name} may be missing"
-    # One more code among those that a text may be is no break: clients are told to expect such.
+    # One more code among those that a text may be is no break: clients must expect new codes.
     more = {kind for kind in _kinds(new) - _kinds(old) if not kind.startswith("'")}
     yield from (f"{place}: may be {kind}" for kind in sorted(more) if _kinds(old))
 

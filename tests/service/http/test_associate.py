@@ -98,7 +98,7 @@ def test_reasons_are_given_where_an_answer_is_not_usable(client: httpx.Client) -
 
 
 def test_numbers_beside_a_pose(client: httpx.Client) -> None:
-    """Its critical wall, down to where rivals were looked for, and the paper's measures of each alternative."""
+    """Its critical wall, down to where alternatives were looked for, and the paper's measures of each alternative."""
     rectangle = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 0, 5], [0, 5, 0, 0]]}
     corner = {"segments": [[-3.5, 1.0, -3.5, -3.0], [-3.5, -3.0, 2.5, -3.0]]}
     answer = associated(client, map=rectangle, scan=corner, options={"sampling": "random", "seed": 4})

@@ -1,4 +1,4 @@
-"""What a web page may do to a service without keys, by the browser of somebody who can reach it."""
+"""Requests of web pages to a service without keys, by the browser of its user."""
 
 from __future__ import annotations
 

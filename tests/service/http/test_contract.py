@@ -1,4 +1,4 @@
-"""The contract beside that of the last release: names under /v1/ stay as they are."""
+"""The contract next to that of the last release: names under /v1/ stay as they are."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 from .breaking import breaking
 
-# Written anew at a release, and only then: curl -s localhost:8000/openapi.json | python -m json.tool > ...
+# Written at a release, and only then: curl -s localhost:8000/openapi.json | python -m json.tool > ...
 RELEASED = json.loads(Path(__file__).with_name("openapi-0.1.0.json").read_text())
 SCHEMAS = RELEASED["components"]["schemas"]
 

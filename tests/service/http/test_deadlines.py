@@ -1,4 +1,4 @@
-"""Deadlines over HTTP: who asks is told in time, also where what was begun takes longer."""
+"""Deadlines over HTTP: the client gets an answer in time, also if the search takes longer."""
 
 from __future__ import annotations
 

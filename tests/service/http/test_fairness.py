@@ -1,4 +1,4 @@
-"""One key's flood, over HTTP: it is told so, and leaves the others their share."""
+"""One key's flood, over HTTP: it is reported so, and leaves the others their share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requests that nobody would think of. Made from the schema, from structured JSON and from raw bytes: each finds what
+"""Requests that no one would think of. Made from the schema, from structured JSON and from raw bytes: each finds what
 the others miss."""
 
 from __future__ import annotations

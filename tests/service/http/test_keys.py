@@ -1,4 +1,4 @@
-"""Keys over HTTP: what asks for one, and what is said to whom."""
+"""Keys over HTTP: what requests one, and what is stated to whom."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was tried with keys that may do less on a running service, as far as `test_roles` does not try it."""
+"""Attempts with keys of few rights on a running service, in addition to `test_roles`."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def test_one_writer_wins(pair: Pair, url: str) -> None:
             answers = at_once(writers(if_match=f'"{revision}"'))
             assert sorted(answer.status_code for answer in answers) == [200] + [412] * (WRITERS - 1)
         revision += 1
-        # One deletes or one writes, and whoever comes second is told.
+        # One deletes or one writes, and the second one gets an error.
         tag = f'"{revision}"'
         gone = [partial(client.delete, url, headers={"if-match": tag}) for client in pair.clients]
         codes = sorted(answer.status_code for answer in at_once([*gone, *writers(if_match=tag)[:2]]))

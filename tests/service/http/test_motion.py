@@ -1,4 +1,4 @@
-"""Scans that take time: the motion of their sensor is sent, or the answer allows for it and says so."""
+"""Scans that take time: the motion of their sensor is sent, or the answer allows for it and states it."""
 
 from __future__ import annotations
 

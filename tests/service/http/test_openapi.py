@@ -33,7 +33,7 @@ def operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, A
 
 
 def test_it_is_made_once_and_beside_the_event_loop() -> None:
-    """Each who asked had it encoded anew, and the first had the event loop wait for a third of a second."""
+    """Each request encoded it again, and the first one blocked the event loop for a third of a second."""
     made: list[str] = []
     threads = Threads(1, "aside")
 

@@ -50,7 +50,7 @@ RUNNING, WAITING = "linefix_searches_running", "linefix_searches_waiting"
 
 
 def refused(running: RunningService) -> bytes:
-    """Return what a request is told whose body has not come."""
+    """Return the answer to a request whose body has not arrived."""
     answer = b""
     with running.connection() as connection:
         connection.sendall(b"POST /v1/associate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n")

@@ -1,4 +1,4 @@
-"""What is refused, and how: problems, bounded, with pointers, and never a 500."""
+"""Rejected requests: problems, bounded, with pointers, and never a 500."""
 
 from __future__ import annotations
 

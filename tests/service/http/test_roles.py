@@ -21,7 +21,7 @@ ADMIN = "the-key-of-who-may-do-everything"
 MINE, FOREIGN = "hq-1", "lab-1"
 PREFIX = "hq-"
 SCAN = {"segments": examples.SEEN}
-# What each route asks for, said once more: a change of the table in `service.admission.grants` is to be meant.
+# The role of each route, a second time: a change of the table in `service.admission.grants` must be intended.
 # Body None: there is none. "{map_id}" in a body becomes the map's id.
 LOG = "FLASER 3 1.0 2.0 3.0 0 0 0 0 0 0 100.0 robot 100.0\n"  # a log of one
 CALLS: dict[tuple[str, str], tuple[Role | None, Any]] = {
@@ -111,7 +111,7 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
 
 
 def test_every_route_has_a_role_named(guarded: Guarded) -> None:
-    """One that nobody thought of is for whole keys alone until it has."""
+    """A route without a role accepts only keys with all roles."""
     paths = guarded.service.client.get("/openapi.json").json()["paths"]
     there = {(method.upper(), path) for path, item in paths.items() for method in item if path.startswith(GUARDED)}
     named = {(method, route.path): route.role for route in ROUTES for method in route.methods.split()}

@@ -1,4 +1,4 @@
-"""POST /v1/vectorize beside /v1/associate: one way to cut a scan, whoever asks."""
+"""POST /v1/vectorize next to /v1/associate: both cut a scan in the same way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process that reads files of strangers: what it may take, and how it ends."""
+"""The process that reads files of unknown senders: what it may take, and how it ends."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_where_the_extra_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_it_is_told_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A module that stands in for one of the readers tells what it sees."""
+    """A module in place of a reader prints what it finds."""
     (tmp_path / "contourpy.py").write_text(
         f"import os, pathlib\npathlib.Path({str(tmp_path / 'seen')!r}).write_text(repr(dict(os.environ)))\n"
         "raise ModuleNotFoundError('contourpy')"

@@ -1,4 +1,4 @@
-"""What the bounded process makes of a form."""
+"""Result of the bounded process for a form."""
 
 from __future__ import annotations
 

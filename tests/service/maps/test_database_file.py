@@ -83,7 +83,7 @@ def test_who_stands_in_for_another_makes_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("part", [Part(1, 2), Part(0, 2, replaces=True)], ids=["second", "replaces"])
 def test_of_several_processes_only_the_first_makes_it(tmp_path: Path, part: Part) -> None:
-    """One that still started when the file was moved away made it anew."""
+    """A process that was still starting when the file was moved created it again."""
     services = create_app(Settings(data_dir=tmp_path), part).state.services
     with pytest.raises(StoreAwayError):
         services.store.open()

@@ -1,9 +1,9 @@
 """Stores that version 0.1.0 wrote are opened, every map bit for bit; a newer one is refused.
 
 `stores-0.1.0/` was written over HTTP by the service at three commits, on SQLite and on PostgreSQL, where `pg_dump` read
-it out; what it then answered is beside it. `first` (f21fb3f) had no migrations, `sealed` (c81779d) has documents in a
+it out; what it then answered is next to it. `first` (f21fb3f) had no migrations, `sealed` (c81779d) has documents in a
 table of their own, `properties` (bd9f405) has columns of sigma and oriented. A store of each release is added, and none
-is made anew.
+is made again.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def test_a_service_goes_on_with_it(start_service: Callable[..., RunningService],
 
 
 def test_a_service_says_that_a_store_is_newer(start_service: Callable[..., RunningService], tmp_path: Path) -> None:
-    """It does not end: whoever puts the newer version back finds the store as it was, and this one waits."""
+    """It does not end, and leaves the store unchanged for the newer version."""
     path = tmp_path / "maps.sqlite3"
     shutil.copy(STORES / "properties.sqlite3", path)
     alter(f"sqlite:///{path}", "UPDATE linefix_schema SET version_num = '9999'")

@@ -123,7 +123,7 @@ def test_what_is_indexed_is_found_at_once_as_it_is_now(lookup: Lookup) -> None:
     assert lookup.find_at_once("m", oriented=None) is None
     lookup.look(StoredMap(map_id="m"), oriented=None)
     assert lookup.find_at_once("m", oriented=None) == lookup.find("m", oriented=None)
-    assert lookup.find_at_once("m", oriented=True) is None  # another index, which nobody has wanted yet
+    assert lookup.find_at_once("m", oriented=True) is None  # another index, not requested yet
     lookup.put("m", segments=examples.WALLS)
     assert lookup.find_at_once("m", oriented=None) is None
     lookup.look(StoredMap(map_id="m"), oriented=None)

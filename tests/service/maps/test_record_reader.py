@@ -23,7 +23,7 @@ from service.maps.errors import BusyStoreError, UnknownMapError
 
 BOX = MapOutline(4, (0.0, 0.0, 1.0, 1.0))
 ANY = Preconditions()
-# Another process does what it is told, line by line, on the same database.
+# Another process runs commands, line by line, on the same database.
 OTHER = """
 import sys
 from service.database_location import database_url

@@ -1,4 +1,4 @@
-"""The map store by itself, on each database that it can use."""
+"""The map store alone, on each database that it can use."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a full, read-only, busy, broken or absent database makes of the map store."""
+"""The map store with a full, read-only, busy, broken or absent database."""
 
 from __future__ import annotations
 

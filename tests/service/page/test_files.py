@@ -1,4 +1,4 @@
-"""What is in the package is what web/ and examples/scenes.py make."""
+"""The files in the package are those that web/ and examples/scenes.py make."""
 
 from __future__ import annotations
 

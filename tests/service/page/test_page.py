@@ -403,7 +403,7 @@ def test_nothing_comes_from_elsewhere(page: Page, service: RunningService) -> No
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_accessible(browser: Browser, service: RunningService, scheme: str) -> None:
-    """By axe, which a page of this policy does not let in by itself."""
+    """By axe, which the policy of the page blocks by default."""
     context = browser.new_context(base_url=service.url, bypass_csp=True, color_scheme=scheme)  # type: ignore[arg-type]
     page = context.new_page()
     shown(page, "office", "usable")

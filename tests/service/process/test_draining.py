@@ -1,4 +1,4 @@
-"""How the process ends."""
+"""End of the process."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_second_ctrl_c_cuts_the_draining_short(start_service: Callable[..., Ru
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_terminal_that_goes_away_drains_it(start_service: Callable[..., RunningService], workers: int) -> None:
     """It ended at once, without its last answers, and left its counts in shared memory."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may have been told to outlive it
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup may ignore it
     try:
         running = start_service(drain_s=1.0, workers=workers, searches=2)
     finally:

@@ -1,4 +1,4 @@
-"""HTTP as nobody should send it: what it costs the service, and what the sender is told."""
+"""HTTP as no one should send it: what it costs the service, and what the sender is reported."""
 
 from __future__ import annotations
 

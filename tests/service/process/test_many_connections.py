@@ -1,4 +1,4 @@
-"""Connections that are held open, and answers that nobody reads."""
+"""Connections that are held open, and answers that no one reads."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_answers_that_nobody_reads_are_bounded(start_service: Callable[..., Runn
         assert peak() - before < 120.0
         assert statuses.count(b"200") in (1, 2, 3)
         assert statuses.count(b"429") == 60 - statuses.count(b"200")
-        # Another address has its share all the same, and whoever reads has it whole.
+        # Another address still has its part, and a client that reads gets the whole answer.
         transport = httpx.HTTPTransport(local_address="127.0.0.2")
         with httpx.Client(base_url=running.url, transport=transport, timeout=30.0) as client:
             assert client.get("/v1/maps/large").content == body
@@ -110,7 +110,7 @@ def test_answers_that_nobody_reads_are_bounded(start_service: Callable[..., Runn
 
 
 def test_many_readers_of_the_pages_share_what_they_read(service: RunningService) -> None:
-    """A script of 1.5 MB that everybody may ask for, without a key."""
+    """A script of 1.5 MB that everybody may request, without a key."""
     before = service.memory_mb()
     with service.peak_mb() as peak, ExitStack() as stack:
         for _ in range(150):

@@ -1,4 +1,4 @@
-"""What the server does with requests that come slowly, wrongly or not at all."""
+"""Requests that arrive slowly, wrongly or not at all."""
 
 from __future__ import annotations
 

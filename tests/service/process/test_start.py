@@ -1,4 +1,4 @@
-"""What a start loads and leaves."""
+"""Modules that a start loads and does not load."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-# Loaded when somebody asks for what needs them.
+# Loaded by the first request that needs them.
 LATER = ("alembic", "cryptography", "ezdxf", "psycopg", "rosbags", "scipy.ndimage")
 PROGRAM = f"""
 import asyncio, gc, json, sys

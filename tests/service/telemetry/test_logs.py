@@ -47,7 +47,7 @@ def test_what_a_sleeping_reader_misses_is_counted() -> None:
         assert process.stderr is not None
         ending = threading.Timer(PATIENCE, process.kill)
         ending.start()
-        assert process.stdout.readline(), "stood still"  # nobody reads the log meanwhile
+        assert process.stdout.readline(), "stood still"  # the log is not read meanwhile
         ending.cancel()
         lines = [orjson.loads(line) for line in process.stderr.read().splitlines()]
     lost = sum(line.get("count", 0) for line in lines)

@@ -1,4 +1,4 @@
-"""What an operator sees: counts, the log, and a dashboard that asks only for what there is."""
+"""Metrics, the log, and a dashboard that uses only existing metrics."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ COMPILE = "from service.work.compiling import compile_kernels; compile_kernels()
 
 @pytest.mark.skipif((os.cpu_count() or 1) == 1, reason="one core compiles alone")
 def test_a_compiler_that_is_killed_takes_the_other_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It went on for as long as its half took, 20 s of a core, with whoever waited for its output waiting as well."""
+    """It went on for as long as its half took, 20 s of a core, and blocked the reader of its output."""
     monkeypatch.setenv("LINEFIX_KERNELS", str(tmp_path))
     with subprocess.Popen([sys.executable, "-c", COMPILE]) as compiler:
         until(lambda: len(family_of(compiler.pid)) == 2 and any(tmp_path.rglob("walls.*.nbc")))

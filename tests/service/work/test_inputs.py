@@ -1,4 +1,4 @@
-"""What the search is asked for is what the request asks for."""
+"""The search gets the options of the request."""
 
 from __future__ import annotations
 

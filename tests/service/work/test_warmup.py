@@ -1,4 +1,4 @@
-"""What the warm-up leaves to compile: nothing."""
+"""The warm-up leaves nothing to compile."""
 
 from __future__ import annotations
 

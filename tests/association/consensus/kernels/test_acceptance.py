@@ -1,4 +1,4 @@
-"""A consensus set is reported in the map's own pieces, as the twins say."""
+"""A consensus set is reported in the map's own pieces, as the references say."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ...scenes import context_of, index_of, local, pose, scan_of
 
 
 def sent(ends: np.ndarray) -> Records:
-    """Return the ends of segments as those of a scan are, which nobody may write to."""
+    """Return the ends of segments as a read-only array, as those of a scan are."""
     records = as_records(ENDS, ends)
     records.flags.writeable = False
     return records
@@ -81,7 +81,7 @@ def test_a_segment_is_accepted_on_walls_that_are_nearly_one(step: float, others:
 
 
 def test_segments_of_one_line_are_accepted_one_by_one() -> None:
-    """Those of which half lies on the wall; whether they may bridge a doorway is told by the line."""
+    """Those of which half lies on the wall; the line decides whether they may bridge a doorway."""
     wall = [[0.0, 0.0, 4.0, 0.0]]
     on, beyond = [0.5, 0.0, 3.0, 0.0], [3.2, 0.0, 4.7, 0.0]
     pairs, overlaps, _, _ = accepted_on(wall, beyond, on)
@@ -131,7 +131,7 @@ def test_pieces_that_overlap_one_another(seed: int) -> None:
 
 
 def as_lines_of(segments: np.ndarray) -> Records:
-    """Return each segment as a scan line by itself."""
+    """Return each segment as a scan line of its own."""
     lines = np.zeros(len(segments), SCAN_LINE)
     lines["length"] = np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
     return lines

@@ -1,4 +1,4 @@
-"""What is seen is compared with what the map shows, as the twins do it."""
+"""The scan is compared with the map in the same way as by the references."""
 
 from __future__ import annotations
 

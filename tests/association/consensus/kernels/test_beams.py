@@ -1,4 +1,4 @@
-"""Single beams speak for the pose at which they read what they should, as their twins say."""
+"""Single beams speak for the pose at which they read what they should, as their references say."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HERE = local(ROOM_INDEX, INSIDE)
 
 
 def drawn_rays(rng: np.random.Generator, count: int) -> tuple[Rays, RigidTransform]:
-    """Return what two sensors beside the origin of their frame read in the maze, with noise, people and mirrors."""
+    """Return what two sensors next to the origin of their frame read in the maze, with noise, people and mirrors."""
     at = moved(pose(), rng.uniform(-1.0, 1.0, 3) * [3.0, 7.0, 7.0])
     places = rng.uniform(-0.3, 0.3, (2, 2))
     by_sensor = [read(INDEX, moved(at.compose(pose(*place)), [0.0, *INDEX.origin])) for place in places.tolist()]
@@ -72,7 +72,7 @@ def shares_of(ranges: np.ndarray) -> tuple[float, float]:
 
 
 def test_beams_that_read_farther_and_nearer_than_the_map_shows() -> None:
-    """By 5 and 10 cm across the wall; behind a reading the wall is looked for far beyond what evidence asks for."""
+    """By 5 and 10 cm across the wall; behind a reading, the search for the wall goes far beyond what evidence needs."""
     ranges = read(ROOM_INDEX, INSIDE)
     assert shares_of(ranges) == (0.0, 0.0)
     assert shares_of(ranges + 0.049)[0] == 0.0

@@ -1,4 +1,4 @@
-"""A scan is matched to the walls as its twin says, and no pose is given up that could have scored."""
+"""A scan is matched to the walls as its reference says, and no pose is given up that could have scored."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def may_score(
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
 def test_may_score(seed: int) -> None:
-    """The bound is what the twin adds up, no matching exceeds it, and what can lie nowhere needs no matching."""
+    """The bound is what the reference adds up, no matching exceeds it, and what can lie nowhere needs no matching."""
     d = drawn(seed)
     theta_var, pin, slip = 10.0 ** d.rng.uniform(-6.0, -3.0), d.rng.uniform(-5.0, 5.0, 2), d.rng.uniform(0.0, 0.2)
     spreads, shifts = twin.gates_about(d.scan, theta_var, pin, slip, GATES)
@@ -143,7 +143,7 @@ def test_may_score(seed: int) -> None:
         assert matching.match_scan(d.scan, one, PLACE, GATES[0], possible, total - 1e-9, matches) == total
         np.testing.assert_array_equal(matches["wall"], others["wall"])
     far = moved(d.at, [0.0, 1e3, 0.0])
-    # Of many each is told by itself.
+    # Each of many is tested separately.
     floors = [bound + 1e-6 if k == 1 else bound - 1e-6 for k, bound in enumerate(bounds)]
     told_so, gains = may_score(d.scan, [*places, far], [*floors, 1e-9], spreads, shifts, TABLES.raster)
     assert told_so == [True, False, True, False]

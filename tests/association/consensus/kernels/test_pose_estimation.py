@@ -216,7 +216,7 @@ def test_the_error_of_many_walls_is_estimated_from_their_residuals(wall_error: f
         held = np.arange(60)
         d = Drawn(d.rng, d.endpoints, d.truth, d.row_of, np.resize(d.scan, 60), d.at)
         scan = laid_on(PLACE.walls, held[: len(PLACE.walls)], d.at, d, wall_error, 0.0)
-        # Each line is as noisy as the weights say that it is on such walls.
+        # Each line has the noise that its weight states.
         scan = with_noise(scan, PLACE.walls, d, wall_error)
         found, _ = Set(scan, PLACE.walls, held[: len(scan)], d.at).estimated()
         estimates.append(math.sqrt(found["wall_variance"]))

@@ -1,4 +1,4 @@
-"""Candidates are ranked as their twins rank them."""
+"""Candidates are ranked as their references rank them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A consensus set grows and shrinks as its twin's, which solves anew from nothing in every round."""
+"""A consensus set grows and shrinks as its reference's, which solves again from nothing in every round."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_TIES = np.full(1, -1.0)
 
 
 def test_covariance_about_a_point() -> None:
-    """As its twin has it, and the covariance of the place of the point that is held is 0."""
+    """As its reference has it, and the covariance of the place of the point that is held is 0."""
     out = np.zeros(1, SYMMETRIC3)
     scoring.covariance_about(0.01, 2.0, -3.0, out[0])
     got = covariance_of(out[0])
@@ -179,7 +179,7 @@ def test_log_determinant(seed: int) -> None:
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
 def test_score_pairs(seed: int) -> None:
-    """Also of matches that cost more than they gain, on walls of their own and beside others."""
+    """Also of matches that cost more than they gain, on separate walls and next to others."""
     d = drawn(seed)
     variance = float(10.0 ** d.rng.uniform(-4.0, -1.0))
     wide = GATES.copy()
@@ -293,7 +293,7 @@ def refined(walls: ArrayLike, scan: Scan, start: RigidTransform) -> tuple[float,
 
 @pytest.mark.parametrize(("off", "stays"), [(0.02, False), (0.06, True)])
 def test_a_set_that_would_carry_its_pose_far_away_leaves_it(off: float, stays: bool) -> None:
-    """Two walls 30 mrad apart: what is seen `off` beside one of them puts the crossing 33 times as far along."""
+    """Two walls 30 mrad apart: what is seen `off` next to one of them puts the crossing 33 times as far along."""
     walls = [[0.0, 0.0, 10.0, 0.0], [10.0, 3.0, 0.0, 3.3]]
     seen = [[2.0, 0.0, 8.0, 0.0], [8.0, 3.06 + off, 2.0, 3.24 + off]]
     score, at = refined(walls, scan_of(seen), pose())

@@ -1,4 +1,4 @@
-"""Rays meet the walls that their twins meet, and what passes through a wall is counted once."""
+"""Rays meet the walls that their references meet, and what passes through a wall is counted once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walls are merged and listed as their twins do it."""
+"""Walls are merged and listed as their references do it."""
 
 from __future__ import annotations
 

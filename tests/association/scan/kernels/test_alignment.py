@@ -1,4 +1,4 @@
-"""Lines of several views are paired as their twin pairs them."""
+"""Lines of several views are paired as their reference pairs them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How wide a scan is, and which way its segments face, beside plain numpy."""
+"""Width of a scan and facing of its segments, compared with plain numpy."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_nothing_has_no_extent() -> None:
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
 def test_facing_away(seed: int) -> None:
-    """From one place, and from a place of its own for each segment, one of which nobody knows."""
+    """From one place, and from one place for each segment, of which one is unknown."""
     rng = np.random.default_rng(seed)
     ends, places = rng.uniform(-9.0, 9.0, (8, 4)), rng.uniform(-9.0, 9.0, (8, 2))
     places[3] = np.nan

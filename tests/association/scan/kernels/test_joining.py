@@ -1,4 +1,4 @@
-"""Segments of a scan are joined to lines, and these described, as the twins do it."""
+"""Segments of a scan are joined to lines, and these described, as the references do it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bases are planned, and taken, as the twins do it."""
+"""Bases are planned, and taken, as the references do it."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ ABSCISSAE = st.floats(-30.0, 30.0)
 
 
 def figure_of(a: Record, b: Record) -> Records:
-    """Return what is asked for of a base of two scan segments, in the order that has the second left of the first."""
+    """Return the look-up of a base of two scan segments, with the second one left of the first."""
     figure, left = record(FIGURE), a["dx"] * b["dy"] > a["dy"] * b["dx"]
     measure(*((a, b) if left else (b, a)), GATES[0], figure[0])
     return figure
@@ -127,9 +127,9 @@ def test_bins_of_angles_have_a_right_angle_in_the_middle_of_one() -> None:
 
 
 def test_at_a_right_angle_a_segment_is_nearer_than_at_the_edges_of_the_bin() -> None:
-    """By 2 cm in 30 m, which tells where a cell of the lists ends.
+    """By 2 cm in 30 m, which decides where a cell of the lists ends.
 
-    The angle of the first segment is known, so that nothing else widens what is asked for.
+    The angle of the first segment is known, so that nothing else widens the look-up.
     """
     chains = index_of([[-9.0, 0.0, 9.0, 0.0], [0.0, 20.0, 0.0, 40.0]]).chains.rows
     found, cells = all_of(chains, 32.0), set()
@@ -147,7 +147,7 @@ def test_at_a_right_angle_a_segment_is_nearer_than_at_the_edges_of_the_bin() -> 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize("first", [False, True])
 def test_where_the_far_end_is_beyond_the_lists_the_near_one_is_deciding_place(side: float, first: bool) -> None:
-    """Be it of the first segment or of the second; where both are beyond nothing is told."""
+    """Be it of the first segment or of the second; if both are beyond, nothing is found."""
     up = 1.0 if not first else -1.0  # the long one is to the left of the other, or the other to the left of it
     chains = index_of([[-2.0, 0.0, 2.0, 0.0], [0.0, 15.0 * (side - up), 0.0, 15.0 * (side + up)]]).chains.rows
     found = all_of(chains, 4.0)

@@ -1,4 +1,4 @@
-"""What tells that nothing can have been missed is what the twins, or all sets gone through, say."""
+"""The stop rule agrees with the references and with brute force over all sets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ...reference.scans import freedom_alone
 
 
 def test_bound_is_never_below_what_can_have_been_missed() -> None:
-    """Brute force over all consensus sets that contain none of the bases; what is lowered is told."""
+    """Brute force over all consensus sets that contain none of the bases; the lowered values are returned."""
     rng = np.random.default_rng(4)
     gains = rng.uniform(1.0, 10.0, 9)
     residual, bound = gains.copy(), float(gains.sum())
@@ -85,7 +85,7 @@ def test_drawn_probability() -> None:
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
 def test_least_freedom(seed: int) -> None:
-    """Brute force over all sets; some lines take as much as others, and some sets come to what is needed to the bit."""
+    """Brute force over all sets; some lines take as much as others, and some sets reach what is needed to the bit."""
     rng = np.random.default_rng(seed)
     scan = np.zeros(int(rng.integers(1, 9)), SCAN_LINE)
     scan["gain"], scan["freedom"] = rng.integers(1, 9, len(scan)), rng.integers(1, 6, len(scan))

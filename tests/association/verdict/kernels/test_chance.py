@@ -1,4 +1,4 @@
-"""What chance scores, bounded as the twins do."""
+"""Score of random walls, bounded as by the references."""
 
 from __future__ import annotations
 

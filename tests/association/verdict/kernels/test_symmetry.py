@@ -1,4 +1,4 @@
-"""What a map shows at one pose, mirrored, at another: as its twin says, ray by ray and wall by wall."""
+"""Mirrored view of a map from one pose, at another pose: the same as by the reference, ray by ray and wall by wall."""
 
 from __future__ import annotations
 
