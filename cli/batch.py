@@ -59,7 +59,7 @@ def batch(
     search: SearchChoice,
     as_json: AsJson = False,
 ) -> None:
-    """Find where the scans of many logs were taken; a run that was killed goes on where it was.
+    """Localize the scans of many logs; the same command continues an interrupted run.
 
     A scan lies on the map that its column map_id names, else on that named as its log, else on the only one.
     """

@@ -25,7 +25,7 @@ def key(
         typer.Option(metavar="PREFIX", help="Prefix of the ids of the maps that the key may use. Default: all maps."),
     ] = "",
 ) -> None:
-    """Make a key: it goes to stderr, once, and the lines for LINEFIX_KEYS_FILE, which hold its digest, to stdout."""
+    """Make a key and print it once, on stderr; print the lines for LINEFIX_KEYS_FILE, with its digest, on stdout."""
     made = secrets.token_urlsafe(32)
     described = {"name": name, "sha256": hashlib.sha256(made.encode()).hexdigest(), "roles": role or list(Role)}
     if maps:

@@ -22,7 +22,8 @@ T = TypeVar("T")
 Topic = Annotated[
     str | None,
     typer.Option(
-        help="Topic of the scans; for CARMEN the message, such as FLASER. Default: the topic with most scans."
+        help="Topic of the scans; for CARMEN the kind of line, such as FLASER. Default: the topic with most scans, or "
+        "the first kind in a CARMEN log."
     ),
 ]
 TfNamespace = Annotated[

@@ -31,7 +31,8 @@ class SaidOfFile:
     """Facts that a file does not state itself, as options."""
 
     units: Annotated[
-        str | None, typer.Option(help="Unit of a drawing: m, cm, mm, in, ft, or metres per unit.", metavar="UNIT")
+        str | None,
+        typer.Option(help="Unit of a drawing: m, cm, mm, dm, km, in, ft, yd, or metres per unit.", metavar="UNIT"),
     ] = None
     layers: Annotated[
         list[str] | None,

@@ -22,7 +22,8 @@ class LogOptions:
     Attributes
     ----------
     topic : str or None
-        Of the scans; None: the one with most of them. In a CARMEN log the kind of message, such as ``FLASER``.
+        Of the scans; None: the one with most of them. In a CARMEN log the kind of line, such as ``FLASER``; None: the
+        first kind.
     pose_frame : str or None
         Frame that the poses are wanted in; None: ``odom`` where the log has it, else the outermost that moves.
     tf_namespace : str or None

@@ -73,7 +73,7 @@ def test_pieces_may_make_a_wall_longer_than_a_segment_may_be(oriented: bool) -> 
 
 
 def test_a_slow_bend_is_not_straightened() -> None:
-    """Twenty pieces, each within the merging angle of the last, turn by 30 degrees in all; a wall next to them stays."""
+    """Twenty pieces, each within the merging angle of the last, turn by 30 degrees; a wall next to them stays."""
     turns = np.cumsum(np.full(20, math.radians(1.5)))
     corners = np.concatenate([[[0.0, 0.0]], np.cumsum(np.stack([np.cos(turns), np.sin(turns)], axis=1), axis=0)])
     straight = [[0.0, -5.0, 3.0, -5.0], [3.1, -5.0, 6.0, -5.0]]

@@ -182,7 +182,7 @@ def test_only_what_would_be_usable_is_compared_with_the_mirrored_scan(monkeypatc
     sure = leading(40.0)
     most = tuning.NULL_FRACTIONS[-1]
     assert asked_of(sure, monkeypatch) == [most], "no other null takes anything from it"
-    assert asked_of(replace(sure, complete=False), monkeypatch) == [0.0], "the reasons are told by it"
+    assert asked_of(replace(sure, complete=False), monkeypatch) == [0.0], "the reasons use it"
     for matters, share in ((most + 0.01, most), (1.01, 1.0), (0.96, 0.95), (0.71, 0.0)):
         with judged_by({**SURE, "cautious": {"constant": [5.0], "null": [0.0, matters, -1000.0]}}):
             assert asked_of(sure, monkeypatch) == [share]
