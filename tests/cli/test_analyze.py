@@ -58,8 +58,8 @@ def test_files_of_it(folder: Path, linefix: Linefix) -> None:
     assert ended.code == 0, ended.err
     assert "usable" in ended.out
     assert re.search(r"^usable +2[0-4] \((8[3-9]|9\d|100) %\), simulated", ended.out, re.MULTILINE)
-    assert "at once or on the way" in ended.out
-    assert "without people and furniture" in ended.out
+    assert "at once or after a drive" in ended.out
+    assert "without people, and without furniture" in ended.out
     assert "with the landmark" in ended.out
     features = json.loads((folder / "a.geojson").read_text())["features"]
     assert len(features) > 15
