@@ -61,7 +61,7 @@ def test_variances_are_those_of_the_sigmas_and_of_the_model() -> None:
 
 
 def test_a_walls_own_error_is_the_maps_and_the_models() -> None:
-    """What differs along a wall is in the weights of its lines; a wide tolerance means that walls are that far off."""
+    """Differences along a wall are in the weights of its lines; a wide tolerance means that walls are that far off."""
     exact = context_of(ROOM_INDEX, SCAN).lines.model[0]
     assert exact["wall_variance"] == pytest.approx(MODEL_OFFSET**2 - ROUGHNESS**2)
     assert (exact["free_distance"], exact["free_angle"]) == (FREE_DISTANCE, FREE_ANGLE)

@@ -125,7 +125,7 @@ def test_walls_too_thick_or_too_thin_are_no_scale(drawn: float) -> None:
 
 @pytest.mark.parametrize("factor", [1.0, 1.02])
 def test_a_scan_is_usable_here_as_it_is_where_it_is_asked(factor: float) -> None:
-    """What is off by 2 % is put to scale in both; the check still states that it is off."""
+    """A map off by 2 % is put to scale in both; the check still reports the factor."""
     index = index_of(factor * faces())
     asked = [associate(index, scan).usable for _, scan in sampled()]
     samples = [try_sample(index, scan, Deadline(), oriented=True) for _, scan in sampled()]
