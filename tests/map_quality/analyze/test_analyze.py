@@ -207,6 +207,6 @@ def test_places_that_cannot_be(spacing: float, point: tuple[float, float] | None
 
 def test_too_many_places_are_refused_with_a_spacing_that_will_do() -> None:
     wide = two_rooms(500.0)
-    with pytest.raises(AnalysisError, match=r"with (\d+\.\d) m") as caught:
+    with pytest.raises(AnalysisError, match=r"at least (\d+\.\d) m") as caught:
         standing_places(Segments.from_array(np.vstack([wide.endpoints, [[0.0, 400.0, 1.0, 400.0]]])), Robot(), 0.5)
     assert caught.value.argument == "spacing"
