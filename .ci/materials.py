@@ -21,6 +21,8 @@ from packaging.utils import canonicalize_name
 PINS, BILL = Path("requirements/runtime.txt"), Path("out/sbom.json")
 OURS, CLIENT = "linefix", "linefix-client"
 COPYLEFT = re.compile(r"(?<!L)(?<!Lesser )\b(A?GPL|(Affero )?General Public License)", re.IGNORECASE)
+# Licences that are free text in the metadata of packages, which the bill leaves out.
+DECLARED = {"cyclonedds": "EPL-2.0 OR BSD-3-Clause", "rich-click": "MIT"}
 LESSER = re.compile(r"LGPL|Lesser General Public License", re.IGNORECASE)
 
 
@@ -56,7 +58,7 @@ def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
     ]
     if wrong:
         raise MaterialsError(f"not installed in this version: {', '.join(sorted(wrong))}; make clean, and again")
-    parts = [components[name] for name in sorted(pins)]
+    parts = [with_licence(components[name]) for name in sorted(pins)]
     metadata = dict(bill.get("metadata", {}))
     if OURS in components:
         ours = components[OURS]
@@ -71,6 +73,12 @@ def kept(bill: dict[str, Any], pins: dict[str, str]) -> dict[str, Any]:
         if one["ref"] in refs
     ]
     return {**bill, "metadata": metadata, "components": parts, "dependencies": needs}
+
+
+def with_licence(component: dict[str, Any]) -> dict[str, Any]:
+    """Return a package with its licence of `DECLARED`, where the bill has none."""
+    found = DECLARED.get(canonicalize_name(component["name"]))
+    return component if found is None or licences(component) else {**component, "licenses": [{"expression": found}]}
 
 
 def licences(component: dict[str, Any]) -> str:

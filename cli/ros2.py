@@ -18,31 +18,47 @@ from .asking import document_at
 from .errors import RefusedError, WrongUseError
 from .inputs import needing_formats
 from .options import grouped
+from .ros2_parameters import parameters_of, robots_of
 
 if TYPE_CHECKING:
     import linefix
     from ros2 import NodeOptions
 
 MAX_FRAME = 255  # characters
-MAX_PARAMETERS = 65_536  # characters of a file of parameters
-NODE = "linefix"  # the name of the node in parameter files
+CHOSEN, FILE = "linefix.ros2.namespace", "linefix.ros2.file"  # of the context: what the command line has
 NOT_IN_FILES = ("params_file", "ros_args", "remap", "parameter", "help")
 
 
 def _read_params(context: typer.Context, file: Path | None) -> Path | None:
     """Take the parameters of a file as defaults: what stands on the command line counts before them."""
-    if file is not None:
-        known = {
-            option.name: option
-            for option in context.command.params
-            if option.name is not None and option.name not in NOT_IN_FILES
-        }
-        values = parameters_of(file)
-        for name in values:
-            if name not in known:
-                raise WrongUseError(f"{file}: found the parameter {name}, expected one of {', '.join(sorted(known))}")
-        context.default_map = {**(context.default_map or {}), **values}
+    context.meta[FILE] = file, context.default_map or {}
+    _take_defaults(context)
     return file
+
+
+def _read_namespace(context: typer.Context, value: Any) -> Any:
+    """Take the namespace, from itself or from remappings: it chooses the parameters of a file that may come first."""
+    rules = [value] if isinstance(value, str) else [rule[6:] for rule in value or [] if rule.startswith("__ns:=")]
+    if rules:
+        context.meta[CHOSEN] = rules[-1]
+        _take_defaults(context)
+    return value
+
+
+def _take_defaults(context: typer.Context) -> None:
+    file, others = context.meta.get(FILE, (None, {}))
+    if file is None:
+        return
+    known = {
+        option.name: option
+        for option in context.command.params
+        if option.name is not None and option.name not in NOT_IN_FILES
+    }
+    values = parameters_of(file, context.meta.get(CHOSEN))
+    for name in values:
+        if name not in known:
+            raise WrongUseError(f"{file}: found the parameter {name}, expected one of {', '.join(sorted(known))}")
+    context.default_map = {**others, **values}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +107,12 @@ class RobotNames:
     ] = "odom"
     namespace: Annotated[
         str | None,
-        typer.Option(metavar="NAMESPACE", help="Namespace of all relative topics. Default: that of the first --scan."),
+        typer.Option(
+            metavar="NAMESPACE",
+            is_eager=True,
+            callback=_read_namespace,
+            help="Namespace of all relative topics. Default: that of the first --scan.",
+        ),
     ] = None
     frame_prefix: Annotated[
         str, typer.Option(metavar="PREFIX", help="Prefix of all frames of the robot, such as robot1/.")
@@ -149,7 +170,15 @@ class RosArguments:
     ] = None
     ros_args: Annotated[bool, typer.Option("--ros-args", help="Ignored; the options after it apply as usual.")] = False
     remap: Annotated[
-        list[str] | None, typer.Option("--remap", "-r", metavar="FROM:=TO", help="Remap the name of a topic.")
+        list[str] | None,
+        typer.Option(
+            "--remap",
+            "-r",
+            metavar="FROM:=TO",
+            is_eager=True,
+            callback=_read_namespace,
+            help="Remap the name of a topic.",
+        ),
     ] = None
 
 
@@ -166,6 +195,8 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
             'linefix ros2 needs the extras formats and ros2: in a checkout, pip install ".[formats,ros2]"'
         ) from None
 
+    if names.namespace is None and not any(rule.startswith("__ns:=") for rule in ros.remap or []):
+        _require_one_robot(ros.params_file)
     on = source.on
     scans = tuple(sources.scan or ("scan",))
     try:
@@ -194,6 +225,12 @@ def ros2(source: MapSource, sources: ScanSources, names: RobotNames, publishing:
     except (OptionError, ConnectionRefusedError) as error:
         raise WrongUseError(str(error)) from None
     _run(node, options, on)
+
+
+def _require_one_robot(file: Path | None) -> None:
+    robots = [] if file is None else robots_of(file)
+    if len(robots) > 1:
+        raise WrongUseError(f"{file}: found parameters of {', '.join(robots)}, expected one; add --namespace")
 
 
 def _run(node: Any, options: NodeOptions, on: str | None) -> None:
@@ -241,40 +278,3 @@ def _map_at(name: str) -> tuple[linefix.MapIndex, str]:
             f"{MAX_FRAME} printable characters; correct it in the map file"
         )
     return index, frame
-
-
-def parameters_of(file: Path) -> dict[str, Any]:
-    """Return the parameters of a file: those of the node ``linefix``, in any namespace, and of ``/**``.
-
-    Raises
-    ------
-    WrongUseError
-        When there is no such file, or it is no file of parameters.
-    """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    expected = f"expected {NODE}: ros__parameters: name: value"
-    try:
-        with file.open(encoding="utf-8") as stream:
-            text = stream.read(MAX_PARAMETERS + 1)
-        if len(text) > MAX_PARAMETERS or "<<" in text:
-            raise WrongUseError(f"{file}: {expected}, in at most {MAX_PARAMETERS} characters without merge keys")
-        document = YAML(typ="safe").load(text)
-    except OSError as error:
-        raise WrongUseError(f"{file}: {error.strerror}") from None
-    except (YAMLError, ValueError, RecursionError):
-        raise WrongUseError(f"{file}: not YAML; {expected}") from None
-    if not isinstance(document, dict):
-        raise WrongUseError(f"{file}: {expected}")
-    values: dict[str, Any] = {}
-    found = False
-    for name, inner in document.items():
-        if str(name).strip("/").rpartition("/")[2] in (NODE, "**") and isinstance(inner, dict):
-            parameters = inner.get("ros__parameters")
-            if isinstance(parameters, dict):
-                found = True
-                values.update({str(key): value for key, value in parameters.items()})
-    if not found:
-        raise WrongUseError(f"{file}: {expected}")
-    return {("on" if key == "map" else key): value for key, value in values.items() if value is not None}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
@@ -82,7 +83,8 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     -------
     View
         Several of them, put together by `assemble`, are one scan. If the scanner's motion during the scan is not
-        known, it has the covariance and the warning for that.
+        known, it has the error and the warning for that. Scanners of one robot share its motion, so this error is
+        common to all views, each with its own lever arm.
 
     Raises
     ------
@@ -107,11 +109,12 @@ def view_of(seen: MountedScan, base_from_then: RigidTransform = HERE, sigma: flo
     scan, warning = ranges_scan(seen.laser, sigma), motion_warning(seen)
     scan = scan if warning is None else replace(scan, warnings=(warning,))
     place = base_from_then.compose(seen.mount or HERE)
-    return View(mirrored(scan) if seen.flipped else scan, place, _motion_covariance(seen, base_from_then))
+    shown = mirrored(scan) if seen.flipped else scan
+    return View(shown, place, motion=_motion_root(seen, base_from_then))
 
 
-def _motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
-    """Return the covariance of a scanner's place from its motion during the scan; None where the motion is known.
+def _motion_root(seen: MountedScan, base_from_then: RigidTransform = HERE) -> NDArray[np.float64] | None:
+    """Return the error of a scanner's place by its motion during the scan, per variate; None if the motion is known.
 
     On average the beams are taken half the duration after the first one. A robot moves by ``v`` and ``omega``
     meanwhile, and a sensor at ``r`` by ``v + omega x r``.
@@ -125,16 +128,18 @@ def _motion_covariance(seen: MountedScan, base_from_then: RigidTransform = HERE)
     Returns
     -------
     (3, 3) or None
-        Of additive (x, y, theta) of the view's pose: m^2, m rad, rad^2.
+        Additive (x, y, theta) of the view's pose, metres and radians; by columns for one standard deviation of the
+        robot's forward speed, sideward speed and turn rate.
     """
     seconds = _seconds_moving(seen)
     if not seconds:
         return None
     place = base_from_then.compose(seen.mount or HERE)
     x, y = place.x - base_from_then.x, place.y - base_from_then.y
-    moved = 0.5 * seconds * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-    covariance: NDArray[np.float64] = moved @ np.diag([SPEED**2, SPEED**2, TURN**2]) @ moved.T
-    return covariance
+    c, s = math.cos(base_from_then.theta), math.sin(base_from_then.theta)
+    moved = 0.5 * seconds * np.array([[c, -s, -y], [s, c, x], [0.0, 0.0, 1.0]])
+    root: NDArray[np.float64] = moved * np.array([SPEED, SPEED, TURN])
+    return root
 
 
 def motion_warning(seen: MountedScan) -> AssociationWarning | None:

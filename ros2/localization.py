@@ -68,12 +68,9 @@ class Localization:
         self._pending = None
 
     def take_requests(self) -> None:
-        """Take requests for a pose, and new subscribers, which want one, too."""
+        """Take requests for a pose."""
         if self._topics.requests.take() or self._requests.take():
             self.begin_again()
-        if self._topics.initial.joined():
-            self._initial.want()
-            self._settled = max(self._settled, time.monotonic() + SETTLE_SECONDS)
         self._requests.expire()
 
     def take_localizer(self, pose: PoseWithCovarianceStamped) -> None:
@@ -113,7 +110,14 @@ class Localization:
             self.publish_initial()
 
     def publish_initial(self) -> None:
-        """Publish the pose that waits to be, unless a subscriber has come that would not receive it yet."""
+        """Publish the pose that waits to be, unless a subscriber has come that would not receive it yet.
+
+        A new subscriber wants the pose. It is published only to known subscribers: to one that is discovered in the
+        meantime it would go twice.
+        """
+        if self._topics.initial.joined():
+            self._initial.want()
+            self._settled = time.monotonic() + SETTLE_SECONDS
         if self._pending is None or time.monotonic() < self._settled:
             return
         (stamp, scan, reason), self._pending = self._pending, None
@@ -121,16 +125,17 @@ class Localization:
             return
         if reason == "lost":
             self._health.beat(State.LOST, current_time(), self.values)
-        widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
-        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self.map_frame))
         subscribed = self._topics.initial.subscribed
         self._initial.published(subscribed=subscribed, now=time.monotonic())
         self._watch.reset()
         x, y, degrees = scan.pose.x, scan.pose.y, math.degrees(scan.pose.theta)
-        note = "" if subscribed else ", which has no subscriber"
-        self._health.note(
-            f"published {self._topics.initial.name}{note} ({reason}): x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
-        )
+        name, place = self._topics.initial.name, f"x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees"
+        if not subscribed:
+            self._health.note(f"not published, because {name} has no subscriber ({reason}): {place}", "no subscriber")
+            return
+        widened = at_least(scan.covariance, self._options.min_sigma, self._options.min_sigma_theta)
+        self._topics.initial.publish(stamped_pose(stamp, scan.pose, widened, self.map_frame))
+        self._health.note(f"published {name} ({reason}): {place}")
 
     def _odometry_at(self, stamp: int) -> linefix.RigidTransform | None:
         """Return odom_from_base, by odometry or else by transforms."""

@@ -68,7 +68,9 @@ class MapConverter:
         self._ended = False
         self.busy = False
         self.ready = threading.Event()
-        threading.Thread(target=self._run, name="map conversion", daemon=True).start()
+        self._starting = threading.Lock()  # no process starts after the end
+        self._thread = threading.Thread(target=self._run, name="map conversion", daemon=True)
+        self._thread.start()
 
     def take(self, grid: SerializedGrid) -> None:
         """Convert a grid, unless it is the one that was converted last; a grid that still waits is left out."""
@@ -86,17 +88,20 @@ class MapConverter:
         self.busy = not self._grids.empty()
         return found
 
-    def end(self) -> None:
-        """Stop converting; returns at once."""
-        self._ended = True
+    def end(self, seconds: float) -> bool:
+        """Stop converting, and return whether thread and process have ended within a time."""
+        with self._starting:
+            self._ended = True
+            if self._process is not None:
+                self._process.kill()
         self._grids.put(None)
-        process = self._process
-        if process is not None:
-            process.kill()
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
-        self._process = _Process()
-        self._process.wait_until_ready()
+        process = self._started()
+        if process is not None:
+            process.wait_until_ready()
         self.ready.set()
         idle: float | None = None
         while not self._ended:
@@ -105,26 +110,39 @@ class MapConverter:
                 while not self._grids.empty():
                     grid = self._grids.get()
             except queue.Empty:
-                if self._process is not None:
-                    self._process.kill()
-                self._process, idle = None, None
+                self._stop()
+                idle = None
                 continue
             if grid is None:
                 break
             self._results.put(self._convert(grid))
             self._done()
             idle = CONVERSION_IDLE
-        if self._process is not None:
-            self._process.kill()
+        self._stop()
+
+    def _started(self) -> _Process | None:
+        """Return the process, started where there is none; None after the end."""
+        with self._starting:
+            if self._ended:
+                return None
+            if self._process is None or not self._process.alive:
+                self._process = _Process()
+            return self._process
+
+    def _stop(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
 
     def _convert(self, grid: bytes) -> Converted:
         if len(grid) > MAX_GRID_BYTES:
             return Converted(problem=f"found {len(grid)} bytes, expected at most {MAX_GRID_BYTES}")
-        if self._process is None or not self._process.alive:
-            self._process = _Process()
-        converted = self._process.convert(grid)
+        process = self._started()
+        if process is None:
+            return Converted(problem="the node ends")
+        converted = process.convert(grid)
         if converted is None:
-            self._process.kill()
+            self._stop()
             return Converted(
                 problem=f"its conversion takes more than {CONVERSION_SECONDS:g} s of a core or 4 GB, as noise does; "
                 "look at the map, or convert it with `linefix map import` and pass it with --map"
@@ -165,6 +183,12 @@ class _Process:
 
     def kill(self) -> None:
         self._process.kill()
+
+    def end(self) -> None:
+        """End it, and leave nothing of it behind."""
+        self._process.kill()
+        self._process.join()
+        self._connection.close()
 
 
 def convert(serialized: bytes) -> Converted:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 
 import linefix
@@ -23,7 +24,7 @@ from .searching import Found, Searcher
 from .silence import Silence
 from .topics import Topics
 from .transforms import FrameError, planar
-from .tuning import END_SECONDS
+from .tuning import END_SECONDS, ODOMETRY_SECONDS
 from .wire import Waiting
 
 BEAT = 0.2  # s between two checks whether to end
@@ -66,6 +67,7 @@ class Node:
         self._frames, self._odometry = Frames(), OdometryHistory()
         self._gathering = Gathering(len(options.scans), options.together_s)
         self._next: dict[int, Sequence[LaserScan]] = {}  # by topic; what has waited longest is first
+        self._held: tuple[Found, float] | None = None  # a result that waits for odometry, and until when
         self._ended, self._searched = False, False
         participant = connect(options.domain)
         self._topics = Topics(participant, options, lambda problem: self._health.problem(problem))
@@ -98,11 +100,20 @@ class Node:
         self._ended = True
         self._waiting.wake()
 
-    def close(self) -> bool:
-        """Cancel what goes on in the background; return whether all of it has ended."""
-        if self._converter is not None:
-            self._converter.end()
-        return self._searcher.end(END_SECONDS)
+    def close(self, seconds: float = END_SECONDS) -> bool:
+        """Cancel what goes on in the background; return whether all of it has ended within a time.
+
+        False is no defect: a search looks for its cancellation between two steps, and a conversion after a start of its
+        process. On a busy machine that may take longer. Both are threads that a process may leave at its end.
+        """
+        until = time.monotonic() + seconds
+        converted = self._converter is None or self._converter.end(seconds)
+        return self._searcher.end(max(0.0, until - time.monotonic())) and converted
+
+    @property
+    def waits_for_odometry(self) -> bool:
+        """Return whether the result of a scan waits until odometry has reached its stamp."""
+        return self._held is not None
 
     def turn(self) -> None:
         """Take the messages and results that have come, and search the newest scans."""
@@ -111,9 +122,7 @@ class Node:
         self._localization.take_requests()
         for odometry in self._topics.odometry.take():
             self._take_odometry(odometry)
-        found = self._searcher.result()
-        if found is not None:
-            self._take_result(found)
+        self._turn_results()
         self._localization.publish_initial()
         self._turn_scans()
         self._health.beat(self._state, current_time(), self._localization.values)
@@ -163,6 +172,23 @@ class Node:
         while self._next and not self._searcher.busy:
             self._search(self._next.pop(next(iter(self._next))))
         self._silence.look(has_map=self._index is not None)
+
+    def _turn_results(self) -> None:
+        """Take results; each waits until odometry has reached its stamp, or long enough.
+
+        By the odometry before, the robot would be where it was then, and a scan of a moving robot would disagree.
+        """
+        while True:
+            if self._held is None:
+                found = self._searcher.result()
+                if found is None:
+                    return
+                self._held = found, time.monotonic() + ODOMETRY_SECONDS
+            found, until = self._held
+            if self._odometry.awaited(found.stamp) and time.monotonic() < until:
+                return
+            self._held = None
+            self._take_result(found)
 
     def _take_odometry(self, message: Odometry) -> None:
         try:

@@ -94,6 +94,11 @@ class OdometryHistory:
         """The newest time, nanoseconds, and odom_from_base at it."""
         return (self._stamps[-1], self._poses[-1]) if self._stamps else None
 
+    def awaited(self, stamp: Time) -> bool:
+        """Return whether odometry arrives, but has not reached a stamp."""
+        behind = nanoseconds(stamp) - self._stamps[-1] if self._stamps else 0
+        return 0 < behind <= STALE_NS
+
     def speed(self, at: int) -> Speed | None:
         """Return the speed of the robot at a time, nanoseconds; None where it is not known."""
         after = bisect.bisect_left(self._stamps, at)

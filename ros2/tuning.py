@@ -25,6 +25,7 @@ CONVERSION_IDLE = 60.0  # s after which the process of conversions ends; it hold
 CONVERSION_BYTES = 4 * 2**30  # address space of the process that converts a grid
 SEARCH_SECONDS = 10.0  # s for one scan; the slowest of the public logs takes 1 s
 END_SECONDS = 0.5  # s that the end waits for a search
+ODOMETRY_SECONDS = 0.5  # s that a result waits for odometry of its time; the slowest usual odometry has 10 Hz
 REPEAT_SECONDS = 1.0  # s within which the same problem is published once
 
 # When scans agree.

@@ -130,8 +130,8 @@ class Publisher(Generic[Message]):
 
     @property
     def subscribed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return bool(self._readers.connected)
+        """Return whether there was a subscriber at the last call of `joined`."""
+        return bool(self._known)
 
     def joined(self) -> bool:
         """Return whether there is a new subscriber since the last call."""

@@ -36,12 +36,18 @@ class View:
         in the frame of that one. None: the step is exact.
     relative_to : int or None
         Index of that view; None: the scan's frame itself.
+    motion : (3, 3) or None
+        Error by a motion that is not known and that all views share, as scanners of one robot do: additive
+        (x, y, theta) of this view's pose in the scan's frame, metres and radians, for one standard deviation of the
+        speed along x and y and of the turn rate, by columns. Proportional to the duration of the view. Views that are
+        relative to this one do not have it. None: no such error.
     """
 
     scan: Scan
     pose: RigidTransform = HERE
     covariance: Floats | None = None
     relative_to: int | None = None
+    motion: Floats | None = None
 
 
 def assemble(views: Sequence[View]) -> Scan:
@@ -63,9 +69,9 @@ def assemble(views: Sequence[View]) -> Scan:
                 f"expected variances of at most {MOST_VARIANCE:g}", argument=f"scan.views.{v}.covariance"
             )
     order = _outward(views)
-    if len(views) == 1 and not _uncertain(views[0]) and views[0].pose == HERE:
+    if len(views) == 1 and not _uncertain(views[0]) and views[0].motion is None and views[0].pose == HERE:
         return views[0].scan
-    root = _root(views, order)
+    root = np.hstack([_root(views, order), _motion_root(views)])
     places = [_viewpoint(view) for view in views]
     with_beams = all(view.scan.beams is not None for view in views)
     beams = _together([moved_beams(view) for view in views]) if with_beams else None
@@ -211,3 +217,17 @@ def _root(views: Sequence[View], order: Sequence[int]) -> Floats:
             values, vectors = np.linalg.eigh(view.covariance)
             own[:, k : k + 3] += turn @ (vectors * np.sqrt(np.maximum(0.0, values)))
     return root
+
+
+def _motion_root(views: Sequence[View]) -> Floats:
+    """Return the columns of `Views.root` for the motion that views share; none where no view has it.
+
+    It moves all views as one body, and as long as the longest of them lasts: an upper bound for shorter ones. So it is
+    not inferred from the distance of two views, because each of them is distorted by the motion, which no root shows.
+    """
+    longest = max((float(view.motion[2, 2]) for view in views if view.motion is not None), default=0.0)
+    if not longest:
+        return np.zeros((3 * len(views), 0))
+    nothing = np.zeros((3, 3))
+    parts = [nothing if view.motion is None else view.motion * (longest / view.motion[2, 2]) for view in views]
+    return np.concatenate(parts)

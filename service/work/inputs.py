@@ -100,15 +100,17 @@ def _view_of(view: SegmentView | LaserView | PointView, number: int, *, timed: b
 
 
 def _laser_view(view: LaserView, place: str, *, timed: bool) -> View:
-    """Return a scanner's view; without a known motion, the covariance is the sum of the step's and the motion's."""
-    pose = transform_of(view.pose)
+    """Return a scanner's view; scanners on one robot share its unknown motion, views of a drive have each their own."""
+    at = transform_of(view.pose)
     seen = replace(range_scan(view.laser, view.twist, place, timed=timed), flipped=view.flipped)
-    at = pose
-    if view.relative_to is None and view.covariance is None and math.hypot(pose.x, pose.y) <= LONGEST_LEVER:
-        seen, at = replace(seen, mount=pose), HERE  # turns with the robot, whose frame is that of the scan
+    if view.relative_to is None and view.covariance is None and math.hypot(at.x, at.y) <= LONGEST_LEVER:
+        # It turns with the robot, whose frame is that of the scan.
+        return view_laser(replace(seen, mount=at), HERE, view.sigma, viewpoint_of(view.viewpoint), place)
     found = view_laser(seen, at, view.sigma, viewpoint_of(view.viewpoint), place)
-    parts = [one for one in (view.covariance, found.covariance) if one is not None]
-    return replace(found, covariance=sum(parts[1:], parts[0]) if parts else None, relative_to=view.relative_to)
+    own = None if found.motion is None else found.motion @ found.motion.T
+    parts = [one for one in (view.covariance, own) if one is not None]
+    covariance = sum(parts[1:], parts[0]) if parts else None
+    return replace(found, covariance=covariance, relative_to=view.relative_to, motion=None)
 
 
 def prior_of(prior: SoftPriorFields | HardPriorFields | None) -> Prior | None:

@@ -7,6 +7,7 @@ import runpy
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import metadata
 from pathlib import Path
 from typing import Any
 
@@ -129,3 +130,13 @@ import registration, vectorization, association, simulation, formats, map_qualit
 import cli.program
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+
+
+@pytest.mark.parametrize("name", ["cyclonedds", "rich-click"])
+def test_a_licence_that_the_bill_leaves_out_is_the_one_in_its_metadata(name: str) -> None:
+    """The table has what the installed package declares, under another spelling."""
+    whole = {"components": [{"name": name, "version": "1.0", "bom-ref": name}], "dependencies": []}
+    kept = MATERIALS["kept"](whole, {name: "1.0"})
+    MATERIALS["require_licences"](kept)
+    first_line = metadata(name)["License"].splitlines()[0]
+    assert MATERIALS["licences"](kept["components"][0]).replace(" OR ", ", ") == first_line.removesuffix(" License")

@@ -19,6 +19,9 @@ STEP = math.tau / BEAMS
 MOUNT = RigidTransform(0.25, -0.15, 1.1)
 ROBOT = RigidTransform(2.2, 1.7, 0.6)
 HERE = RigidTransform(0.0, 0.0, 0.0)
+MOUNTS = MOUNT, RigidTransform(-0.4, 0.1, 3.0), RigidTransform(0.1, 0.2, -1.5)
+RUNS = 100  # of a robot at different speeds
+BOUND = 3.3 * math.sqrt(6.0 / RUNS)  # of the mean of chi-squares with three degrees of freedom, at 99.9 %
 
 
 def seen(
@@ -115,6 +118,47 @@ def test_two_scanners_are_one_scan() -> None:
     answer = linefix.locate(ROOM, together)
     assert answer.usable
     assert off(answer, ROBOT)[0] < 0.02
+
+
+def moving_ranges(mount: RigidTransform, twist: np.ndarray, seconds: float, rng: np.random.Generator) -> np.ndarray:
+    """Return ranges all around from a robot that moves at a twist, the first beam from `ROBOT`."""
+    places = linefix.Motion(seconds / BEAMS, *twist.tolist()).places(BEAMS)
+    poses = [ROBOT.compose(RigidTransform(*place)).compose(mount) for place in places.tolist()]
+    x, y, heading = np.array([(pose.x, pose.y, pose.theta) for pose in poses]).T
+    angle = heading - math.pi + STEP * np.arange(BEAMS)
+    along = np.array([np.cos(angle), np.sin(angle)])
+    begin, way = ROOM[:, None, :2], (ROOM[:, 2:] - ROOM[:, :2])[:, None]
+    away = begin - np.array([x, y]).T
+    across = along[0] * way[..., 1] - along[1] * way[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (away[..., 0] * way[..., 1] - away[..., 1] * way[..., 0]) / across
+        place = (away[..., 0] * along[1] - away[..., 1] * along[0]) / across
+    met = (distance > 0.0) & (place >= 0.0) & (place <= 1.0)
+    ranges: np.ndarray = np.where(met, distance, math.inf).min(axis=0) + rng.normal(0.0, 0.01, BEAMS)
+    return ranges
+
+
+@pytest.mark.parametrize(
+    ("seconds", "least"),
+    [((0.1, 0.1, 0.1), 3.0 - BOUND), ((0.1, 0.05, 0.1), 0.5)],
+    ids=["alike", "one of them faster"],
+)
+def test_scanners_of_one_robot_share_its_unknown_motion(seconds: tuple[float, ...], least: float) -> None:
+    """Squared errors in units of the covariance have the mean 3, or less where the covariance is an upper bound."""
+    rng, index = np.random.default_rng(8), linefix.index_map(ROOM)
+    squares = []
+    for _ in range(RUNS):
+        twist = rng.normal(0.0, (0.5, 0.5, 1.0))
+        views = [
+            linefix.view_of(logged(moving_ranges(mount, twist, time, rng), mount=mount, seconds=time))
+            for mount, time in zip(MOUNTS, seconds, strict=True)
+        ]
+        answer = linefix.locate(index, linefix.assemble(views), prior=linefix.HardPrior(ROBOT, 0.5, 0.5))
+        assert answer.pose is not None
+        assert answer.covariance is not None
+        error = np.array([answer.pose.x - ROBOT.x, answer.pose.y - ROBOT.y, answer.pose.theta - ROBOT.theta])
+        squares.append(float(error @ np.linalg.solve(answer.covariance, error)))
+    assert least < np.mean(squares) < 3.0 + BOUND
 
 
 def test_the_documented_loop_is_the_one_that_is_tested() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,11 +15,12 @@ from .robot import LOOPBACK, ROOM
 
 
 @pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     number = 100 + os.getpid() % 50  # others may run these tests at the same time
     monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    return number
+    yield number
+    gc.collect()  # participants that are not yet deleted would take part in the next test
 
 
 @pytest.fixture

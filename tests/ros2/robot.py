@@ -12,10 +12,12 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
+from cyclonedds.util import duration
 
 import linefix
 from ros2 import Node, NodeOptions, messages
@@ -26,8 +28,9 @@ LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces></General>"
     "<Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
-START_SECONDS = 120.0  # in which the process of the node has to start
+START_SECONDS = 600.0  # in which the process of the node has to start: kernels may have to be compiled first
 PATIENCE = 60.0  # s for what has to come about
+POLL = 0.05  # s between two looks whether it has
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], dtype=float)
 MAP_FROM_BASE = linefix.RigidTransform(1.0, 1.5, 0.4)
@@ -73,9 +76,11 @@ def grid_of_room(frame: str = "map") -> messages.OccupancyGrid:
 
 
 @contextmanager
-def running(options: NodeOptions, index: linefix.MapIndex | None) -> Iterator[Node]:
+def running(
+    options: NodeOptions, index: linefix.MapIndex | None, log: Callable[[str], None] = lambda _: None
+) -> Iterator[Node]:
     """Run a bridge in a thread of this process, which takes no time to start."""
-    node = Node(options, index, log=lambda _: None)
+    node = Node(options, index, log=log)
     node.wait_until_ready()
     with ThreadPoolExecutor(1) as pool:
         ended = pool.submit(node.run)
@@ -85,11 +90,37 @@ def running(options: NodeOptions, index: linefix.MapIndex | None) -> Iterator[No
         finally:
             node.end()
             ended.result(PATIENCE)
-            assert node.close()
+            assert node.close(PATIENCE)
+
+
+def wait_until(condition: Callable[[], object], problem: Callable[[], object] = lambda: None) -> None:
+    """Return when a condition holds."""
+    ends = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < ends, problem()
+        time.sleep(POLL)
+
+
+def deliver(publisher: Publisher[Any]) -> None:
+    """Wait until a bridge has received what was published reliably."""
+    wait_until(lambda: publisher.joined() or publisher.subscribed)
+    assert publisher._writer.wait_for_acks(duration(seconds=PATIENCE))
+
+
+@dataclass(frozen=True, slots=True)
+class Bridge:
+    """The process of a bridge, and the file that it logs to."""
+
+    process: subprocess.Popen[bytes]
+    log: BinaryIO
+
+    @property
+    def logged(self) -> bytes:
+        return os.pread(self.log.fileno(), 100_000, 0)
 
 
 @contextmanager
-def bridge(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+def bridge(*arguments: str) -> Iterator[Bridge]:
     """Run ``linefix ros2`` in a process of its own."""
     program = "import sys; from cli.entry import run; sys.exit(run(['ros2', *sys.argv[1:]]))"
     with tempfile.TemporaryFile() as log:
@@ -97,12 +128,12 @@ def bridge(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
             [sys.executable, "-c", program, *arguments], cwd=ROOT, env=dict(os.environ), stderr=log
         )
         try:
-            until = time.monotonic() + START_SECONDS
-            while b"subscribed to" not in (said := os.pread(log.fileno(), 100_000, 0)):
+            found, until = Bridge(process, log), time.monotonic() + START_SECONDS
+            while b"subscribed to" not in (said := found.logged):
                 assert process.poll() is None, said
                 assert time.monotonic() < until, said
-                time.sleep(0.1)
-            yield process
+                time.sleep(POLL)
+            yield found
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
                 assert process.wait(PATIENCE) == 0
@@ -127,13 +158,22 @@ class Robot:
         self.markers = Subscription(net, f"{namespace}/linefix/markers", messages.MarkerArray, LATCHED)
         self.walls = Subscription(net, f"{namespace}/linefix/map_markers", messages.MarkerArray, LATCHED)
         self.diagnostics = Subscription(net, "/diagnostics", messages.DiagnosticArray, RELIABLE)
+        self.status = Subscription(net, f"{namespace}/linefix/status", messages.DiagnosticStatus, LATCHED)
+        self._connected = False
+
+    def connect(self) -> None:
+        """Wait until the bridge has discovered the subscriptions: the last of them is received, so all are."""
+        wait_until(self.status.take)
+        self._connected = True
 
     def until(self, heard: Subscription[Any], play: Callable[[], None], wanted: Callable[[Any], bool] = bool) -> Any:
         """Play again and again until something wanted is received; return it."""
+        if not self._connected:
+            self.connect()
         ends = time.monotonic() + PATIENCE
         while time.monotonic() < ends:
             play()
-            time.sleep(0.05)
+            time.sleep(POLL)
             for message in heard.take():
                 if wanted(message):
                     return message

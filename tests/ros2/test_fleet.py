@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from cyclonedds.domain import DomainParticipant
 
 import linefix
 from ros2 import NodeOptions, messages
 from ros2.wire import LATCHED, RELIABLE, SENSOR, Publisher, Subscription
 
-from .robot import BASE_FROM_LASER, MAP_FROM_BASE, ROOM, SCANNER, Robot, mount, quaternion, running
+from .robot import (
+    BASE_FROM_LASER,
+    MAP_FROM_BASE,
+    ROOM,
+    SCANNER,
+    Robot,
+    deliver,
+    is_at_truth,
+    mount,
+    quaternion,
+    running,
+    wait_until,
+)
 
 WALLS = linefix.Segments.from_array(ROOM)
 
@@ -43,7 +55,6 @@ class Fleet(Robot):
         self.agreed = Subscription(
             self.net, f"{namespace}/linefix/agreed_pose", messages.PoseWithCovarianceStamped, RELIABLE
         )
-        self.status = Subscription(self.net, f"{namespace}/linefix/status", messages.DiagnosticStatus, LATCHED)
         self.transforms = Subscription(self.net, "/tf", messages.TFMessage, RELIABLE)
 
     def drive(self, at: linefix.RigidTransform, second: float) -> None:
@@ -52,7 +63,6 @@ class Fleet(Robot):
         message = messages.Odometry(messages.Header(stamp, f"{self.prefix}odom"), f"{self.prefix}base_link")
         message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
         self.odometry.publish(message)
-        time.sleep(0.02)
         self.scans.publish(scan_from(at, second, f"{self.prefix}laser"))
 
 
@@ -67,7 +77,6 @@ def drive_until(robot: Fleet, heard: Subscription[Any], second: float = 1.0, wan
     def play() -> None:
         times[0] += 0.5
         robot.drive(moved(min(times[0], 9.0)), times[0])
-        time.sleep(0.1)
 
     return robot.until(heard, play, wanted), times[0]
 
@@ -85,9 +94,9 @@ def test_a_pose_is_published_when_scans_agree(domain: int, room: linefix.MapInde
     with running(NodeOptions(domain=domain), room):
         robot = Fleet(domain)
         robot.mounts.publish(mount())
-        usable, _ = drive_until(robot, robot.poses)
+        usable, second = drive_until(robot, robot.poses)
         assert robot.initial.take() == []
-        initial, _ = drive_until(robot, robot.initial, stamp_of(usable))
+        initial, _ = drive_until(robot, robot.initial, second)
         assert off(initial, stamp_of(initial)) < 0.03
         assert stamp_of(initial) - stamp_of(usable) >= 0.9  # three scans, 0.5 m or 30 degrees
         covariance = np.reshape(initial.pose.covariance, (6, 6))
@@ -115,12 +124,61 @@ def test_a_pose_that_is_contradicted_is_reported_and_corrected(domain: int, room
             message.pose.pose = messages.Pose(messages.Point(at.x + 1.0, at.y), quaternion(at.theta))
             robot.odometry.publish(message)
             robot.scans.publish(scan_from(there, clock[0]))
-            time.sleep(0.1)
 
         contradicted = robot.until(robot.status, play, lambda one: one.level == 2)
         assert "contradicted" in contradicted.message
         corrected = robot.until(robot.initial, play)
     assert math.hypot(corrected.pose.pose.position.x - 2.0, corrected.pose.pose.position.y - 4.0) < 0.03
+
+
+def test_the_result_of_a_scan_waits_for_its_odometry(
+    domain: int, room: linefix.MapIndex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the odometry before, the scan would contradict the agreed pose, and the pose would be corrected."""
+    monkeypatch.setattr("ros2.node.ODOMETRY_SECONDS", 3600.0)
+    with running(NodeOptions(domain=domain, agree=1), room) as node:
+        robot = Fleet(domain)
+        robot.mounts.publish(mount())
+        robot.until(robot.initial, lambda: robot.drive(moved(1.0), 1.0))
+        robot.until(robot.agreed, lambda: robot.drive(moved(1.1), 1.1), lambda one: stamp_of(one) > 1.05)
+        robot.initial.take()
+        robot.status.take()
+        further, second = moved(2.2), 1.5
+
+        def waiting() -> bool:
+            robot.scans.publish(scan_from(further, second))
+            return node.waits_for_odometry
+
+        wait_until(waiting)
+        found = robot.until(robot.agreed, lambda: robot.drive(further, second), lambda one: stamp_of(one) > 1.2)
+        assert stamp_of(found) == second
+        assert robot.initial.take() == []
+        assert [one.message for one in robot.status.take() if one.level == 2] == []
+
+
+def test_a_subscriber_receives_the_pose_once(domain: int, room: linefix.MapIndex) -> None:
+    """Also one that subscribes when the pose is agreed already, the first of all."""
+    logged: list[str] = []
+    with running(NodeOptions(domain=domain, namespace="/lone", agree=1), room, logged.append):
+        net = DomainParticipant(domain)
+        scans = Publisher(net, "/lone/scan", messages.LaserScan, SENSOR)
+        mounts = Publisher(net, "/lone/tf_static", messages.TFMessage, LATCHED)
+        mounts.publish(mount())
+
+        def agreed() -> bool:
+            scans.publish(scan_from(MAP_FROM_BASE, 1.0))
+            return any("no subscriber" in line for line in logged)
+
+        wait_until(agreed, lambda: logged)
+        robot = Fleet(domain, "/lone")
+        robot.until(robot.initial, lambda: scans.publish(scan_from(MAP_FROM_BASE, 2.0)))
+        for second in (3.0, 4.0, 5.0):
+            robot.until(
+                robot.poses,
+                lambda second=second: scans.publish(scan_from(MAP_FROM_BASE, second)),  # type: ignore[misc]
+                lambda one, second=second: stamp_of(one) == second,  # type: ignore[misc]
+            )
+        assert robot.initial.take() == []
 
 
 def amcl_at(pose: linefix.RigidTransform, second: float) -> messages.PoseWithCovarianceStamped:
@@ -142,9 +200,16 @@ def localized(robot: Fleet, error: float, second: float = 1.0) -> Any:
         at = moved(min(clock[0], 9.0))
         amcl.publish(amcl_at(linefix.RigidTransform(at.x + error, at.y, at.theta), clock[0]))
         robot.drive(at, clock[0])
-        time.sleep(0.1)
 
+    amcl.publish(amcl_at(linefix.RigidTransform(moved(second).x + error, moved(second).y, moved(second).theta), second))
+    deliver(amcl)
     return play
+
+
+def drive_on(robot: Fleet, play: Any, heard: Subscription[Any]) -> None:
+    """Drive on until the bridge has published something for five more scans."""
+    for _ in range(5):
+        robot.until(heard, play)
 
 
 def test_a_bridge_that_starts_again_leaves_a_localizer_alone_that_has_the_pose(
@@ -154,9 +219,7 @@ def test_a_bridge_that_starts_again_leaves_a_localizer_alone_that_has_the_pose(
         robot = Fleet(domain)
         robot.mounts.publish(mount())
         play = localized(robot, 0.05)
-        robot.until(robot.agreed, play)
-        for _ in range(5):
-            play()
+        drive_on(robot, play, robot.agreed)
         assert robot.initial.take() == []
 
 
@@ -173,8 +236,7 @@ def test_a_localizer_that_is_lost_is_reported(domain: int, room: linefix.MapInde
         if when == "lost":
             robot.until(robot.initial, wrong)
         else:
-            for _ in range(5):
-                wrong()
+            drive_on(robot, wrong, robot.agreed)
             assert robot.initial.take() == []
 
 
@@ -234,9 +296,7 @@ def test_odometry_may_be_of_another_frame_than_the_base(domain: int, room: linef
             message = messages.Odometry(messages.Header(stamp, "odom"), "wheels")
             message.pose.pose = messages.Pose(messages.Point(wheels.x, wheels.y), quaternion(wheels.theta))
             robot.odometry.publish(message)
-            time.sleep(0.02)
             robot.scans.publish(scan_from(at, clock[0]))
-            time.sleep(0.1)
 
         initial = robot.until(robot.initial, play)
     assert off(initial, stamp_of(initial)) < 0.03
@@ -256,12 +316,9 @@ def test_a_mount_that_moves_is_followed(domain: int, room: linefix.MapIndex) -> 
                 transform.header.stamp = messages.Time(int(second), int(1e9 * (second % 1.0)))
                 transform.transform.rotation = quaternion(BASE_FROM_LASER.theta + turn - 0.4)
                 robot.tf.publish(message)
-            time.sleep(0.02)
             robot.scans.publish(scan_from(MAP_FROM_BASE, seconds[0]))
 
-        found = robot.until(robot.poses, play)
-    turn = 2.0 * math.atan2(found.pose.pose.orientation.z, found.pose.pose.orientation.w)
-    assert turn == pytest.approx(MAP_FROM_BASE.theta, abs=0.02)
+        robot.until(robot.poses, play, is_at_truth)
 
 
 def test_a_request_with_an_id_is_answered(domain: int, room: linefix.MapIndex) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import signal
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -14,12 +13,11 @@ import pytest
 
 import linefix
 from ros2 import NodeOptions, messages
+from ros2.frames import Frames
 from ros2.tuning import MAX_FRAMES
 from ros2.wire import LATCHED, RELIABLE, Publisher
 
-from .robot import Robot, bridge, grid_of_room, is_at_truth, mount, running, scan
-
-SOON = 20.0  # s; what the bridge is busy with takes minutes
+from .robot import PATIENCE, Robot, bridge, grid_of_room, is_at_truth, mount, running, scan, wait_until
 
 
 class NotUtf8(str):
@@ -85,19 +83,19 @@ def test_the_bridge_goes_on_after_broken_messages(domain: int, room: linefix.Map
     """Also where they are latched, so that a bridge that starts again receives them first."""
     robot = Robot(domain)
     writers = {name: Publisher(robot.net, f"/{topic}", type(one), LATCHED) for name, (topic, one) in BROKEN.items()}
-    with running(NodeOptions(agree=1, domain=domain), room):
+    logged: list[str] = []
+    with running(NodeOptions(agree=1, domain=domain), room, logged.append):
         for second, (name, (_, message)) in enumerate(BROKEN.items(), 1):
-            writers[name].publish(message)
-            time.sleep(0.1)
-            assert is_at_truth(pose_at(robot, second)), name
-        told = {one.status[0].message for one in robot.diagnostics.take()}
-    assert any("cannot be decoded" in one for one in told)
+            found = pose_at(robot, second, lambda name=name, message=message: writers[name].publish(message))  # type: ignore[misc]
+            assert is_at_truth(found), name
+        wait_until(lambda: any("cannot be decoded" in line for line in logged), lambda: logged)
     with running(NodeOptions(agree=1, domain=domain), room):
         assert is_at_truth(pose_at(robot, 1))
 
 
-def pose_at(robot: Robot, second: int) -> messages.PoseWithCovarianceStamped:
+def pose_at(robot: Robot, second: int, before: Callable[[], None] = lambda: None) -> messages.PoseWithCovarianceStamped:
     def play() -> None:
+        before()
         robot.mounts.publish(mount())
         robot.scans.publish(scan(second))
 
@@ -122,15 +120,14 @@ def test_a_bad_transform_does_not_lose_those_beside_it(domain: int, room: linefi
         robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
 
 
-def test_a_mount_is_taken_after_ever_so_many_frames(domain: int, room: linefix.MapIndex) -> None:
-    with running(NodeOptions(agree=1, domain=domain), room):
-        robot = Robot(domain)
-        for begin in range(0, MAX_FRAMES + 1000, 500):
-            many = [transform("base_link", f"tag_{k}").transforms[0] for k in range(begin, begin + 500)]
-            robot.mounts.publish(messages.TFMessage(many))
-            time.sleep(0.05)
-        robot.mounts.publish(mount())
-        robot.until(robot.initial, lambda: robot.scans.publish(scan(1)))
+def test_a_mount_is_taken_after_ever_so_many_frames() -> None:
+    frames = Frames()
+    for begin in range(0, MAX_FRAMES + 1000, 500):
+        many = [transform("base_link", f"tag_{k}").transforms[0] for k in range(begin, begin + 500)]
+        assert frames.take(messages.TFMessage(many), static=True) == []
+    assert frames.mount("base_link", "tag_0", None) is None
+    assert frames.take(mount(), static=True) == []
+    assert frames.mount("base_link", "laser", None) is not None
 
 
 def noise(cells: int) -> messages.OccupancyGrid:
@@ -140,15 +137,15 @@ def noise(cells: int) -> messages.OccupancyGrid:
 
 
 def test_a_map_of_noise_keeps_nothing_from_going_on(domain: int) -> None:
-    with bridge("--base", "laser", "--agree", "1") as process:
+    with bridge("--base", "laser", "--agree", "1") as program:
         robot = Robot(domain)
         robot.maps.publish(noise(1500))
         converting = robot.until(
             robot.diagnostics, lambda: robot.scans.publish(scan(1)), lambda one: "converted" in one.status[0].message
         )
         assert converting.status[0].level == 2
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(SOON) == 0
+        program.process.send_signal(signal.SIGTERM)
+        assert program.process.wait(PATIENCE) == 0
 
 
 @pytest.mark.parametrize("quality", [LATCHED, RELIABLE], ids=["transient local", "volatile"])
@@ -248,10 +245,13 @@ def test_sigterm_ends_it_during_a_search(domain: int, tmp_path: Any) -> None:
     file = tmp_path / "noise.json"
     linefix.write_map(linefix.LineMap(linefix.Segments.from_array(walls)), file)
     ranges = rng.uniform(1.0, 20.0, 60).repeat(12)
-    with bridge("--map", str(file), "--base", "laser") as process:
+    with bridge("--map", str(file), "--base", "laser") as program:
         robot = Robot(domain)
-        for _ in range(10):
+
+        def searching() -> bool:
             robot.scans.publish(replace(scan(1), ranges=ranges.tolist()))
-            time.sleep(0.05)
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(SOON) == 0
+            return b"first scan" in program.logged
+
+        wait_until(searching, lambda: program.logged)
+        program.process.send_signal(signal.SIGTERM)
+        assert program.process.wait(PATIENCE) == 0

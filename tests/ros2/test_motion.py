@@ -135,7 +135,7 @@ def test_the_clock_that_goes_back_takes_twists_along() -> None:
 def test_a_scan_that_says_no_time_is_taken_at_once(time_increment: float) -> None:
     look = looked(timed(2, time_increment), odometry(10, 0))
     assert (look.time_increment, look.laser.motion, look.notes) == (0.0, None, {})
-    assert look.view.covariance is None
+    assert look.view.motion is None
 
 
 STILL = Speed(0.0, 0.0, 0.0)
@@ -148,14 +148,14 @@ def test_without_odometry_the_covariance_allows_for_a_motion_and_that_is_noted()
     assert code == "motion_unknown"
     assert "time_increment of 0.001 s a scan of 100 beams takes 0.1 s" in note
     assert "odometry" in note
-    assert look.view.covariance is not None
-    assert np.sqrt(np.diag(look.view.covariance)) == pytest.approx([0.025, 0.025, 0.05])
+    assert look.view.motion is not None
+    assert np.linalg.norm(look.view.motion, axis=1) == pytest.approx([0.025, 0.025, 0.05])
 
 
 def test_a_robot_that_stands_still_or_is_not_to_be_corrected_has_no_note() -> None:
     for look in (looked(timed(100, 0.001), odometry(10, HALF, STILL)), looked(timed(100, 0.001), motion=False)):
         assert look.notes == {}
-        assert look.view.covariance is None
+        assert look.view.motion is None
 
 
 def test_a_time_increment_in_another_unit_is_replaced_as_in_logs() -> None:

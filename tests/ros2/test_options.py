@@ -8,7 +8,7 @@ import pytest
 
 from cli.entry import run
 from cli.errors import WrongUseError
-from cli.ros2 import parameters_of
+from cli.ros2_parameters import parameters_of
 from ros2 import NodeOptions, OptionError, checked_namespace, namespace_of, remapping_of
 from ros2.names import absolute_name
 
@@ -72,6 +72,44 @@ def test_a_file_of_parameters_is_that_of_ros(tmp_path: Path) -> None:
         file.write_text(text)
         with pytest.raises(WrongUseError, match="ros__parameters"):
             parameters_of(file)
+
+
+FLEET = (
+    "linefix:\n  ros__parameters: {agree: 4}\n"
+    "/robot1/linefix:\n  ros__parameters: {map: one.yaml}\n"
+    "/robot2/linefix:\n  ros__parameters: {map: two.yaml, agree: 5}\n"
+)
+
+
+def test_a_file_may_have_the_parameters_of_several_robots(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.yaml"
+    file.write_text(FLEET)
+    assert parameters_of(file, "/robot1") == {"agree": 4, "on": "one.yaml"}
+    assert parameters_of(file, "robot2/") == {"agree": 5, "on": "two.yaml"}
+    assert parameters_of(file, "robot3") == parameters_of(file) == {"agree": 4}
+    file.write_text("/robot1/linefix:\n  ros__parameters: {agree: 4}\n")
+    with pytest.raises(WrongUseError, match=r"of /robot1, expected those of /robot2"):
+        parameters_of(file, "robot2")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--params-file", "FILE", "--namespace", "robot2"], "two.yaml"),
+        (["--namespace", "robot1", "--params-file", "FILE"], "one.yaml"),
+        (["--ros-args", "-r", "__ns:=/robot2", "--params-file", "FILE"], "two.yaml"),
+        (["--ros-args", "--params-file", "FILE", "-r", "__ns:=/robot1"], "one.yaml"),
+        (["--params-file", "FILE"], "found parameters of /robot1, /robot2, expected one; add --namespace"),
+    ],
+)
+def test_the_namespace_chooses_the_parameters_of_a_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], expected: str
+) -> None:
+    """The map of the chosen robot is looked for."""
+    file = tmp_path / "fleet.yaml"
+    file.write_text(FLEET)
+    assert run(["ros2", *(str(file) if one == "FILE" else one for one in arguments)]) == 2
+    assert expected in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -133,12 +133,13 @@ def test_odometry_is_interpolated_and_forgotten() -> None:
 
 
 def test_scans_wait_for_one_another_for_a_while() -> None:
+    waiting = Gathering(2, 3600.0)
+    waiting.take(0, seen("front", 1))
+    assert waiting.ready() == []
+    waiting.take(1, seen("back", 1))
+    assert [one.header.frame_id for one in waiting.ready()] == ["front", "back"]
+    assert waiting.left is None
     gathering = Gathering(2, 0.1)
-    gathering.take(0, seen("front", 1))
-    assert gathering.ready() == []
-    gathering.take(1, seen("back", 1))
-    assert [one.header.frame_id for one in gathering.ready()] == ["front", "back"]
-    assert gathering.left is None
     gathering.take(1, seen("back", 2))
     gathering.take(0, seen("front", 3))  # a second later: no longer of one moment
     assert [one.header.frame_id for one in gathering.ready()] == ["front"]

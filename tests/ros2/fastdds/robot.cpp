@@ -94,6 +94,7 @@ private:
         TypeSupport type(new Type());
         type.register_type(participant_);
         const std::string whole = "rt" + (name[0] == '/' ? name : space_ + "/" + name);
+        if (auto* known = participant_->lookup_topicdescription(whole)) return dynamic_cast<Topic*>(known);
         return participant_->create_topic(whole, type.get_type_name(), TOPIC_QOS_DEFAULT);
     }
 
@@ -113,7 +114,58 @@ static Time_ time_of(std::istream& words) {
     return stamp;
 }
 
-using Posed = geometry_msgs::msg::dds_::PoseWithCovarianceStamped_;
+namespace g = geometry_msgs::msg::dds_;
+using Posed = g::PoseWithCovarianceStamped_;
+
+// What this robot and an AMCL would publish besides its own topics.
+struct Others {
+    DataWriter *global_mounts, *moving, *amcl, *requests;
+};
+
+static g::TransformStamped_ transform(const std::string& parent, const std::string& child, std::istream& words) {
+    double x, y, theta;
+    words >> x >> y >> theta;
+    g::TransformStamped_ one;
+    one.header().frame_id(parent);
+    one.child_frame_id(child);
+    one.transform().translation().x(x);
+    one.transform().translation().y(y);
+    one.transform().rotation().z(std::sin(0.5 * theta));
+    one.transform().rotation().w(std::cos(0.5 * theta));
+    return one;
+}
+
+static void publish_other(const Others& others, const std::string& command, std::istream& words) {
+    if (command == "global_mount" || command == "moving_mount") {
+        const bool moving = command == "moving_mount";
+        std::string prefix;
+        if (!moving) words >> prefix;
+        const Time_ stamp = moving ? time_of(words) : Time_();
+        auto one = transform(prefix + "base_link", prefix + "laser", words);
+        one.header().stamp(stamp);
+        tf2_msgs::msg::dds_::TFMessage_ message;
+        message.transforms().push_back(one);
+        (moving ? others.moving : others.global_mounts)->write(&message);
+    } else if (command == "amcl") {
+        Posed message;
+        message.header().stamp(time_of(words));
+        message.header().frame_id("map");
+        double x, y, theta;
+        words >> x >> y >> theta;
+        message.pose().pose().position().x(x);
+        message.pose().pose().position().y(y);
+        message.pose().pose().orientation().z(std::sin(0.5 * theta));
+        message.pose().pose().orientation().w(std::cos(0.5 * theta));
+        for (int k : {0, 7, 35}) message.pose().covariance()[k] = 0.01;
+        others.amcl->write(&message);
+    } else if (command == "request") {
+        std_msgs::msg::dds_::String_ message;
+        std::string id;
+        words >> id;
+        message.data(id);
+        others.requests->write(&message);
+    }
+}
 
 static std::function<void(const Posed&)> printing_pose(const std::string& name) {
     return [name](const Posed& message) {
@@ -126,15 +178,40 @@ static std::function<void(const Posed&)> printing_pose(const std::string& name) 
     };
 }
 
+static void subscribe_others(Robot& robot) {
+    using Markers = visualization_msgs::msg::dds_::MarkerArray_;
+    for (const char* name : {"linefix/map_markers", "linefix/markers"}) {
+        robot.reader<visualization_msgs::msg::dds_::MarkerArray_PubSubType, Markers>(
+            name, LATCHED, [](const Markers& message) {
+                for (const auto& one : message.markers()) {
+                    print("marker " + one.ns() + ' ' + std::to_string(one.points().size()));
+                }
+            });
+    }
+    robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>(
+        "linefix/agreed_pose", RELIABLE, printing_pose("agreed"));
+    using Status = diagnostic_msgs::msg::dds_::DiagnosticStatus_;
+    robot.reader<diagnostic_msgs::msg::dds_::DiagnosticStatus_PubSubType, Status>(
+        "linefix/locate_result", LATCHED, [](const Status& message) {
+            print("result " + message.name() + ' ' + std::to_string(message.level()) + ' ' + message.message());
+        });
+}
+
 int main(int argc, char** argv) {
     const std::string space = argc > 2 ? argv[2] : "";
     Robot robot(std::stoul(argv[1]), space);
-    namespace g = geometry_msgs::msg::dds_;
     auto* scans = robot.writer<sensor_msgs::msg::dds_::LaserScan_PubSubType>("scan", SENSOR);
     auto* odometry = robot.writer<nav_msgs::msg::dds_::Odometry_PubSubType>("odom", RELIABLE);
     auto* mounts = robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>("tf_static", LATCHED);
     auto* maps = robot.writer<nav_msgs::msg::dds_::OccupancyGrid_PubSubType>("map", LATCHED);
     auto* requests = robot.writer<std_msgs::msg::dds_::Empty_PubSubType>("linefix/locate", RELIABLE);
+    const Others others{
+        robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>("/tf_static", LATCHED),
+        robot.writer<tf2_msgs::msg::dds_::TFMessage_PubSubType>(space.empty() ? "/tf" : "tf", RELIABLE),
+        robot.writer<g::PoseWithCovarianceStamped_PubSubType>("amcl_pose", LATCHED),
+        robot.writer<std_msgs::msg::dds_::String_PubSubType>("linefix/locate_request", RELIABLE),
+    };
+    subscribe_others(robot);
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>("initialpose", RELIABLE, printing_pose("initialpose"));
     robot.reader<g::PoseWithCovarianceStamped_PubSubType, Posed>("linefix/pose", RELIABLE, printing_pose("pose"));
     robot.reader<tf2_msgs::msg::dds_::TFMessage_PubSubType, tf2_msgs::msg::dds_::TFMessage_>(
@@ -160,17 +237,8 @@ int main(int argc, char** argv) {
         std::string command;
         words >> command;
         if (command == "mount") {
-            double x, y, theta;
-            words >> x >> y >> theta;
-            g::TransformStamped_ one;
-            one.header().frame_id("base_link");
-            one.child_frame_id("laser");
-            one.transform().translation().x(x);
-            one.transform().translation().y(y);
-            one.transform().rotation().z(std::sin(0.5 * theta));
-            one.transform().rotation().w(std::cos(0.5 * theta));
             tf2_msgs::msg::dds_::TFMessage_ message;
-            message.transforms().push_back(one);
+            message.transforms().push_back(transform("base_link", "laser", words));
             mounts->write(&message);
         } else if (command == "odom") {
             nav_msgs::msg::dds_::Odometry_ message;
@@ -215,6 +283,8 @@ int main(int argc, char** argv) {
         } else if (command == "locate") {
             std_msgs::msg::dds_::Empty_ message;
             requests->write(&message);
+        } else {
+            publish_other(others, command, words);
         }
     }
     std::_Exit(0);

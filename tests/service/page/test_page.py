@@ -237,7 +237,7 @@ def test_what_a_drive_and_a_box_would_do(page: Page, client: httpx.Client) -> No
     client.delete("/v1/maps/page-rectangle")
 
 
-def test_an_example_that_arrives_late_does_not_replace_the_map_that_was_opened(page: Page, client: httpx.Client) -> None:
+def test_a_late_example_does_not_replace_an_opened_map(page: Page, client: httpx.Client) -> None:
     walls = {"segments": [[0, 0, 8, 0], [8, 0, 8, 5], [8, 5, 3, 5], [3, 5, 0, 4], [0, 4, 0, 0]]}
     client.put("/v1/maps/page-chosen", json=walls).raise_for_status()
     on_the_way: list[Route] = []

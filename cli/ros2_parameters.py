@@ -1,0 +1,78 @@
+"""Parameter files of ROS 2: the sections of the node ``linefix``, for one robot or for several."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .errors import WrongUseError
+
+MAX_PARAMETERS = 65_536  # characters of a file of parameters
+NODE = "linefix"  # the name of the node in parameter files
+ANY = "**"  # stands for each node
+
+Sections = dict[tuple[str, str], dict[str, Any]]
+
+
+def parameters_of(file: Path, namespace: str | None = None) -> dict[str, Any]:
+    """Return the parameters of a file for a robot, by the names of options.
+
+    The sections ``/**`` and ``linefix`` apply to each robot, ``/robot1/linefix`` to that one and with precedence.
+
+    Parameters
+    ----------
+    file : Path
+    namespace : str, optional
+        Of the robot, such as ``/robot1``. None: that of the file, if all its sections have one at most.
+
+    Raises
+    ------
+    WrongUseError
+        When there is no such file, it is no file of parameters, or it has none for this robot.
+    """
+    sections, robots = _sections_of(file), robots_of(file)
+    only = robots[0] if len(robots) == 1 else ""
+    chosen = (only if namespace is None else namespace).strip("/")
+    keys = [("", ANY), ("", NODE), *([(chosen, ANY), (chosen, NODE)] if chosen else [])]
+    if namespace is not None and not any(key in sections for key in keys):
+        raise WrongUseError(
+            f"{file}: found parameters of {', '.join(robots)}, expected those of /{chosen}; correct --namespace"
+        )
+    values: dict[str, Any] = {}
+    for key in keys:
+        values.update(sections.get(key, {}))
+    return {("on" if key == "map" else key): value for key, value in values.items() if value is not None}
+
+
+def robots_of(file: Path) -> list[str]:
+    """Return the namespaces that sections of a file have, such as ``/robot1``; raises `WrongUseError`."""
+    return sorted({f"/{above}" for above, _ in _sections_of(file) if above})
+
+
+def _sections_of(file: Path) -> Sections:
+    """Return the sections of the node by namespace and name of the node."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    expected = f"expected {NODE}: ros__parameters: name: value"
+    try:
+        with file.open(encoding="utf-8") as stream:
+            text = stream.read(MAX_PARAMETERS + 1)
+        if len(text) > MAX_PARAMETERS or "<<" in text:
+            raise WrongUseError(f"{file}: {expected}, in at most {MAX_PARAMETERS} characters without merge keys")
+        document = YAML(typ="safe").load(text)
+    except OSError as error:
+        raise WrongUseError(f"{file}: {error.strerror}") from None
+    except (YAMLError, ValueError, RecursionError):
+        raise WrongUseError(f"{file}: not YAML; {expected}") from None
+    if not isinstance(document, dict):
+        raise WrongUseError(f"{file}: {expected}")
+    sections: Sections = {}
+    for name, inner in document.items():
+        above, _, node = str(name).strip("/").rpartition("/")
+        parameters = inner.get("ros__parameters") if isinstance(inner, dict) else None
+        if node in (NODE, ANY) and isinstance(parameters, dict):
+            sections[above, node] = {str(key): value for key, value in parameters.items()}
+    if not sections:
+        raise WrongUseError(f"{file}: {expected}")
+    return sections
