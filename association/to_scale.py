@@ -199,15 +199,21 @@ def is_far_off(similarity: Similarity) -> bool:
 def _alternatives_at_other_scales(first: ScaledSearch, found: ScaledSearch) -> list[ConsensusSet]:
     """Return the consensus sets that explain the scan at other scales, each at the one that fits it best.
 
-    Of two rooms that differ by a factor the one fits with a map too large, the other with one too small.
+    Of two rooms that differ by a factor the one fits with a map too large, the other with one too small. Poses are
+    searched that score a fraction of what the answer does; a search that starts from nothing takes up to ten times as
+    long, because at a wrong scale nothing scores high.
     """
     alternatives: list[ConsensusSet] = []
+    answer = found.explanations.answer
+    assert answer is not None  # it has a factor
+    known = answer.best.by_segments + answer.best.posterior - answer.best.score
     for scale in ALTERNATIVE_SCALES:
         context = first.context if scale == 1.0 else at_scale(first.context, scale)
         if len(context.lines.rows) == len(found.context.lines.rows):
             ranked = first.explanations.ranked
             if scale != 1.0:
-                ranked = tuple(rank_candidates(context, find_candidates(context)))
+                effort = replace(Effort.of(context), known=known)
+                ranked = tuple(rank_candidates(context, find_candidates(context, effort)))
             near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
             alternatives += [_at_best_scale(first, context, scale, one) for one in near[:LOOSE_ALTERNATIVES]]
     return alternatives
