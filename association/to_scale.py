@@ -152,7 +152,7 @@ def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> S
         if not abs(factor - 1.0) <= MOST_FACTOR:
             break
         again = at_scale(first.context, factor)
-        explanations = search_and_explain(again)
+        explanations = search_and_explain(again, _effort_beyond(again, found))
         stretched = ScaledSearch(again, explanations, first.explanations, Factor(factor, similarity.deviation))
         fitted = _similarity(stretched)
         # A factor that no more walls fix than it takes lets the sides of a room fit those of any other.
@@ -160,6 +160,18 @@ def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> S
             break
         found, similarity = stretched, fitted
     return found
+
+
+def _effort_beyond(context: SearchContext, found: ScaledSearch) -> Effort:
+    """Return the effort of a search at another scale: for poses that score a fraction of what the answer does.
+
+    At a wrong scale nothing scores high: a search that starts from nothing would go on until no base is left, which
+    takes up to ten times as long.
+    """
+    answer = found.explanations.answer
+    assert answer is not None  # whose factor is tried
+    known = answer.best.by_segments + answer.best.posterior - answer.best.score
+    return replace(Effort.of(context), known=known)
 
 
 def at_scale(context: SearchContext, factor: float, options: AssociationOptions | None = None) -> SearchContext:
@@ -199,21 +211,16 @@ def is_far_off(similarity: Similarity) -> bool:
 def _alternatives_at_other_scales(first: ScaledSearch, found: ScaledSearch) -> list[ConsensusSet]:
     """Return the consensus sets that explain the scan at other scales, each at the one that fits it best.
 
-    Of two rooms that differ by a factor the one fits with a map too large, the other with one too small. Poses are
-    searched that score a fraction of what the answer does; a search that starts from nothing takes up to ten times as
-    long, because at a wrong scale nothing scores high.
+    Of two rooms that differ by a factor the one fits with a map too large, the other with one too small. See
+    `_effort_beyond`.
     """
     alternatives: list[ConsensusSet] = []
-    answer = found.explanations.answer
-    assert answer is not None  # it has a factor
-    known = answer.best.by_segments + answer.best.posterior - answer.best.score
     for scale in ALTERNATIVE_SCALES:
         context = first.context if scale == 1.0 else at_scale(first.context, scale)
         if len(context.lines.rows) == len(found.context.lines.rows):
             ranked = first.explanations.ranked
             if scale != 1.0:
-                effort = replace(Effort.of(context), known=known)
-                ranked = tuple(rank_candidates(context, find_candidates(context, effort)))
+                ranked = tuple(rank_candidates(context, find_candidates(context, _effort_beyond(context, found))))
             near = [one for one in ranked if one.score >= LEAST_AS_SENT * found.score]
             alternatives += [_at_best_scale(first, context, scale, one) for one in near[:LOOSE_ALTERNATIVES]]
     return alternatives
