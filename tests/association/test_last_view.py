@@ -105,7 +105,9 @@ def test_a_drive_that_speaks_against_the_pose_is_not_answered() -> None:
     """However sure the last view is: in a building like this one the views before it show that it is another."""
     context, verdict = judged(drive())
     for cautious, answered in ((AGREED_CAUTIOUS, True), (AGREED_CAUTIOUS - 1e-9, False)):
-        assert (search_last_view(context, replace(verdict, cautious=cautious)).result is not None) is answered
+        assert verdict.probabilities is not None
+        found = replace(verdict.probabilities, by_model=cautious, among_as_scored=1.0, among_with_loose_walls=None)
+        assert (search_last_view(context, replace(verdict, probabilities=found)).result is not None) is answered
 
 
 def test_what_is_not_usable_alone_is_not_usable_as_a_drive() -> None:

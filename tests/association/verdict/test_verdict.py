@@ -16,7 +16,7 @@ from association import AssociationOptions, Deadline, HardPrior, Reason, Status,
 from association.consensus.consensus_set import ConsensusSet
 from association.context import SearchContext
 from association.search import candidates
-from association.verdict import alternatives, chance, probabilities, reasons, tuning, verdict
+from association.verdict import alternatives, chance, probabilities, tuning, verdict, vetoes
 from association.verdict.verdict import Verdict, judge
 
 from ..answers import answer_with, estimated_of, explanations_of, ranked, registered_corridor, registered_room, room
@@ -225,16 +225,16 @@ def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, mo
     with judged_by(SURE):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.OK if usable else Status.AMBIGUOUS, usable)
-    assert usable or got.reasons[0] == Reason("not_on_map", reasons.MIRRORED)
+    assert usable or got.reasons[0] == Reason("not_on_map", vetoes.MIRRORED)
 
 
 def test_nothing_found() -> None:
     """Outside of the window there may be something."""
     nothing = judge(room(), explanations_of(None))
-    assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, False, (), True)
+    assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, ())
     assert [reason.code for reason in nothing.reasons] == ["not_on_map"]
     outside = judge(room(), explanations_of(None, ranked(inside=False)))
-    assert replace(outside, reasons=()) == replace(nothing, reasons=(), contradicted=True)
+    assert replace(outside, reasons=()) == replace(nothing, reasons=(), vetoes=(vetoes.BETTER_ELSEWHERE,))
     assert [reason.code for reason in outside.reasons] == ["prior_contradicted", "not_on_map"]
 
 
