@@ -20,7 +20,7 @@ from .context import SearchContext
 from .report import report
 from .result import AssociationResult, AssociationWarning
 from .scan.scan import Indices, Scan, Views
-from .to_scale import search_to_scale
+from .to_scale import ScaledSearch, search_to_scale
 from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
 from .verdict.verdict import Verdict, judge
 from .warnings import warnings_of_scan
@@ -42,10 +42,16 @@ class LastView:
         The answer for the drive, usable, with the indices of the drive's segments; None where there is none.
     complete : bool
         False where the deadline ended the search of it.
+    found : ScaledSearch or None
+        Its search; None where there was none.
+    verdict : Verdict or None
+        On that, whether or not it stands for the drive.
     """
 
     result: AssociationResult | None
     complete: bool = True
+    found: ScaledSearch | None = None
+    verdict: Verdict | None = None
 
 
 NO_LAST_VIEW = LastView(None)
@@ -86,11 +92,11 @@ def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     found = search_to_scale(alone)
     judged = judge(found.context, found.explanations, off_scale=found.off_scale)
     if not judged.usable or not _agree(judged.pose, verdict.pose):
-        return LastView(None, complete=judged.complete)
+        return LastView(None, judged.complete, found, judged)
     result = report(found.context, found.explanations, judged, found.factor)
     if not result.usable:
         return LastView(None, complete=False)
-    return LastView(_of_the_drive(context, result, own))
+    return LastView(_of_the_drive(context, result, own), True, found, judged)
 
 
 def last_view(scan: Scan) -> tuple[Scan, Indices]:
