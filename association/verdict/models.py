@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,12 +152,13 @@ def as_document(model: Model) -> dict[str, list[float]]:
     return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 
 
-def _read() -> tuple[dict[str, Model], dict[str, str], Features]:
+def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
     document = json.loads(files(__package__).joinpath(FILE).read_bytes())
     models = {name: as_model(curves) for name, curves in document["models"].items()}
-    return models, document["fitted_on"], Features(**document["usual"])
+    return models, document["manifest"], Features(**document["usual"])
 
 
 # "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are
-# included; each also "_with_beams". The data that each was fitted on, and the medians of the features of right answers.
-MODELS, FITTED_ON, USUAL = _read()
+# included; each also "_with_beams". Where they come from (`benchmarks.manifest`), and the medians of the features of right
+# answers.
+MODELS, MANIFEST, USUAL = _read()

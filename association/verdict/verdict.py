@@ -107,7 +107,7 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     if answer is None:
         return _no_match(explanations)
     description = describe_answer(context, explanations, answer)
-    findings = _findings(explanations, description, off_scale=off_scale)
+    findings = findings_of(explanations, description, off_scale=off_scale)
     found = work_out_probabilities(context, description, applied(findings))
     pose = choose_along_direction(context, answer)
     vetoes = applied(_all_findings(context, findings, found, pose))
@@ -143,7 +143,7 @@ def _best(explanations: Explanations) -> float:
     return max((other.score for other in explanations.others), default=-math.inf)
 
 
-def _findings(explanations: Explanations, description: Description, *, off_scale: bool) -> Findings:
+def findings_of(explanations: Explanations, description: Description, *, off_scale: bool) -> Findings:
     """Return what the vetoes need, as far as it is known before the probabilities."""
     answer = description.answer
     return Findings(
