@@ -82,7 +82,7 @@ class WeighedAlternative:
     gap : float
         Its evidence less that of the answer, nats.
     counted : float
-        How far it counts by its score over the answer's, 0 to 1.
+        Its weight by the ratio of its score to the answer's, 0 to 1.
     weight : float
         Relative to the answer, whose weight is 1.
     """
@@ -127,7 +127,7 @@ class VetoOutcome:
 
 @dataclass(frozen=True, slots=True)
 class VerdictExplanation:
-    """How the verdict on an answer came about.
+    """The numbers behind the verdict on an answer.
 
     The answer is usable if ``probability_of_pose`` and ``cautious`` reach their thresholds and no veto applies. Both
     are the probability by a model times that among the alternatives.

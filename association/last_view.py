@@ -21,7 +21,7 @@ from .report import report
 from .result import AssociationResult, AssociationWarning
 from .scan.scan import Indices, Scan, Views
 from .to_scale import ScaledSearch, search_to_scale
-from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
+from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, DISTINCT_DISTANCE
 from .verdict.verdict import Verdict, judge
 from .warnings import warnings_of_scan
 
@@ -60,7 +60,7 @@ NO_LAST_VIEW = LastView(None)
 def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     """Search the last view of a drive that is not usable alone, and return its answer where it may stand for the drive.
 
-    The answer is used if it is usable, and the drive's best pose agrees within `AGREED_DISTANCE` and `AGREED_ANGLE`.
+    The answer is used if it is usable, and the drive's best pose agrees within `DISTINCT_DISTANCE` and `AGREED_ANGLE`.
     The cautious probability of the drive must also be at least `AGREED_CAUTIOUS`. The last view consists of all views
     whose pose in the scan's frame is exact.
 
@@ -154,7 +154,7 @@ def _agree(one: RigidTransform | None, other: RigidTransform | None) -> bool:
     if one is None or other is None:
         return False
     away = math.hypot(one.x - other.x, one.y - other.y)
-    return away <= AGREED_DISTANCE and abs(wrap_angle(one.theta - other.theta)) <= AGREED_ANGLE
+    return away <= DISTINCT_DISTANCE and abs(wrap_angle(one.theta - other.theta)) <= AGREED_ANGLE
 
 
 def _of_the_drive(context: SearchContext, result: AssociationResult, own: Indices) -> AssociationResult:

@@ -27,7 +27,7 @@ import numpy as np
 
 from association.verdict.features import Features
 from association.verdict.models import MODELS, USUAL, Model, as_document
-from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS, USABLE_CAUTIOUS_WITH_BEAMS
+from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
 
 from .curves import Fitted, Task, fit, log_loss
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
@@ -174,8 +174,7 @@ def print_answered(
     form: str, title: str, found: Sequence[np.ndarray], examples: Sequence[Example], model: Model
 ) -> dict[str, float]:
     """Print how often the probability that is answered is right, and what each veto alone rejects; return metrics."""
-    bar = USABLE_CAUTIOUS_WITH_BEAMS if form == RANGES else USABLE_CAUTIOUS
-    verdicts = answered(examples, found[0], found[-1], bar, model)
+    verdicts = answered(examples, found[0], found[-1], USABLE_CAUTIOUS, model)
     stated = np.array([not e.stranger for e in examples]) & ~np.isnan(verdicts.probability)
     right = np.array([e.right for e in examples])
     probability = verdicts.probability[stated]

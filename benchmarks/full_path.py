@@ -25,7 +25,7 @@ class Answered:
     probability : float64
         As answered; nan where nothing matches, or along an unobservable direction: there is none.
     passes : bool
-        Whether both probabilities reach their thresholds.
+        True if both probabilities reach their thresholds.
     usable : bool
         The same, and that no veto applies.
     """

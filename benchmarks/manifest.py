@@ -1,7 +1,7 @@
 """The manifest of the verdict's models: from which code, data and command they come; it stands in `models.json`.
 
 A digest covers the code that defines the features and the score, without comments and docstrings. When that code
-changes, either the models are fitted again, which writes a new manifest, or somebody states why they still hold:
+changes, fit the models again, which writes a new manifest, or state why they still hold:
 
 ``python -m benchmarks.manifest --accept "REASON"``
 """

@@ -35,9 +35,10 @@ from .table import Row, print_table
 ROOT = Path(association.__file__).parents[1]
 MOVED = (0.8, 1.2)
 ANSWERS = 120
-SLOWEST = 0.03  # s; scans that take longer are left out of the sample
+SLOWEST = 0.2  # s; scans that take longer are left out of the sample
 SAME_POSE = 1e-6  # m, rad; poses that differ by less are equal
 STRIDES = {SEGMENTS: 16, RANGES: 16}
+STEP = 3  # one case in three of the four kinds in turn: some of each kind
 
 Number = int | float
 Value = Number | tuple[Number, ...]
@@ -50,7 +51,7 @@ class Threshold:
     Attributes
     ----------
     module : str
-        Where it stands.
+        Name of the `tuning` module.
     name : str
     value : number or tuple of numbers
     compiled : bool
@@ -121,8 +122,13 @@ class Sampled:
     prior: Prior | None
     number: int
 
+    @property
+    def with_beams(self) -> bool:
+        """Return whether the scan comes with its ranges."""
+        return self.case.scan.beams is not None
+
     def answer(self, *, index_again: bool = False) -> Told:
-        """Search the scan; where it is asked for, index the map again before."""
+        """Search the scan; with `index_again`, index the map before."""
         index = self.case.index
         if index_again:
             index = MapIndex.build(index.segments, index.sigma, oriented=len(index.segments) == index.directed)
@@ -144,13 +150,16 @@ def _moved(value: Number, factor: float) -> Number:
 
 
 def thresholds() -> list[Threshold]:
-    """Return all numbers of the ``tuning.py`` of `association`, in the order of the files."""
+    """Return all numbers of the ``tuning.py`` of `association` but derived ones, in the order of the files."""
     found = []
     for path in sorted((ROOT / "association").rglob("tuning.py")):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         module = sys.modules.get(name) or __import__(name, fromlist=["*"])
+        derived = _derived(path)
         for constant in _assigned(path):
             value = getattr(module, constant)
+            if constant in derived:
+                continue
             if _is_number(value) or (isinstance(value, tuple) and all(map(_is_number, value))):
                 found.append(Threshold(name, constant, value, _is_compiled(constant)))
     return found
@@ -166,6 +175,17 @@ def _assigned(path: Path) -> Iterator[str]:
         if isinstance(statement, ast.Assign):
             for target in statement.targets:
                 yield from (node.id for node in ast.walk(target) if isinstance(node, ast.Name))
+
+
+def _derived(path: Path) -> dict[str, ast.expr]:
+    """Return the constants that are computed from one other alone, such as a cosine of an angle."""
+    found = {}
+    for statement in ast.parse(path.read_text()).body:
+        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+            names = [node.id for node in ast.walk(statement.value) if isinstance(node, ast.Name)]
+            if any(name.isupper() for name in names) and not isinstance(statement.value, ast.Tuple):
+                found[statement.targets[0].id] = statement.value
+    return found
 
 
 def _is_compiled(name: str) -> bool:
@@ -191,40 +211,58 @@ class moved:  # noqa: N801
     """Let all modules see another value of a threshold, for as long as the block lasts."""
 
     def __init__(self, threshold: Threshold, value: Value) -> None:
-        self._places = (*readers(threshold.name), sys.modules[threshold.module])
-        self._name, self._value, self._before = threshold.name, value, threshold.value
+        self._tuning, self._name = sys.modules[threshold.module], threshold.name
+        self._value, self._before = value, getattr(self._tuning, threshold.name)
 
     def __enter__(self) -> None:
-        for module in self._places:
-            setattr(module, self._name, self._value)
+        self._set(self._value)
 
     def __exit__(self, *_: object) -> None:
-        for module in self._places:
-            setattr(module, self._name, self._before)
+        self._set(self._before)
+
+    def _set(self, value: Value) -> None:
+        """Set the threshold and what is derived from it, and forget what functions have cached."""
+        values: dict[str, Any] = {self._name: value}
+        setattr(self._tuning, self._name, value)
+        for name, expression in _derived(Path(str(self._tuning.__file__))).items():
+            if self._name in {node.id for node in ast.walk(expression) if isinstance(node, ast.Name)}:
+                values[name] = eval(ast.unparse(expression), vars(self._tuning))  # of our own module
+                setattr(self._tuning, name, values[name])
+        for name, one in values.items():
+            for module in readers(name):
+                setattr(module, name, one)
+        for key, module in list(sys.modules.items()):
+            if key.startswith("association."):
+                for member in list(vars(module).values()):
+                    if hasattr(member, "cache_clear"):
+                        member.cache_clear()
 
 
 def sample(count: int) -> list[Sampled]:
-    """Return scans of plans, logs and drawn worlds, as segments and as ranges, a third of them with a prior.
+    """Return scans of plans, logs and drawn worlds, half of them as segments and half as ranges, some with a prior.
 
     Scans that take longer than `SLOWEST` are left out, so that all thresholds can be moved.
     """
-    found: list[Sampled] = []
-    for one in _drawn():
-        one.answer()
-        if timed([one])[1] <= SLOWEST:
-            found.append(one)
-        if len(found) == count:
+    found: dict[bool, list[Sampled]] = {False: [], True: []}
+    for one in draw():
+        same = found[one.with_beams]
+        if len(same) < (count + 1) // 2:
+            one.answer()
+            if timed([one])[1] <= SLOWEST:
+                same.append(one)
+        if len(found[False]) + len(found[True]) >= count:
             break
-    return found
+    return sorted((*found[False], *found[True]), key=lambda one: one.number)
 
 
 def sample_of(numbers: Sequence[int]) -> list[Sampled]:
     """Return the scans with some numbers, in ascending order: the same in any process."""
     wanted = set(numbers)
-    return [one for one in islice(_drawn(), max(wanted) + 1) if one.number in wanted]
+    return [one for one in islice(draw(), max(wanted) + 1) if one.number in wanted]
 
 
-def _drawn() -> Iterator[Sampled]:
+def draw() -> Iterator[Sampled]:
+    """Yield scans of all kinds in turn."""
     kinds: list[Iterator[Case]] = [
         segment_cases(STRIDES[SEGMENTS]),
         range_cases(STRIDES[RANGES]),
@@ -232,7 +270,7 @@ def _drawn() -> Iterator[Sampled]:
         world_cases(RANGES, 128, kept_for_report=True),
     ]
     mixed = (case for some in zip_longest(*kinds) for case in some if case is not None)
-    for number, case in enumerate(islice(mixed, 0, None, 2)):
+    for number, case in enumerate(islice(mixed, 0, None, STEP)):
         yield Sampled(case, _prior(case, number), number)
 
 
@@ -332,7 +370,9 @@ def run(count: int, chosen: Sequence[Threshold]) -> None:
     some, every = sample(count), thresholds()
     found = list(effects(some, chosen))
     read = sum(not one.compiled for one in every)
-    print(f"\n{len(every)} thresholds, {read} read by Python only; {len(some)} answers, each in at most {SLOWEST:g} s")
+    with_beams = sum(one.with_beams for one in some)
+    print(f"\n{len(every)} thresholds, {read} read by Python only; {len(some)} answers, {with_beams} with ranges")
+    print("Drives, causes and other units are not in the sample: their thresholds change nothing here.")
     print_effects("Thresholds moved by 20 %: answers that change", found)
     still = [one.name for one, both in found if not any(effect.changed or effect.failed for effect in both)]
     print(f"\n{len(still)} of {len(found)} change nothing: {', '.join(still)}")

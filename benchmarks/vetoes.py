@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from association.verdict.models import MODELS
-from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS, USABLE_CAUTIOUS_WITH_BEAMS
+from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
 
 from .calibration import TASKS
 from .curves import Fitted
@@ -21,15 +21,13 @@ from .full_path import Answered, answered, veto_rows
 from .reliability import print_bins
 from .table import print_table
 
-BARS = {RANGES: USABLE_CAUTIOUS_WITH_BEAMS, SEGMENTS: USABLE_CAUTIOUS}
-
 
 def verdicts(form: str, examples: Sequence[Example]) -> Answered:
     """Return the verdicts on answers by the present models, as the product gives them."""
     likely, careful = (
         Fitted(MODELS[task.name], ALTERNATIVE_TEMPERATURE).probabilities(examples) for task in TASKS[form]
     )
-    return answered(examples, likely, careful, BARS[form], MODELS[TASKS[form][-1].name])
+    return answered(examples, likely, careful, USABLE_CAUTIOUS, MODELS[TASKS[form][-1].name])
 
 
 def print_verdicts(form: str, examples: Sequence[Example]) -> None:

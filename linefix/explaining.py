@@ -1,4 +1,4 @@
-"""How a verdict came about: for programs, and as the JSON document of ``linefix explain --json``."""
+"""Explain a verdict: for programs, and as the JSON document of ``linefix explain --json``."""
 
 from __future__ import annotations
 

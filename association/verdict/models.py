@@ -159,6 +159,6 @@ def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
 
 
 # "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are
-# included; each also "_with_beams". Where they come from (`benchmarks.manifest`), and the medians of the features of right
+# included; each also "_with_beams". Their manifest, see `benchmarks.manifest`, and the medians of the features of right
 # answers.
 MODELS, MANIFEST, USUAL = _read()

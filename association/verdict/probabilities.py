@@ -17,7 +17,6 @@ from .models import MODELS, USUAL, Model
 from .tuning import (
     USABLE_CAUTIOUS,
     USABLE_CAUTIOUS_DRIVE,
-    USABLE_CAUTIOUS_WITH_BEAMS,
     USABLE_PROBABILITY,
 )
 from .vetoes import Veto
@@ -167,4 +166,4 @@ def least_cautious(context: SearchContext) -> float:
     """Return the least cautious probability of a usable answer."""
     if context.scan.views is not None and context.scan.views.uncertain:
         return USABLE_CAUTIOUS_DRIVE
-    return USABLE_CAUTIOUS_WITH_BEAMS if context.with_beams else USABLE_CAUTIOUS
+    return USABLE_CAUTIOUS

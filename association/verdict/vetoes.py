@@ -1,7 +1,7 @@
 """The vetoes: what speaks against an answer whatever its probability, in one ordered table.
 
-A veto follows from the contract, or from failures that the features do not show (measured). ``docs/explanation/
-verdict.md`` has the number of right and wrong answers that each rejects.
+A veto follows from the contract, or from failures that the features do not show (measured). ``docs/dev/benchmarks.md``
+has the number of right and wrong answers that each rejects.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Findings:
 
 
 class Origin(StrEnum):
-    """Where a veto comes from: the contract of the API, or failures on recorded and drawn data."""
+    """The origin of a veto: the contract of the API, or failures on recorded and drawn data."""
 
     CONTRACT = "contract"
     MEASURED = "measured"

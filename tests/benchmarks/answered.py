@@ -15,6 +15,6 @@ def example(*, right: bool = False, stranger: bool = False, told: bool = False, 
     group = DRAWN_STRANGERS if stranger else DRAWN
     gaps = counted = np.zeros(0)
     return Example(
-        SEGMENTS, group, "clean", "world", more.pop("features", USUAL), gaps, counted, right,
+        SEGMENTS, group, "clean", more.pop("fold", "world"), more.pop("features", USUAL), gaps, counted, right,
         more.pop("degenerate", False), told=told, **more,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The manifest of the verdict's models belongs to the code, and says what is not known."""
+"""The manifest of the verdict's models belongs to the code, and marks unknown entries."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_the_features_are_those_of_the_code_in_order() -> None:
 
 
 def test_the_models_are_fitted_to_the_present_code() -> None:
-    """Or somebody stated why they still hold: python -m benchmarks.manifest --accept REASON."""
+    """Or a reason why they still hold is on record: python -m benchmarks.manifest --accept REASON."""
     assert MANIFEST["code"]["digest"] == digest(), "fit the models again, or accept them: see CONTRIBUTING"
     accepted = MANIFEST["code"]["accepted"]
     assert digest() in {MANIFEST["code"]["at_fit"], *(one["digest"] for one in accepted)}

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import association
-from association import MapIndex, Scan
+from association import AssociationOptions, MapIndex, Scan
+from association.scan import tuning as scan_tuning
+from association.scan.scan_lines import gates
 from association.verdict import probabilities, tuning
+from benchmarks import sensitivity
 from benchmarks.compiled_thresholds import dependent_kernels
 from benchmarks.examples import Case
 from benchmarks.sensitivity import (
@@ -28,7 +33,7 @@ from registration import MeasuredSegments, RigidTransform, Segments
 
 ROOM = np.array([[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]], float)
 HERE = RigidTransform(1.0, 1.0, 0.5)
-MOST = 292  # thresholds; fewer from time to time, and never more
+MOST = 285  # thresholds; fewer from time to time, and never more
 
 
 def named(name: str) -> Threshold:
@@ -72,6 +77,27 @@ def test_every_reader_sees_the_moved_value_and_the_former_one_afterwards() -> No
     assert {vars(module)[one.name] for module in (*readers(one.name), tuning)} == {before}
 
 
+def test_the_sample_has_scans_with_and_without_ranges() -> None:
+    drawn = list(islice(sensitivity.draw(), 12))
+    assert {one.with_beams for one in drawn} == {False, True}
+    assert [one.number for one in drawn] == list(range(12))
+    assert any(one.prior is not None for one in drawn)
+    again = sensitivity.sample_of([3, 7])
+    assert [one.number for one in again] == [3, 7]
+    assert again[0].case.group == drawn[3].case.group
+
+
+def test_what_is_cached_or_derived_moves_too() -> None:
+    before = gates(AssociationOptions())
+    with moved(named("LEAST_OFFSET_GATE"), 1.0):
+        assert gates(AssociationOptions()) != before
+    assert gates(AssociationOptions()) == before
+    with moved(named("LINE_ANGLE"), 0.5):
+        assert math.cos(0.5) == scan_tuning.LINE_COSINE
+    assert math.cos(scan_tuning.LINE_ANGLE) == scan_tuning.LINE_COSINE
+    assert "LINE_COSINE" not in {one.name for one in thresholds()}, "it is no threshold of its own"
+
+
 def test_a_threshold_that_decides_changes_answers_and_one_for_work_does_not() -> None:
     some = [in_room()]
     assert some[0].answer().usable
@@ -89,6 +115,7 @@ def test_a_value_that_is_not_possible_is_reported() -> None:
         [in_room()], [Threshold("association.verdict.tuning", "USABLE_PROBABILITY", (0.9, 0.9), False)]
     )
     assert all(one.failed.startswith("TypeError") for one in both)
+    assert in_room().answer().usable, "the former value is back"
 
 
 def test_changes_are_counted() -> None:

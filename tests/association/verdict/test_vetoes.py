@@ -69,7 +69,7 @@ def test_vetoes_apply_in_the_order_of_the_table() -> None:
 
 
 def test_with_another_status_the_status_is_the_reason() -> None:
-    """What the contract says holds with each of them; along an open direction no wall decides."""
+    """Vetoes of the contract count with each of them; along an open direction no wall decides."""
     every = {"better_elsewhere", "far_from_prior", "search_incomplete"}
     for status, more in (
         (Status.NO_MATCH, set[str]()),
