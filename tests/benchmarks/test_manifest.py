@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from association.verdict.features import FEATURES, Features
-from association.verdict.kernels.features import describe
 from association.verdict.models import MANIFEST, MODELS, USUAL, as_document
 from benchmarks import manifest
 from benchmarks.calibration import RANGES, SEGMENTS, TASKS, write
@@ -25,7 +24,6 @@ TASK_OF = {task.name: task for tasks in TASKS.values() for task in tasks}
 def test_the_features_are_those_of_the_code_in_order() -> None:
     assert MANIFEST["format"] == FORMAT
     assert tuple(MANIFEST["code"]["features"]) == Features._fields == FEATURES.names
-    assert describe.py_func.__name__ == "describe"
 
 
 def test_the_models_are_fitted_to_the_present_code() -> None:
