@@ -3,6 +3,16 @@
 from registration import Beams
 
 from .associating import associate
+from .auditing import (
+    AnswerExplanation,
+    Contribution,
+    ExplainedModel,
+    ExplainedNull,
+    VerdictExplanation,
+    VetoOutcome,
+    WeighedAlternative,
+    explain_verdict,
+)
 from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
 from .index.map_index import MapIndex
@@ -29,6 +39,7 @@ __all__ = [
     "MAX_VIEWS",
     "PARTS",
     "Alternative",
+    "AnswerExplanation",
     "AssociationDiagnostics",
     "AssociationError",
     "AssociationOptions",
@@ -36,9 +47,12 @@ __all__ = [
     "AssociationWarning",
     "Beams",
     "CancelledError",
+    "Contribution",
     "Correspondence",
     "CriticalWall",
     "Deadline",
+    "ExplainedModel",
+    "ExplainedNull",
     "HardPrior",
     "IndexingEndedError",
     "InvalidMapError",
@@ -51,11 +65,15 @@ __all__ = [
     "SearchReport",
     "SoftPrior",
     "Status",
+    "VerdictExplanation",
+    "VetoOutcome",
     "View",
     "Views",
     "WarningCode",
+    "WeighedAlternative",
     "assemble",
     "associate",
+    "explain_verdict",
     "message_of",
     "mirrored",
 ]

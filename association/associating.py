@@ -4,21 +4,45 @@ from __future__ import annotations
 
 import time
 
+from registration.values import value
+
 from .causes import find_causes
 from .context import SearchContext
 from .deadline import Deadline
 from .explain import explain
 from .index.map_index import MapIndex
-from .last_view import search_last_view
+from .last_view import LastView, search_last_view
 from .options import AssociationOptions, Prior
 from .report import report, with_causes
 from .result import AssociationResult
 from .scan.scan import Scan
 from .search.candidates import find_candidates
-from .to_scale import put_to_scale
-from .verdict.verdict import judge
+from .to_scale import ScaledSearch, put_to_scale
+from .verdict.verdict import Verdict, judge
 
 DEFAULT_OPTIONS = AssociationOptions()
+
+
+@value(frozen=True, slots=True)
+class Stages:
+    """The stages of an answer.
+
+    Attributes
+    ----------
+    found : ScaledSearch
+        The search, and its explanations.
+    verdict : Verdict
+        On them.
+    last : LastView
+        Of a drive that is not usable: its last view alone.
+    result : AssociationResult
+        The answer.
+    """
+
+    found: ScaledSearch
+    verdict: Verdict
+    last: LastView
+    result: AssociationResult
 
 
 def associate(
@@ -57,6 +81,17 @@ def associate(
     CancelledError
         When the deadline was cancelled.
     """
+    return run_stages(index, scan, prior, options, deadline).result
+
+
+def run_stages(
+    index: MapIndex,
+    scan: Scan,
+    prior: Prior | None = None,
+    options: AssociationOptions = DEFAULT_OPTIONS,
+    deadline: Deadline | None = None,
+) -> Stages:
+    """Find the same; return it with the stages that it comes from."""
     began = time.monotonic()
     context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
     candidates = find_candidates(context)
@@ -65,7 +100,8 @@ def associate(
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     last = search_last_view(found.context, verdict)
     if last.result is not None:
-        return last.result
+        return Stages(found, verdict, last, last.result)
     verdict = verdict if last.complete else verdict.cut_short()
     result = report(found.context, found.explanations, verdict, found.factor)
-    return with_causes(result, find_causes(context, found.explanations, verdict, began))
+    result = with_causes(result, find_causes(context, found.explanations, verdict, began))
+    return Stages(found, verdict, last, result)

@@ -20,9 +20,9 @@ from .to_scale import at_scale, estimate_factor
 from .tuning import (
     CAUSE_CONFIDENCE,
     CAUSE_GAP,
-    CAUSE_KEPT,
     CAUSE_RATIO,
     CAUSE_SHARE,
+    FEW_KEPT,
     LEAST_TIME_FOR_CAUSES,
     RIVAL_SHARE,
     TIMES_FOR_CAUSES,
@@ -153,7 +153,7 @@ def _with_smaller_map(context: SearchContext, factor: float) -> SearchContext:
 def _tried(changed: SearchContext, mistake: Mistake, factor: float, known: float) -> Cause | None:
     """Search without a mistake; None where that fits no better."""
     options = changed.options
-    effort = Effort(CAUSE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options), known)
+    effort = Effort(FEW_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options), known)
     explanations = search_and_explain(changed, effort)
     if explanations.answer is None or explanations.answer.best.score <= known:
         return None

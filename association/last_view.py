@@ -20,8 +20,8 @@ from .context import SearchContext
 from .report import report
 from .result import AssociationResult, AssociationWarning
 from .scan.scan import Indices, Scan, Views
-from .to_scale import search_to_scale
-from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
+from .to_scale import ScaledSearch, search_to_scale
+from .tuning import AGREED_ANGLE, AGREED_CAUTIOUS, DISTINCT_DISTANCE
 from .verdict.verdict import Verdict, judge
 from .warnings import warnings_of_scan
 
@@ -42,10 +42,16 @@ class LastView:
         The answer for the drive, usable, with the indices of the drive's segments; None where there is none.
     complete : bool
         False where the deadline ended the search of it.
+    found : ScaledSearch or None
+        Its search; None where there was none.
+    verdict : Verdict or None
+        On that, whether or not it stands for the drive.
     """
 
     result: AssociationResult | None
     complete: bool = True
+    found: ScaledSearch | None = None
+    verdict: Verdict | None = None
 
 
 NO_LAST_VIEW = LastView(None)
@@ -54,7 +60,7 @@ NO_LAST_VIEW = LastView(None)
 def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     """Search the last view of a drive that is not usable alone, and return its answer where it may stand for the drive.
 
-    The answer is used if it is usable, and the drive's best pose agrees within `AGREED_DISTANCE` and `AGREED_ANGLE`.
+    The answer is used if it is usable, and the drive's best pose agrees within `DISTINCT_DISTANCE` and `AGREED_ANGLE`.
     The cautious probability of the drive must also be at least `AGREED_CAUTIOUS`. The last view consists of all views
     whose pose in the scan's frame is exact.
 
@@ -86,11 +92,11 @@ def search_last_view(context: SearchContext, verdict: Verdict) -> LastView:
     found = search_to_scale(alone)
     judged = judge(found.context, found.explanations, off_scale=found.off_scale)
     if not judged.usable or not _agree(judged.pose, verdict.pose):
-        return LastView(None, complete=judged.complete)
+        return LastView(None, judged.complete, found, judged)
     result = report(found.context, found.explanations, judged, found.factor)
     if not result.usable:
         return LastView(None, complete=False)
-    return LastView(_of_the_drive(context, result, own))
+    return LastView(_of_the_drive(context, result, own), True, found, judged)
 
 
 def last_view(scan: Scan) -> tuple[Scan, Indices]:
@@ -148,7 +154,7 @@ def _agree(one: RigidTransform | None, other: RigidTransform | None) -> bool:
     if one is None or other is None:
         return False
     away = math.hypot(one.x - other.x, one.y - other.y)
-    return away <= AGREED_DISTANCE and abs(wrap_angle(one.theta - other.theta)) <= AGREED_ANGLE
+    return away <= DISTINCT_DISTANCE and abs(wrap_angle(one.theta - other.theta)) <= AGREED_ANGLE
 
 
 def _of_the_drive(context: SearchContext, result: AssociationResult, own: Indices) -> AssociationResult:

@@ -36,12 +36,11 @@ from .tuning import (
     LEAST_AS_SENT,
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
-    LEAST_STRETCH,
     MOST_FACTOR,
     REACH,
+    RIVAL_SHARE,
     SCALE_KEPT,
     SCALE_LENGTH,
-    SCALE_SHARE,
 )
 from .verdict.tuning import LOOSE_ALTERNATIVES
 
@@ -266,14 +265,14 @@ def estimate_factor(context: SearchContext, rung: float = 1.0) -> float | None:
     options = replace(context.options, offset_tolerance=REACH)
     scan = scaled(context.scan, rung)
     lax = SearchContext.of(context.index, Scan(scan.measured, None, None), None, options, context.deadline)
-    effort = Effort(SCALE_KEPT, SCALE_SHARE, SCALE_SHARE, allowed_by(options))
+    effort = Effort(SCALE_KEPT, RIVAL_SHARE, RIVAL_SHARE, allowed_by(options))
     best: tuple[float, float] | None = None
     for one in rank_candidates(lax, find_candidates(lax, effort))[:SCALE_KEPT]:
         fitted = fit_trimmed_similarity(lax, one) if one.fraction >= SCALE_LENGTH else None
         if fitted is None:
             continue
         factor, left = fitted[0].factor, fitted[1]
-        if LEAST_STRETCH <= abs(factor - 1.0) <= GREATEST_STRETCH and (best is None or left < best[0]):
+        if LEAST_FACTOR <= abs(factor - 1.0) <= GREATEST_STRETCH and (best is None or left < best[0]):
             best = left, factor
     return None if best is None else best[1]
 

@@ -57,6 +57,7 @@ AT_ONCE = 256  # runs, cells and poses that go through a stage together; measure
 # --- Keeping: which poses are remembered ------------------------------------------------------------------------------
 
 RIVAL_SHARE = 0.75  # of the best value, tables; a pose above it must not have been missed, for the verdict weighs it
+FEW_KEPT = 24  # poses, tables; of a changed or mirrored scan, of which only the best matter
 DISTINCT_DISTANCE = 0.3  # m, tables
 DISTINCT_ANGLE = 0.1  # rad, tables
 SOFT_FLOOR = -20.0  # nats, tables; the most that a soft prior speaks against a pose
@@ -117,7 +118,6 @@ EXCEEDING = 1.1  # of the map's diagonal, measured; the scans of plans and logs 
 TIMES_FOR_CAUSES = 2.0  # of the answer's own time; the contract
 LEAST_TIME_FOR_CAUSES = 0.02  # s, measured; where nothing fits an answer takes no time, and twice that is none
 CAUSE_CONFIDENCE = 0.99  # tables
-CAUSE_KEPT = 24  # poses, tables
 # A changed scan that would not be usable either still fits much better with so much more score and inliers.
 # Measured: of 127 scans in their map that were not usable none did so.
 CAUSE_GAP = 30.0  # nats
@@ -130,16 +130,15 @@ GREATEST_EXTENT = 60.0  # m, tables; a larger scan is of another unit itself
 GREATEST_SAME_GATES = 5.0
 USUAL_PART = (0.25, 2.0)  # times, tables; usual length of scan lines, once of one unit, over that of walls
 MOST_FOR_UNITS = 2000  # map segments; indexing them again takes some 20 ms
-LEAST_STRETCH, GREATEST_STRETCH = 0.004, 0.12  # tables; how far a factor near one may be from it
+GREATEST_STRETCH = 0.12  # tables; how far a factor near one may be from it; `LEAST_FACTOR` at least
 SCALE_LENGTH = 0.5  # of the scan's length, tables; that has to match where the gates are wide
 SCALE_KEPT = 8  # poses, tables
-SCALE_SHARE = 0.75  # of the best value, tables
 
 # --- Verdict ----------------------------------------------------------------------------------------------------------
 
-# The answer of the last view alone stands for a drive if the best pose of the drive is this near. The cautious
-# probability of the drive must also be this high. Measured on 764 drives of 10 m in drawn buildings, as ranges and as
-# segments: of 47 right answers that only the last view makes usable one is below 0.5, of 14 in other buildings five.
-AGREED_DISTANCE = 0.3  # m
+# The answer of the last view alone stands for a drive if the best pose of the drive is as near as `DISTINCT_DISTANCE`
+# and turned by no more than this. The cautious probability of the drive must also be this high. Measured on 764 drives
+# of 10 m in drawn buildings, as ranges and as segments: of 47 right answers that only the last view makes usable one is
+# below 0.5, of 14 in other buildings five.
 AGREED_ANGLE = math.radians(3.4)
 AGREED_CAUTIOUS = 0.5

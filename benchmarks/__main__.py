@@ -26,6 +26,7 @@ from .ranges import ranges
 from .replicas import replicas
 from .request import request
 from .ros2 import ros2
+from .sensitivity import sensitivity
 from .starts import starts
 from .sums import sums
 from .table import Row, machine, print_rows
@@ -124,6 +125,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "batch": batch,
     "views": views,
     "replicas": replicas,
+    "sensitivity": sensitivity,
     "plan": plan,
     "ros2": ros2,
     "starts": starts,

@@ -8,26 +8,32 @@ fully for the cautious one, which an answer has to pass too before a robot goes 
 comes from a fit without its building, its log or its world; the coefficients come from all of these. The drawn worlds
 that ``python -m benchmarks worlds`` reports on are never fitted on.
 
-``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write]``
+The tables are about the number that is answered: alternatives are compared again with walls off by more where an answer
+would be usable, and vetoes apply. The fit itself takes the alternatives as they were scored.
+
+``python -m benchmarks.calibration [--stride 1] [--form segments] [--keep FOLDER] [--write [FILE]]``
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-import association
 from association.verdict.features import Features
-from association.verdict.models import FILE, FITTED_ON, MODELS, USUAL, Model, as_document
-from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS, USABLE_PROBABILITY
+from association.verdict.models import MODELS, USUAL, Model, as_document
+from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, USABLE_CAUTIOUS
 
-from .curves import Fitted, Task, fit, log_loss, tellable
+from .curves import Fitted, Task, fit, log_loss
 from .examples import DRAWN, DRAWN_STRANGERS, RANGES, SEGMENTS, STRANGERS, Example, cases, collected
-from .reliability import print_bins
+from .full_path import answered, veto_rows
+from .manifest import MODELS_FILE, data_of, manifest_of
+from .reliability import TELLING, bins, print_bins
 from .table import print_table
 
 TEMPERATURES = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)  # nats
@@ -104,7 +110,7 @@ def print_thresholds(title: str, p: np.ndarray, careful: np.ndarray, examples: S
     """
     cells, kept = [], []
     for threshold in THRESHOLDS:
-        usable = (p >= USABLE_PROBABILITY) & (careful >= threshold) & ~np.array([e.degenerate for e in examples])
+        usable = answered(examples, p, careful, threshold).usable
         row = [f"{threshold:g}"]
         for group in GROUPS:
             mine = [k for k, e in enumerate(examples) if e.group == group]
@@ -143,37 +149,58 @@ def print_changes(old: np.ndarray, new: np.ndarray, examples: Sequence[Example])
     print_table(f"Answers over {USABLE_CAUTIOUS:g}, next to the present model", ("", *GROUPS, DRAWN_STRANGERS), cells)
 
 
-def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dict[str, Model]:
-    """Print how present and new models do on one form of scans; return the new ones."""
+def report(form: str, tasks: Sequence[Task], examples: Sequence[Example]) -> dict[str, dict[str, float]]:
+    """Print how present and new models do on one form of scans; return by model the metrics of the new ones."""
     print(f"\n## Scans as {form}: {len(examples)} answers")
     cells: list[tuple[str, ...]] = []
     for temperature in TEMPERATURES:
         losses = [told_loss(cross_validated(examples, t, temperature), examples, t) for t in tasks]
         cells.append((f"{temperature:g}", *(f"{v:.4f}" for v in losses)))
     print_table("Temperature of similar places, cross-validated log-loss", ("nats", *(t.name for t in tasks)), cells)
-    own = np.array([not e.stranger for e in examples])
-    right = np.array([e.right for e in examples])
     tried = [cross_validated(examples, t, ALTERNATIVE_TEMPERATURE) for t in tasks]
     present = [Fitted(t.current, ALTERNATIVE_TEMPERATURE).probabilities(examples) for t in tasks]
-    for title, found in (("cross-validated", tried), ("present", present)):
-        told = (f"{t.name} {told_loss(p, examples, t):.4f}" for t, p in zip(tasks, found, strict=True))
+    metrics: dict[str, dict[str, float]] = {}
+    for title, found in (("present", present), ("cross-validated", tried)):
+        metrics = {t.name: {"log_loss": told_loss(p, examples, t)} for t, p in zip(tasks, found, strict=True)}
+        told = (f"{name} {some['log_loss']:.4f}" for name, some in metrics.items())
         print(f"\nLog-loss, {title}: {', '.join(told)}")
-        print_bins(f"Scans as {form} in their own map, {title}", found[0][own], right[own])
+        metrics[tasks[0].name] |= print_answered(form, title, found, examples, tasks[-1].current)
         print_thresholds(f"Usable share of scans as {form}, {title}", found[0], found[-1], examples)
     print_changes(present[-1], tried[-1], examples)
-    return {t.name: fit(examples, t, ALTERNATIVE_TEMPERATURE).model for t in tasks}
+    return metrics
 
 
-def write(models: dict[str, Model], fitted_on: dict[str, str], usual: Features) -> Path:
-    """Write the file that `association.verdict.models` reads; return where it is."""
-    path = Path(association.__file__).parent / "verdict" / FILE
+def print_answered(
+    form: str, title: str, found: Sequence[np.ndarray], examples: Sequence[Example], model: Model
+) -> dict[str, float]:
+    """Print how often the probability that is answered is right, and what each veto alone rejects; return metrics."""
+    verdicts = answered(examples, found[0], found[-1], USABLE_CAUTIOUS, model)
+    stated = np.array([not e.stranger for e in examples]) & ~np.isnan(verdicts.probability)
+    right = np.array([e.right for e in examples])
+    probability = verdicts.probability[stated]
+    print_bins(f"Scans as {form} in their own map, as answered, {title}", probability, right[stated])
+    print_table(
+        f"Rejected by one veto alone, scans as {form}, {title}",
+        ("veto", "right", "wrong", "out of map"),
+        veto_rows(examples, verdicts.passes),
+    )
+    off = [abs(p - observed) for count, p, observed in bins(probability, right[stated]) if count >= TELLING]
+    return {
+        "worst_bin_points": 100.0 * max(off, default=float("nan")),
+        "usable": float(verdicts.usable.sum()),
+        "usable_wrong_in_map": float((verdicts.usable & ~right)[[not e.stranger for e in examples]].sum()),
+        "usable_out_of_map": float(verdicts.usable[[e.stranger for e in examples]].sum()),
+    }
+
+
+def write(path: Path, models: dict[str, Model], manifest: dict[str, Any], usual: Features) -> None:
+    """Write the file that `association.verdict.models` reads."""
     document = {
-        "fitted_on": fitted_on,
+        "manifest": manifest,
         "usual": {name: float(f"{value:.4g}") for name, value in usual._asdict().items()},
         "models": {name: as_document(model) for name, model in models.items()},
     }
     path.write_text(json.dumps(document, indent=2) + "\n")
-    return path
 
 
 def usual_of(examples: Sequence[Example], before: Features, form: str) -> Features:
@@ -188,27 +215,33 @@ def main() -> None:
     parser.add_argument("--stride", type=int, default=1, help="take one in so many queries")
     parser.add_argument("--form", choices=tuple(TASKS), help="only these scans; by default both")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep answers there, and read those that are")
-    parser.add_argument("--write", action="store_true", help="write the models to the file that the verdict reads")
+    parser.add_argument(
+        "--write",
+        type=Path,
+        nargs="?",
+        const=MODELS_FILE,
+        metavar="FILE",
+        help="write the models with their manifest; by default to the file that the verdict reads",
+    )
     args = parser.parse_args()
-    models, fitted_on, usual = dict(MODELS), dict(FITTED_ON), USUAL
+    models, usual, data = dict(MODELS), USUAL, {}
+    tasks: list[Task] = []
+    metrics: dict[str, dict[str, float]] = {}
     for form in (args.form,) if args.form else TASKS:
         path = None if args.keep is None else args.keep / f"{form}.pickle"
         examples = collected(path, cases(form, args.stride))
-        fitted = report(form, TASKS[form], examples)
-        models |= fitted
+        metrics |= report(form, TASKS[form], examples)
+        models |= {t.name: fit(examples, t, ALTERNATIVE_TEMPERATURE).model for t in TASKS[form]}
         usual = usual_of(examples, usual, form)
-        told = tellable(examples)
-        away = sum(e.stranger for e in told)
-        for task in TASKS[form]:
-            fitted_on[task.name] = (
-                f"{len(told) - away} scans as {form} in their own map, {away} in that of another building or part "
-                f"of it at a weight of {task.strangers:g}"
-            )
-    if args.write:
-        print(f"\nWritten: {write(models, fitted_on, usual)}")
-    else:
+        data[form] = data_of(examples)
+        tasks += TASKS[form]
+    if args.write is None:
         for name, model in models.items():
             print(f"\n{name}: {as_document(model)}")
+        return
+    command = " ".join(["python -m benchmarks.calibration", *sys.argv[1:]])
+    write(args.write, models, manifest_of(command, data, tasks, metrics), usual)
+    print(f"\nWritten: {args.write}")
 
 
 if __name__ == "__main__":

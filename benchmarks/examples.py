@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +12,12 @@ import numpy as np
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.to_scale import search_to_scale
-from association.verdict.alternatives import compare_alternatives
+from association.verdict.alternatives import probability_among, probability_with_loose_walls
 from association.verdict.chance import find_null_score
-from association.verdict.features import Features, features_of, with_null_score
+from association.verdict.features import Features, describe_answer, with_null_score
+from association.verdict.models import USUAL
+from association.verdict.verdict import findings_of
+from association.verdict.vetoes import applied
 from registration import RigidTransform
 from simulation import CONDITIONS, FAMILIES
 from simulation import Case as DrawnCase
@@ -56,6 +59,12 @@ class Example:
     right, degenerate : bool
     told : bool
         True if the scan shows that the answer is not where it was taken, where the answer is wrong.
+    before_null : Features
+        The same with the least null score there is.
+    share, loose : float
+        Probability among the alternatives, as they were scored and with walls off by more, 0 to 1.
+    vetoes : tuple of str
+        That apply, in the order of the table.
     """
 
     form: str
@@ -68,6 +77,10 @@ class Example:
     right: bool
     degenerate: bool
     told: bool
+    before_null: Features = USUAL
+    share: float = 1.0
+    loose: float = 1.0
+    vetoes: tuple[str, ...] = ()
 
     @property
     def stranger(self) -> bool:
@@ -110,8 +123,11 @@ class Case:
         context, found = to_scale.context, to_scale.explanations
         if found.answer is None:
             return None
-        best, rivals, pose = found.answer.best, tuple(found.alternatives), found.answer.registered.pose
-        weighed, right = compare_alternatives(best, rivals), False
+        best, pose, right = found.answer.best, found.answer.registered.pose, False
+        description = describe_answer(context, found, found.answer)
+        weighed, plain = description.alternatives, Features(*description.features.item())
+        features = with_null_score(plain, best, find_null_score(context, best))
+        findings = findings_of(found, description, off_scale=to_scale.off_scale)
         if self.truth is not None and pose is not None:
             distance, angle = offset(pose, self.truth)
             right = distance < self.distance and angle < self.angle
@@ -120,12 +136,16 @@ class Case:
             group=self.group,
             condition=self.condition,
             fold=self.fold,
-            features=with_null_score(features_of(context, found.answer, weighed), best, find_null_score(context, best)),
+            features=features,
             gaps=np.minimum(0.0, weighed["gap"]),
             counted=weighed["counted"],
             right=right,
             degenerate=found.answer.estimated.degenerate,
             told=not right and (self.told is None or pose is None or self.told(pose)),
+            before_null=plain,
+            share=probability_among(weighed),
+            loose=probability_with_loose_walls(context, found.answer, description.others),
+            vetoes=tuple(one.name for one in applied(replace(findings, mirrored_better=features.null_better))),
         )
 
 

@@ -19,7 +19,6 @@ from association.verdict.models import MODELS
 from association.verdict.tuning import (
     ALTERNATIVE_TEMPERATURE,
     USABLE_CAUTIOUS,
-    USABLE_CAUTIOUS_WITH_BEAMS,
     USABLE_PROBABILITY,
 )
 
@@ -31,7 +30,7 @@ from .table import print_table
 from .worlds.goals import KEPT
 
 BARS = (0.0, 0.3, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.88, 0.9, 0.92, 0.94, 0.96, 0.97, 0.98, 0.99, 0.995)
-CHOSEN = {RANGES: USABLE_CAUTIOUS_WITH_BEAMS, SEGMENTS: USABLE_CAUTIOUS}
+CHOSEN = {RANGES: USABLE_CAUTIOUS, SEGMENTS: USABLE_CAUTIOUS}
 STRANGE = ("unmapped", "sister")  # the conditions whose scans are hardest to tell
 
 

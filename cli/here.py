@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import linefix
-from linefix.answers import association_json, registration_json
+from association import Prior, explain_verdict
+from linefix.answers import Included, association_json, registration_json
+from linefix.explaining import explanation_json
 from linefix.map_answers import checked_json, import_json, map_json
 from map_quality import check_map
 from service.contract import (
@@ -42,19 +44,65 @@ if TYPE_CHECKING:
 
 def associate(body: Json) -> Json:
     """Return the answer of ``POST /v1/associate``."""
-    settings, watch = settings_here(), Stopwatch()
-    asked = validate(AssociateRequest, body, settings.limits())
-    options, deadline = asked.options, watch.deadline(asked.options.deadline_ms, settings.max_deadline_ms)
-    found = map_here(body["map"])
-    directed = is_oriented(options.oriented, found.document.get("oriented"))
-    index = linefix.index_map({**found.document, "oriented": directed})
-    watch.lap("decode")
-    scanned, search = scanned_of(asked.scan), association_options_of(options, oriented=directed)
-    require_time(deadline)
-    result = linefix.associate(index, scanned.scan, prior_of(asked.prior), search, deadline)
-    watch.lap("search")
-    included = included_of(asked.scan, options, scanned, found.document.get("frame_id", "map"))
-    return _sealed({**association_json(result, included), "map": found.reference, "client_ref": None}, watch)
+    asked = _Search.of(body)
+    return asked.answer(linefix.associate(*asked.arguments))
+
+
+def explain(body: Json) -> Json:
+    """Return the answer of ``POST /v1/associate`` as ``answer``, and next to it how its verdict came about.
+
+    Raises
+    ------
+    RefusedError
+        When a part of the request is not taken.
+    """
+    compile_first()
+    with refusing(Asked(id_of(body.get("map")))):
+        asked = _Search.of(body)
+        found = explain_verdict(*asked.arguments)
+        return {"answer": asked.answer(found.result), **explanation_json(found)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """A request of ``POST /v1/associate``, ready to be searched.
+
+    Attributes
+    ----------
+    arguments : tuple
+        Of `linefix.associate`.
+    included : Included
+    reference : dict or None
+        Of the map.
+    watch : Stopwatch
+    """
+
+    arguments: tuple[linefix.MapIndex, linefix.Scan, Prior | None, linefix.AssociationOptions, linefix.Deadline]
+    included: Included
+    reference: Json | None
+    watch: Stopwatch
+
+    @staticmethod
+    def of(body: Json) -> _Search:
+        """Read a request."""
+        settings, watch = settings_here(), Stopwatch()
+        asked = validate(AssociateRequest, body, settings.limits())
+        options, deadline = asked.options, watch.deadline(asked.options.deadline_ms, settings.max_deadline_ms)
+        found = map_here(body["map"])
+        directed = is_oriented(options.oriented, found.document.get("oriented"))
+        index = linefix.index_map({**found.document, "oriented": directed})
+        watch.lap("decode")
+        scanned, search = scanned_of(asked.scan), association_options_of(options, oriented=directed)
+        included = included_of(asked.scan, options, scanned, found.document.get("frame_id", "map"))
+        require_time(deadline)
+        return _Search((index, scanned.scan, prior_of(asked.prior), search, deadline), included, found.reference, watch)
+
+    def answer(self, result: linefix.AssociationResult) -> Json:
+        """Return the answer with a result."""
+        self.watch.lap("search")
+        return _sealed(
+            {**association_json(result, self.included), "map": self.reference, "client_ref": None}, self.watch
+        )
 
 
 def register(body: Json) -> Json:

@@ -53,6 +53,15 @@ def locate(
     as_json: AsJson = False,
 ) -> None:
     """Find the pose of a scan on a map; the answer is that of /v1/associate."""
+    answer = ask("associate", request_body(on, scan, window, search), server)
+    if as_json:
+        print_json(answer)
+    else:
+        print_rows(verdict_rows(answer))
+
+
+def request_body(on: str, scan: str, window: NearOptions, search: SearchChoice) -> Json:
+    """Return the request of ``/v1/associate`` for the arguments and options of a command."""
     body: Json = {"map": read_map_or_id(on), "scan": read_scan(scan), "options": {}}
     if window.near is not None:
         pose = dict(zip(("x", "y", "theta"), window.near, strict=True))
@@ -63,8 +72,4 @@ def locate(
         body["options"]["include"] = ["correspondences", "alternatives", "segments", "missing_map", "causes"]
     if search.deadline_ms is not None:
         body["options"]["deadline_ms"] = search.deadline_ms
-    answer = ask("associate", body, server)
-    if as_json:
-        print_json(answer)
-    else:
-        print_rows(verdict_rows(answer))
+    return body

@@ -15,6 +15,7 @@ from . import maps
 from .analyze import analyze
 from .batch import batch
 from .errors import WrongUseError
+from .explain import explain
 from .key import key
 from .locate import locate
 from .register import register
@@ -24,7 +25,7 @@ from .vectorize import vectorize
 
 # Plain help: what is printed in boxes cannot be searched or copied. Errors are one line, which `entry` prints.
 app = typer.Typer(name="linefix", rich_markup_mode=None, pretty_exceptions_enable=False)
-for command in (locate, replay, analyze, batch, register, vectorize, key, ros2):
+for command in (locate, explain, replay, analyze, batch, register, vectorize, key, ros2):
     app.command()(command)
 app.add_typer(maps.app)
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import simulation
 from association import (
+    AnswerExplanation,
     AssociationOptions,
     AssociationResult,
     Deadline,
@@ -43,6 +44,7 @@ from registration import (
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .checking import CheckedMap, check
+from .explaining import explain
 from .locating import index_map, locate, scan_of
 from .mounted import MountedScan, view_of
 
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 _OF_FORMATS = frozenset(("ImportOptions", "LineMap", "LogOptions", "draw_map", "read_log", "read_map", "write_map"))
 
 __all__ = [
+    "AnswerExplanation",
     "AssociationOptions",
     "AssociationResult",
     "Beams",
@@ -81,6 +84,7 @@ __all__ = [
     "associate",
     "check",
     "draw_map",
+    "explain",
     "index_map",
     "locate",
     "read_log",

@@ -80,10 +80,17 @@ def locate(
     >>> f"{answer.pose.x:.2f} {answer.pose.y:.2f} {answer.pose.theta:.2f}"
     '1.00 1.00 1.57'
     """
+    index, how = prepared(map, options)
+    return associate(index, scan_of(scan, angles), prior, how, deadline)
+
+
+def prepared(
+    map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike, options: AssociationOptions | None
+) -> tuple[MapIndex, AssociationOptions]:
+    """Return a map's index and the options of a search; directions count where they do in both."""
     index, how = index_map(map), options or AssociationOptions()
-    directed = len(index.segments) == index.directed
-    how = replace(how, oriented=how.oriented and directed)
-    return associate(index if how.oriented else index.undirected, scan_of(scan, angles), prior, how, deadline)
+    how = replace(how, oriented=how.oriented and len(index.segments) == index.directed)
+    return index if how.oriented else index.undirected, how
 
 
 def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, Any] | ArrayLike) -> MapIndex:

@@ -20,8 +20,9 @@ from ..context import SearchContext
 from ..scan.scan import mirrored
 from ..scan.scan_lines import ScanLines
 from ..search.candidates import Effort, allowed_by, find_candidates
+from ..tuning import FEW_KEPT
 from .kernels import chance, symmetry
-from .tuning import NULL_ALLOWED, NULL_ALLOWED_NEAR, NULL_ENOUGH, NULL_FRACTION, NULL_KEPT, NULL_MARGIN, NULL_SAMPLES
+from .tuning import NULL_ALLOWED, NULL_ALLOWED_NEAR, NULL_ENOUGH, NULL_FRACTION, NULL_MARGIN, NULL_SAMPLES
 
 EXPONENTS = np.geomspace(0.01, 2.0, 40)  # of Chernoff's bound
 
@@ -108,12 +109,12 @@ def _efforts(context: SearchContext, best: ConsensusSet, wanted: float) -> tuple
     allowed, known = allowed_by(context.options), max(0.0, best.by_segments)
     # Beams may add to any pose, so that without them nothing is enough.
     enough = math.inf if context.with_beams else NULL_ENOUGH * known
-    whole = Effort(NULL_KEPT, NULL_FRACTION, NULL_FRACTION, max(allowed, NULL_ALLOWED), known, enough, NULL_SAMPLES)
+    whole = Effort(FEW_KEPT, NULL_FRACTION, NULL_FRACTION, max(allowed, NULL_ALLOWED), known, enough, NULL_SAMPLES)
     by_segments = NULL_MARGIN * (wanted - BEAMS_READ if context.with_beams else wanted)
     if not by_segments > NULL_FRACTION * known > 0.0:
         return None, whole
     least = by_segments / known
-    return Effort(NULL_KEPT, least, least, max(allowed, NULL_ALLOWED_NEAR), known, enough, NULL_SAMPLES), whole
+    return Effort(FEW_KEPT, least, least, max(allowed, NULL_ALLOWED_NEAR), known, enough, NULL_SAMPLES), whole
 
 
 def symmetry_of(context: SearchContext, best: ConsensusSet, null: ConsensusSet) -> float:

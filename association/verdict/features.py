@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from registration.layout import Records
+from registration.values import value
 
 from ..consensus.consensus_set import ConsensusSet
 from ..context import SearchContext
-from ..explanations import Answer
+from ..explanations import Answer, Explanations
 from ..layout import FACTS, SET_SCORE, record
+from .alternatives import compare_alternatives
 from .chance import NullScore
 from .kernels import features as kernels
 from .kernels.null_features import write_null_features
@@ -90,6 +92,38 @@ class Features(NamedTuple):
 
 FEATURES = np.dtype([(name, np.float64) for name in Features._fields])
 """The same as a record, for the kernels."""
+
+
+@value(frozen=True, slots=True)
+class Description:
+    """An answer among its alternatives, before any probability.
+
+    Attributes
+    ----------
+    answer : Answer
+    others : tuple of ConsensusSet
+        Its alternatives, best first.
+    alternatives : (k,) of `ALTERNATIVE`
+        The gap of each of them to the answer, and how far it counts.
+    features : (1,) of `FEATURES`
+        With the least null score there is.
+    few_walls : bool
+        True if few walls fix the pose, and one of them alone decides.
+    """
+
+    answer: Answer
+    others: tuple[ConsensusSet, ...]
+    alternatives: Records
+    features: Records
+    few_walls: bool
+
+
+def describe_answer(context: SearchContext, explanations: Explanations, answer: Answer) -> Description:
+    """Compare an answer with its alternatives, and describe it by features."""
+    best, others = answer.best, tuple(explanations.alternatives)
+    alternatives, facts = compare_alternatives(best, others), facts_of(context, answer)
+    few_walls = depends_on_one_wall(context, answer, facts)
+    return Description(answer, others, alternatives, describe(best, facts, alternatives), few_walls)
 
 
 def facts_of(context: SearchContext, answer: Answer) -> Records:

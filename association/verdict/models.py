@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,10 @@ class Curve:
     slope: float
     bends: tuple[tuple[float, float], ...] = ()
 
+    def at(self, value: float) -> float:
+        """Return the contribution at a value of the feature, nats."""
+        return self.slope * value + sum(more * (value - start) for start, more in self.bends if value > start)
+
 
 @dataclass(frozen=True, slots=True)
 class Pair:
@@ -61,6 +66,19 @@ class Pair:
     nats: float
     from_to: tuple[tuple[float, float], tuple[float, float]]
 
+    @property
+    def key(self) -> str:
+        """Return the name of the pair in the file."""
+        return f"{self.kind} {self.first} {self.second}"
+
+    def at(self, first: float, second: float) -> float:
+        """Return the contribution at values of both features, nats."""
+        fractions = [
+            min(1.0, max(0.0, (value - start) / (full - start)))
+            for value, (start, full) in zip((first, second), self.from_to, strict=True)
+        ]
+        return self.nats * (min(fractions) if self.kind == LEAST else max(fractions))
+
 
 @dataclass(frozen=True)
 class Model:
@@ -79,6 +97,13 @@ class Model:
     def logit(self, features: Features | Floats) -> float:
         """Return the logarithm of the odds; for several models an array (n,) of the features is faster."""
         return float(log_odds(self.odds, np.asarray(features)))
+
+    def terms(self, features: Features) -> dict[str, float]:
+        """Return the terms of the logarithm of the odds, nats, by the names of features and the keys of pairs."""
+        found = {name: curve.at(getattr(features, name)) for name, curve in self.curves.items()}
+        for pair in self.pairs:
+            found[pair.key] = pair.at(getattr(features, pair.first), getattr(features, pair.second))
+        return found
 
     @cached_property
     def odds(self) -> Odds:
@@ -123,16 +148,17 @@ def as_document(model: Model) -> dict[str, list[float]]:
     """Do the opposite of `as_model`."""
     numbers = {name: (curve.slope, *(v for bend in curve.bends for v in bend)) for name, curve in model.curves.items()}
     for pair in model.pairs:
-        numbers[f"{pair.kind} {pair.first} {pair.second}"] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
+        numbers[pair.key] = (pair.nats, *pair.from_to[0], *pair.from_to[1])
     return {key: [float(f"{value:.4g}") for value in values] for key, values in numbers.items()}
 
 
-def _read() -> tuple[dict[str, Model], dict[str, str], Features]:
+def _read() -> tuple[dict[str, Model], dict[str, Any], Features]:
     document = json.loads(files(__package__).joinpath(FILE).read_bytes())
     models = {name: as_model(curves) for name, curves in document["models"].items()}
-    return models, document["fitted_on"], Features(**document["usual"])
+    return models, document["manifest"], Features(**document["usual"])
 
 
 # "probability", for scans that are known to be of this map, and "cautious", where scans of other buildings are
-# included; each also "_with_beams". The data that each was fitted on, and the medians of the features of right answers.
-MODELS, FITTED_ON, USUAL = _read()
+# included; each also "_with_beams". Their manifest, see `benchmarks.manifest`, and the medians of the features of right
+# answers.
+MODELS, MANIFEST, USUAL = _read()

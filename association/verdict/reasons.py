@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
 
 from registration.values import value
 
@@ -11,6 +10,7 @@ from ..result import Reason, ReasonCode, Status
 from .features import Features
 from .models import USUAL, Model
 from .tuning import NO_ALTERNATIVE, TELLING_REASON
+from .vetoes import Veto
 
 
 @value(frozen=True, slots=True)
@@ -20,42 +20,28 @@ class Doubts:
     Attributes
     ----------
     status : Status
-    complete, contradicted : bool
-        True if the search was complete; true if the prior contradicts the answer.
+    vetoes : tuple of Veto
+        Those that count with the status.
     not_on_map : bool
         True if there is little evidence for this map at all.
-    few_walls : bool
-        True if few walls fix the pose, and one of them alone decides.
     similar_place : bool
         True if alternatives alone make the answer too uncertain.
     alone : bool
         True if no other explanation was found where the prior allows one.
-    mirrored : bool
-        True if the scan fits the map better with left and right exchanged.
-    out_of_step : bool
-        True if the view from the scan's own place fits far worse than the views on the way.
-    off_scale : bool
-        True if scan and map differ by a factor that is too great to be corrected.
     """
 
     status: Status
-    complete: bool
-    contradicted: bool
-    not_on_map: bool
-    few_walls: bool = False
+    vetoes: tuple[Veto, ...] = ()
+    not_on_map: bool = False
     similar_place: bool = False
     alone: bool = False
-    mirrored: bool = False
-    out_of_step: bool = False
-    off_scale: bool = False
 
 
-INCOMPLETE: Literal["search_incomplete"] = "search_incomplete"
 SENTENCES: Mapping[ReasonCode, str] = {
     "prior_contradicted": "The pose that the scan supports contradicts the prior. Check the prior, or search without "
     "it.",
-    INCOMPLETE: "The search is incomplete: the deadline passed, or too many walls of the map lie in one place. A "
-    "better pose may have been missed. Extend the deadline, or see `warnings`.",
+    "search_incomplete": "The search is incomplete: the deadline passed, or too many walls of the map lie in one "
+    "place. A better pose may have been missed. Extend the deadline, or see `warnings`.",
     "unobservable_direction": "The observed walls do not fix the position along one direction (`unobservable`). Move "
     "until other walls are in view, and scan again.",
     "not_on_map": "The scan fits this map no better than an unrelated scan would. The robot may be in a place that "
@@ -68,14 +54,11 @@ SENTENCES: Mapping[ReasonCode, str] = {
     "insufficient_evidence": "The scan has too few walls to distinguish this place from others. Move and scan again.",
 }
 
-MIRRORED = (
-    "The scan fits this map better with left and right exchanged. Check whether the laser is mounted upside down, and "
-    "whether this is the right map."
-)
-OFF_SCALE = (
-    "The scan fits this map better with its lengths changed by more than 4 %. Check that scan and map are in metres, "
-    "and that this is the right map."
-)
+# The order of the reasons that do not come from the contributions of the features.
+ORDER: tuple[ReasonCode, ...] = (
+    "prior_contradicted", "search_incomplete", "not_on_map", "unobservable_direction", "insufficient_evidence",
+    "single_wall", "map_mismatch", "similar_place",
+)  # fmt: skip
 
 # The features of each reason. The decrease of a usual right answer's odds by a feature is attributed to its reason.
 FEATURES_OF: Mapping[ReasonCode, tuple[str, ...]] = {
@@ -101,25 +84,16 @@ def reasons_of(doubts: Doubts, features: Features | None, cautious: Model | None
     cautious : Model or None
         Whose odds fall short.
     """
-    codes: list[ReasonCode] = []
-    if doubts.contradicted:
-        codes.append("prior_contradicted")
-    if not doubts.complete:
-        codes.append(INCOMPLETE)
-    if doubts.not_on_map or (doubts.mirrored and doubts.status is Status.AMBIGUOUS):
-        codes.append("not_on_map")
-    if doubts.status is Status.DEGENERATE:
-        codes.append("unobservable_direction")
-    elif doubts.status is Status.AMBIGUOUS and features is not None and cautious is not None:
-        codes += ["insufficient_evidence", "single_wall"] if doubts.few_walls else []
-        codes += ["map_mismatch"] if doubts.out_of_step or doubts.off_scale else []
-        codes += ["similar_place"] if doubts.similar_place else []
-        codes += [code for code in _weighed(features, cautious, alone=doubts.alone) if code not in codes]
+    settled: set[ReasonCode] = {code for veto in doubts.vetoes for code in veto.reasons}
+    if doubts.not_on_map:
+        settled.add("not_on_map")
+    if doubts.similar_place and doubts.status is Status.AMBIGUOUS:
+        settled.add("similar_place")
+    codes = [code for code in ORDER if code in settled]
+    if doubts.status is Status.AMBIGUOUS and features is not None and cautious is not None:
+        codes += [code for code in _weighed(features, cautious, alone=doubts.alone) if code not in settled]
     sentences = dict(SENTENCES)
-    if doubts.mirrored:
-        sentences["not_on_map"] = MIRRORED
-    if doubts.off_scale:
-        sentences["map_mismatch"] = OFF_SCALE
+    sentences |= {veto.reasons[-1]: veto.message for veto in doubts.vetoes if veto.message is not None}
     return tuple(Reason(code, sentences[code]) for code in codes)
 
 
@@ -128,12 +102,17 @@ def _weighed(features: Features, cautious: Model, *, alone: bool) -> list[Reason
 
     `alone`: whether there is no other explanation; then the lead is the answer's own score.
     """
-    lacking = {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
+    lacking = taken_by_reason(features, cautious)
     if alone or features.lead > NO_ALTERNATIVE:
         # Many places explain a little of the scan, and none explains it about as well.
         lacking["insufficient_evidence"] += max(0.0, lacking.pop("similar_place"))
     ordered = sorted(lacking, key=lambda code: -lacking[code])
     return [code for k, code in enumerate(ordered) if k == 0 or lacking[code] > TELLING_REASON]
+
+
+def taken_by_reason(features: Features, cautious: Model) -> dict[ReasonCode, float]:
+    """Return for each reason the decrease of the logarithm of the odds by its features, nats."""
+    return {code: _taken(features, cautious, names) for code, names in FEATURES_OF.items()}
 
 
 def _taken(features: Features, cautious: Model, names: tuple[str, ...]) -> float:

@@ -11,7 +11,6 @@ LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
 
 SHORTEST_SHOWN = 0.2  # m, tables; less of a wall tells nothing of its symmetry
-NULL_KEPT = 24  # poses, tables
 NULL_FRACTION = 0.7  # of the answer's score, tables; a null below it says no more
 # By what fraction a null may be better than the answer, measured: of 11,275 right answers that are sure otherwise 3
 # have one that is better by more. Else the laser is upside down, or the robot elsewhere.
@@ -51,8 +50,7 @@ UNLIKE_SYMMETRY, SYMMETRIC = (
 LEAST_MISFIT, MOST_MISFIT = 1e-2, 1e3
 ALTERNATIVE_TEMPERATURE = 1.5  # nats, fitted; how far apart two explanations score that are as likely as one to e
 USABLE_PROBABILITY = 0.94  # cross-validated
-USABLE_CAUTIOUS = 0.9  # cross-validated; of the same, where other buildings are included,
-USABLE_CAUTIOUS_WITH_BEAMS = 0.9  # cross-validated; and with raw beams
+USABLE_CAUTIOUS = 0.9  # cross-validated, with and without raw beams; of the same, where other buildings are included
 # The same of views that are not exact: the models were fitted to scans from one place. Of drives of 5 m through sister
 # buildings, and of 10 m in logs, those that were usable and wrong came to 0.92 and 0.945. Measured.
 USABLE_CAUTIOUS_DRIVE = 0.95

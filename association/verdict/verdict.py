@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from registration import RigidTransform
 from registration.values import value
 
 from ..consensus.ranking import with_lines_of_sight
-from ..consensus.tuning import CONTRADICTION
 from ..context import SearchContext
 from ..explanations import Answer, Explanations
 from ..result import Reason, Status
-from .probabilities import Probabilities, least_cautious, work_out_probabilities
-from .reasons import INCOMPLETE, SENTENCES, Doubts, reasons_of
-from .tuning import (
-    CONTRADICTED,
-    ELSEWHERE_PROBABILITY,
-    FAR_FROM_PRIOR,
-    LEAST_IN_STEP,
-    NO_MATCH_PROBABILITY,
-    USABLE_PROBABILITY,
-)
+from .features import Description, describe_answer
+from .probabilities import Probabilities, work_out_probabilities
+from .reasons import SENTENCES, Doubts, reasons_of
+from .tuning import CONTRADICTED, ELSEWHERE_PROBABILITY, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
 from .unobservable import choose_along_direction
+from .vetoes import INCOMPLETE, VETOES, Findings, Veto, applied, contradict_prior, counted
 
 
 @value(frozen=True, slots=True)
@@ -42,14 +37,14 @@ class Verdict:
         may be others below `SearchReport.complete_above` of the score.
     runner_up : float or None
         Those of the next over those of the best, never below 0.
-    contradicted : bool
-        True if the prior contradicts the pose.
     reasons : tuple of Reason
         Why it is not usable, the weightiest first.
-    complete : bool
-        True if the deadline ended neither the search nor the comparison of its result.
-    cautious : float
-        Probability that the pose is right where other buildings are included; 0 without an answer.
+    vetoes : tuple of Veto
+        Those that apply and count with the status, in the order of `vetoes.VETOES`.
+    description : Description or None
+        The answer by its features; None without an answer.
+    probabilities : Probabilities or None
+        The numbers behind `probability`; likewise.
     """
 
     status: Status
@@ -58,25 +53,43 @@ class Verdict:
     pose: RigidTransform | None
     margin: float | None
     runner_up: float | None
-    contradicted: bool
     reasons: tuple[Reason, ...]
-    complete: bool
-    cautious: float = 0.0
+    vetoes: tuple[Veto, ...] = ()
+    description: Description | None = None
+    probabilities: Probabilities | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Return whether the deadline ended neither the search nor the comparison of its result."""
+        return INCOMPLETE not in self.vetoes
+
+    @property
+    def contradicted(self) -> bool:
+        """Return whether the prior contradicts the pose."""
+        return contradict_prior(self.vetoes)
+
+    @property
+    def cautious(self) -> float:
+        """Return the probability that the pose is right where out-of-map scans are included; 0 without an answer."""
+        return 0.0 if self.probabilities is None else self.probabilities.cautious
 
     def cut_short(self) -> Verdict:
         """Return the same, not usable, where something was left undone."""
         if not self.complete:
             return self
-        reasons = (Reason(INCOMPLETE, SENTENCES[INCOMPLETE]), *self.reasons)
-        return replace(self, usable=False, complete=False, reasons=reasons)
+        reasons = (*(Reason(code, SENTENCES[code]) for code in INCOMPLETE.reasons), *self.reasons)
+        vetoes = tuple(veto for veto in VETOES if veto in (*self.vetoes, INCOMPLETE))
+        return replace(self, usable=False, vetoes=vetoes, reasons=reasons)
 
 
 def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool = False) -> Verdict:
     """Judge the best explanation.
 
-    1. Note what speaks against it whatever its probability: the prior, scale, the last view of a drive.
-    2. Work out its probabilities: features, models, alternatives, null score.
-    3. Decide the status, and list the reasons where it is not usable.
+    1. Describe it by features, among its alternatives.
+    2. Evaluate the models: how probable it is.
+    3. Apply the vetoes.
+    4. Decide the status.
+    5. List the reasons, if it is not usable.
 
     Parameters
     ----------
@@ -90,47 +103,77 @@ def judge(context: SearchContext, explanations: Explanations, *, off_scale: bool
     CancelledError
         When the deadline was cancelled.
     """
-    answer, complete = explanations.answer, explanations.search.complete
+    answer = explanations.answer
     if answer is None:
         return _no_match(explanations)
-    best = answer.best
-    better_elsewhere = any(other.score > best.score + CONTRADICTION for other in explanations.others)
-    contradicted = better_elsewhere or best.posterior - best.score < FAR_FROM_PRIOR
-    doubted = off_scale or _out_of_step(answer)
-    certain = complete and not contradicted and context.window is None and not doubted
-    found = work_out_probabilities(context, explanations, answer, capped=better_elsewhere, certain=certain)
-    # The mirrored scan and the alternatives with walls farther off are searched, and scored, no further than the
-    # deadline.
-    complete = complete and not context.deadline.passed
-    status = _status(
-        answer, found, least_cautious(context), capped=better_elsewhere, doubted=doubted or found.few_walls
-    )
+    description = describe_answer(context, explanations, answer)
+    findings = findings_of(explanations, description, off_scale=off_scale)
+    found = work_out_probabilities(context, description, applied(findings))
     pose = choose_along_direction(context, answer)
-    if context.window is not None and pose is not None and not context.window.contains(pose):
-        # It was inside before it was registered: the window is narrower than the error of the pose.
-        contradicted = contradicted or status is not Status.NO_MATCH
-    usable = status is Status.OK and complete and not contradicted
-    doubts = _doubts(explanations, answer, found, status, complete=complete, contradicted=contradicted)
+    vetoes = applied(_all_findings(context, findings, found, pose))
+    status = _status(found, vetoes)
+    vetoes = counted(vetoes, status)
+    usable = status is Status.OK and not vetoes
     margin, runner_up = _margin(context, explanations, answer)
     return Verdict(
         status=status,
-        probability=_probability(status, found.right, contradicted=contradicted),
+        probability=_probability(status, found.right, contradicted=contradict_prior(vetoes)),
         usable=usable,
         pose=pose,
         margin=margin,
         runner_up=runner_up,
-        contradicted=contradicted,
-        reasons=() if usable else reasons_of(replace(doubts, off_scale=off_scale), found.features, found.model),
-        complete=complete,
-        cautious=found.cautious,
+        reasons=() if usable else _reasons(description, found, status, vetoes),
+        vetoes=vetoes,
+        description=description,
+        probabilities=found,
     )
 
 
 def _no_match(explanations: Explanations) -> Verdict:
     """Return the verdict where nothing explains the scan within the prior's window."""
-    complete, outside = explanations.search.complete, bool(explanations.ranked)
-    reasons = reasons_of(Doubts(Status.NO_MATCH, complete, outside, not_on_map=True), None, None)
-    return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, outside, reasons, complete)
+    vetoes = counted(
+        applied(Findings(explanations.search.complete, score_elsewhere=_best(explanations))), Status.NO_MATCH
+    )
+    reasons = reasons_of(Doubts(Status.NO_MATCH, vetoes, not_on_map=True), None, None)
+    return Verdict(Status.NO_MATCH, 0.0, False, None, None, None, reasons, vetoes)
+
+
+def _best(explanations: Explanations) -> float:
+    """Return the best score of the other explanations, also outside the prior's window, nats."""
+    return max((other.score for other in explanations.others), default=-math.inf)
+
+
+def findings_of(explanations: Explanations, description: Description, *, off_scale: bool) -> Findings:
+    """Return what the vetoes need, as far as it is known before the probabilities."""
+    answer = description.answer
+    return Findings(
+        complete=explanations.search.complete,
+        score=answer.best.score,
+        score_elsewhere=_best(explanations),
+        prior=answer.best.posterior - answer.best.score,
+        unobservable=answer.estimated.degenerate,
+        few_walls=description.few_walls,
+        in_step=answer.beams.in_step,
+        off_scale=off_scale,
+    )
+
+
+def _all_findings(
+    context: SearchContext, findings: Findings, found: Probabilities, pose: RigidTransform | None
+) -> Findings:
+    """Return all that the vetoes need.
+
+    The mirrored scan and the alternatives with walls farther off are searched, and scored, no further than the
+    deadline. The explanation was inside the window before its pose was registered: the window may be narrower than the
+    error of the pose.
+    """
+    window = context.window
+    return replace(
+        findings,
+        complete=findings.complete and not context.deadline.passed,
+        outside_window=window is not None and pose is not None and not window.contains(pose),
+        mirrored_better=found.features.null_better,
+    )
 
 
 def _margin(context: SearchContext, explanations: Explanations, answer: Answer) -> tuple[float | None, float | None]:
@@ -152,40 +195,25 @@ def _probability(status: Status, right: float, *, contradicted: bool) -> float |
     return min(right, CONTRADICTED) if contradicted else right
 
 
-def _doubts(
-    explanations: Explanations,
-    answer: Answer,
-    found: Probabilities,
-    status: Status,
-    *,
-    complete: bool,
-    contradicted: bool,
-) -> Doubts:
-    """Return the evidence against an answer, except for its features."""
-    return Doubts(
+def _reasons(
+    description: Description, found: Probabilities, status: Status, vetoes: tuple[Veto, ...]
+) -> tuple[Reason, ...]:
+    """List why an answer is not usable."""
+    doubts = Doubts(
         status,
-        complete,
-        contradicted,
+        vetoes,
         not_on_map=found.explained < ELSEWHERE_PROBABILITY,
-        few_walls=found.few_walls,
         similar_place=found.among_alternatives < USABLE_PROBABILITY,
-        alone=next(explanations.alternatives, None) is None,
-        mirrored=found.mirrored,
-        out_of_step=_out_of_step(answer),
+        alone=not description.others,
     )
+    return reasons_of(doubts, found.features, found.model)
 
 
-def _out_of_step(answer: Answer) -> bool:
-    """Return whether the last view of a drive fits far worse than those before it: then its own place is not known."""
-    return answer.beams.in_step < LEAST_IN_STEP
-
-
-def _status(answer: Answer, found: Probabilities, bar: float, *, capped: bool, doubted: bool) -> Status:
-    """Decide in order of precedence; a `capped` probability is never enough."""
+def _status(found: Probabilities, vetoes: tuple[Veto, ...]) -> Status:
+    """Decide in order of precedence."""
     if found.explained < NO_MATCH_PROBABILITY:
         return Status.NO_MATCH
-    if answer.estimated.degenerate:
+    caps = [veto.caps for veto in vetoes if veto.caps is not None]
+    if Status.DEGENERATE in caps:
         return Status.DEGENERATE
-    likely = found.right >= USABLE_PROBABILITY and not capped
-    sure = found.cautious >= bar and not doubted and not found.mirrored
-    return Status.OK if likely and sure else Status.AMBIGUOUS
+    return Status.OK if found.suffice and not caps else Status.AMBIGUOUS

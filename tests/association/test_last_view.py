@@ -12,7 +12,7 @@ from association import AssociationOptions, AssociationResult, Deadline, HardPri
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.last_view import LAST_VIEW_ONLY, last_view, search_last_view
-from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, AGREED_DISTANCE
+from association.tuning import AGREED_ANGLE, AGREED_CAUTIOUS, DISTINCT_DISTANCE
 from association.verdict.verdict import Verdict, judge
 from registration import RigidTransform
 
@@ -95,7 +95,7 @@ def test_a_drive_whose_best_pose_is_elsewhere_is_not_answered() -> None:
     near, far = 0.95, 1.1
     for part, agreed in ((near, True), (far, False)):
         for moved in (
-            RigidTransform(INSIDE.x + part * AGREED_DISTANCE, INSIDE.y, INSIDE.theta),
+            RigidTransform(INSIDE.x + part * DISTINCT_DISTANCE, INSIDE.y, INSIDE.theta),
             RigidTransform(INSIDE.x, INSIDE.y, INSIDE.theta - part * AGREED_ANGLE),
         ):
             assert (search_last_view(context, replace(verdict, pose=moved)).result is not None) is agreed
@@ -105,7 +105,9 @@ def test_a_drive_that_speaks_against_the_pose_is_not_answered() -> None:
     """However sure the last view is: in a building like this one the views before it show that it is another."""
     context, verdict = judged(drive())
     for cautious, answered in ((AGREED_CAUTIOUS, True), (AGREED_CAUTIOUS - 1e-9, False)):
-        assert (search_last_view(context, replace(verdict, cautious=cautious)).result is not None) is answered
+        assert verdict.probabilities is not None
+        found = replace(verdict.probabilities, by_model=cautious, among_as_scored=1.0, among_with_loose_walls=None)
+        assert (search_last_view(context, replace(verdict, probabilities=found)).result is not None) is answered
 
 
 def test_what_is_not_usable_alone_is_not_usable_as_a_drive() -> None:

@@ -14,6 +14,7 @@ from association.explain import search_and_explain
 from association.explanations import Answer
 from association.report import report
 from association.verdict.verdict import Verdict, judge
+from association.verdict.vetoes import BETTER_ELSEWHERE, INCOMPLETE
 from registration import RigidTransform, Segments
 from registration.layout import Floats
 
@@ -43,7 +44,7 @@ from .scenes import (
     seen,
 )
 
-SURE = Verdict(Status.OK, 0.97, True, pose(1.0, 2.0, 0.3), 20.0, 0.75, False, (), True)
+SURE = Verdict(Status.OK, 0.97, True, pose(1.0, 2.0, 0.3), 20.0, 0.75, ())
 WHY = (Reason("similar_place", "Another pose fits the scan about as well."),)
 ROOMS = index_of(equal_rooms(4))
 
@@ -167,7 +168,7 @@ def test_a_pose_that_fits_worse_is_less_probable() -> None:
     "verdict",
     [
         replace(SURE, status=Status.DEGENERATE, usable=False, probability=None, reasons=WHY),
-        replace(SURE, status=Status.AMBIGUOUS, usable=False, contradicted=True, reasons=WHY),
+        replace(SURE, status=Status.AMBIGUOUS, usable=False, vetoes=(BETTER_ELSEWHERE,), reasons=WHY),
         replace(SURE, status=Status.NO_MATCH, usable=False, probability=0.0, pose=None, reasons=WHY),
     ],
     ids=["degenerate", "contradicted", "no match"],
@@ -301,7 +302,7 @@ def test_where_a_direction_is_free_it_is_named_instead_of_a_covariance() -> None
 
 def test_no_match() -> None:
     """All that was found is an alternative, also what would have been the answer."""
-    nothing = Verdict(Status.NO_MATCH, 0.01, False, pose(), None, None, False, WHY, True)
+    nothing = Verdict(Status.NO_MATCH, 0.01, False, pose(), None, None, WHY)
     context = context_of(ROOMS, SCAN)
     explanations = search_and_explain(context)
     for answer, status in ((explanations.answer, Status.NO_MATCH), (None, Status.OK)):
@@ -383,6 +384,7 @@ def test_what_the_verdict_and_the_search_say_is_told() -> None:
     for contradicted, complete in ((False, True), (True, True), (False, False), (True, False)):
         explanations = explanations_of(answer, complete=complete)
         for status in (Status.OK, Status.NO_MATCH):
-            verdict = replace(SURE, contradicted=contradicted, status=status, complete=complete)
+            vetoes = (BETTER_ELSEWHERE,) * contradicted + (INCOMPLETE,) * (not complete)
+            verdict = replace(SURE, vetoes=vetoes, status=status)
             expected = ["prior_contradicted"] * contradicted + ["search_incomplete"] * (not complete)
             assert [w.code for w in report(context, explanations, verdict).warnings] == expected

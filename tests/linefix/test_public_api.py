@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import linefix
-from linefix import checking, locating, mounted
+from linefix import checking, explaining, locating, mounted
 
 ROOT = Path(linefix.__file__).parent.parent
 
@@ -22,6 +22,7 @@ def test_exports_are_sorted_and_complete() -> None:
         "annotations",
         "answers",
         "checking",
+        "explaining",
         "importlib",
         "locating",
         "map_answers",
@@ -43,7 +44,9 @@ def test_every_name_says_what_it_is(name: str) -> None:
     assert not described.startswith(f"{name}(")
 
 
-@pytest.mark.parametrize("module", [linefix, checking, locating, mounted], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    "module", [linefix, checking, explaining, locating, mounted], ids=lambda module: module.__name__
+)
 def test_examples_give_what_they_show(module: object) -> None:
     failed, tried = doctest.testmod(module)  # type: ignore[arg-type]
     assert (failed, tried > 0) == (0, True)

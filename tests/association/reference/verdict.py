@@ -151,7 +151,7 @@ class Judged:
 
 def bar_of(context: SearchContext) -> float:
     """Return what the careful chance has to reach."""
-    return tuning.USABLE_CAUTIOUS if context.scan.beams is None else tuning.USABLE_CAUTIOUS_WITH_BEAMS
+    return tuning.USABLE_CAUTIOUS
 
 
 def judge(

@@ -14,8 +14,8 @@ import association
 from association.verdict.features import Features
 from association.verdict.models import (
     FILE,
-    FITTED_ON,
     LEAST,
+    MANIFEST,
     MODELS,
     MOST,
     USUAL,
@@ -102,7 +102,7 @@ def test_a_bend_has_a_value_and_a_change() -> None:
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_the_fitted_models_are_those_of_the_file(name: str) -> None:
     document = json.loads((Path(association.__file__).parent / "verdict" / FILE).read_text())
-    assert set(MODELS) == set(document["models"]) == set(FITTED_ON) == NAMES
+    assert set(MODELS) == set(document["models"]) == set(MANIFEST["models"]) == NAMES
     curves = document["models"][name]
     assert {name for key in curves for name in key.removeprefix(LEAST).removeprefix(MOST).split()} <= set(
         Features._fields

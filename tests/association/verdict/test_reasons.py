@@ -13,6 +13,7 @@ from association.verdict.features import Features
 from association.verdict.models import USUAL, as_model
 from association.verdict.reasons import FEATURES_OF, SENTENCES, Doubts, reasons_of
 from association.verdict.tuning import NO_ALTERNATIVE, TELLING_REASON
+from association.verdict.vetoes import Findings, applied, counted
 
 from ..scenes import CORRIDOR, INSIDE, ROOM, answer_of, equal_rooms, index_of, maze, pose, scan_of, seen
 
@@ -47,7 +48,9 @@ def codes_of(
     twin: bool = False,
 ) -> list[str]:
     """Return the codes of an answer of which these reasons take so many nats."""
-    standing = Doubts(status, complete, contradicted, not_on_map=strange, few_walls=thin, similar_place=twin)
+    findings = Findings(complete, prior=-100.0 if contradicted else 0.0, unobservable=True, few_walls=thin)
+    vetoes = counted(applied(findings), status)
+    standing = Doubts(status, vetoes, not_on_map=strange, similar_place=twin)
     features = USUAL_ONE._replace(**{ONE_OF[code]: nats for code, nats in taken.items()})
     told = reasons_of(standing, features, MODEL)
     assert all(reason.message == SENTENCES[reason.code] for reason in told)
@@ -80,13 +83,13 @@ def test_several_features_of_a_reason_count_together() -> None:
     assert set(names) == set(Features._fields) - {"constant"}
     model = as_model({"lead": [-1.0], "solitude": [-1.0], "inlier_fraction": [-1.0]})
     features = USUAL_ONE._replace(lead=0.8, solitude=0.8, inlier_fraction=1.2)
-    told = reasons_of(Doubts(Status.AMBIGUOUS, True, False, False, False, False), features, model)
+    told = reasons_of(Doubts(Status.AMBIGUOUS), features, model)
     assert [reason.code for reason in told] == ["similar_place", "map_mismatch"]
 
 
 def test_what_is_far_behind_is_no_twin() -> None:
     model = as_model({"solitude": [1.0], "root_count": [1.0]})
-    standing = Doubts(Status.AMBIGUOUS, True, False, not_on_map=False, few_walls=False, similar_place=False)
+    standing = Doubts(Status.AMBIGUOUS)
 
     def codes_at(lead: float, *, alone: bool = False) -> list[str]:
         features = USUAL_ONE._replace(lead=lead, solitude=-3.0, root_count=-2.0)
@@ -130,9 +133,7 @@ def test_a_free_direction_is_told_instead_of_what_is_weighed() -> None:
 
 
 def test_without_an_answer_there_is_nothing_to_weigh() -> None:
-    told = reasons_of(
-        Doubts(Status.NO_MATCH, True, False, not_on_map=True, few_walls=False, similar_place=False), None, None
-    )
+    told = reasons_of(Doubts(Status.NO_MATCH, not_on_map=True), None, None)
     assert [reason.code for reason in told] == ["not_on_map"]
 
 

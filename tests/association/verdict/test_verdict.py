@@ -16,7 +16,7 @@ from association import AssociationOptions, Deadline, HardPrior, Reason, Status,
 from association.consensus.consensus_set import ConsensusSet
 from association.context import SearchContext
 from association.search import candidates
-from association.verdict import alternatives, chance, probabilities, reasons, tuning, verdict
+from association.verdict import alternatives, chance, probabilities, tuning, verdict, vetoes
 from association.verdict.verdict import Verdict, judge
 
 from ..answers import answer_with, estimated_of, explanations_of, ranked, registered_corridor, registered_room, room
@@ -25,7 +25,7 @@ from ..scenes import INSIDE, ROOM, equal_rooms, index_of, pose, same_pose, scan_
 
 SURE = {name: {"constant": [30.0]} for name in PLAIN}  # by which every answer is right
 THROUGH = AssociationOptions(exhaustive=True)
-BARS = {"USABLE_PROBABILITY": 0.7, "USABLE_CAUTIOUS": 0.6, "USABLE_CAUTIOUS_WITH_BEAMS": 0.9}
+BARS = {"USABLE_PROBABILITY": 0.7, "USABLE_CAUTIOUS": 0.6}
 
 
 @pytest.fixture(autouse=True)
@@ -44,11 +44,11 @@ def leading(lead: float, *, with_beams: bool = False) -> Drawn:
         ("probability", False, 0.7),
         ("probability_with_beams", True, 0.7),
         ("cautious", False, 0.6),
-        ("cautious_with_beams", True, 0.9),
+        ("cautious_with_beams", True, 0.6),
     ],
 )
 def test_an_answer_is_usable_from_the_limit_on(model: str, with_beams: bool, bar: float) -> None:
-    """Of either probability; by the models and the limits for scans with beams, or those for scans without."""
+    """Of either probability; by the models for scans with beams, or those for scans without."""
     with judged_by({**SURE, model: {"constant": [-3.0], "lead": [0.2]}}, **BARS):
         low, high = crossing(lambda lead: leading(lead, with_beams=with_beams).verdict.status, 40.0, 60)
         assert leading(low, with_beams=with_beams).verdict.status is Status.AMBIGUOUS
@@ -225,16 +225,16 @@ def test_what_fits_better_mirrored_is_not_usable(better: float, usable: bool, mo
     with judged_by(SURE):
         got = leading(40.0).verdict
     assert (got.status, got.usable) == (Status.OK if usable else Status.AMBIGUOUS, usable)
-    assert usable or got.reasons[0] == Reason("not_on_map", reasons.MIRRORED)
+    assert usable or got.reasons[0] == Reason("not_on_map", vetoes.MIRRORED)
 
 
 def test_nothing_found() -> None:
     """Outside of the window there may be something."""
     nothing = judge(room(), explanations_of(None))
-    assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, False, (), True)
+    assert replace(nothing, reasons=()) == Verdict(Status.NO_MATCH, 0.0, False, None, None, None, ())
     assert [reason.code for reason in nothing.reasons] == ["not_on_map"]
     outside = judge(room(), explanations_of(None, ranked(inside=False)))
-    assert replace(outside, reasons=()) == replace(nothing, reasons=(), contradicted=True)
+    assert replace(outside, reasons=()) == replace(nothing, reasons=(), vetoes=(vetoes.BETTER_ELSEWHERE,))
     assert [reason.code for reason in outside.reasons] == ["prior_contradicted", "not_on_map"]
 
 

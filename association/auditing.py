@@ -1,0 +1,300 @@
+"""Explain a verdict number by number: features, contributions, alternatives, null score, vetoes, thresholds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from registration import RigidTransform
+
+from .associating import DEFAULT_OPTIONS, run_stages
+from .context import SearchContext
+from .deadline import Deadline
+from .index.map_index import MapIndex
+from .options import AssociationOptions, Prior
+from .result import AssociationResult, Reason, ReasonCode, Status
+from .scan.scan import Scan
+from .verdict.features import Description, Features
+from .verdict.models import USUAL, Model
+from .verdict.probabilities import Probabilities
+from .verdict.reasons import FEATURES_OF, taken_by_reason
+from .verdict.tuning import ALTERNATIVE_TEMPERATURE, NO_MATCH_PROBABILITY, USABLE_PROBABILITY
+from .verdict.verdict import Verdict
+from .verdict.vetoes import VETOES, Origin
+
+REASON_OF: Mapping[str, ReasonCode] = {name: code for code, names in FEATURES_OF.items() for name in names}
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """The term of one feature, or of a pair of features, in the logarithm of the odds.
+
+    Attributes
+    ----------
+    name : str
+        Of the feature; of a pair its kind and both names.
+    value : float or None
+        Of the feature; None for a pair.
+    nats : float
+        The term.
+    usual : float
+        The same term of a usual right answer, nats.
+    reason : str or None
+        The reason that the feature speaks for where its term is lower than usual; None for the constant and pairs.
+    """
+
+    name: str
+    value: float | None
+    nats: float
+    usual: float
+    reason: ReasonCode | None
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedModel:
+    """One of the two models, evaluated.
+
+    Attributes
+    ----------
+    probability : float
+        Of the features alone, 0 to 1.
+    log_odds : float
+        The sum of the terms, nats.
+    contributions : tuple of Contribution
+        In the order of the model.
+    """
+
+    probability: float
+    log_odds: float
+    contributions: tuple[Contribution, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class WeighedAlternative:
+    """An alternative, as the verdict weighs it.
+
+    Attributes
+    ----------
+    pose : RigidTransform
+        In the map frame.
+    gap : float
+        Its evidence less that of the answer, nats.
+    counted : float
+        Its weight by the ratio of its score to the answer's, 0 to 1.
+    weight : float
+        Relative to the answer, whose weight is 1.
+    """
+
+    pose: RigidTransform
+    gap: float
+    counted: float
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedNull:
+    """The score of the mirrored scan.
+
+    Attributes
+    ----------
+    score : float
+        Nats; 0 where it is below `searched_above` of the answer's.
+    fraction : float
+        Of the answer's score.
+    symmetry : float
+        Fraction of the map's view that the map also shows mirrored, 0 to 1.
+    searched_above : float
+        Fraction of the answer's score; a lower null score makes no difference, and was not searched.
+    """
+
+    score: float
+    fraction: float
+    symmetry: float
+    searched_above: float
+
+
+@dataclass(frozen=True, slots=True)
+class VetoOutcome:
+    """One veto of the table, and whether it applies to the answer."""
+
+    name: str
+    origin: Origin
+    applies: bool
+    reasons: tuple[ReasonCode, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictExplanation:
+    """The numbers behind the verdict on an answer.
+
+    The answer is usable if ``probability_of_pose`` and ``cautious`` reach their thresholds and no veto applies. Both
+    are the probability by a model times that among the alternatives.
+
+    Attributes
+    ----------
+    status : Status
+    usable : bool
+    probability : float or None
+        As answered.
+    pose : RigidTransform or None
+    reasons : tuple of Reason
+    vetoes : tuple of VetoOutcome
+        The whole table, in its order.
+    features : mapping or None
+        By name; None without an answer, as all that follows.
+    usual, cautious_model : ExplainedModel or None
+        The model for scans that are known to be of this map, and the one that includes out-of-map scans.
+    taken : mapping or None
+        By reason the decrease of the cautious log odds by its features, nats.
+    alternatives : tuple of WeighedAlternative
+    among_as_scored, among_with_loose_walls : float or None
+        Probability of the answer among its alternatives, as they were scored, and with walls that may be off by more.
+        The second is None where it was not needed. The lower one counts.
+    null : ExplainedNull or None
+        None where it was not needed.
+    probability_of_pose, cautious : float or None
+    explained : float or None
+        Probability that this place or a similar one is right.
+    thresholds : mapping of str to float
+        Of ``probability_of_pose``, ``cautious`` and ``explained``.
+    """
+
+    status: Status
+    usable: bool
+    probability: float | None
+    pose: RigidTransform | None
+    reasons: tuple[Reason, ...]
+    vetoes: tuple[VetoOutcome, ...]
+    features: Mapping[str, float] | None = None
+    usual: ExplainedModel | None = None
+    cautious_model: ExplainedModel | None = None
+    taken: Mapping[ReasonCode, float] | None = None
+    alternatives: tuple[WeighedAlternative, ...] = ()
+    among_as_scored: float | None = None
+    among_with_loose_walls: float | None = None
+    null: ExplainedNull | None = None
+    probability_of_pose: float | None = None
+    cautious: float | None = None
+    explained: float | None = None
+    thresholds: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerExplanation:
+    """An answer, and how its verdict came about.
+
+    Attributes
+    ----------
+    result : AssociationResult
+        The answer, as `associate` returns it.
+    verdict : VerdictExplanation
+        On the scan as a whole.
+    last_view : VerdictExplanation or None
+        On the last view of a drive alone, where the drive as a whole is not usable.
+    """
+
+    result: AssociationResult
+    verdict: VerdictExplanation
+    last_view: VerdictExplanation | None
+
+
+def explain_verdict(
+    index: MapIndex,
+    scan: Scan,
+    prior: Prior | None = None,
+    options: AssociationOptions = DEFAULT_OPTIONS,
+    deadline: Deadline | None = None,
+) -> AnswerExplanation:
+    """Answer as `associate`, and return how the verdict came about, number by number.
+
+    Parameters
+    ----------
+    index : MapIndex
+    scan : Scan
+        In the sensor's frame.
+    prior : SoftPrior, HardPrior or None
+        In the map frame.
+    options : AssociationOptions
+    deadline : Deadline or None
+
+    Returns
+    -------
+    AnswerExplanation
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
+    stages = run_stages(index, scan, prior, options, deadline)
+    last, verdict = stages.last, stages.verdict
+    if last.result is None and not (last.complete and stages.result.search.complete):
+        verdict = verdict.cut_short()
+    alone = None if last.found is None or last.verdict is None else explained(last.found.context, last.verdict)
+    return AnswerExplanation(stages.result, explained(stages.found.context, verdict), alone)
+
+
+def explained(context: SearchContext, verdict: Verdict) -> VerdictExplanation:
+    """Return how a verdict came about."""
+    names = {veto.name for veto in verdict.vetoes}
+    vetoes = tuple(VetoOutcome(one.name, one.origin, one.name in names, one.reasons) for one in VETOES)
+    shown = VerdictExplanation(
+        verdict.status, verdict.usable, verdict.probability, verdict.pose, verdict.reasons, vetoes
+    )
+    found, description = verdict.probabilities, verdict.description
+    return shown if found is None or description is None else _with_numbers(context, shown, description, found)
+
+
+def _with_numbers(
+    context: SearchContext, shown: VerdictExplanation, description: Description, found: Probabilities
+) -> VerdictExplanation:
+    return VerdictExplanation(
+        shown.status,
+        shown.usable,
+        shown.probability,
+        shown.pose,
+        shown.reasons,
+        shown.vetoes,
+        features=found.features._asdict(),
+        usual=_evaluated(found.usual, found.features, found.by_usual),
+        cautious_model=_evaluated(found.model, found.features, found.by_model),
+        taken=taken_by_reason(found.features, found.model),
+        alternatives=_weighed(context, description),
+        among_as_scored=found.among_as_scored,
+        among_with_loose_walls=found.among_with_loose_walls,
+        null=_null(description, found),
+        probability_of_pose=found.right,
+        cautious=found.cautious,
+        explained=found.explained,
+        thresholds={
+            "probability_of_pose": USABLE_PROBABILITY,
+            "cautious": found.least_cautious,
+            "explained": NO_MATCH_PROBABILITY,
+        },
+    )
+
+
+def _evaluated(model: Model, features: Features, probability: float) -> ExplainedModel:
+    terms, usual = model.terms(features), model.terms(USUAL)
+    contributions = tuple(
+        Contribution(name, features._asdict().get(name), nats, usual[name], REASON_OF.get(name))
+        for name, nats in terms.items()
+    )
+    return ExplainedModel(probability, sum(terms.values()), contributions)
+
+
+def _weighed(context: SearchContext, description: Description) -> tuple[WeighedAlternative, ...]:
+    """Return the alternatives with their weights, as in `probability_among`."""
+    gaps, counted = description.alternatives["gap"], description.alternatives["counted"]
+    weights = counted * np.exp(np.minimum(0.0, gaps) / ALTERNATIVE_TEMPERATURE)
+    rows = zip(description.others, gaps.tolist(), counted.tolist(), weights.tolist(), strict=True)
+    return tuple(WeighedAlternative(context.in_map(one.pose), *numbers) for one, *numbers in rows)
+
+
+def _null(description: Description, found: Probabilities) -> ExplainedNull | None:
+    if found.null is None:
+        return None
+    score = found.null.score
+    return ExplainedNull(score, score / description.answer.best.score, found.null.symmetry, found.null_above)

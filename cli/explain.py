@@ -1,0 +1,102 @@
+"""``linefix explain``: how the verdict on an answer came about."""
+
+from __future__ import annotations
+
+from .contract import Json
+from .locate import NearOptions, SearchChoice, request_body
+from .options import AsJson, MapArgument, ScanArgument, grouped
+from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
+
+TITLES = {"probability_of_pose": "Scans of this map", "cautious": "Out-of-map scans included"}
+MOST_ALTERNATIVES = 10  # that people read; --json has all
+
+
+@grouped
+def explain(
+    on: MapArgument, scan: ScanArgument, window: NearOptions, search: SearchChoice, as_json: AsJson = False
+) -> None:
+    """Show how the verdict on a scan came about: features, alternatives, null score, vetoes, probabilities.
+
+    The answer is that of linefix locate. It is usable if both probabilities reach their thresholds and no veto applies.
+    """
+    from . import here
+
+    found = here.explain(request_body(on, scan, window, search))
+    if as_json:
+        print_json(found)
+        return
+    print_rows(verdict_rows(found["answer"]))
+    _print_verdict(found["verdict"])
+    if found["last_view"] is not None:
+        print("\nThe last view of the drive alone:")
+        _print_verdict(found["last_view"])
+
+
+def _print_verdict(one: Json) -> None:
+    """Print a verdict, part by part."""
+    if one["features"] is not None:
+        for name, title in TITLES.items():
+            _print_model(title, one["models"][name])
+        _print_taken(one["taken"])
+        _print_alternatives(one)
+        _print_null(one["null"])
+    print("\nVetoes")
+    print_table(
+        ("veto", "origin", "result"),
+        [(veto["name"], veto["origin"], "applies" if veto["applies"] else "passed") for veto in one["vetoes"]],
+    )
+    _print_probabilities(one)
+
+
+def _print_model(title: str, model: Json) -> None:
+    """Print the terms of a model, next to those of a usual right answer."""
+    print(f"\n{title}: contributions to the log odds, nats")
+    rows = [(term["name"], term["value"], term["nats"], term["usual"]) for term in model["contributions"]]
+    rows.append(("sum", None, model["log_odds"], sum(term["usual"] for term in model["contributions"])))
+    print_table(("feature", "value", "contribution", "usual"), rows)
+    print(f"probability by the model: {model['probability']:.4f}")
+
+
+def _print_taken(taken: Json) -> None:
+    print("\nDecrease of the log odds by reason, nats (out-of-map scans included)")
+    print_table(("reason", "nats"), list(taken.items()))
+
+
+def _print_alternatives(one: Json) -> None:
+    """Print the alternatives with their weights, and the probability among them."""
+    others, among = one["alternatives"], one["among_alternatives"]
+    print(f"\nAlternatives: {len(others)}; the answer has weight 1")
+    rows = [
+        (pose_text(other["pose"]), round(other["gap"], 3) + 0.0, other["weight"])
+        for other in others[:MOST_ALTERNATIVES]
+    ]
+    if rows:
+        print_table(("pose", "gap in nats", "weight"), rows)
+    loose = among["with_loose_walls"]
+    compared = "not compared" if loose is None else f"{loose:.4f}"
+    print(f"probability among them: {among['as_scored']:.4f}; with walls off by more: {compared}")
+
+
+def _print_null(null: Json | None) -> None:
+    if null is None:
+        print("\nNull score: not searched, because the answer is not usable without it")
+        return
+    if not null["score"]:
+        print(f"\nNull score: none above {null['searched_above']:.2f} of the answer's score")
+        return
+    print(
+        f"\nNull score: {null['score']:.1f} nats, {null['fraction']:.3f} of the answer's score; "
+        f"symmetry of the map {null['symmetry']:.2f}"
+    )
+
+
+def _print_probabilities(one: Json) -> None:
+    """Print the probabilities next to their thresholds, and what follows."""
+    if one["thresholds"] is not None:
+        print("\nProbabilities")
+        rows = [
+            (name, one[name], threshold, "reached" if one[name] >= threshold else "not reached")
+            for name, threshold in one["thresholds"].items()
+        ]
+        print_table(("probability", "value", "threshold", "result"), rows)
+    print(f"\nstatus {one['status']}, {'usable' if one['usable'] else 'not usable'}")

@@ -1,0 +1,101 @@
+"""Explain a verdict: for programs, and as the JSON document of ``linefix explain --json``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from association import AnswerExplanation, AssociationOptions, Deadline, MapIndex, Prior, Scan, explain_verdict
+from association.auditing import ExplainedModel, VerdictExplanation
+from registration import Segments
+from vectorization import LaserScan
+
+from .answers import Json, pose_json
+from .locating import prepared, scan_of
+from .mounted import MountedScan
+
+if TYPE_CHECKING:
+    from formats import ImportedMap, LineMap
+
+
+def explain(
+    map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike,
+    scan: Scan | MountedScan | LaserScan | Segments | ArrayLike,
+    angles: tuple[float, float] | None = None,
+    *,
+    prior: Prior | None = None,
+    options: AssociationOptions | None = None,
+    deadline: Deadline | None = None,
+) -> AnswerExplanation:
+    """Locate a scan, and return how the verdict on the answer came about, number by number.
+
+    Parameters
+    ----------
+    map, scan, angles, prior, options, deadline
+        As of `locate`.
+
+    Returns
+    -------
+    AnswerExplanation
+        `result` is the answer of `locate`. `verdict` has the features with their contributions, the alternatives with
+        their weights, the null score, each veto, the probabilities and their thresholds.
+
+    Raises
+    ------
+    InputError
+        When map, scan or options are not valid; the message names the argument.
+
+    Examples
+    --------
+    Of two equal rooms each explains the scan:
+
+    >>> import linefix
+    >>> room = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+    >>> other = [[x1 + 9, y1, x2 + 9, y2] for x1, y1, x2, y2 in room]
+    >>> seen = [[-1, 1, -1, -5], [-1, -5, 1, -5], [1, -5, 1, -3], [1, -3, 4, -3], [4, -3, 4, 1], [4, 1, -1, 1]]
+    >>> verdict = linefix.explain(room + other, seen).verdict
+    >>> verdict.usable, [reason.code for reason in verdict.reasons]
+    (False, ['similar_place'])
+    >>> len(verdict.alternatives), round(verdict.among_as_scored, 3)
+    (1, 0.5)
+    """
+    index, how = prepared(map, options)
+    return explain_verdict(index, scan_of(scan, angles), prior, how, deadline)
+
+
+def explanation_json(found: AnswerExplanation) -> Json:
+    """Return how a verdict came about as JSON, without the answer itself."""
+    last = found.last_view
+    return {"verdict": _verdict_json(found.verdict), "last_view": None if last is None else _verdict_json(last)}
+
+
+def _verdict_json(one: VerdictExplanation) -> Json:
+    return {
+        "status": str(one.status),
+        "usable": one.usable,
+        "probability": one.probability,
+        "pose": pose_json(one.pose),
+        "reasons": [{"code": reason.code, "message": reason.message} for reason in one.reasons],
+        "vetoes": [{**asdict(veto), "origin": str(veto.origin)} for veto in one.vetoes],
+        "features": None if one.features is None else dict(one.features),
+        "models": None
+        if one.usual is None or one.cautious_model is None
+        else {"probability_of_pose": _model_json(one.usual), "cautious": _model_json(one.cautious_model)},
+        "taken": None if one.taken is None else dict(one.taken),
+        "alternatives": [
+            {"pose": pose_json(other.pose), "gap": other.gap, "counted": other.counted, "weight": other.weight}
+            for other in one.alternatives
+        ],
+        "among_alternatives": {"as_scored": one.among_as_scored, "with_loose_walls": one.among_with_loose_walls},
+        "null": None if one.null is None else asdict(one.null),
+        "probability_of_pose": one.probability_of_pose,
+        "cautious": one.cautious,
+        "explained": one.explained,
+        "thresholds": None if one.thresholds is None else dict(one.thresholds),
+    }
+
+
+def _model_json(model: ExplainedModel) -> Json:
+    return asdict(model)
