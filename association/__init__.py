@@ -5,6 +5,7 @@ from registration import Beams
 from .associating import associate
 from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
+from .index.joint import MapPart
 from .index.map_index import MapIndex
 from .options import PARTS, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
@@ -14,6 +15,7 @@ from .result import (
     AssociationWarning,
     Correspondence,
     CriticalWall,
+    MapVerdict,
     Reason,
     ReasonCode,
     SearchReport,
@@ -22,11 +24,13 @@ from .result import (
 )
 from .scan.scan import Scan, Views, mirrored
 from .scan.views import MAX_VIEWS, View, assemble
+from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps, map_set
 from .words import AS_WELL, message_of
 
 __all__ = [
     "AS_WELL",
     "MAX_VIEWS",
+    "NOTHING_KNOWN",
     "PARTS",
     "Alternative",
     "AssociationDiagnostics",
@@ -43,7 +47,11 @@ __all__ = [
     "IndexingEndedError",
     "InvalidMapError",
     "InvalidSearchError",
+    "KnownOfMaps",
     "MapIndex",
+    "MapPart",
+    "MapSet",
+    "MapVerdict",
     "Prior",
     "Reason",
     "ReasonCode",
@@ -56,6 +64,8 @@ __all__ = [
     "WarningCode",
     "assemble",
     "associate",
+    "associate_on_maps",
+    "map_set",
     "message_of",
     "mirrored",
 ]

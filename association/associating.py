@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 
+from registration.values import value
+
 from .causes import find_causes
 from .context import SearchContext
 from .deadline import Deadline
 from .explain import explain
+from .explanations import Explanations
 from .index.map_index import MapIndex
 from .last_view import search_last_view
 from .options import AssociationOptions, Prior
@@ -16,7 +19,7 @@ from .result import AssociationResult
 from .scan.scan import Scan
 from .search.candidates import find_candidates
 from .to_scale import put_to_scale
-from .verdict.verdict import judge
+from .verdict.verdict import Verdict, judge
 
 DEFAULT_OPTIONS = AssociationOptions()
 
@@ -58,14 +61,45 @@ def associate(
         When the deadline was cancelled.
     """
     began = time.monotonic()
-    context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
+    return answer(SearchContext.of(index, scan, prior, options, deadline or Deadline()), began).result
+
+
+@value(frozen=True, slots=True)
+class Answered:
+    """The answer of a search, and the explanations that it was put together from.
+
+    Attributes
+    ----------
+    result : AssociationResult
+    context : SearchContext
+        With the scan to scale.
+    explanations : Explanations
+    verdict : Verdict
+        On them; of a drive whose last view alone is the answer, on the whole drive.
+    """
+
+    result: AssociationResult
+    context: SearchContext
+    explanations: Explanations
+    verdict: Verdict
+
+
+def answer(context: SearchContext, began: float) -> Answered:
+    """Search, explain and judge as `associate` describes; `began` is when that started, `time.monotonic()` seconds.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
     candidates = find_candidates(context)
     explanations = explain(context, candidates)
     found = put_to_scale(context, explanations)
     verdict = judge(found.context, found.explanations, off_scale=found.off_scale)
     last = search_last_view(found.context, verdict)
     if last.result is not None:
-        return last.result
+        return Answered(last.result, found.context, found.explanations, verdict)
     verdict = verdict if last.complete else verdict.cut_short()
     result = report(found.context, found.explanations, verdict, found.factor)
-    return with_causes(result, find_causes(context, found.explanations, verdict, began))
+    result = with_causes(result, find_causes(context, found.explanations, verdict, began))
+    return Answered(result, found.context, found.explanations, verdict)

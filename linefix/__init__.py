@@ -23,6 +23,7 @@ from association import (
     Deadline,
     HardPrior,
     MapIndex,
+    MapSet,
     Scan,
     SoftPrior,
     Status,
@@ -43,7 +44,7 @@ from registration import (
 from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions, vectorize
 
 from .checking import CheckedMap, check
-from .locating import index_map, locate, scan_of
+from .locating import index_map, index_maps, locate, scan_of
 from .mounted import MountedScan, view_of
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ __all__ = [
     "LineMap",
     "LogOptions",
     "MapIndex",
+    "MapSet",
     "MeasuredSegments",
     "Motion",
     "MountedScan",
@@ -82,6 +84,7 @@ __all__ = [
     "check",
     "draw_map",
     "index_map",
+    "index_maps",
     "locate",
     "read_log",
     "read_map",
