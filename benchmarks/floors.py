@@ -64,7 +64,7 @@ class Floors:
     absent_explained : list of bool
         The same of scans that another floor explains.
     equal : list of bool
-        Of each scan of a floor that is there twice: whether it is said so, and both are listed.
+        Of each scan of a floor that is there twice: whether the answer is not usable and lists both.
     """
 
     wanted: list[bool] = field(default_factory=list)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from functools import cache
 
@@ -12,6 +13,7 @@ import pytest
 import linefix
 from association import (
     AssociationOptions,
+    Deadline,
     HardPrior,
     InvalidMapError,
     InvalidSearchError,
@@ -21,6 +23,8 @@ from association import (
     MapSet,
     Scan,
     SoftPrior,
+    View,
+    assemble,
     associate,
     associate_on_maps,
     map_set,
@@ -245,3 +249,23 @@ def test_the_least_exact_map_decides_the_gates() -> None:
     assert joint_sigma([0.01, 0.05]) == 0.05
     assert joint_sigma([None, 0.01]) is None
     assert joint_sigma([None, 0.05]) == 0.05
+
+
+def test_a_deadline_that_passes_is_told() -> None:
+    found = associate_on_maps(building(), seen_on(0), deadline=Deadline(time.monotonic()))
+    assert not found.search.complete
+    assert not found.usable
+    assert "search_incomplete" in [one.code for one in found.reasons]
+    assert {one.map_id for one in found.maps} == set(building().ids)
+
+
+def test_views_of_a_drive_are_all_on_one_map() -> None:
+    step = RigidTransform(-1.5, 0.2, 0.1)
+    before = scan(floors()[4], TRUTH.compose(step), SCANNER, np.random.default_rng(9)).ranges
+    laser = linefix.LaserScan(SCANNER.angle_min, SCANNER.angle_increment, before)
+    views = [View(seen_on(4)), View(linefix.scan_of(laser), step, np.diag([1e-4, 1e-4, 1e-5]), 0)]
+    found = associate_on_maps(building(), assemble(views))
+    assert found.map_id == "floor-4"
+    assert is_truth(found.pose)
+    assert all(0 <= pair.map < len(floors()[4]) for pair in found.correspondences)
+    assert {pair.scan for pair in found.correspondences} & set(range(len(seen_on(4).measured), 1000))
