@@ -78,8 +78,11 @@ def test_the_floor_is_found_among_floors_that_share_their_outer_walls() -> None:
 @pytest.mark.parametrize("floor", [0, 4])
 def test_the_answer_is_that_of_the_map_alone_in_its_frame_and_indices(floor: int) -> None:
     far = np.array([500_000.0, -4_000_000.0])
-    maps = map_set({str(k): MapPart(one.shifted(k * far)) for k, one in enumerate(floors()[:5])})
-    alone = associate(MapIndex.build(floors()[floor].shifted(floor * far)), seen_on(floor))
+    # A wall across the corridor that is gone since.
+    gone = [[24.0, 8.8, 24.0, 10.2], [24.0, 10.2, 24.0, 8.8]]
+    mapped = [Segments.from_array(np.vstack([one.endpoints, gone])) for one in floors()[:5]]
+    maps = map_set({str(k): MapPart(one.shifted(k * far)) for k, one in enumerate(mapped)})
+    alone = associate(MapIndex.build(mapped[floor].shifted(floor * far)), seen_on(floor))
     among = associate_on_maps(maps, seen_on(floor))
     assert among.pose is not None
     assert alone.pose is not None
@@ -89,6 +92,7 @@ def test_the_answer_is_that_of_the_map_alone_in_its_frame_and_indices(floor: int
     np.testing.assert_allclose(among.covariance, alone.covariance, rtol=1e-6)
     assert [(a.scan, a.map) for a in among.correspondences] == [(a.scan, a.map) for a in alone.correspondences]
     assert among.missing_map == alone.missing_map
+    assert {len(mapped[floor]) - 2, len(mapped[floor]) - 1} & set(among.missing_map)
     assert among.diagnostics is not None
     assert alone.diagnostics is not None
     before, own = among.diagnostics.registration.ambiguity_before, alone.diagnostics.registration.ambiguity_before
