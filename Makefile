@@ -109,6 +109,7 @@ page: $(VENV)/.ready  ## build the page from web/ into service/page/ (needs node
 pictures: $(VENV)/.ready  ## draw the pictures of README and documents that need no data; the page with chromium
 	$(BIN)/python -m examples.animation
 	$(BIN)/python -m examples.concepts
+	$(BIN)/python -m examples.several_maps
 	$(BIN)/python -m benchmarks.verdicts
 	$(BIN)/python -m examples.demo && cp out/demo.png docs/demo.png
 

@@ -15,6 +15,7 @@ from .auditing import (
 )
 from .deadline import CancelledError, Deadline
 from .errors import AssociationError, IndexingEndedError, InvalidMapError, InvalidSearchError
+from .index.joint import MapPart
 from .index.map_index import MapIndex
 from .options import PARTS, AssociationOptions, HardPrior, Prior, SoftPrior
 from .result import (
@@ -24,6 +25,7 @@ from .result import (
     AssociationWarning,
     Correspondence,
     CriticalWall,
+    MapVerdict,
     Reason,
     ReasonCode,
     SearchReport,
@@ -32,11 +34,13 @@ from .result import (
 )
 from .scan.scan import Scan, Views, mirrored
 from .scan.views import MAX_VIEWS, View, assemble
+from .several_maps import NOTHING_KNOWN, KnownOfMaps, MapSet, associate_on_maps, map_set
 from .words import AS_WELL, message_of
 
 __all__ = [
     "AS_WELL",
     "MAX_VIEWS",
+    "NOTHING_KNOWN",
     "PARTS",
     "Alternative",
     "AnswerExplanation",
@@ -57,7 +61,11 @@ __all__ = [
     "IndexingEndedError",
     "InvalidMapError",
     "InvalidSearchError",
+    "KnownOfMaps",
     "MapIndex",
+    "MapPart",
+    "MapSet",
+    "MapVerdict",
     "Prior",
     "Reason",
     "ReasonCode",
@@ -73,7 +81,9 @@ __all__ = [
     "WeighedAlternative",
     "assemble",
     "associate",
+    "associate_on_maps",
     "explain_verdict",
+    "map_set",
     "message_of",
     "mirrored",
 ]

@@ -10,6 +10,7 @@ from .causes import find_causes
 from .context import SearchContext
 from .deadline import Deadline
 from .explain import explain
+from .explanations import Explanations
 from .index.map_index import MapIndex
 from .last_view import LastView, search_last_view
 from .options import AssociationOptions, Prior
@@ -32,7 +33,7 @@ class Stages:
     found : ScaledSearch
         The search, and its explanations.
     verdict : Verdict
-        On them.
+        On them; of a drive whose last view alone is the answer, on the whole drive.
     last : LastView
         Of a drive that is not usable: its last view alone.
     result : AssociationResult
@@ -43,6 +44,16 @@ class Stages:
     verdict: Verdict
     last: LastView
     result: AssociationResult
+
+    @property
+    def context(self) -> SearchContext:
+        """The inputs of the search, with the scan to scale."""
+        return self.found.context
+
+    @property
+    def explanations(self) -> Explanations:
+        """The explanations that the answer was put together from."""
+        return self.found.explanations
 
 
 def associate(
@@ -81,19 +92,18 @@ def associate(
     CancelledError
         When the deadline was cancelled.
     """
-    return run_stages(index, scan, prior, options, deadline).result
-
-
-def run_stages(
-    index: MapIndex,
-    scan: Scan,
-    prior: Prior | None = None,
-    options: AssociationOptions = DEFAULT_OPTIONS,
-    deadline: Deadline | None = None,
-) -> Stages:
-    """Find the same; return it with the stages that it comes from."""
     began = time.monotonic()
-    context = SearchContext.of(index, scan, prior, options, deadline or Deadline())
+    return run_stages(SearchContext.of(index, scan, prior, options, deadline or Deadline()), began).result
+
+
+def run_stages(context: SearchContext, began: float) -> Stages:
+    """Search, explain and judge as `associate` describes; `began` is when that started, `time.monotonic()` seconds.
+
+    Raises
+    ------
+    CancelledError
+        When the deadline was cancelled.
+    """
     candidates = find_candidates(context)
     explanations = explain(context, candidates)
     found = put_to_scale(context, explanations)

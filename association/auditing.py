@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -228,7 +229,8 @@ def explain_verdict(
     CancelledError
         When the deadline was cancelled.
     """
-    stages = run_stages(index, scan, prior, options, deadline)
+    began = time.monotonic()
+    stages = run_stages(SearchContext.of(index, scan, prior, options, deadline or Deadline()), began)
     last, verdict = stages.last, stages.verdict
     if last.result is None and not (last.complete and stages.result.search.complete):
         verdict = verdict.cut_short()

@@ -13,6 +13,7 @@ from registration import Segments
 from .context import SearchContext
 from .explain import search_and_explain
 from .explanations import Explanations
+from .index.joint import JointIndex
 from .index.map_index import MapIndex
 from .scan.scan import Scan, mirrored, turned_round
 from .search.candidates import Effort, allowed_by
@@ -129,7 +130,8 @@ def _undone(context: SearchContext) -> Iterator[tuple[Mistake, float, SearchCont
     if context.options.oriented:
         yield Mistake.REVERSED, 1.0, _with_scan(context, turned_round(scan))
     yield Mistake.MIRRORED, 1.0, _with_scan(context, mirrored(scan))
-    for factor in likely_map_units(context):
+    # Smaller maps would lie too near one another: the unit of several maps is not tested.
+    for factor in [] if isinstance(context.index, JointIndex) else likely_map_units(context):
         yield Mistake.UNIT_SCALE, factor, _with_smaller_map(context, factor)
     for factor in likely_units(context):
         yield Mistake.UNIT_SCALE, factor, at_scale(context, factor)

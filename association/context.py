@@ -8,11 +8,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from registration import RigidTransform
-from registration.layout import Records
+from registration.layout import POSE, Records
 from registration.observability import most_parallel_up_to
 from registration.values import value
 
 from .deadline import Deadline
+from .index.joint import JointIndex
 from .index.map_index import MapIndex
 from .layout import (
     ENDS,
@@ -26,10 +27,11 @@ from .layout import (
     SIGHTING,
     SOFT_PRIOR,
     TERMS,
+    Integers,
     as_records,
     record,
 )
-from .options import AssociationOptions, HardPrior, Prior, SoftPrior
+from .options import AssociationOptions, HardPrior, MapsPrior, Prior, SoftPrior
 from .scan.alignment import aligned
 from .scan.scan import Scan
 from .scan.scan_lines import ScanLines, gates
@@ -64,7 +66,7 @@ class SearchContext:
     index : MapIndex
         Of the directed or of the undirected map, as the options want it.
     scan : Scan
-    prior : Prior or None
+    prior : Prior, MapsPrior or None
         In the map frame.
     options : AssociationOptions
     deadline : Deadline
@@ -74,7 +76,7 @@ class SearchContext:
 
     index: MapIndex
     scan: Scan
-    prior: Prior | None
+    prior: Prior | MapsPrior | None
     options: AssociationOptions
     deadline: Deadline
     lines: ScanLines
@@ -82,7 +84,12 @@ class SearchContext:
 
     @classmethod
     def of(
-        cls, index: MapIndex, scan: Scan, prior: Prior | None, options: AssociationOptions, deadline: Deadline
+        cls,
+        index: MapIndex,
+        scan: Scan,
+        prior: Prior | MapsPrior | None,
+        options: AssociationOptions,
+        deadline: Deadline,
     ) -> SearchContext:
         """Prepare a search; views that are not exact are laid on one another, as far as the deadline lets it.
 
@@ -101,9 +108,15 @@ class SearchContext:
         return self.scan.beams is not None
 
     @property
+    def pose_prior(self) -> Prior | None:
+        """The prior of the pose, if there is one."""
+        return self.prior.of_pose if isinstance(self.prior, MapsPrior) else self.prior
+
+    @property
     def window(self) -> HardPrior | None:
         """The hard prior, if there is one."""
-        return self.prior if isinstance(self.prior, HardPrior) else None
+        prior = self.pose_prior
+        return prior if isinstance(prior, HardPrior) else None
 
     @cached_property
     def ends(self) -> Records:
@@ -147,7 +160,7 @@ class SearchContext:
         Of the lines of sight of the scan, of those in all directions, and of the beams that are compared.
         """
         grid, views, scan = self.index.grid.shape[0], self.sights.places, self.scan
-        across = float(grid["columns"] + grid["rows"])  # cells that a ray passes at most
+        across = self.index.across
         rays = RAYS * len(views) + MAX_RAYS * len(self.sights.seen) + (COMPARED_BEAMS if self.with_beams else 0)
         in_a_cell = self.index.most_near + EMPTY_CELL
         if rays * across * in_a_cell <= MOST_LOOKED_AT:
@@ -218,6 +231,27 @@ class SearchContext:
     def _searching(self, scan: Scan, lines: ScanLines) -> SearchContext:
         return SearchContext(self.index, scan, None, self.options, self.deadline, lines, self.gates)
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Mean of the midpoints of the scan's lines, metres in the scan frame."""
+        rows = self.lines.rows
+        return (float(rows["x"].mean()), float(rows["y"].mean())) if len(rows) else (0.0, 0.0)
+
+    def maps_at(self, poses: Records) -> Integers:
+        """Return the map of each pose (k,), (k,): that nearest to the middle of the scan; 0 where there is one."""
+        if not isinstance(self.index, JointIndex) or not len(poses):
+            return np.zeros(len(poses), np.intp)
+        x, y = self.middle
+        c, s = np.cos(poses["theta"]), np.sin(poses["theta"])
+        return self.index.map_at(np.stack([c * x - s * y + poses["x"], s * x + c * y + poses["y"]], axis=1))
+
+    def on_map_of(self, pose: RigidTransform, other: RigidTransform) -> bool:
+        """Return whether a pose of the map frame is on the map of one of the index frame, where there are several."""
+        here = self.in_index(pose)
+        at = np.array([(here.theta, here.x, here.y), (other.theta, other.x, other.y)], POSE)
+        of_here, of_other = self.maps_at(at)
+        return bool(of_here == of_other)
+
     def in_map(self, pose: RigidTransform) -> RigidTransform:
         """Return a pose of the index frame in the map frame."""
         x, y = self.index.origin
@@ -231,7 +265,7 @@ class SearchContext:
     @cached_property
     def prior_record(self) -> Records:
         """The prior in the index frame, (1,) of `PRIOR`."""
-        prior = self.prior
+        prior = self.pose_prior
         if prior is None:
             return NOTHING_KNOWN
         x, y = self.index.origin

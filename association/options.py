@@ -77,6 +77,22 @@ class HardPrior:
 Prior = SoftPrior | HardPrior
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MapsPrior:
+    """Prior knowledge about which of several maps the robot is on, and of its pose on one of them.
+
+    Attributes
+    ----------
+    of_maps : (k,)
+        Of each map, added to the posterior of each pose on it, nats; at most 0, that of the likeliest map.
+    of_pose : SoftPrior, HardPrior or None
+        In the joint frame of the maps.
+    """
+
+    of_maps: Floats
+    of_pose: Prior | None
+
+
 @dataclass(frozen=True, slots=True)
 class AssociationOptions:
     """How to search.

@@ -140,7 +140,8 @@ def _alternatives(
     shown = tuple(islice(with_lines_of_sight(context, explanations.ranked, others), context.options.max_alternatives))
     if not shown:
         return ()
-    estimated, probabilities = estimate_poses(context, shown), _probabilities(explanations.answer, verdict, shown)
+    estimated = estimate_poses(context, shown)
+    probabilities = probabilities_of_others(explanations.answer, verdict, shown)
     found: list[Alternative] = []
     for some in slices_between_looks(context, len(estimated)):
         measures = _measures(context, shown[some], estimated[some])
@@ -159,7 +160,9 @@ def _measures(
     return measures
 
 
-def _probabilities(answer: Answer | None, verdict: Verdict, others: Sequence[ConsensusSet]) -> list[float | None]:
+def probabilities_of_others(
+    answer: Answer | None, verdict: Verdict, others: Sequence[ConsensusSet]
+) -> list[float | None]:
     """Return the probability that each of some other poses is right, 0 to 1; None where the verdict has none to share.
 
     As in `probability_among`: the best explanation weighs 1, another one what it is counted, reduced by its gap.

@@ -149,6 +149,8 @@ class Alternative:
     probability : float or None
         That this pose is right, 0 to 1: all of them and the answer's together make at most 1. None where the answer has
         none, or contradicts the prior.
+    map_id : str or None
+        Of several maps the one that the pose is on; None where a single map was searched.
     """
 
     pose: RigidTransform
@@ -158,6 +160,7 @@ class Alternative:
     reliability: float
     inlier_fraction: float
     probability: float | None
+    map_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +211,32 @@ class AssociationWarning:
 
 
 @dataclass(frozen=True, slots=True)
+class MapVerdict:
+    """The best pose on one of several maps.
+
+    Attributes
+    ----------
+    map_id : str
+    status : Status
+        Of the map of the answer that of the answer. Of another one `ambiguous` where its pose explains the scan about
+        as well, and the answer is not usable, else `no_match`.
+    score : float or None
+        Log-likelihood over that of a scan that is all clutter, and the logarithm of the map's weight over the largest
+        weight, nats; None where no pose was found on the map.
+    probability : float or None
+        Probability that this pose is right, 0 to 1; None where the answer has none.
+    pose : RigidTransform or None
+        In the map's own frame; None where none was found.
+    """
+
+    map_id: str
+    status: Status
+    score: float | None
+    probability: float | None
+    pose: RigidTransform | None
+
+
+@dataclass(frozen=True, slots=True)
 class AssociationResult:
     """The answer of `associate`; lengths in metres, angles in radians, poses map_from_scan.
 
@@ -238,6 +267,10 @@ class AssociationResult:
         Distinct from the pose and from each other, best first.
     search : SearchReport
     warnings : tuple of AssociationWarning
+    map_id : str or None
+        Of several maps the one that the pose is on; None for `no_match`, and where a single map was searched.
+    maps : tuple of MapVerdict
+        Of several maps each, the best first; empty where a single map was searched.
     """
 
     status: Status
@@ -254,3 +287,5 @@ class AssociationResult:
     alternatives: tuple[Alternative, ...]
     search: SearchReport
     warnings: tuple[AssociationWarning, ...]
+    map_id: str | None = None
+    maps: tuple[MapVerdict, ...] = ()

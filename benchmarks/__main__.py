@@ -13,6 +13,7 @@ from .batch import batch
 from .drawn import SCANNER
 from .estimators import estimators
 from .figures import record
+from .floors import floors
 from .growth import PAIRS, SIZES, growth
 from .imports import imports
 from .localization import localization
@@ -79,6 +80,12 @@ def _analyze(quick: int) -> list[Row]:
     return rows
 
 
+def _floors(quick: int) -> list[Row]:
+    rows = floors(scans=max(2, 8 // quick), buildings=2 if quick == 1 else 1, repeats=max(5, 20 // quick))
+    print_rows("Floors", rows)
+    return rows
+
+
 def _mistakes(quick: int) -> list[Row]:
     rows = mistakes(quick)
     print_rows("Time for causes", rows)
@@ -117,6 +124,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "adversarial": _adversarial,
     "parts": _parts,
     "mistakes": _mistakes,
+    "floors": _floors,
     "peers": _peers,
     "request": request,
     "sums": _sums,

@@ -176,7 +176,7 @@ def parts_of(asked: Asked) -> Iterator[dict[str, Callable[[], object]]]:
         lookup = MapLookup(IndexCache(100_000_000, Metrics()), store, ParserProcess())
         associator = Associator(lookup, Metrics())
         wanted, empty = (read_model(AssociateRequest, body, limits) for body in (asked.request, asked.nothing))
-        target = associator.target(lookup.find("m", oriented=None), wanted.options, deadline)
+        target = associator.target(wanted, lookup.find("m", oriented=None), deadline)
         answer = associator.find(target, wanted, wanted.options, deadline)
         yield {
             "parsing and checking": partial(read_model, AssociateRequest, asked.request, limits),

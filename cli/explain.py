@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .contract import Json
+from .errors import WrongUseError
 from .locate import NearOptions, SearchChoice, request_body
 from .options import AsJson, MapArgument, ScanArgument, grouped
 from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
@@ -21,7 +22,10 @@ def explain(
     """
     from . import here
 
-    found = here.explain(request_body(on, scan, window, search))
+    body = request_body([on], scan, window, search)
+    if "maps" in body:
+        raise WrongUseError(f"{on}: found a folder with {len(body['maps'])} maps, expected one map")
+    found = here.explain(body)
     if as_json:
         print_json(found)
         return

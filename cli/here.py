@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import linefix
-from association import Prior, explain_verdict
+from association import KnownOfMaps, Prior, associate_on_maps, explain_verdict
 from linefix.answers import Included, association_json, registration_json
 from linefix.explaining import explanation_json
 from linefix.map_answers import checked_json, import_json, map_json
@@ -36,7 +36,7 @@ from .compiling import compile_first
 from .contract import Json, Question, id_of
 from .errors import Asked, NoServerError
 from .inputs import needing_formats, refusing
-from .stored import map_here, require_storable, settings_here
+from .stored import FoundMap, map_here, require_storable, settings_here
 
 if TYPE_CHECKING:
     from formats import ImportOptions, LoggedScan
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
 def associate(body: Json) -> Json:
     """Return the answer of ``POST /v1/associate``."""
+    if "maps" in body:
+        return _associate_on_maps(body)
     asked = _Search.of(body)
     return asked.answer(linefix.associate(*asked.arguments))
 
@@ -103,6 +105,37 @@ class _Search:
         return _sealed(
             {**association_json(result, self.included), "map": self.reference, "client_ref": None}, self.watch
         )
+
+
+def _associate_on_maps(body: Json) -> Json:
+    """Return the answer of ``POST /v1/associate`` for several maps, of files or stored ones."""
+    settings, watch = settings_here(), Stopwatch()
+    asked = validate(AssociateRequest, body, settings.limits())
+    options, deadline = asked.options, watch.deadline(asked.options.deadline_ms, settings.max_deadline_ms)
+    maps: Sequence[Json] = body["maps"]
+    found = {one["map_id"]: FoundMap(one, None) if "segments" in one else map_here(one) for one in maps}
+    documents = {
+        name: {
+            "segments": one.document["segments"],
+            "sigma": one.document.get("sigma"),
+            "oriented": is_oriented(options.oriented, one.document.get("oriented")),
+        }
+        for name, one in found.items()
+    }
+    index = linefix.index_maps(documents)
+    watch.lap("decode")
+    scanned, search = scanned_of(asked.scan), association_options_of(options, oriented=index.oriented)
+    require_time(deadline)
+    prior_map = None if asked.prior is None else asked.prior.map_id
+    known = KnownOfMaps(prior_of(asked.prior), prior_map, asked.map_weights)
+    result = associate_on_maps(index, scanned.scan, known, search, deadline)
+    watch.lap("search")
+    frame_id = found[result.map_id or next(iter(found))].document.get("frame_id", "map")
+    answer = association_json(result, included_of(asked.scan, options, scanned, frame_id))
+    references = {name: one.reference or {"map_id": name, "revision": None} for name, one in found.items()}
+    answer["maps"] = [{**one, **references[one["map_id"]]} for one in answer["maps"]]
+    on = None if result.map_id is None else references[result.map_id]
+    return _sealed({**answer, "map": on, "client_ref": None}, watch)
 
 
 def register(body: Json) -> Json:

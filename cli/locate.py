@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -9,10 +10,11 @@ import typer
 
 from .asking import ask
 from .contract import Json
-from .inputs import read_map_or_id
-from .options import AsJson, MapArgument, ScanArgument, Server, grouped
-from .printing import print_json, print_rows, verdict_rows
+from .errors import WrongUseError
+from .options import AsJson, MapsArgument, ScanArgument, Server, grouped
+from .printing import pose_text, print_json, print_rows, print_table, verdict_rows
 from .scans import read_scan
+from .several import read_target
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,7 @@ class NearOptions:
     ] = None
     radius: Annotated[float, typer.Option(metavar="METRES", help="Maximum distance from --near.")] = 1.0
     angle: Annotated[float, typer.Option(metavar="RADIANS", help="Maximum rotation from --near.")] = 0.5
+    near_map: Annotated[str | None, typer.Option(metavar="MAP_ID", help="Of several maps the one of --near.")] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,32 +43,49 @@ class SearchChoice:
             "--causes", help="If the answer is not usable, test the scan mirrored, reversed and in other units."
         ),
     ] = False
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="MAP_ID=PROBABILITY",
+            help="Probability of one of several maps, for example of a lift's display; may be repeated.",
+        ),
+    ] = None
     deadline_ms: Annotated[float | None, typer.Option(metavar="MS", help="Time limit of the search.")] = None
 
 
 @grouped
 def locate(
-    on: MapArgument,
+    on: MapsArgument,
     scan: ScanArgument,
     window: NearOptions,
     search: SearchChoice,
     server: Server = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find the pose of a scan on a map; the answer is that of /v1/associate."""
+    """Find the pose of a scan on a map, or on one of several; the answer is that of /v1/associate."""
     answer = ask("associate", request_body(on, scan, window, search), server)
     if as_json:
         print_json(answer)
-    else:
-        print_rows(verdict_rows(answer))
+        return
+    rows = verdict_rows(answer)
+    if "maps" in answer and answer.get("map"):
+        rows.insert(1, ("map", answer["map"]["map_id"]))
+    print_rows(rows)
+    if answer.get("maps"):
+        columns = ("map", "status", "score", "probability", "pose")
+        print_table(columns, [_map_row(one) for one in answer["maps"]])
 
 
-def request_body(on: str, scan: str, window: NearOptions, search: SearchChoice) -> Json:
+def request_body(on: Sequence[str], scan: str, window: NearOptions, search: SearchChoice) -> Json:
     """Return the request of ``/v1/associate`` for the arguments and options of a command."""
-    body: Json = {"map": read_map_or_id(on), "scan": read_scan(scan), "options": {}}
+    body: Json = {**read_target(on), "scan": read_scan(scan), "options": {}}
     if window.near is not None:
         pose = dict(zip(("x", "y", "theta"), window.near, strict=True))
         body["prior"] = pose | {"radius": window.radius, "angle": window.angle}
+        if window.near_map is not None:
+            body["prior"]["map_id"] = window.near_map
+    if search.weight:
+        body["map_weights"] = dict(map(_weight, search.weight))
     if search.undirected:
         body["options"]["oriented"] = False
     if search.causes:
@@ -73,3 +93,17 @@ def request_body(on: str, scan: str, window: NearOptions, search: SearchChoice) 
     if search.deadline_ms is not None:
         body["options"]["deadline_ms"] = search.deadline_ms
     return body
+
+
+def _map_row(one: Json) -> tuple[object, ...]:
+    pose = None if one["pose"] is None else pose_text(one["pose"])
+    return one["map_id"], one["status"], one["score"], one["probability"], pose
+
+
+def _weight(told: str) -> tuple[str, float]:
+    """Return the map and its probability of ``MAP_ID=PROBABILITY``; raises `WrongUseError` where it is not that."""
+    name, _, value = told.rpartition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise WrongUseError(f"--weight: found {told!r}, expected MAP_ID=PROBABILITY, for example hq-3=0.8") from None

@@ -13,11 +13,12 @@ import numpy as np
 import linefix
 from registration import InputError, RigidTransform
 
-from .asking import server_at, whole_map
+from .asking import server_at
 from .compiling import compile_first
 from .contract import Json
 from .errors import RefusedError
 from .logs import sent
+from .several import documents_of
 
 if TYPE_CHECKING:
     from formats import LoggedScan
@@ -43,6 +44,8 @@ class Found:
     warnings : list of str
         Codes.
     timing_ms : dict
+    map_id : str or None
+        Of several maps the one that the pose is on.
     """
 
     status: str
@@ -53,19 +56,20 @@ class Found:
     reasons: list[Json]
     warnings: list[str]
     timing_ms: Json
+    map_id: str | None = None
 
 
 class Locator(Protocol):
-    """Finds the scans of a log in one map."""
+    """Finds the scans of a log in one map, or on several; then a prior is on the map `prior_map`."""
 
-    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
+    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None, prior_map: str | None = None) -> Found:
         """Return where a scan was taken; raises `RefusedError` where it is not taken."""
         ...
 
 
 @contextmanager
-def locating(on: Json, server: str | None) -> Iterator[Locator]:
-    """Give a locator for a map: this process, or the server at a URL.
+def locating(target: Json, server: str | None) -> Iterator[Locator]:
+    """Give a locator for the map, or the maps, of a request: this process, or the server at a URL.
 
     Raises
     ------
@@ -74,16 +78,18 @@ def locating(on: Json, server: str | None) -> Iterator[Locator]:
     """
     if server is not None:
         with closing(server_at(server)) as remote:
-            yield Remote(remote, on)
+            yield Remote(remote, target)
         return
     from .stored import require_size, settings_here
 
     seconds = 1e-3 * settings_here().max_deadline_ms
-    document = whole_map(on, None)
-    require_size(document)
+    documents = documents_of(target, None)
+    for document in documents.values():
+        require_size(document)
     compile_first()
     try:
-        index = linefix.index_map(document)
+        several = "maps" in target
+        index = linefix.index_maps(documents) if several else linefix.index_map(next(iter(documents.values())))
     except InputError as error:
         raise RefusedError(str(error)) from None
     yield Local(index, seconds)
@@ -95,22 +101,24 @@ class Local:
 
     Attributes
     ----------
-    index : MapIndex
+    index : MapIndex or MapSet
     seconds : float
         That a search may take.
     """
 
-    index: linefix.MapIndex
+    index: linefix.MapIndex | linefix.MapSet
     seconds: float
 
-    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
+    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None, prior_map: str | None = None) -> Found:
         """Return where a scan was taken."""
         begun = time.perf_counter()
         try:
             scan = linefix.scan_of(one)
             read = time.perf_counter()
             deadline = linefix.Deadline(time.monotonic() + self.seconds)
-            answer = linefix.locate(self.index, scan, prior=prior, options=SEARCH, deadline=deadline)
+            answer = linefix.locate(
+                self.index, scan, prior=prior, prior_map=prior_map, options=SEARCH, deadline=deadline
+            )
         except InputError as error:
             raise RefusedError(str(error)) from None
         ended = time.perf_counter()
@@ -123,21 +131,24 @@ class Local:
             [{"code": reason.code, "message": reason.message} for reason in answer.reasons],
             [warning.code for warning in answer.warnings],
             {"decode": _ms(read - begun), "search": _ms(ended - read), "total": _ms(ended - begun)},
+            answer.map_id,
         )
 
 
 class Remote:
     """A server, over HTTP."""
 
-    def __init__(self, service: Server, on: Json) -> None:
+    def __init__(self, service: Server, target: Json) -> None:
         self._service = service
-        self._map = on
+        self._target = target
 
-    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None) -> Found:
+    def locate(self, one: LoggedScan, prior: linefix.SoftPrior | None, prior_map: str | None = None) -> Found:
         """Return where a scan was taken."""
-        body: Json = {"map": self._map, "scan": sent(one), "options": {"include": [], "max_alternatives": 0}}
+        body: Json = {**self._target, "scan": sent(one), "options": {"include": [], "max_alternatives": 0}}
         if prior is not None:
             body["prior"] = {**_pose(prior.pose), "covariance": np.asarray(prior.covariance).tolist()}
+            if prior_map is not None:
+                body["prior"]["map_id"] = prior_map
         answer = self._service.ask("associate", body)
         pose = answer["pose"]
         return Found(
@@ -149,6 +160,7 @@ class Remote:
             answer["reasons"],
             [warning["code"] for warning in answer["warnings"]],
             answer["timing_ms"],
+            answer["map"]["map_id"] if "maps" in self._target and answer["map"] else None,
         )
 
 

@@ -24,6 +24,14 @@ MapArgument = Annotated[
         help="A map file: json, yaml of map_server, dxf, svg, geojson or csv; or the id of a stored map.",
     ),
 ]
+MapsArgument = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="MAP...",
+        help="A map file: json, yaml of map_server, dxf, svg, geojson or csv; a folder of these; or the id of a stored "
+        "map. Several are searched together.",
+    ),
+]
 ScanArgument = Annotated[
     str,
     typer.Argument(

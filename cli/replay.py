@@ -20,15 +20,16 @@ from rich.progress import track
 from linefix.mounted import SPEED, TURN
 from registration import RigidTransform
 
-from .asking import whole_map
 from .contract import Json
 from .errors import CommandError, NoSuchMapError, RefusedError
 from .frames import Frames, odometry_of
-from .inputs import line_map_of, needing_formats, read_map_or_id
+from .inputs import line_map_of, needing_formats
 from .locators import Found, Locator, locating
 from .logs import TfNamespace, Topic, opened, options_of, print_notes, scans_of
 from .options import AsJson, Server, grouped
 from .printing import plain, print_json, print_rows, print_table
+from .several import documents_of, read_target
+from .stays import Stays
 from .tracking import Tracker
 
 if TYPE_CHECKING:
@@ -56,8 +57,9 @@ class Tally:
     warnings: Counter[str] = field(default_factory=Counter)
     times: list[float] = field(default_factory=list)  # ms
     usable: list[StampedPose] = field(default_factory=list)
-    others: list[RigidTransform] = field(default_factory=list)
+    on_map: dict[str, tuple[list[RigidTransform], list[RigidTransform]]] = field(default_factory=dict)  # usable, others
     refused: CommandError | None = None  # the last
+    stays: Stays = field(default_factory=Stays)
 
     @property
     def count(self) -> int:
@@ -76,11 +78,13 @@ class Tally:
         self.reasons.update(one["code"] for one in found.reasons[:1])
         self.warnings.update(found.warnings)
         self.times.append(found.timing_ms["total"])
+        self.stays.take(stamp_ns, found)
         if found.pose is not None and found.usable:
             covariance = None if found.covariance is None else np.array(found.covariance)
             self.usable.append(StampedPose(stamp_ns, found.pose, covariance))
+            self.on_map.setdefault(found.map_id or "", ([], []))[0].append(found.pose)
         elif found.pose is not None:
-            self.others.append(found.pose)
+            self.on_map.setdefault(found.map_id or "", ([], []))[1].append(found.pose)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +115,14 @@ class ScanChoice:
 @grouped
 def replay(
     log: Annotated[Path, typer.Argument(help="A bag of ROS 1 or ROS 2, an MCAP file, or a CARMEN log.")],
-    on: Annotated[str, typer.Option("--map", metavar="MAP", help="A map file, or the id of a stored map.")],
+    on: Annotated[
+        list[str],
+        typer.Option(
+            "--map",
+            metavar="MAP",
+            help="A map file, a folder of map files, or the id of a stored map; repeatable.",
+        ),
+    ],
     source: LogChoice,
     scans: ScanChoice,
     out: Annotated[
@@ -130,7 +141,7 @@ def replay(
     laser.
     """
     options = options_of(source.topic, source.tf_namespace, source.mount)
-    told, opened_log = read_map_or_id(on), opened(log, options)
+    told, opened_log = read_target(on), opened(log, options)
     tally, frames = Tally(), Frames(options.mount)
     broken: RefusedError | None = None
     with locating(told, server) as locator:
@@ -139,7 +150,7 @@ def replay(
             for one, found in located(locator, taken, frames, scans.mode):
                 tally.take(one.stamp_ns, found)
                 if as_json:
-                    print_json(_line(one, found, frames))
+                    print_json(_line(one, found, frames, several="maps" in told))
         except RefusedError as error:  # the rest of the log cannot be read; what came before it counts
             if not tally.count:
                 raise
@@ -149,7 +160,7 @@ def replay(
 
         write_tum(tally.usable, out)
     if picture is not None:
-        _draw(whole_map(told, server), tally, picture)
+        _draw(documents_of(told, server), tally, picture)
     _tell_log(opened_log, frames, sys.stderr if as_json else sys.stdout)
     if not as_json:
         _tell(tally)
@@ -177,7 +188,7 @@ def located(
         odometry = odometry_of(one)
         prior = None if tracker is None else tracker.prior(odometry)
         try:
-            found = locator.locate(one, prior)
+            found = locator.locate(one, prior, None if tracker is None or prior is None else tracker.map_id)
         except RefusedError as error:
             refusals = None if refusals is None else [*refusals, str(error)]
             if isinstance(error, NoSuchMapError) or error.pointer.startswith("/map") or _hopeless(refusals):
@@ -202,7 +213,7 @@ def _shown(scans: Iterator[LoggedScan], log: Log, every: int) -> Iterator[Logged
     yield from track(scans, "scans", total=total, console=where, transient=True, disable=not where.is_terminal)
 
 
-def _line(one: LoggedScan, found: Found | CommandError, frames: Frames) -> Json:
+def _line(one: LoggedScan, found: Found | CommandError, frames: Frames, *, several: bool) -> Json:
     taken = None if isinstance(found, CommandError) else found
     pose = taken and taken.pose
     return {
@@ -216,14 +227,23 @@ def _line(one: LoggedScan, found: Found | CommandError, frames: Frames) -> Json:
         "timing_ms": taken and taken.timing_ms,
         "child_frame_id": frames.name,
         "error": None if taken else str(found),
+        **({"map_id": taken and taken.map_id} if several else {}),
     }
 
 
-def _draw(document: Json, tally: Tally, picture: Path) -> None:
+def _draw(documents: dict[str, Json], tally: Tally, picture: Path) -> None:
+    """Draw the map and the poses on it; of several maps those with a usable pose, each to a file with its name."""
+    several = len(documents) > 1
+    visited = {stay.map_id for stay in tally.stays.found}
     with needing_formats("drawing a picture"):
         from formats import draw_map
 
-        draw_map(line_map_of(document), picture, [one.pose for one in tally.usable], tally.others)
+        for name, document in documents.items():
+            if several and name not in visited:
+                continue
+            usable, others = tally.on_map.get(name if several else "", ([], []))
+            file = picture.with_stem(f"{picture.stem}-{name}") if several else picture
+            draw_map(line_map_of(document), file, usable, others)
 
 
 def _tell_log(log: Log, frames: Frames, where: TextIO) -> None:
@@ -242,6 +262,9 @@ def _tell(tally: Tally) -> None:
     count = max(1, tally.count)
     table = [(verdict, number, f"{100.0 * number / count:.1f} %") for verdict, number in tally.verdicts.most_common()]
     print_table(("verdict", "scans", "fraction"), table)
+    if tally.stays.found:
+        columns = ("map", "from", "to", "usable scans")
+        print_table(columns, [(one.map_id, one.first, one.last, one.scans) for one in tally.stays.found])
     if tally.reasons:
         print_table(("why not usable", "scans"), tally.reasons.most_common())
     if tally.warnings:

@@ -31,6 +31,7 @@ class Tracker:
     _last: RigidTransform | None = None  # of the scan before
     _driven: float = 0.0
     _turned: float = 0.0
+    map_id: str | None = None  # of several maps the one that the last usable pose is on
 
     def prior(self, odometry: RigidTransform | None) -> SoftPrior | None:
         """Return the prior of the next scan's pose, None without one.
@@ -61,5 +62,5 @@ class Tracker:
         if "prior_contradicted" in found.warnings:
             self._pose = None
         elif found.usable:
-            self._pose, self._odometry = found.pose, odometry
+            self._pose, self._odometry, self.map_id = found.pose, odometry, found.map_id
             self._driven = self._turned = 0.0

@@ -24,6 +24,7 @@ from association import (
     Deadline,
     HardPrior,
     MapIndex,
+    MapSet,
     Scan,
     SoftPrior,
     Status,
@@ -45,7 +46,7 @@ from vectorization import LaserScan, Motion, Vectorization, VectorizationOptions
 
 from .checking import CheckedMap, check
 from .explaining import explain
-from .locating import index_map, locate, scan_of
+from .locating import index_map, index_maps, locate, scan_of
 from .mounted import MountedScan, view_of
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ __all__ = [
     "LineMap",
     "LogOptions",
     "MapIndex",
+    "MapSet",
     "MeasuredSegments",
     "Motion",
     "MountedScan",
@@ -86,6 +88,7 @@ __all__ = [
     "draw_map",
     "explain",
     "index_map",
+    "index_maps",
     "locate",
     "read_log",
     "read_map",

@@ -15,6 +15,7 @@ from association import (
     AssociationWarning,
     Correspondence,
     CriticalWall,
+    MapVerdict,
     message_of,
 )
 from association.warnings import NOT_IN_ORDER
@@ -131,6 +132,18 @@ def alternative_json(other: Alternative) -> Json:
         "reliability": other.reliability,
         "inlier_fraction": other.inlier_fraction,
         "probability": other.probability,
+        **({} if other.map_id is None else {"map_id": other.map_id}),
+    }
+
+
+def map_verdict_json(one: MapVerdict) -> Json:
+    """Return the best pose on one of several maps."""
+    return {
+        "map_id": one.map_id,
+        "status": str(one.status),
+        "score": one.score,
+        "probability": one.probability,
+        "pose": pose_json(one.pose),
     }
 
 
@@ -218,6 +231,8 @@ def association_json(result: AssociationResult, included: Included) -> Json:
         answer["alternatives"] = [alternative_json(other) for other in result.alternatives]
     if "missing_map" in parts:
         answer["missing_map"] = list(result.missing_map)
+    if result.maps:
+        answer["maps"] = [map_verdict_json(one) for one in result.maps]
     answer["frame_id"] = included.frame_id
     answer["child_frame_id"] = included.child_frame_id
     answer["stamp"] = included.stamp

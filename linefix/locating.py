@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from association import AssociationOptions, AssociationResult, Deadline, MapIndex, Prior, Scan, assemble, associate
+from association import (
+    AssociationOptions,
+    AssociationResult,
+    Deadline,
+    KnownOfMaps,
+    MapIndex,
+    MapPart,
+    MapSet,
+    Prior,
+    Scan,
+    assemble,
+    associate,
+    associate_on_maps,
+    map_set,
+)
 from registration import InvalidArgumentError, MeasuredSegments, Segments
 from vectorization import LaserScan
 
@@ -22,21 +36,24 @@ MAP_FIELDS = frozenset(("segments", "sigma", "oriented", "frame_id", "meta"))  #
 
 
 def locate(
-    map: MapIndex | LineMap | ImportedMap | Segments | ArrayLike,
+    map: MapIndex | MapSet | Sequence[MapIndex] | LineMap | ImportedMap | Segments | ArrayLike,
     scan: Scan | MountedScan | LaserScan | Segments | ArrayLike,
     angles: tuple[float, float] | None = None,
     *,
     prior: Prior | None = None,
+    prior_map: str | None = None,
+    map_weights: Mapping[str, float] | None = None,
     options: AssociationOptions | None = None,
     deadline: Deadline | None = None,
 ) -> AssociationResult:
-    """Find where in a map a scan was taken, and how sure that is.
+    """Find where in a map, or on which of several maps, a scan was taken, and how sure that is.
 
     Parameters
     ----------
-    map : MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
+    map : MapIndex, MapSet, sequence of MapIndex, LineMap, ImportedMap, Segments, or array-like of shape (n, 4)
         Metres in the map frame, free space on the left of every segment. For many scans of one map index it once, by
-        `index_map`: that takes longer than a search.
+        `index_map`: that takes longer than a search. Several maps likewise, by `index_maps`; a sequence of indices
+        is named "0", "1" and so on.
     scan : Scan, LoggedScan or other MountedScan, LaserScan, Segments, or array-like
         In the sensor's frame, metres: ranges of shape (m,), points of shape (m, 2) in scanning order, or segments of
         shape (n, 4). A scan of a log counts with its mount, its motion, and upside down where it is mounted so.
@@ -45,6 +62,11 @@ def locate(
         counter-clockwise.
     prior : SoftPrior or HardPrior, optional
         Of the pose that is returned.
+    prior_map : str, optional
+        Of several maps the one that the prior is on, and required with a prior there.
+    map_weights : mapping of str to float, optional
+        Probabilities of several maps, by name. Maps without one share the rest equally. They are part of the score,
+        and never fused.
     options : AssociationOptions, optional
         Default: those of the service. Directions count where they do in the map, and `options.oriented` is true.
     deadline : Deadline, optional
@@ -56,7 +78,8 @@ def locate(
     AssociationResult
         Its `usable` is the one flag to gate on; `pose` is map_from_scan. Of a `MountedScan` it is that of the robot at
         the first beam, map_from_base, if the mount is known, else that of the sensor. If a scan took time and its
-        motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation).
+        motion is not known, the covariance allows for 0.5 m/s and 1 rad/s (one standard deviation). Of several maps
+        `map_id` names that of the pose, and `maps` lists the best pose of each.
 
     Raises
     ------
@@ -80,7 +103,16 @@ def locate(
     >>> f"{answer.pose.x:.2f} {answer.pose.y:.2f} {answer.pose.theta:.2f}"
     '1.00 1.00 1.57'
     """
-    index, how = prepared(map, options)
+    maps = _several(map)
+    if maps is not None:
+        how, known = options or AssociationOptions(), KnownOfMaps(prior, prior_map, map_weights)
+        return associate_on_maps(maps, scan_of(scan, angles), known, how, deadline)
+    if prior_map is not None or map_weights is not None:
+        raise InvalidArgumentError(
+            "found it with a single map, expected it with several; use `index_maps`, or omit it",
+            argument="map_weights" if prior_map is None else "prior_map",
+        )
+    index, how = prepared(map, options)  # type: ignore[arg-type]
     return associate(index, scan_of(scan, angles), prior, how, deadline)
 
 
@@ -116,29 +148,75 @@ def index_map(map: MapIndex | LineMap | ImportedMap | Segments | Mapping[str, An
     """
     if isinstance(map, MapIndex):
         return map
+    part = _part(map, "map")
+    return MapIndex.build(part.segments, part.sigma, oriented=part.oriented)
+
+
+def index_maps(maps: Mapping[str, Any] | Sequence[Any]) -> MapSet:
+    """Prepare several maps for scans that are searched on all of them at once.
+
+    Parameters
+    ----------
+    maps : mapping of str to map, or sequence of maps
+        1 to 256, each in a form that `index_map` takes, by name. Those of a sequence are named "0", "1" and so on.
+
+    Raises
+    ------
+    InputError
+        When one is no map that can be searched; the argument names it, as ``maps.3.segments``.
+
+    Examples
+    --------
+    >>> import linefix
+    >>> room = [[0, 0, 6, 0], [6, 0, 6, 2], [6, 2, 4, 2], [4, 2, 4, 5], [4, 5, 0, 5], [0, 5, 0, 0]]
+    >>> hall = [[0, 0, 9, 0], [9, 0, 9, 4], [9, 4, 0, 4], [0, 4, 0, 0]]
+    >>> seen = [[-1, 1, -1, -5], [-1, -5, 1, -5], [1, -5, 1, -3], [1, -3, 4, -3], [4, -3, 4, 1], [4, 1, -1, 1]]
+    >>> answer = linefix.locate(linefix.index_maps({"room": room, "hall": hall}), seen)
+    >>> answer.usable, answer.map_id
+    (True, 'room')
+    >>> [(one.map_id, str(one.status)) for one in answer.maps]
+    [('room', 'ok'), ('hall', 'no_match')]
+    """
+    named = list(maps.items()) if isinstance(maps, Mapping) else [(str(n), one) for n, one in enumerate(maps)]
+    return map_set([(name, _part(one, f"maps.{number}")) for number, (name, one) in enumerate(named)])
+
+
+def _several(map: Any) -> MapSet | None:
+    """Return several maps, None where it is one."""
+    if isinstance(map, MapSet):
+        return map
+    if isinstance(map, list | tuple) and map and all(isinstance(one, MapIndex) for one in map):
+        return index_maps(map)
+    return None
+
+
+def _part(map: Any, argument: str) -> MapPart:
+    """Return one of several maps; raises `InputError` where it is none."""
+    if isinstance(map, MapIndex):
+        return MapPart.of(map)
     if isinstance(map, Mapping):
-        return _index_document(map)
+        return _document_part(map, argument)
     inner: Any = getattr(map, "map", map)  # an imported map comes with a report
     segments = getattr(inner, "segments", None)
     if isinstance(segments, Segments):
-        return MapIndex.build(segments, inner.sigma, oriented=inner.oriented)
-    return MapIndex.build(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument="map"))
+        return MapPart(segments, inner.sigma, inner.oriented)
+    return MapPart(inner if isinstance(inner, Segments) else Segments.from_array(inner, argument=argument))
 
 
-def _index_document(document: Mapping[str, Any]) -> MapIndex:
-    """Index a map document; raises `InputError` where a field is unknown, or not what it should be."""
+def _document_part(document: Mapping[str, Any], argument: str) -> MapPart:
+    """Return the map of a document; raises `InputError` where a field is unknown, or not what it should be."""
     unknown = sorted(set(map(str, document)) - MAP_FIELDS)
     if unknown:
         raise InvalidArgumentError(
-            f"found the field {unknown[0]}, expected {', '.join(sorted(MAP_FIELDS))}", argument="map"
+            f"found the field {unknown[0]}, expected {', '.join(sorted(MAP_FIELDS))}", argument=argument
         )
     oriented, sigma = document.get("oriented"), document.get("sigma")
     if not (oriented is None or isinstance(oriented, bool)):
-        raise InvalidArgumentError(f"expected true, false or null, found {oriented!r}", argument="map.oriented")
+        raise InvalidArgumentError(f"expected true, false or null, found {oriented!r}", argument=f"{argument}.oriented")
     if sigma is not None and (isinstance(sigma, bool) or not isinstance(sigma, int | float)):
-        raise InvalidArgumentError(f"expected metres or null, found {sigma!r}", argument="map.sigma")
-    segments = Segments.from_array(document.get("segments", []), argument="map.segments")
-    return MapIndex.build(segments, sigma, oriented=oriented is not False)
+        raise InvalidArgumentError(f"expected metres or null, found {sigma!r}", argument=f"{argument}.sigma")
+    segments = Segments.from_array(document.get("segments", []), argument=f"{argument}.segments")
+    return MapPart(segments, sigma, oriented is not False)
 
 
 def scan_of(

@@ -4,6 +4,7 @@ from .buildings import FAMILIES, Building, Family
 from .cases import Case, Window, draw_case
 from .conditions import CONDITIONS, Condition, Stranger
 from .errors import SimulationError
+from .floors import FLOOR_KINDS, FloorKind, draw_floors, free_places
 from .offices import OfficePlan, offices
 from .places import free_place
 from .scanner import Scanner, SimulatedScan, scan
@@ -23,10 +24,12 @@ from .worlds import (
 __all__ = [
     "CONDITIONS",
     "FAMILIES",
+    "FLOOR_KINDS",
     "Building",
     "Case",
     "Condition",
     "Family",
+    "FloorKind",
     "OfficePlan",
     "Scanner",
     "SimulatedScan",
@@ -37,7 +40,9 @@ __all__ = [
     "corridor",
     "cut_square",
     "draw_case",
+    "draw_floors",
     "free_place",
+    "free_places",
     "l_room",
     "oblique",
     "offices",

@@ -14,6 +14,7 @@ from registration.values import value
 from ..context import SearchContext
 from ..deadline import CancelledError
 from ..layout import ESTIMATE, MATCH, SET_SCORE, Integers
+from ..options import MapsPrior
 from ..search.candidates import Candidates
 from ..tuning import DISTINCT_ANGLE, DISTINCT_DISTANCE, INSIDE, MOST_LOOKED_AT
 from .beams import beam_evidence_at, beam_score
@@ -74,7 +75,8 @@ def rank_candidates(context: SearchContext, candidates: Candidates) -> list[Cons
     if context.with_beams:
         scored = _add_beams(context, scored)
     bonuses = NO_PRIOR if context.prior is None else _prior_values(context, scored.estimates)
-    order = _distinct(scored, bonuses, max(LEAST_DISTINCT, context.options.max_alternatives + 1))
+    most = max(LEAST_DISTINCT, context.options.max_alternatives + 1, context.index.least_kept)
+    order = _distinct(scored, bonuses, most)
     return [_consensus_set(context, scored, bonuses, k) for k in order.tolist()]
 
 
@@ -210,4 +212,6 @@ def _add_beams(context: SearchContext, scored: _Scored) -> _Scored:
 def _prior_values(context: SearchContext, poses: Records) -> Floats:
     """Return the score of each pose by the prior, nats."""
     values: Floats = prior_values(context.prior_record, poses)
+    if isinstance(context.prior, MapsPrior):
+        values += context.prior.of_maps[context.maps_at(poses)]
     return values

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,45 +102,44 @@ class MapIndex:
         IndexingEndedError
             When the deadline passes, or is cancelled, first.
         """
+        low, high = cls.require(segments, sigma, argument="map")
+        origin = np.round(0.5 * (low + high))
+        either = segments if oriented else both_ways(segments)
+        return cls._of(either, sigma, origin, len(segments), deadline)
+
+    @staticmethod
+    def require(segments: Segments, sigma: float | None, *, argument: str) -> tuple[Floats, Floats]:
+        """Return the low and the high corner of a map, (2,) metres, that can be indexed.
+
+        Raises
+        ------
+        InvalidMapError
+            As `build`; `argument` is the name of the map.
+        """
         if len(segments) == 0:
-            raise InvalidMapError("expected at least one segment, found none", argument="map.segments")
+            raise InvalidMapError("expected at least one segment, found none", argument=f"{argument}.segments")
         if sigma is not None and not 0.0 <= sigma <= MAX_MAP_SIGMA:
-            raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument="map.sigma")
+            raise InvalidMapError(f"expected a number from 0 to {MAX_MAP_SIGMA:g}", argument=f"{argument}.sigma")
         corners = segments.endpoints.reshape(-1, 2)
         low, high = corners.min(axis=0), corners.max(axis=0)
         if (high - low).max() > MAX_EXTENT:
             raise InvalidMapError(
-                f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit", argument="map.segments"
+                f"expected an extent of at most {MAX_EXTENT:g} m, found more; check the unit",
+                argument=f"{argument}.segments",
             )
-        origin = np.round(0.5 * (low + high))
-        either = segments if oriented else both_ways(segments)
-        return cls._of(either, sigma, origin, len(segments), deadline)
+        return low, high
 
     @classmethod
     def _of(
         cls, segments: Segments, sigma: float | None, origin: Floats, directed: int, deadline: Deadline | None
     ) -> MapIndex:
-        local = segments.shifted(-origin)
-        one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_ONE_LINE, ONE_LINE_SHARE * sigma))
-        walls, wall_of_piece = merge(local, WHOLE_GAP, one_line, deadline)
-        blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
-        if blends > one_line:
-            walls, wall_of_piece = blended(local, walls, wall_of_piece.astype(np.intp), blends, deadline)
-        chains = chains_of(walls, deadline)
-        ties, firsts = tie(walls, deadline)
-        order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
-        starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
-        pieces = Pieces(order, starts, as_records(ENDS, local.endpoints), firsts)
-        _require_time(deadline)
-        sweep = swept_chains(chains)
-        _require_time(deadline)
-        crossings = crossing_chains(sweep.chains)
-        _require_time(deadline)
-        grids = near_walls(walls), sweep, crossings, directions_near(walls, chains)
-        index = cls(segments, sigma, origin, directed, wall_of_piece, pieces, walls, ties, chains, *grids)
+        return cls(segments, sigma, origin, directed, *tables_of(segments.shifted(-origin), sigma, deadline)).warmed()
+
+    def warmed(self) -> Self:
+        """Compute what the first search would wait for, and return the index."""
         for name in ("wall_lengths", "crowd", "most_near", "area", "diagonal", "tables"):
-            getattr(index, name)  # kept from here on, so that the first search does not wait for them
-        return index
+            getattr(self, name)
+        return self
 
     @cached_property
     def undirected(self) -> MapIndex:
@@ -170,7 +169,7 @@ class MapIndex:
         """The lengths of its walls."""
         lengths = np.sort(self.walls.longest)
         beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
-        return WallLengths(lengths, beyond, self._agreeing_share(), self.area)
+        return WallLengths(lengths, beyond, self.agreeing_share(), self.area)
 
     @cached_property
     def crowd(self) -> float:
@@ -183,7 +182,7 @@ class MapIndex:
         """Return the number of walls on the longest list of a cell."""
         return int(np.diff(self.grid.starts).max())
 
-    def _agreeing_share(self) -> float:
+    def agreeing_share(self) -> float:
         """Return the probability that two points of walls have the same direction, up to a neighbouring bin."""
         shares = np.add.reduceat(
             np.append(self.walls.longest, 0.0), np.minimum(self.walls.bin_starts[:-1], len(self.walls.rows))
@@ -196,6 +195,17 @@ class MapIndex:
         """Of the map's bounding box with a margin, m^2."""
         cell, columns, rows = self.grid.shape[["cell", "columns", "rows"]][0]
         return float(cell**2 * columns * rows)
+
+    @property
+    def across(self) -> float:
+        """Return the number of cells of the grid that a ray passes at most."""
+        columns, rows = self.grid.shape[["columns", "rows"]][0]
+        return float(columns + rows)
+
+    @property
+    def least_kept(self) -> int:
+        """Return the number of poses that a search keeps at least: 1."""
+        return 1
 
     @cached_property
     def diagonal(self) -> float:
@@ -233,6 +243,35 @@ class MapIndex:
         return sum(
             array.nbytes for array in [self.wall_of_piece, self.ties, *lines, *(a for table in tables for a in table)]
         )
+
+
+def tables_of(
+    local: Segments, sigma: float | None, deadline: Deadline | None
+) -> tuple[Integers, Pieces, Walls, Floats, Walls, Grid, Sweep, Crossings, Raster]:
+    """Compute the tables of an index from segments about the origin, in the order of the fields of `MapIndex`.
+
+    Raises
+    ------
+    IndexingEndedError
+        When the deadline passes, or is cancelled, first.
+    """
+    one_line = ONE_LINE if sigma is None else min(ONE_LINE, max(LEAST_ONE_LINE, ONE_LINE_SHARE * sigma))
+    walls, wall_of_piece = merge(local, WHOLE_GAP, one_line, deadline)
+    blends = BLENDED_STEP if sigma is None else min(BLENDED_STEP, BLENDED_SIGMAS * sigma)
+    if blends > one_line:
+        walls, wall_of_piece = blended(local, walls, wall_of_piece.astype(np.intp), blends, deadline)
+    chains = chains_of(walls, deadline)
+    ties, firsts = tie(walls, deadline)
+    order = np.argsort(wall_of_piece, kind="stable").astype(np.int32)
+    starts = np.searchsorted(wall_of_piece[order], np.arange(len(walls.rows) + 1))
+    pieces = Pieces(order, starts, as_records(ENDS, local.endpoints), firsts)
+    _require_time(deadline)
+    sweep = swept_chains(chains)
+    _require_time(deadline)
+    crossings = crossing_chains(sweep.chains)
+    _require_time(deadline)
+    raster = directions_near(walls, chains)
+    return wall_of_piece, pieces, walls, ties, chains, near_walls(walls), sweep, crossings, raster
 
 
 def _require_time(deadline: Deadline | None) -> None:

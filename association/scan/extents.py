@@ -9,6 +9,7 @@ from registration.layout import Records
 
 from ..layout import POINT, as_records
 from .kernels.extents import extent_along
+from .scan import Scan
 from .tuning import EXTENT_ANGLES, OUTERMOST_SHARE
 
 _ANGLES = np.arange(EXTENT_ANGLES) * (np.pi / EXTENT_ANGLES)
@@ -35,3 +36,19 @@ def inner_extent(segments: Segments) -> float:
     high = np.argmax(fractions >= 1.0 - OUTERMOST_SHARE, axis=1)
     rows = np.arange(EXTENT_ANGLES)
     return float((along[rows, order[rows, high]] - along[rows, order[rows, low]]).max())
+
+
+def whole_extent(scan: Scan) -> float:
+    """Return the diagonal of the box around all that a scan shows, with the sensors and the ends of beams, metres."""
+    points = [scan.measured.segments.endpoints.reshape(-1, 2)]
+    if scan.viewpoint is not None:
+        points.append(np.array([scan.viewpoint]))
+    if scan.views is not None:
+        points.append(scan.views.viewpoints[~np.isnan(scan.views.viewpoints[:, 0])])
+    if scan.beams is not None:
+        back = np.flatnonzero(np.isfinite(scan.beams.ranges))
+        angles, ranges = scan.beams.angles[back], scan.beams.ranges[back]
+        begins = np.array(scan.viewpoint or (0.0, 0.0)) if scan.beams.origins is None else scan.beams.origins[back]
+        points.append(begins + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    every = np.concatenate(points)
+    return float(np.hypot(*np.ptp(every, axis=0))) if len(every) else 0.0

@@ -85,8 +85,8 @@ class Effort:
     @classmethod
     def of(cls, context: SearchContext) -> Effort:
         """Keep poses more freely where raw beams are to decide between them."""
-        kept = (KEPT_FOR_BEAMS, KEPT_SHARE_FOR_BEAMS) if context.with_beams else (KEPT, KEPT_SHARE)
-        return cls(*kept, RIVAL_SHARE, allowed_by(context.options))
+        kept, share = (KEPT_FOR_BEAMS, KEPT_SHARE_FOR_BEAMS) if context.with_beams else (KEPT, KEPT_SHARE)
+        return cls(max(kept, context.index.least_kept), share, RIVAL_SHARE, allowed_by(context.options))
 
 
 def allowed_by(options: AssociationOptions) -> float:

@@ -31,8 +31,9 @@ def choose_along_direction(context: SearchContext, answer: Answer) -> RigidTrans
 
 def _anchor(context: SearchContext, best: ConsensusSet) -> RigidTransform | None:
     """Return the pose that picks one along the direction: the prior, else where the raw beams fit best, else None."""
-    if context.prior is not None:
-        return context.prior.pose
+    prior = context.pose_prior
+    if prior is not None and context.on_map_of(prior.pose, best.pose):
+        return prior.pose
     return context.in_map(best.pose) if context.with_beams else None
 
 

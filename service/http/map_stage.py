@@ -16,7 +16,9 @@ from ..admission.ticket import Ticket
 from ..maps.cache import CachedMap
 from ..maps.errors import StoreAwayError
 from ..maps.lookup import FoundMap
+from ..maps.several import CachedMaps, FoundMaps
 from ..schemas.parts import InlineMap, StoredMap
+from ..schemas.requests import AssociateRequest, BatchRequest
 from .exchange import Exchange
 from .services import Services
 
@@ -65,17 +67,47 @@ async def looking_up(
         yield found
 
 
+@asynccontextmanager
+async def looking_up_any(
+    exchange: Exchange, asked: AssociateRequest | BatchRequest, deadline: Deadline
+) -> AsyncIterator[InlineMap | FoundMap | FoundMaps]:
+    """Look up the map of a request, or its maps; raises as `looking_up`, and `InvalidRequestError` for a prefix."""
+    if asked.map is not None:
+        async with looking_up(exchange, asked.map, deadline, oriented=asked.options.oriented) as on:
+            yield on
+        return
+    assert asked.maps is not None
+    services, prefix = exchange.services, exchange.ticket.maps
+    if isinstance(asked.maps, list) and any(
+        isinstance(one, StoredMap) and not one.map_id.startswith(prefix) for one in asked.maps
+    ):
+        raise ForeignMapError
+    left = None if deadline.at is None else max(0.0, deadline.at - time.monotonic())
+    try:
+        async with asyncio.timeout(left):
+            found = await ask_store(services, partial(services.lookup.find_together, asked.maps, prefix))
+    except TimeoutError:
+        raise DeadlinePassedError from None
+    yield found
+
+
 async def index_map(
-    exchange: Exchange, on: InlineMap | FoundMap, deadline: Deadline, *, oriented: bool | None
-) -> CachedMap | None:
-    """Index a map for which that takes long, in a slot of another gate: its threads go behind all searches.
+    exchange: Exchange, on: InlineMap | FoundMap | FoundMaps, deadline: Deadline, *, oriented: bool | None
+) -> CachedMap | CachedMaps | None:
+    """Index a map for which that takes long, or several, in a slot of another gate: its threads go behind all searches.
 
     None where it is left to the search's own slot.
     """
     services = exchange.services
-    if not services.lookup.takes_long(on):
+    call: Callable[[], CachedMap | CachedMaps]
+    if isinstance(on, FoundMaps):
+        if services.lookup.are_cached(on, oriented=oriented):
+            return None
+        call = partial(services.lookup.indexed_together, on, oriented=oriented, deadline=deadline)
+    elif services.lookup.takes_long(on):
+        call = partial(services.lookup.indexed, on, oriented=oriented, deadline=deadline)
+    else:
         return None
-    call = partial(services.lookup.indexed, on, oriented=oriented, deadline=deadline)
     return await services.indexing.run(call, deadline, Ticket(exchange.ticket.holder), lambda: False)
 
 

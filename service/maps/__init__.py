@@ -3,11 +3,14 @@
 from .cache import CachedMap, IndexCache
 from .preconditions import Preconditions
 from .records import Bounds, MapOutline, MapPage, MapRecord, MapSummary, StoredMap
+from .several import CachedMaps, FoundMaps
 from .store import MapStore
 
 __all__ = [
     "Bounds",
     "CachedMap",
+    "CachedMaps",
+    "FoundMaps",
     "IndexCache",
     "MapOutline",
     "MapPage",

@@ -8,10 +8,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..telemetry.metrics import Metrics
 from .errors import IndexNotReadyError
+from .several import CachedMaps
 
 if TYPE_CHECKING:  # the store comes without what computes
     from association import Deadline, MapIndex
@@ -34,6 +35,10 @@ class CachedMap:
         return len(self.index.segments) == self.index.directed
 
 
+Cached = CachedMap | CachedMaps
+C = TypeVar("C", CachedMap, CachedMaps)
+
+
 class IndexCache:
     """Builds missing indices; callers that want the same map wait for one build.
 
@@ -44,8 +49,8 @@ class IndexCache:
         self._max_bytes = max_bytes
         self._metrics = metrics
         self._lock = threading.Lock()
-        self._ready: OrderedDict[Hashable, CachedMap] = OrderedDict()
-        self._building: dict[Hashable, Future[CachedMap]] = {}
+        self._ready: OrderedDict[Hashable, Cached] = OrderedDict()
+        self._building: dict[Hashable, Future[Any]] = {}
         self.bytes = 0
 
     def __len__(self) -> int:
@@ -56,8 +61,8 @@ class IndexCache:
         with self._lock:
             return key in self._ready
 
-    def get(self, key: Hashable, build: Callable[[], CachedMap], deadline: Deadline) -> CachedMap:
-        """Return the map of a key, built by this caller or by the first one that requested it.
+    def get(self, key: Hashable, build: Callable[[], C], deadline: Deadline) -> C:
+        """Return the map, or the maps, of a key, built by this caller or by the first one that requested it.
 
         Raises
         ------
@@ -69,13 +74,14 @@ class IndexCache:
             if found is not None:
                 self._ready.move_to_end(key)
                 self._metrics.cache_hits.inc()
-                return found
+                return found  # type: ignore[return-value]  # a key is of one kind
             promise = self._building.get(key)
             mine = promise is None
             if promise is None:
                 promise = self._building[key] = Future()
         if not mine:
-            return _awaited(promise, deadline)
+            made: C = _awaited(promise, deadline)
+            return made
         self._metrics.cache_misses.inc()
         return self._build(key, promise, build)
 
@@ -84,7 +90,7 @@ class IndexCache:
         with self._lock:
             self._drop_until(self._max_bytes - size)
 
-    def _build(self, key: Hashable, promise: Future[CachedMap], build: Callable[[], CachedMap]) -> CachedMap:
+    def _build(self, key: Hashable, promise: Future[Any], build: Callable[[], C]) -> C:
         try:
             made = build()
         except BaseException as error:
@@ -98,7 +104,7 @@ class IndexCache:
         promise.set_result(made)
         return made
 
-    def _keep(self, key: Hashable, made: CachedMap) -> None:
+    def _keep(self, key: Hashable, made: Cached) -> None:
         """Keep a map; one that is larger than the cache, by up to as much again, alone and until the next comes.
 
         It takes as much whenever it is built: to do so for each request would need no less memory.
@@ -115,7 +121,7 @@ class IndexCache:
             self.bytes -= dropped.bytes
 
 
-def _awaited(promise: Future[CachedMap], deadline: Deadline) -> CachedMap:
+def _awaited(promise: Future[C], deadline: Deadline) -> C:
     """Return the map that another thread builds, if it is there in time; the waiting thread holds a slot."""
     while not deadline.passed:
         left = LOOK_SECONDS if deadline.at is None else deadline.at - time.monotonic()

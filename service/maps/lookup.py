@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from association import Deadline, InvalidMapError, MapIndex
+from association import Deadline, IndexingEndedError, InvalidMapError, MapIndex, MapPart, MapSet
 from registration import Segments
 
 from ..parsing.parser_process import LARGE, ParserProcess
 from ..parsing.reading import read_stored
-from ..schemas.parts import InlineMap, MapDocument, is_oriented
+from ..schemas.errors import Fault, InvalidRequestError, TooManyError
+from ..schemas.parts import InlineMap, MapDocument, StoredMap, is_oriented
+from ..schemas.several import MOST_MAPS, MapPrefix, NamedMap
 from .cache import CachedMap, IndexCache
-from .errors import BusyStoreError
+from .errors import BusyStoreError, CorruptMapError, IndexNotReadyError, UnknownMapError
 from .records import MapOutline, MapRecord
+from .several import CachedMaps, FoundMaps
 from .store import MapStore
 
 MAX_EXTENT = 1e5  # m
 OVERHEAD = 24_000  # bytes that an index takes in addition to its arrays, however small these are
 LONG_SEGMENTS = 2_000  # of a map that takes some milliseconds to be indexed, and
 LONG_BYTES = 100_000  # of the document of one
+MOST_TOGETHER = 200_000  # segments of several maps, as of one
 INDEXED_BYTES = 400  # that a segment takes once it is indexed, about
 
 
@@ -50,9 +55,14 @@ class MapLookup:
     store : MapStore
     parser : ParserProcess
         Parses large stored maps.
+    most_together : int
+        Segments of maps that are searched together.
     """
 
-    def __init__(self, cache: IndexCache, store: MapStore, parser: ParserProcess) -> None:
+    def __init__(
+        self, cache: IndexCache, store: MapStore, parser: ParserProcess, most_together: int = MOST_TOGETHER
+    ) -> None:
+        self._most_together = most_together
         self._cache = cache
         self._store = store
         self._parser = parser
@@ -113,10 +123,68 @@ class MapLookup:
             directed = is_oriented(oriented, asked.record.oriented)
             return self._cache.get((asked.record, directed), partial(self._read, asked, directed), deadline)
         # Robots send the same map with every scan: its content is its name.
-        digest = hashlib.sha256(asked.segments.tobytes()).hexdigest()
         directed = is_oriented(oriented, asked.oriented)
-        key = digest, asked.sigma, asked.frame_id, directed
+        key = _digest(asked), asked.sigma, asked.frame_id, directed
         return self._cache.get(key, lambda: self._index(asked, directed), deadline)
+
+    def find_together(self, asked: Sequence[NamedMap | StoredMap] | MapPrefix, prefix: str) -> FoundMaps:
+        """Look several maps up; runs in a thread that may wait. `prefix` is that of all maps that the caller may use.
+
+        Raises
+        ------
+        StoreError
+            When a map is not stored, or is damaged, or the store does not answer.
+        InvalidRequestError
+            When more maps than allowed have the prefix.
+        """
+        if not isinstance(asked, MapPrefix):
+            records = (one if isinstance(one, NamedMap) else self._store.record(one.map_id) for one in asked)
+            return FoundMaps(tuple((one.map_id, one) for one in records))
+        both = sorted((asked.prefix, prefix), key=len)
+        if not both[1].startswith(both[0]):
+            raise UnknownMapError
+        page = self._store.list(MOST_MAPS, "", both[1])
+        if page.corrupt:
+            raise CorruptMapError
+        if page.next is not None:
+            message = f"found more than {MOST_MAPS} maps, expected at most that many; send a longer prefix"
+            raise InvalidRequestError([Fault("/maps/prefix", message)])
+        if not page.maps:
+            raise UnknownMapError
+        return FoundMaps(tuple((one.map_id, self._store.record(one.map_id)) for one in page.maps))
+
+    def are_cached(self, asked: FoundMaps, *, oriented: bool | None) -> bool:
+        """Return whether several maps are indexed together already."""
+        return self._cache.has(_key_together(asked, oriented))
+
+    def indexed_together(self, asked: FoundMaps, *, oriented: bool | None, deadline: Deadline) -> CachedMaps:
+        """Return several maps ready to be searched together, by one index.
+
+        Runs off the event loop; raises as `indexed`, and `IndexNotReadyError` when the deadline passes first. Inline
+        maps are named in errors by their place, as ``maps.3.segments``.
+        """
+        return self._cache.get(
+            _key_together(asked, oriented), partial(self._index_together, asked, oriented, deadline), deadline
+        )
+
+    def _index_together(self, asked: FoundMaps, oriented: bool | None, deadline: Deadline) -> CachedMaps:
+        parts, frame_ids = {}, []
+        for number, (name, one) in enumerate(asked.maps):
+            if deadline.passed:
+                raise IndexNotReadyError
+            document = one if isinstance(one, InlineMap) else self._document(FoundMap(one, None))
+            segments = Segments.from_array(document.segments, argument=f"maps.{number}.segments")
+            parts[name] = MapPart(segments, document.sigma, is_oriented(oriented, document.oriented))
+            frame_ids.append(document.frame_id)
+        count = sum(len(part.segments) for part in parts.values())
+        if count > self._most_together:
+            raise TooManyError("/maps", self._most_together, "segments of all maps together")
+        self._cache.make_room(2 * INDEXED_BYTES * count)
+        try:
+            maps = MapSet(parts, deadline)
+        except IndexingEndedError:
+            raise IndexNotReadyError from None
+        return CachedMaps(maps, tuple(frame_ids), maps.nbytes + OVERHEAD)
 
     def index_once(self, asked: InlineMap, deadline: Deadline) -> MapIndex:
         """Return the index, with its directions, of a map that is not searched; it is not cached.
@@ -133,6 +201,9 @@ class MapLookup:
         return MapIndex.build(segments, asked.sigma, deadline=deadline)
 
     def _read(self, found: FoundMap, oriented: bool) -> CachedMap:
+        return self._index(self._document(found), oriented)
+
+    def _document(self, found: FoundMap) -> MapDocument:
         document = found.document
         if document is None:
             stored = self._store.load(found.record.map_id)
@@ -140,8 +211,8 @@ class MapLookup:
                 raise BusyStoreError  # changed since, and out of the cache meanwhile
             document = stored.document
         if len(document) > LARGE:
-            return self._index(self._parser.call(read_stored, document), oriented)
-        return self._index(read_stored(document), oriented)
+            return self._parser.call(read_stored, document)
+        return read_stored(document)
 
     def _index(self, asked: InlineMap | MapDocument, oriented: bool) -> CachedMap:
         # The old goes before the new comes: two of the largest at once would take too much.
@@ -149,6 +220,19 @@ class MapLookup:
         segments = Segments.from_array(asked.segments, argument="map.segments")
         index = MapIndex.build(segments, asked.sigma, oriented=oriented)
         return CachedMap(index, asked.frame_id, index.nbytes + OVERHEAD)
+
+
+def _key_together(asked: FoundMaps, oriented: bool | None) -> Hashable:
+    """Return the name of the content of several maps, in their order."""
+    parts = (
+        (name, one) if isinstance(one, MapRecord) else (name, _digest(one), one.sigma, one.frame_id, one.oriented)
+        for name, one in asked.maps
+    )
+    return ("together", oriented, *parts)
+
+
+def _digest(asked: InlineMap) -> str:
+    return hashlib.sha256(asked.segments.tobytes()).hexdigest()
 
 
 def outline_of(document: MapDocument) -> MapOutline:

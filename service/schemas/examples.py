@@ -30,6 +30,11 @@ ASSOCIATE_STORED: dict[str, Any] = {
     "scan": {"segments": SEEN, "sigma": 0.02},
     "prior": {"x": 1.0, "y": 0.5, "theta": 1.6, "radius": 2.0, "angle": 0.5},
 }
+ASSOCIATE_SEVERAL: dict[str, Any] = {
+    "maps": [{"map_id": "ground", "segments": WALLS}, {"map_id": "first", "segments": WALLS[:4]}],
+    "scan": {"segments": SEEN, "sigma": 0.02},
+    "map_weights": {"ground": 0.8},
+}
 BATCH: dict[str, Any] = {
     "map": {"segments": WALLS},
     "scans": [{"segments": SEEN}, {"segments": SEEN[:3]}],

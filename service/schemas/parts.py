@@ -31,7 +31,7 @@ BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS = "<segments>", "<laser>", "<points>"
 SOFT, HARD = "<soft>", "<hard>"
 _BESIDE_A_MAP = frozenset(("sigma", "oriented", "frame_id", "meta"))
 _BESIDE_A_SCAN = frozenset(("sigma", "frame_id", "stamp", "viewpoint", "twist"))
-TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS, SOFT, HARD))
+TAGS = frozenset((INLINE, STORED, BY_SEGMENTS, BY_LASER, BY_POINTS, BY_VIEWS, SOFT, HARD, "<list>", "<prefix>"))
 
 
 class MapDocument(Strict):
@@ -264,6 +264,7 @@ class SoftPriorFields(Pose):
     covariance: Covariance = Field(
         description="covariance of additive (x, y, theta); m^2, m rad, rad^2; positive definite"
     )
+    map_id: MapId | None = Field(None, description="of several maps the one whose frame the pose is in")
 
 
 class HardPriorFields(Pose):
@@ -275,6 +276,7 @@ class HardPriorFields(Pose):
         AfterValidator(in_radians(5e-324, 4.0, "above 0 and up to 4")),
         Field(json_schema_extra={"exclusiveMinimum": 0.0, "maximum": 4.0}),
     ] = Field(description="radians around theta")
+    map_id: MapId | None = Field(None, description="of several maps the one whose frame the pose is in")
 
 
 def _prior_kind(value: Any) -> str | None:

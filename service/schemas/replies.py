@@ -143,6 +143,7 @@ class AlternativeAnswer(Answer):
         description="that this pose is right, as `probability` of the answer; null where the answer has no "
         "probability, or contradicts the prior"
     )
+    map_id: str | None = Field(None, description="of several maps the one that the pose is on")
 
 
 class CriticalWallAnswer(Answer):
@@ -206,10 +207,24 @@ class ReasonAnswer(Answer):
 
 
 class MapReference(Answer):
-    """Which stored map was searched."""
+    """Which map was searched; of several maps that of the pose."""
 
     map_id: str
-    revision: int
+    revision: int | None = Field(description="of a stored map; null: the map came with the request")
+
+
+class MapVerdictAnswer(MapReference):
+    """The best pose on one of several maps."""
+
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"] = Field(
+        description="of the map of the answer its status; of another map `ambiguous` where its pose explains the scan "
+        "about as well and the answer is not usable, else `no_match`"
+    )
+    score: float | None = Field(
+        description="score of the best pose on this map, with the logarithm of its weight, nats; null: none was found"
+    )
+    probability: Share | None = Field(description="probability that this pose is right; null where the answer has none")
+    pose: PoseAnswer | None = Field(description="in the frame of this map")
 
 
 class FoundAnswer(Answer):
@@ -247,12 +262,17 @@ class FoundAnswer(Answer):
         "in their common frame",
     )
     warnings: list[WarningAnswer]
+    map: MapReference | None = Field(None, description="of several maps that of the pose; null for `no_match`")
+    maps: list[MapVerdictAnswer] = Field([], description="of several maps the best pose on each, the best first")
 
 
 class AssociateAnswer(FoundAnswer):
     """The answer of a search."""
 
-    map: MapReference | None
+    map: MapReference | None = Field(
+        description="the stored map; of several maps that of the pose; null for `no_match` there, and where a single "
+        "map came with the request"
+    )
     client_ref: Any = Field(description="returned as it was sent")
     request_id: str
     timing_ms: TimingAnswer

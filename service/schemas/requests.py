@@ -22,6 +22,7 @@ from .parts import (
     require_at_the_sensor,
     require_times,
 )
+from .several import MapWeights, SeveralMaps, require_one_kind
 from .strict import FreeJson, Point, Pose, Sigma, Strict
 from .views import AnyScan
 
@@ -70,17 +71,38 @@ class RegisterRequest(Strict):
 class AssociateRequest(Strict):
     """Unknown correspondences."""
 
-    map: AnyMap = Field(description="the map to search, or the id of a stored one")
+    map: AnyMap | None = Field(None, description="the map to search, or the id of a stored one; or `maps`")
+    maps: SeveralMaps | None = Field(
+        None, description="2 to 256 maps, or a prefix of the ids of stored ones, to search together"
+    )
+    map_weights: MapWeights | None = Field(
+        None,
+        description="probability of maps by id; the other maps share the rest equally. It is part of the score, and "
+        "never fused",
+    )
     scan: AnyScan = Field(description="the scan: segments, ranges, points or views")
     prior: AnyPrior | None = Field(None, description="prior knowledge of the pose; null: none")
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="returned as it was sent")
 
+    @model_validator(mode="after")
+    def _one_kind(self) -> AssociateRequest:
+        require_one_kind(self.map, self.maps, self.map_weights)
+        return self
+
 
 class BatchRequest(Strict):
-    """Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else."""
+    """Several scans, one map or several. Each scan and prior is checked alone, so that a bad one spoils no other."""
 
-    map: AnyMap = Field(description="the map to search, or the id of a stored one")
+    map: AnyMap | None = Field(None, description="the map to search, or the id of a stored one; or `maps`")
+    maps: SeveralMaps | None = Field(
+        None, description="2 to 256 maps, or a prefix of the ids of stored ones, to search together"
+    )
+    map_weights: MapWeights | None = Field(
+        None,
+        description="probability of maps by id; the other maps share the rest equally. It is part of the score, and "
+        "never fused",
+    )
     # Each is validated separately, as `BatchItem`.
     scans: list[Annotated[AnyScan, SkipValidation]] = Field(
         min_length=1, description="scans, each as `scan` of /v1/associate"
@@ -93,6 +115,7 @@ class BatchRequest(Strict):
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
+        require_one_kind(self.map, self.maps, self.map_weights)
         limits: Limits | None = info.context
         if limits is not None and len(self.scans) > limits.batch:
             raise TooManyError("/scans", limits.batch, "scans")

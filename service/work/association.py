@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import orjson
 
-from association import CancelledError, Deadline, associate
+from association import (
+    AssociationResult,
+    CancelledError,
+    Deadline,
+    IndexingEndedError,
+    InvalidSearchError,
+    KnownOfMaps,
+    Scan,
+    associate,
+    associate_on_maps,
+)
 from linefix.answers import Json, association_json
 
 from ..admission.errors import DeadlinePassedError
-from ..maps import CachedMap
+from ..maps import CachedMap, CachedMaps, FoundMaps
 from ..maps.lookup import FoundMap, MapLookup
 from ..schemas.encoding import encode
-from ..schemas.parts import InlineMap, SearchOptions
+from ..schemas.parts import HardPriorFields, InlineMap, SearchOptions, SoftPriorFields
 from ..schemas.requests import AssociateRequest, BatchItem, BatchRequest
 from ..telemetry.metrics import Metrics
 from ..telemetry.traces import stage
@@ -26,17 +36,23 @@ from .job import Done, Job
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A map that is ready to be searched.
+    """A map, or several, ready to be searched.
 
     Attributes
     ----------
-    cached : CachedMap
+    cached : CachedMap or CachedMaps
     reference : dict, or None
-        Id and revision of a stored map, as they are answered.
+        Id and revision of a stored map, as they are answered; None of several.
+    maps : FoundMaps, or None
+        Several maps.
+    map_weights : mapping, or None
+        Of several maps, as sent.
     """
 
-    cached: CachedMap
+    cached: CachedMap | CachedMaps
     reference: Json | None
+    maps: FoundMaps | None = None
+    map_weights: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,21 +86,30 @@ class Associator:
     metrics: Metrics
 
     def answer(
-        self, asked: AssociateRequest, on: InlineMap | FoundMap, job: Job, ready: CachedMap | None = None
+        self,
+        asked: AssociateRequest,
+        on: InlineMap | FoundMap | FoundMaps,
+        job: Job,
+        ready: CachedMap | CachedMaps | None = None,
     ) -> Done:
-        """Find one scan in one map, which may be ready already; raises what `target` and `find` raise."""
-        target = self.target(on, asked.options, job.deadline, ready)
+        """Find one scan in one map, or on several, which may be ready already; raises as `target` and `find`."""
+        target = self.target(asked, on, job.deadline, ready)
         job.watch.lap("decode")
         job.searching.set()
         found = self.find(target, asked, asked.options, job.deadline)
         job.watch.lap("search")
-        answer = {**found, "map": target.reference, "client_ref": asked.client_ref}
-        return job.done(answer, map=target.reference, verdict=found["status"], usable=found["usable"])
+        reference = found.get("map", target.reference)
+        answer = {**found, "map": reference, "client_ref": asked.client_ref}
+        return job.done(answer, map=reference, verdict=found["status"], usable=found["usable"])
 
     def target(
-        self, on: InlineMap | FoundMap, options: SearchOptions, deadline: Deadline, ready: CachedMap | None = None
+        self,
+        asked: AssociateRequest | BatchRequest,
+        on: InlineMap | FoundMap | FoundMaps,
+        deadline: Deadline,
+        ready: CachedMap | CachedMaps | None = None,
     ) -> Target:
-        """Return a map, indexed unless it is ready; one that is begun is finished, whenever the deadline passes.
+        """Return a map, or several, indexed unless ready; one that is begun is finished, whenever the deadline passes.
 
         Raises
         ------
@@ -95,8 +120,12 @@ class Associator:
         InputError
             When it cannot be searched.
         """
+        oriented = asked.options.oriented
         with stage("index"):
-            cached = ready or self.lookup.indexed(on, oriented=options.oriented, deadline=deadline)
+            if isinstance(on, FoundMaps):
+                together = ready or self.lookup.indexed_together(on, oriented=oriented, deadline=deadline)
+                return Target(together, None, on, asked.map_weights)
+            cached = ready or self.lookup.indexed(on, oriented=oriented, deadline=deadline)
         return Target(cached, reference_to(on))
 
     def find(
@@ -118,13 +147,19 @@ class Associator:
             raise CancelledError
         if deadline.passed:
             raise DeadlinePassedError
-        prior, how = prior_of(sought.prior), association_options_of(options, oriented=target.cached.oriented)
         begun = time.perf_counter()
         with stage("search"):
-            result = associate(target.cached.index, scanned.scan, prior, how, deadline)
+            result = _search(target, scanned.scan, sought.prior, options, deadline)
         seconds = time.perf_counter() - begun
         self.metrics.observe_association(str(result.status), result.usable, seconds, result.search.hypotheses)
-        return association_json(result, included_of(sought.scan, options, scanned, target.cached.frame_id))
+        cached, maps = target.cached, target.maps
+        frame_id = cached.frame_of(result.map_id) if isinstance(cached, CachedMaps) else cached.frame_id
+        answer = association_json(result, included_of(sought.scan, options, scanned, frame_id))
+        if maps is None:
+            return answer
+        verdicts = [{**one, **maps.reference_to(one["map_id"])} for one in answer["maps"]]
+        on = None if result.map_id is None else maps.reference_to(result.map_id)
+        return {**answer, "maps": verdicts, "map": on}
 
     def find_for_batch(
         self, target: Target, index: int, sought: BatchItem | Exception, options: SearchOptions, deadline: Deadline
@@ -137,6 +172,24 @@ class Associator:
             raise sought
         found = self.find(target, sought, options, deadline)
         return BatchResult(found["status"], encode({"index": index, "status_code": 200, "result": found}))
+
+
+def _search(
+    target: Target, scan: Scan, sent: SoftPriorFields | HardPriorFields | None, options: SearchOptions, until: Deadline
+) -> AssociationResult:
+    """Search a map, or several."""
+    cached, prior, on = target.cached, prior_of(sent), None if sent is None else sent.map_id
+    how = association_options_of(options, oriented=cached.oriented)
+    if not isinstance(cached, CachedMaps):
+        if on is not None:
+            raise InvalidSearchError(
+                "found it with a single map, expected it with several; omit it", argument="prior.map_id"
+            )
+        return associate(cached.index, scan, prior, how, until)
+    try:
+        return associate_on_maps(cached.maps, scan, KnownOfMaps(prior, on, target.map_weights), how, until)
+    except IndexingEndedError:
+        raise DeadlinePassedError from None
 
 
 def batch_done(asked: BatchRequest, target: Target, results: Sequence[BatchResult], job: Job) -> Done:

@@ -158,11 +158,11 @@ class MapDocument(TypedDict):
 
 class MapReference(TypedDict):
     """
-    Which stored map was searched.
+    Which map was searched; of several maps that of the pose.
     """
 
     map_id: str
-    revision: int
+    revision: int | None
 
 
 class MapSummaryAnswer(TypedDict):
@@ -434,6 +434,7 @@ class HardPriorFields(TypedDict):
     theta: float
     radius: float
     angle: float
+    map_id: NotRequired[str | None]
 
 
 class Header(TypedDict):
@@ -487,6 +488,14 @@ class Laser(TypedDict):
     intensities: NotRequired[Any]
 
 
+class MapPrefix(TypedDict):
+    """
+    All stored maps whose ids begin alike.
+    """
+
+    prefix: str
+
+
 class MeasuredFields(TypedDict):
     """
     Segments of a scan with what is known of the points behind them.
@@ -497,6 +506,19 @@ class MeasuredFields(TypedDict):
     point_counts: NotRequired[list[float] | None]
     centroids: NotRequired[list[list[float]] | None]
     spreads: NotRequired[list[float] | None]
+
+
+class NamedMap(TypedDict):
+    """
+    A map in the request itself, with a name for the answer.
+    """
+
+    segments: list[list[float]]
+    sigma: NotRequired[float | None]
+    oriented: NotRequired[bool | None]
+    frame_id: NotRequired[str]
+    meta: NotRequired[Any]
+    map_id: str
 
 
 class PointScan(TypedDict):
@@ -586,6 +608,7 @@ class SoftPriorFields(TypedDict):
     y: float
     theta: float
     covariance: list[list[float]]
+    map_id: NotRequired[str | None]
 
 
 class StoredMap(TypedDict):
@@ -641,6 +664,7 @@ class AlternativeAnswer(TypedDict):
     reliability: float
     inlier_fraction: float
     probability: float | None
+    map_id: NotRequired[str | None]
 
 
 class AnalyzedPlaceAnswer(TypedDict):
@@ -699,6 +723,19 @@ class MapList(TypedDict):
     maps: list[MapSummaryAnswer]
     corrupt: list[str]
     next: str | None
+
+
+class MapVerdictAnswer(TypedDict):
+    """
+    The best pose on one of several maps.
+    """
+
+    map_id: str
+    revision: int | None
+    status: Literal["ok", "ambiguous", "degenerate", "no_match"]
+    score: float | None
+    probability: float | None
+    pose: PoseAnswer | None
 
 
 class PlaceAnswer(TypedDict):
@@ -962,6 +999,8 @@ class FoundAnswer(TypedDict):
     search: SearchAnswer
     segments: NotRequired[list[list[float]] | list[list[list[float]] | None] | None]
     warnings: list[WarningAnswer]
+    map: NotRequired[MapReference | None]
+    maps: NotRequired[list[MapVerdictAnswer]]
 
 
 class MapCheckAnswer(TypedDict):
@@ -982,7 +1021,9 @@ class AssociateRequest(TypedDict):
     Unknown correspondences.
     """
 
-    map: InlineMap | StoredMap
+    map: NotRequired[InlineMap | StoredMap | None]
+    maps: NotRequired[list[NamedMap | StoredMap] | MapPrefix | None]
+    map_weights: NotRequired[dict[str, float] | None]
     scan: SegmentScan | LaserScan | PointScan | ViewsScan
     prior: NotRequired[SoftPriorFields | HardPriorFields | None]
     options: NotRequired[SearchOptions]
@@ -991,10 +1032,12 @@ class AssociateRequest(TypedDict):
 
 class BatchRequest(TypedDict):
     """
-    Several scans, one map. Scans and priors are looked at one by one, so that a bad one spoils nothing else.
+    Several scans, one map or several. Each scan and prior is checked alone, so that a bad one spoils no other.
     """
 
-    map: InlineMap | StoredMap
+    map: NotRequired[InlineMap | StoredMap | None]
+    maps: NotRequired[list[NamedMap | StoredMap] | MapPrefix | None]
+    map_weights: NotRequired[dict[str, float] | None]
     scans: list[SegmentScan | LaserScan | PointScan | ViewsScan]
     priors: NotRequired[list[SoftPriorFields | HardPriorFields | None] | None]
     options: NotRequired[SearchOptions]
@@ -1037,6 +1080,7 @@ class AssociateAnswer(TypedDict):
     segments: NotRequired[list[list[float]] | list[list[list[float]] | None] | None]
     warnings: list[WarningAnswer]
     map: MapReference | None
+    maps: NotRequired[list[MapVerdictAnswer]]
     client_ref: Any
     request_id: str
     timing_ms: TimingAnswer

@@ -12,7 +12,7 @@ from ...schemas.replies import AssociateAnswer
 from ...schemas.requests import AssociateRequest
 from ...work.job import Done, Job
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up
+from ..map_stage import index_map, looking_up_any
 from ..receiving import read
 from ..searching import in_slot
 from ..sending import answer
@@ -26,11 +26,18 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
     operation_id="associate",
     response_model=AssociateAnswer,
     responses=problems(*EVERYWHERE, *READS_BODY, *SEARCHES, "unknown_map", "map_corrupt"),
-    openapi_extra=takes(AssociateRequest, {"a room": examples.ASSOCIATE, "a stored map": examples.ASSOCIATE_STORED}),
+    openapi_extra=takes(
+        AssociateRequest,
+        {
+            "a room": examples.ASSOCIATE,
+            "a stored map": examples.ASSOCIATE_STORED,
+            "several maps": examples.ASSOCIATE_SEVERAL,
+        },
+    ),
     summary="Find the pose without knowing correspondences",
 )
 async def post_associate(request: Request) -> Response:
-    """Estimate the pose of a scan in a map, with a verdict and its probability."""
+    """Estimate the pose of a scan in a map, or on one of several, with a verdict and its probability."""
     exchange = begin_search(request)
     asked = await read(exchange, partial(read_model, AssociateRequest))
     job = exchange.job(asked.options.deadline_ms)
@@ -40,7 +47,7 @@ async def post_associate(request: Request) -> Response:
 async def _work(exchange: Exchange, asked: AssociateRequest, job: Job) -> Done:
     """Search in one slot at the gate, in which a small map is indexed, too."""
     oriented = asked.options.oriented
-    async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
+    async with looking_up_any(exchange, asked, job.deadline) as on:
         ready = await index_map(exchange, on, job.deadline, oriented=oriented)
         work = partial(exchange.services.associator.answer, asked, on, job, ready)
         return await in_slot(exchange, work, job.deadline, job.searching.is_set)

@@ -20,7 +20,7 @@ from ...schemas.requests import BatchItem, BatchRequest
 from ...work.association import BatchResult, batch_done
 from ...work.job import Done, Job
 from ..exchange import Exchange, begin_search
-from ..map_stage import index_map, looking_up
+from ..map_stage import index_map, looking_up_any
 from ..problems import INTERNAL, problem_of
 from ..receiving import read
 from ..searching import in_slot
@@ -40,7 +40,7 @@ router = APIRouter(tags=["associate"], route_class=DirectRoute)
     summary="Find several scans in one map",
 )
 async def post_batch(request: Request) -> Response:
-    """Estimate the poses of several scans in one map; an invalid scan yields one problem item."""
+    """Estimate the poses of several scans in one map, or on several; an invalid scan yields one problem item."""
     exchange = begin_search(request)
     asked, items = await read(exchange, read_batch)
     job = exchange.job(asked.options.deadline_ms)
@@ -50,9 +50,9 @@ async def post_batch(request: Request) -> Response:
 async def _work(exchange: Exchange, asked: BatchRequest, items: Sequence[BatchItem | Exception], job: Job) -> Done:
     """Index the map in one slot, and search for each scan in another."""
     associator, oriented = exchange.services.associator, asked.options.oriented
-    async with looking_up(exchange, asked.map, job.deadline, oriented=oriented) as on:
+    async with looking_up_any(exchange, asked, job.deadline) as on:
         ready = await index_map(exchange, on, job.deadline, oriented=oriented)
-        index = partial(associator.target, on, asked.options, job.deadline, ready)
+        index = partial(associator.target, asked, on, job.deadline, ready)
         target = await in_slot(exchange, index, job.deadline, heeds=lambda: False)
     job.watch.lap("decode")
     calls = [

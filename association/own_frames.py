@@ -1,0 +1,193 @@
+"""From the answer in the joint frame of several maps to poses and indices of each map's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from registration import RegistrationOptions, RigidTransform, register
+from registration.layout import POSE
+
+from .associating import Stages
+from .consensus.consensus_set import ConsensusSet
+from .consensus.estimation import estimate_poses
+from .consensus.ranking import with_lines_of_sight
+from .context import SearchContext
+from .index.joint import JointIndex
+from .options import MapsPrior
+from .report import probabilities_of_others
+from .result import (
+    Alternative,
+    AssociationDiagnostics,
+    AssociationResult,
+    Correspondence,
+    MapVerdict,
+    Reason,
+    Status,
+)
+from .words import AS_WELL
+
+
+def in_own_frames(found: Stages, ids: Sequence[str]) -> AssociationResult:
+    """Return an answer with its poses, segments and alternatives on the map that each is on.
+
+    Parameters
+    ----------
+    found : Stages
+        In the joint frame of a `JointIndex`, with its correspondences.
+    ids : sequence of str
+        Name of each map.
+    """
+    context, result = found.context, found.result
+    index = context.index
+    assert isinstance(index, JointIndex)
+    others = tuple(_alternative(context, index, other, ids) for other in result.alternatives)
+    best = None if result.pose is None else _map_of(context, index, result)
+    own = result if best is None else _on_map(context, index, result, best)
+    verdicts = _map_verdicts(found, index, ids, best, own.pose)
+    result = replace(own, alternatives=others, map_id=None if best is None else ids[best], maps=verdicts)
+    return replace(result, reasons=tuple(_named(reason, result) for reason in result.reasons))
+
+
+def _on_map(context: SearchContext, index: JointIndex, result: AssociationResult, m: int) -> AssociationResult:
+    """Return the answer's pose and segments on map `m`; its alternatives stay where they are."""
+    first, last = int(index.starts[m]), int(index.starts[m + 1])
+    assert result.pose is not None
+    pairs = tuple(_correspondence(pair, first) for pair in result.correspondences)
+    pose = _back(index, result.pose, m)
+    diagnostics = result.diagnostics
+    if diagnostics is not None:
+        wall = diagnostics.critical_wall
+        if wall is not None:
+            wall = replace(wall, map=tuple(i - first for i in wall.map))
+        diagnostics = replace(_registered_on_map(context, index, diagnostics, pairs, (m, pose)), critical_wall=wall)
+    missing = tuple(i - first for i in result.missing_map if first <= i < last)
+    return replace(result, pose=pose, correspondences=pairs, missing_map=missing, diagnostics=diagnostics)
+
+
+def _registered_on_map(
+    context: SearchContext,
+    index: JointIndex,
+    diagnostics: AssociationDiagnostics,
+    pairs: Sequence[Correspondence],
+    at: tuple[int, RigidTransform],
+) -> AssociationDiagnostics:
+    """Return diagnostics with the ambiguity before registration in the frame of a map; `at`: that map, and the pose."""
+    m, pose = at
+    if not pairs:
+        return diagnostics
+    indices = np.array([(pair.scan, pair.map) for pair in pairs], dtype=np.intp)
+    options = RegistrationOptions(rotation=context.options.rotation, weights=np.array([pair.weight for pair in pairs]))
+    sigma = index.sigma or 0.0
+    registered = register(index.parts[m].segments, context.scan.measured, indices, sigma, options, pose)
+    before = registered.diagnostics.ambiguity_before
+    return replace(diagnostics, registration=replace(diagnostics.registration, ambiguity_before=before))
+
+
+def _correspondence(pair: Correspondence, first: int) -> Correspondence:
+    return replace(pair, map=pair.map - first, alternatives=tuple(i - first for i in pair.alternatives))
+
+
+def _alternative(context: SearchContext, index: JointIndex, other: Alternative, ids: Sequence[str]) -> Alternative:
+    m = _map_at(context, other.pose)
+    return replace(other, pose=_back(index, other.pose, m), map_id=ids[m])
+
+
+def _map_of(context: SearchContext, index: JointIndex, result: AssociationResult) -> int:
+    """Return the map of an answer: that of its correspondences, which are all on one map."""
+    if result.correspondences:
+        return int(index.map_of(np.array([result.correspondences[0].map]))[0])
+    assert result.pose is not None
+    return _map_at(context, result.pose)
+
+
+def _map_at(context: SearchContext, pose: RigidTransform) -> int:
+    """Return the map of a pose of the joint frame."""
+    return int(context.maps_at(np.array([(pose.theta, pose.x, pose.y)], POSE))[0])
+
+
+def _back(index: JointIndex, pose: RigidTransform, m: int) -> RigidTransform:
+    """Return a pose of the joint frame in the frame of map `m`."""
+    x, y = index.shifts[m].tolist()
+    return RigidTransform(pose.x - x, pose.y - y, pose.theta)
+
+
+def _map_verdicts(
+    found: Stages, index: JointIndex, ids: Sequence[str], best: int | None, pose: RigidTransform | None
+) -> tuple[MapVerdict, ...]:
+    """Return the best pose of each map, the best first; maps without one in their order.
+
+    `best` and `pose` are those of the answer.
+    """
+    context, result, answer = found.context, found.result, found.explanations.answer
+    weights = context.prior.of_maps if isinstance(context.prior, MapsPrior) else np.zeros(len(ids))
+    firsts = _best_on_each(context, found)
+    sets = [one for m, one in firsts.items() if m != best]
+    probabilities = probabilities_of_others(answer, found.verdict, sets)
+    likely = dict(zip((m for m in firsts if m != best), probabilities, strict=True))
+    poses = _poses_of(context, sets)
+    least = -np.inf if answer is None else answer.best.posterior - AS_WELL
+    verdicts: list[MapVerdict] = []
+    if best is not None and result.diagnostics is not None:
+        score = result.diagnostics.score + float(weights[best])
+        verdicts.append(MapVerdict(ids[best], result.status, score, result.probability, pose))
+    for m, at in zip(likely, poses, strict=True):
+        one, there = firsts[m], None if best is None else _back(index, at, m)
+        as_well = best is not None and not result.usable and one.posterior >= least
+        status = Status.AMBIGUOUS if as_well else Status.NO_MATCH
+        score = one.score_by(context.options.estimator) + float(weights[m])
+        verdicts.append(MapVerdict(ids[m], status, score, likely[m], there))
+    none = 0.0 if result.probability is not None else None
+    listed = {verdict.map_id for verdict in verdicts}
+    return (*verdicts, *(MapVerdict(name, Status.NO_MATCH, None, none, None) for name in ids if name not in listed))
+
+
+def _best_on_each(context: SearchContext, found: Stages) -> dict[int, ConsensusSet]:
+    """Return the best explanation on each map that has one, the best map first."""
+    explanations = found.explanations
+    others = with_lines_of_sight(context, explanations.ranked, explanations.others)
+    sets = [*([] if explanations.answer is None else [explanations.answer.best]), *others]
+    firsts: dict[int, ConsensusSet] = {}
+    for one in sets:
+        firsts.setdefault(_map_at(context, context.in_map(one.pose)), one)
+    return firsts
+
+
+def _poses_of(context: SearchContext, sets: Sequence[ConsensusSet]) -> list[RigidTransform]:
+    """Return the poses of consensus sets in the joint frame; those that the deadline leaves out as they were found."""
+    if not sets:
+        return []
+    poses = [one.pose for one in sets]
+    estimated = [one.pose for one in estimate_poses(context, sets)]
+    return [context.in_map(pose) for pose in (*estimated, *poses[len(estimated) :])]
+
+
+def _named(reason: Reason, result: AssociationResult) -> Reason:
+    """Return a reason that names the map of the similar place."""
+    if reason.code == "not_on_map":
+        return replace(
+            reason,
+            message="The scan fits none of these maps better than an unrelated scan would. The robot may be in a place "
+            "that no map contains.",
+        )
+    if reason.code != "similar_place":
+        return reason
+    places = [verdict.map_id for verdict in result.maps if verdict.status is Status.AMBIGUOUS]
+    others = [name for name in places if name != result.map_id]
+    if not others and result.alternatives and result.alternatives[0].map_id not in (None, result.map_id):
+        others = [str(result.alternatives[0].map_id)]
+    if not others:
+        return reason
+    named = f"A pose on the map {others[0]} fits" if len(others) == 1 else f"Poses on the maps {_some(others)} fit"
+    return replace(
+        reason,
+        message=f"{named} the scan about as well: see `maps` and `alternatives`. Send `map_weights` or a prior, or "
+        "move and scan again.",
+    )
+
+
+def _some(names: Sequence[str], most: int = 5) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,0 +1,70 @@
+"""Several maps of a command: files, folders and ids of stored maps to the maps of one request."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from .asking import whole_map
+from .contract import Json
+from .errors import WrongUseError
+from .inputs import FILES, read_map_or_id
+
+MOST_NAME = 120  # letters of a name; the contract allows 128
+NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def read_target(names: Sequence[str]) -> Json:
+    """Return the part of a request that names its map, or its maps: ``{"map": ...}`` or ``{"maps": [...]}``.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Each a map file, a folder of map files, or the id of a stored map. The map of a file is named after it.
+
+    Raises
+    ------
+    WrongUseError
+        When one of them is none of these, or a folder holds no map.
+    RefusedError
+        When a file is not taken.
+    """
+    single = [name for one in names for name in _files_of(one)]
+    if len(single) == 1:
+        return {"map": read_map_or_id(single[0])}
+    maps: list[Json] = []
+    for name in single:
+        document, taken = read_map_or_id(name), {one["map_id"] for one in maps}
+        maps.append(document if "segments" not in document else {**document, "map_id": _name_of(name, taken)})
+    return {"maps": maps}
+
+
+def _files_of(name: str) -> list[str]:
+    """Return the map files of a folder, by name; of anything else itself."""
+    folder = Path(name)
+    if not folder.is_dir():
+        return [name]
+    found = sorted(str(file) for file in folder.iterdir() if file.suffix.lower() in FILES and file.is_file())
+    if not found:
+        raise WrongUseError(f"{name}: found no map file in this folder, expected one with a suffix such as .json")
+    return found
+
+
+def _name_of(name: str, taken: set[str]) -> str:
+    """Return the name of a file's map: that of the file without its suffix, with a number where it is taken."""
+    stem = NOT_IN_NAMES.sub("-", Path(name).stem)[:MOST_NAME] or "map"
+    return next(one for one in (stem, *(f"{stem}-{number}" for number in range(2, 1000))) if one not in taken)
+
+
+def documents_of(target: Json, server: str | None) -> dict[str, Json]:
+    """Return the maps of a request by name, those that are stored, too; the name of a single one may be empty."""
+    maps = target["maps"] if "maps" in target else [target["map"]]
+    return {
+        one.get("map_id", ""): {key: value for key, value in _whole(one, server).items() if key != "map_id"}
+        for one in maps
+    }
+
+
+def _whole(one: Json, server: str | None) -> Json:
+    return one if "segments" in one else whole_map(one, server)

@@ -1,0 +1,72 @@
+"""Several maps in one request."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag
+
+from .errors import Fault, InvalidRequestError
+from .parts import INLINE, STORED, InlineMap, StoredMap
+from .strict import MapId, Strict
+
+FEWEST_MAPS, MOST_MAPS = 2, 256
+
+
+class NamedMap(InlineMap):
+    """A map in the request itself, with a name for the answer."""
+
+    map_id: MapId = Field(description="name of the map in the answer")
+
+
+def _named_kind(value: Any) -> str:
+    return INLINE if isinstance(value, dict) and "segments" in value else STORED
+
+
+NamedOrStored = Annotated[
+    Annotated[NamedMap, Tag(INLINE)] | Annotated[StoredMap, Tag(STORED)], Discriminator(_named_kind)
+]
+
+
+class MapPrefix(Strict):
+    """All stored maps whose ids begin alike."""
+
+    prefix: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,128}$", min_length=1, max_length=128)] = Field(
+        description="beginning of the ids of the maps"
+    )
+
+
+LIST, PREFIX = "<list>", "<prefix>"
+
+
+def _several_kind(value: Any) -> str:
+    return PREFIX if isinstance(value, dict | MapPrefix) else LIST
+
+
+SeveralMaps = Annotated[
+    Annotated[Annotated[list[NamedOrStored], Field(min_length=FEWEST_MAPS, max_length=MOST_MAPS)], Tag(LIST)]
+    | Annotated[MapPrefix, Tag(PREFIX)],
+    Discriminator(_several_kind),
+]
+MapWeights = Annotated[dict[MapId, Annotated[float, Field(ge=0.0, le=1.0)]], Field(min_length=1, max_length=MOST_MAPS)]
+
+
+def require_one_kind(map: object, maps: list[NamedMap | StoredMap] | MapPrefix | None, weights: object) -> None:
+    """Refuse a request with both a map and several, or none, with weights of a single map, or with one map twice.
+
+    Raises
+    ------
+    InvalidRequestError
+        With the place of the fault.
+    """
+    if (map is None) == (maps is None):
+        found = "neither" if map is None else "both"
+        raise InvalidRequestError([Fault("", f"expected exactly one of map and maps, found {found}")])
+    if maps is None and weights is not None:
+        raise InvalidRequestError([Fault("/map_weights", "found it with a single map, expected it with maps; omit it")])
+    if isinstance(maps, list):
+        seen: dict[str, int] = {}
+        for number, one in enumerate(maps):
+            if seen.setdefault(one.map_id, number) != number:
+                message = "found an id that another map has, expected a different one for each map"
+                raise InvalidRequestError([Fault(f"/maps/{number}/map_id", message)])

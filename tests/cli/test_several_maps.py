@@ -1,0 +1,103 @@
+"""One scan, or a log, on several maps by the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from service.schemas import examples
+from tests.map_quality.check.drawn import faces
+from tests.running import RunningService
+
+from .drives import write_log
+from .running import Linefix, refused
+
+HALL = [[0.0, 0.0, 9.0, 0.0], [9.0, 0.0, 9.0, 4.5], [9.0, 4.5, 0.0, 4.5], [0.0, 4.5, 0.0, 0.0]]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    floors = tmp_path / "floors"
+    floors.mkdir()
+    (floors / "hall.json").write_text(json.dumps({"segments": HALL}))
+    (floors / "room.json").write_text(json.dumps({"segments": examples.WALLS, "frame_id": "room"}))
+    (tmp_path / "scan.json").write_text(json.dumps({"segments": examples.SEEN}))
+    return floors
+
+
+def test_a_scan_is_located_on_files_a_folder_and_stored_maps(linefix: Linefix, files: Path) -> None:
+    assert linefix("map", "put", "stored", "floors/room.json").code == 0
+    for maps, name in [
+        (("floors/hall.json", "floors/room.json"), "room"),
+        (("floors",), "room"),
+        (("floors/hall.json", "stored"), "stored"),
+    ]:
+        ended = linefix("locate", *maps, "scan.json", "--json")
+        assert ended.code == 0, ended.err
+        answer = json.loads(ended.out)
+        assert (answer["usable"], answer["map"]["map_id"]) == (True, name)
+        assert answer["map"]["revision"] == (1 if name == "stored" else None)
+        assert answer["pose"]["x"] == pytest.approx(1.0, abs=1e-6)
+        assert [one["map_id"] for one in answer["maps"]] == [name, "hall"]
+        assert answer["frame_id"] == "room"
+    told = linefix("locate", "floors", "scan.json").out
+    assert "room" in told.splitlines()[1]
+    assert "no_match" in told
+
+
+def test_the_server_answers_as_this_process(linefix: Linefix, files: Path, service: RunningService) -> None:
+    url = str(service.client.base_url)
+    here = json.loads(linefix("locate", "floors", "scan.json", "--json").out)
+    there = json.loads(linefix("locate", "floors", "scan.json", "--json", "--server", url).out)
+    for name in ("request_id", "timing_ms"):
+        del here[name], there[name]
+    assert there == here
+
+
+def test_weights_and_the_map_of_a_window_are_taken(linefix: Linefix, files: Path) -> None:
+    (files / "twin.json").write_text((files / "room.json").read_text())
+    both = ("floors/room.json", "floors/twin.json", "scan.json", "--json")
+    assert json.loads(linefix("locate", *both).out)["status"] == "ambiguous"
+    for name in ("room", "twin"):
+        weighed = json.loads(linefix("locate", *both, "--weight", f"{name}=0.9999").out)
+        assert weighed["map"]["map_id"] == name
+        near = json.loads(linefix("locate", *both, "--near", "1", "0.5", "1.57", "--near-map", name).out)
+        assert near["map"]["map_id"] == name
+    assert "MAP_ID=PROBABILITY" in refused(linefix("locate", *both, "--weight", "room"), 2)
+    assert "/map_weights/roof" in refused(linefix("locate", *both, "--weight", "roof=0.5"), 3)
+    assert "/prior/map_id" in refused(linefix("locate", *both, "--near", "1", "0.5", "1.57"), 3)
+
+
+def test_files_of_one_name_are_told_apart(linefix: Linefix, files: Path) -> None:
+    (files.parent / "other").mkdir()
+    (files.parent / "other" / "room.json").write_text(json.dumps({"segments": HALL}))
+    answer = json.loads(linefix("locate", "floors/room.json", "other/room.json", "scan.json", "--json").out)
+    assert {one["map_id"] for one in answer["maps"]} == {"room", "room-2"}
+
+
+def test_an_empty_folder_is_told(linefix: Linefix, files: Path) -> None:
+    (files.parent / "empty").mkdir()
+    assert "no map file" in refused(linefix("locate", "empty", "scan.json"), 2)
+
+
+@pytest.mark.parametrize("mode", ["global", "track"])
+def test_a_log_is_replayed_on_several_maps(linefix: Linefix, files: Path, mode: str) -> None:
+    write_log(files.parent / "drive.log", 8)
+    (files / "floor.json").write_text(json.dumps({"segments": faces().tolist()}))
+    ended = linefix("replay", "drive.log", "--map", "floors", "--mode", mode, "--json")
+    assert ended.code == 0, ended.err
+    found = [json.loads(line) for line in ended.out.splitlines()]
+    usable = [line for line in found if line["usable"]]
+    assert len(usable) >= 4
+    assert {line["map_id"] for line in usable} == {"floor"}
+    told = linefix(
+        "replay", "drive.log", "--map", "floors/floor.json", "--map", "floors/hall.json", "--mode", mode,
+        "--picture", "way.png",
+    )  # fmt: skip
+    assert told.code == 0, told.err
+    row = next(line for line in told.out.splitlines() if line.startswith("floor "))
+    assert int(row.split()[-1]) == len(usable)
+    assert (files.parent / "way-floor.png").exists()
+    assert not (files.parent / "way-hall.png").exists()
