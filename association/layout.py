@@ -38,7 +38,7 @@ WALL = fields((_F, "dx dy offset begin end angle"), (_I, "before after"))
 # direction; midpoint; length; angle of the direction; mean of the points and their second moment along the line (m^2);
 # variances of offset (m^2) and angle (rad^2) with the model's slack, for the gates; weight in the sums (1/m^2), without
 # the error common to a wall; its gain on a wall; the sum of that over all later lines; variance of the offset by the
-# sigmas alone (m^2); the freedom that it alone takes from a pose, nats.
+# scan's sigmas alone (m^2); the freedom that it alone takes from a pose, nats.
 SCAN_LINE = fields(
     (
         _F,
@@ -74,7 +74,7 @@ SCORE_TERMS = fields((_F, "gain chi_square log_determinant"))
 
 # A scored consensus set: its score; the chi-square in it; that of the same sums at the paper's estimate; length of the
 # matched segments; its fraction of the scan's; the paper's reliability, Eq. (28); mean squared offset over what the
-# sigmas alone expect; the penalty of lines of sight, nats; the fractions of the beams that read the wall they
+# scan's sigmas alone expect; the penalty of lines of sight, nats; the fractions of the beams that read the wall they
 # should, and that passed through one, 0 without beams; how many rows are matched.
 SET_SCORE = fields(
     (_F, "score chi_square one_step_chi_square length fraction reliability misfit blocked read passed count"),

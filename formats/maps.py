@@ -18,6 +18,7 @@ from .files import name_of
 from .grids.cells import Grid, picture_of
 from .grids.faces import find_faces
 from .grids.map_server import read_grid
+from .grids.tuning import SURFACE_SIGMA
 from .line_map import ImportedMap, LineMap
 from .logs.folders import SUFFIXES as BAG_SUFFIXES
 from .logs.folders import is_bag
@@ -124,6 +125,6 @@ def map_of_grid(message: Any, name: str = "OccupancyGrid") -> ImportedMap:
 def _from_grid(grid: Grid, notes: Notes, name: str, frame: str) -> LineMap:
     segments = find_faces(grid, notes, name)
     notes.add_read("segments", "faces of walls", len(segments))
-    # Measured with the logs of two grids: no number that was tried makes more scans usable.
-    notes.add_assumed("sigma", "sigma of the walls is unknown; each search estimates it")
-    return LineMap(segments, None, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})
+    sigma = SURFACE_SIGMA * grid.resolution
+    notes.add_assumed("sigma", f"sigma of the walls is assumed to be {sigma:g} m, half a cell")
+    return LineMap(segments, sigma, True, frame, {"source": name, "resolution": f"{grid.resolution:g}"})

@@ -21,9 +21,15 @@ from ..context import SearchContext
 from ..explanations import Answer
 from ..layout import ALTERNATIVE, COMPARED
 from ..scan.scan_lines import ScanLines
-from ..tuning import MODEL_OFFSET
+from ..tuning import LEAST_OFF_WALLS, MODEL_OFFSET
 from .kernels import alternatives as kernels
-from .tuning import ALTERNATIVE_TEMPERATURE, LOOSE_ALTERNATIVES, LOOSE_BEAMS, LOOSE_FACTOR, LOOSE_WALLS
+from .tuning import (
+    ALTERNATIVE_TEMPERATURE,
+    LOOSE_ALTERNATIVES,
+    LOOSE_BEAMS,
+    LOOSE_FACTOR,
+    LOOSE_WALLS,
+)
 
 
 def compare_alternatives(best: ConsensusSet, others: Sequence[ConsensusSet]) -> Records:
@@ -42,16 +48,18 @@ def probability_among(alternatives: Records) -> float:
 def probability_with_loose_walls(context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]) -> float:
     """Return the probability of the best explanation among the next ones where walls may be off by more, up to 1.
 
-    1 where the caller knows by how much they are.
+    1 where the caller knows that they are off by millimetres.
 
     Raises
     ------
     CancelledError
         When the deadline was cancelled.
     """
-    if context.index.sigma is not None or not others:
+    declared = context.index.sigma
+    if not others or (declared is not None and declared < LEAST_OFF_WALLS):
         return 1.0
-    lines = ScanLines.of(context.scan, _loose_sigma(answer.estimated.wall_sigma), context.options, context.lines.given)
+    sigma = _loose_sigma(answer.estimated.wall_sigma) if declared is None else LOOSE_FACTOR * declared
+    lines = ScanLines.of(context.scan, sigma, context.options, context.lines.given)
     explanations = (answer.best, *others[:LOOSE_ALTERNATIVES])
     scores = score_again(context.instead(context.scan, lines), explanations)
     return _probability_of_first(explanations, scores)

@@ -36,7 +36,7 @@ class Features(NamedTuple):
     root_count : square root of the number of matched segments
     root_length : square root of their length, sqrt(m)
     deviation : standard deviation of the position along its weakest direction, m, up to `MOST_DEVIATION`
-    misfit : log of the mean squared offset over what the sigmas expect
+    misfit : log of the mean squared offset over what the scan's sigmas expect
     inverse_count : one over the number of matched segments
     longest_unmatched : length of the longest segment that is not matched, m, up to `LONGEST_UNMATCHED`; of a drive
         the mean over its views

@@ -63,7 +63,9 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_offset / offset))
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_angle / angle))
         one.later_gain = later
-        one.plain_variance = max(LEAST_VARIANCE, line.variance + given.map + line.common_offset)
+        # Not that of the map: the models of the verdict were fitted to maps of unknown deviation, and a declared one
+        # would let any misfit up to it pass as expected.
+        one.plain_variance = max(LEAST_VARIANCE, line.variance + line.common_offset)
         one.freedom = freedom_alone(one, model[0], alone[0])
         later += one.gain
     keep_alive(alone)
