@@ -133,12 +133,14 @@ def put_to_scale(context: SearchContext, as_sent: Explanations) -> ScaledSearch:
 def _may_be_off(first: ScaledSearch) -> bool:
     """Return whether a factor may matter, and nothing but the pose was solved for, and all that was.
 
-    A scan that is off its walls by millimetres leaves nothing to a factor; nor does a map with a declared `sigma`.
+    A scan that is off its walls by millimetres leaves nothing to a factor; nor does a map that is declared to be that
+    exact.
     """
     context, answer = first.context, first.explanations.answer
     if answer is None or answer.estimated.views is not None or context.options.estimator != "joint":
         return False
-    return context.index.sigma is None and answer.estimated.wall_sigma >= LEAST_OFF_WALLS
+    declared = context.index.sigma
+    return (answer.estimated.wall_sigma if declared is None else declared) >= LEAST_OFF_WALLS
 
 
 def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> ScaledSearch:
