@@ -36,6 +36,7 @@ from .tuning import (
     LEAST_AS_SENT,
     LEAST_FACTOR,
     LEAST_OFF_WALLS,
+    LOOSE_WALLS,
     MOST_FACTOR,
     REACH,
     RIVAL_SHARE,
@@ -134,13 +135,15 @@ def _may_be_off(first: ScaledSearch) -> bool:
     """Return whether a factor may matter, and nothing but the pose was solved for, and all that was.
 
     A scan that is off its walls by millimetres leaves nothing to a factor; nor does a map that is declared to be that
-    exact.
+    exact, or to be off by more than the walls of a map of unknown deviation are.
     """
     context, answer = first.context, first.explanations.answer
     if answer is None or answer.estimated.views is not None or context.options.estimator != "joint":
         return False
     declared = context.index.sigma
-    return (answer.estimated.wall_sigma if declared is None else declared) >= LEAST_OFF_WALLS
+    if declared is None:
+        return answer.estimated.wall_sigma >= LEAST_OFF_WALLS
+    return LEAST_OFF_WALLS <= declared <= LOOSE_WALLS
 
 
 def _search_with_factor(first: ScaledSearch, similarity: Similarity | None) -> ScaledSearch:

@@ -26,6 +26,8 @@ NARROW_REACH = 0.15  # m, tables; a wall is in the raster of narrow gates where 
 MODEL_OFFSET = 0.02  # m, tables; of a wall as a whole,
 ROUGHNESS = 0.01  # m, tables; of which that much differs along it
 MODEL_ANGLE = math.radians(0.6)  # tables
+LOOSE_WALLS = 0.05  # m, tables; by which the walls of a map may be off without its caller's word: drawn maps that the
+# verdict's models were fitted to are off by as much
 # Gain of a segment found on a wall, over its being clutter: a constant part, and one by length.
 GAIN = 6.0  # nats, tables
 GAIN_PER_METRE = 2.0  # nats, tables

@@ -21,14 +21,13 @@ from ..context import SearchContext
 from ..explanations import Answer
 from ..layout import ALTERNATIVE, COMPARED
 from ..scan.scan_lines import ScanLines
-from ..tuning import LEAST_OFF_WALLS, MODEL_OFFSET
+from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .kernels import alternatives as kernels
 from .tuning import (
     ALTERNATIVE_TEMPERATURE,
     LOOSE_ALTERNATIVES,
     LOOSE_BEAMS,
     LOOSE_FACTOR,
-    LOOSE_WALLS,
 )
 
 
@@ -58,7 +57,10 @@ def probability_with_loose_walls(context: SearchContext, answer: Answer, others:
     declared = context.index.sigma
     if not others or (declared is not None and declared < LEAST_OFF_WALLS):
         return 1.0
-    sigma = _loose_sigma(answer.estimated.wall_sigma) if declared is None else LOOSE_FACTOR * declared
+    if declared is None:
+        sigma = _loose_sigma(answer.estimated.wall_sigma)
+    else:
+        sigma = min(LOOSE_FACTOR * declared, max(declared, LOOSE_WALLS))
     lines = ScanLines.of(context.scan, sigma, context.options, context.lines.given)
     explanations = (answer.best, *others[:LOOSE_ALTERNATIVES])
     scores = score_again(context.instead(context.scan, lines), explanations)

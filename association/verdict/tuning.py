@@ -2,9 +2,8 @@
 
 # --- Alternatives: compared again with walls off by more --------------------------------------------------------------
 
-# Explanations are scored again with gates as wide as walls may be off: by so much at least,
-LOOSE_WALLS = 0.05  # m, tables
-LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be, or are declared to be,
+# Explanations are scored again with gates as wide as walls may be off: by `LOOSE_WALLS` at least,
+LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
 LOOSE_BEAMS = 0.5  # tables; and with that fraction of the beams' part, which depends on centimetres
 LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 

@@ -11,7 +11,7 @@ from registration.layout import INFORMATION, Record, Records
 from ...consensus.kernels.scoring import log_determinant
 from ...layout import SCAN_LINE, SIGHTING, Indices, Integers
 from ...tables import Measured
-from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
+from ...tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, LOOSE_WALLS, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
 from ..tuning import LEAST_SPREAD, LEAST_VARIANCE
 from .joining import lines_of_a_view, longest_first
 
@@ -63,9 +63,10 @@ def describe_lines(lines: Records, order: Integers, variances: Records, model: R
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_offset / offset))
             one.gain = max(0.0, one.gain - 0.5 * math.log1p(line.common_angle / angle))
         one.later_gain = later
-        # Not that of the map: the models of the verdict were fitted to maps of unknown deviation, and a declared one
-        # would let any misfit up to it pass as expected.
-        one.plain_variance = max(LEAST_VARIANCE, line.variance + line.common_offset)
+        # The models of the verdict were fitted to maps of unknown deviation: a declared one would let any misfit up to
+        # it pass as expected. Beyond the deviations that they were fitted to it does.
+        beyond = max(0.0, given.map - LOOSE_WALLS**2)
+        one.plain_variance = max(LEAST_VARIANCE, line.variance + beyond + line.common_offset)
         one.freedom = freedom_alone(one, model[0], alone[0])
         later += one.gain
     keep_alive(alone)
