@@ -24,6 +24,7 @@ from association.consensus.similarity import Similarity, fit_similarity
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.explanations import Explanations, add_alternatives
+from association.search.candidates import Effort
 from association.to_scale import search_to_scale
 from registration import RigidTransform, Segments
 from registration.layout import Floats
@@ -223,10 +224,10 @@ def test_what_has_no_time_to_be_put_to_scale_is_not_usable(monkeypatch: pytest.M
     in_time = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
     assert in_time.usable
 
-    def late(context: SearchContext) -> Explanations:
+    def late(context: SearchContext, effort: Effort | None = None) -> Explanations:
         if context.scan is not SCAN:
             context.deadline.at = 0.0
-        return searched(context)
+        return searched(context, effort)
 
     monkeypatch.setattr(to_scale, "search_and_explain", late)
     got = associate(index, SCAN, None, deadline=Deadline(time.monotonic() + 60.0))
@@ -311,8 +312,9 @@ def test_what_fits_to_millimetres_is_not_deciding_place_a_factor(
 
 
 def test_what_is_said_of_the_map_is_believed() -> None:
-    """Walls that are off by a centimetre are not off by decimetres."""
-    assert told(answer_of(index_of(1.02 * WALLS, 0.01), SCAN)) == []
+    """Walls that are off by millimetres are not off by decimetres; those of a grid may be."""
+    assert told(answer_of(index_of(1.02 * WALLS, 0.005), SCAN)) == []
+    assert told(answer_of(index_of(1.02 * WALLS, 0.025), SCAN)) != []
     assert told(answer_of(index_of(1.02 * WALLS), SCAN)) != []
 
 

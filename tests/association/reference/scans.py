@@ -9,7 +9,7 @@ import numpy as np
 
 from association.layout import LINE_PARTS, SCAN_LINE
 from association.scan.tuning import LEAST_SPREAD, LEAST_VARIANCE, LINE_GAP
-from association.tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
+from association.tuning import GAIN, GAIN_LENGTH, GAIN_PER_METRE, LOOSE_WALLS, MODEL_ANGLE, MODEL_OFFSET, ROUGHNESS
 from registration import MeasuredSegments, RigidTransform, Segments
 from registration.layout import LEAST_POINTS, Floats, Record, Records
 
@@ -143,7 +143,8 @@ def describe_lines(lines: Records, variances: Record, model: Record) -> tuple[li
             1.0 / (line["variance"] + ROUGHNESS**2), 1.0 / max(1e-300, variances["least_angle"] * spread)
         )
         row["gain"] = GAIN + GAIN_PER_METRE * min(line["covered"], GAIN_LENGTH)
-        row["plain_variance"] = max(LEAST_VARIANCE, line["variance"] + variances["map"])
+        beyond = max(0.0, variances["map"] - LOOSE_WALLS**2)
+        row["plain_variance"] = max(LEAST_VARIANCE, line["variance"] + beyond)
         row["freedom"] = freedom_alone(row, model)
     for k, row in enumerate(rows):
         row["later_gain"] = rows["gain"][k + 1 :].sum()

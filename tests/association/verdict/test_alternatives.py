@@ -57,7 +57,13 @@ def test_that_the_answer_fits_well_shows_not_that_walls_are_where_they_are_drawn
 def test_alone_or_where_walls_are_known_to_be_there_is_no_second_look() -> None:
     context, answer, _ = explained(0)
     assert probability_with_loose_walls(context, answer, ()) == 1.0
-    assert probability_with_loose_walls(*explained(0, sigma=0.05)) == 1.0
+    assert probability_with_loose_walls(*explained(0, sigma=0.005)) == 1.0
+
+
+def test_walls_that_are_declared_to_be_off_by_centimetres_have_a_second_look() -> None:
+    """As those of a map of which nothing is known."""
+    assert probability_with_loose_walls(*explained(0, sigma=0.025)) < 1.0
+    assert probability_with_loose_walls(*explained(0)) < 1.0
 
 
 def test_of_what_beams_say_a_share_counts() -> None:
