@@ -63,7 +63,7 @@ def test_walls_lie_in_the_middle_of_their_cells_with_free_space_on_the_left(tmp_
     imported = read_map(write(tmp_path, l_room(), name=name))
     assert walls(imported) == L_ROOM
     assert imported.map.oriented
-    assert imported.map.sigma is None
+    assert imported.map.sigma == pytest.approx(0.025)
 
 
 def test_the_origin_moves_and_turns_the_map(tmp_path: Path) -> None:
