@@ -20,7 +20,7 @@ from ..schemas.errors import BodyTooLargeError
 from .errors import BodyTooSlowError, EncodingError, MediaTypeError
 
 JSON, FORM = "application/json", "multipart/form-data"
-DROP_SECONDS = 1.0  # s that the rest of a body may take to come
+DROP_SECONDS = 3.0  # s that the rest of a body may take to come
 
 
 @dataclass(frozen=True, slots=True)

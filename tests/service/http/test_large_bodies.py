@@ -58,7 +58,7 @@ def test_no_search_waits_for_a_large_map_to_be_indexed(start_service: Callable[.
     large = (
         b'{"map": ' + slow_to_index(100_000) + seen[:-1] + b', "options": {"oriented": false, "deadline_ms": 30000}}'
     )
-    with running.connection() as connection:
+    with running.connection(timeout=60.0) as connection:
         connection.sendall(POST + b"Content-Length: %d\r\n\r\n" % len(large) + large)
         until(lambda: running.count("linefix_indexing_running") == 1.0)
         running.client.post("/v1/associate", json=examples.ASSOCIATE).raise_for_status()
