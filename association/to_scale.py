@@ -175,7 +175,7 @@ def _effort_beyond(context: SearchContext, found: ScaledSearch) -> Effort:
     answer = found.explanations.answer
     assert answer is not None  # whose factor is tried
     known = answer.best.by_segments + answer.best.posterior - answer.best.score
-    return replace(Effort.of(context), known=known)
+    return replace(Effort.of(context), known=max(0.0, known))  # a soft prior may cost more than the segments gain
 
 
 def at_scale(context: SearchContext, factor: float, options: AssociationOptions | None = None) -> SearchContext:

@@ -47,7 +47,7 @@ def probability_among(alternatives: Records) -> float:
 def probability_with_loose_walls(context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]) -> float:
     """Return the probability of the best explanation among the next ones where walls may be off by more, up to 1.
 
-    1 where the caller knows that they are off by millimetres.
+    1 where the map is declared to be exact to `LEAST_OFF_WALLS`, and without alternatives.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, SkipValidation, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -68,8 +68,8 @@ class RegisterRequest(Strict):
     options: EstimatorOptions = EstimatorOptions()
 
 
-class AssociateRequest(Strict):
-    """Unknown correspondences."""
+class OnMaps(Strict):
+    """A request that names the map to search, or several maps."""
 
     map: AnyMap | None = Field(None, description="the map to search, or the id of a stored one; or `maps`")
     maps: SeveralMaps | None = Field(
@@ -80,29 +80,25 @@ class AssociateRequest(Strict):
         description="probability of maps by id; the other maps share the rest equally. It is part of the score, and "
         "never fused",
     )
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        require_one_kind(self.map, self.maps, self.map_weights)
+        return self
+
+
+class AssociateRequest(OnMaps):
+    """Unknown correspondences."""
+
     scan: AnyScan = Field(description="the scan: segments, ranges, points or views")
     prior: AnyPrior | None = Field(None, description="prior knowledge of the pose; null: none")
     options: SearchOptions = SearchOptions()
     client_ref: FreeJson = Field(None, description="returned as it was sent")
 
-    @model_validator(mode="after")
-    def _one_kind(self) -> AssociateRequest:
-        require_one_kind(self.map, self.maps, self.map_weights)
-        return self
 
-
-class BatchRequest(Strict):
+class BatchRequest(OnMaps):
     """Several scans, one map or several. Each scan and prior is checked alone, so that a bad one spoils no other."""
 
-    map: AnyMap | None = Field(None, description="the map to search, or the id of a stored one; or `maps`")
-    maps: SeveralMaps | None = Field(
-        None, description="2 to 256 maps, or a prefix of the ids of stored ones, to search together"
-    )
-    map_weights: MapWeights | None = Field(
-        None,
-        description="probability of maps by id; the other maps share the rest equally. It is part of the score, and "
-        "never fused",
-    )
     # Each is validated separately, as `BatchItem`.
     scans: list[Annotated[AnyScan, SkipValidation]] = Field(
         min_length=1, description="scans, each as `scan` of /v1/associate"
@@ -115,7 +111,6 @@ class BatchRequest(Strict):
 
     @model_validator(mode="after")
     def _within_limits(self, info: ValidationInfo) -> BatchRequest:
-        require_one_kind(self.map, self.maps, self.map_weights)
         limits: Limits | None = info.context
         if limits is not None and len(self.scans) > limits.batch:
             raise TooManyError("/scans", limits.batch, "scans")
