@@ -269,8 +269,9 @@ def draw() -> Iterator[Sampled]:
         world_cases(SEGMENTS, 128, kept_for_report=True),
         world_cases(RANGES, 128, kept_for_report=True),
     ]
-    mixed = (case for some in zip_longest(*kinds) for case in some if case is not None)
-    for number, case in enumerate(islice(mixed, 0, None, STEP)):
+    some_of_each = (islice(cases, 0, None, STEP) for cases in kinds)
+    mixed = (case for some in zip_longest(*some_of_each) for case in some if case is not None)
+    for number, case in enumerate(mixed):
         yield Sampled(case, _prior(case, number), number)
 
 
