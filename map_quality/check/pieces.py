@@ -19,6 +19,7 @@ from .tuning import (
     DOUBLE_LENGTH,
     DOUBLE_SHARE,
     ENDS_AT_A_TIME,
+    GAP_SIGMAS,
     GREATEST_GAP,
     LARGEST_PIXEL,
     LEAST_GAP,
@@ -161,23 +162,29 @@ def _overlapping(index: MapIndex, near: NearWalls, deadline: Deadline) -> Iterat
 
 
 def _gaping(index: MapIndex, deadline: Deadline) -> Iterator[Finding]:
-    """Yield a finding if ends nearly meet another segment: at no other end, on no other line, and yet near one."""
+    """Yield a finding if ends nearly meet another segment: at no other end, on no other line, and yet near one.
+
+    Ends are as uncertain as the walls: gaps within the declared error of the map are none.
+    """
+    least = max(LEAST_GAP, GAP_SIGMAS * (index.sigma or 0.0))
+    if least >= GREATEST_GAP:
+        return
     ends = index.segments.shifted(-index.origin).endpoints[: index.directed].reshape(-1, 2)
     # A segment whose end is as near as this to its own begin is too short for the test.
     alone = _alone(ends) & np.repeat(index.segments.lengths[: index.directed] > GREATEST_GAP, 2)
     if not alone.any() or deadline.passed:
         return
     found = set()
-    for end, gap in _loose_ends(ends, np.flatnonzero(alone), deadline):
+    for end, gap in _loose_ends(ends, np.flatnonzero(alone), least, deadline):
         if deadline.passed:
             break
         apart = _distance_to_others(index, ends[end], index.wall_of_piece[end // 2])
-        if apart > LEAST_GAP + SAME_LINE and min(apart, gap) <= GREATEST_GAP:
+        if apart > least + SAME_LINE and min(apart, gap) <= GREATEST_GAP:
             found.add(end // 2)
     if found:
         yield Finding(
             "gaps",
-            f"{len(found)} segments end {100.0 * LEAST_GAP:g} to {100.0 * GREATEST_GAP:g} cm before another segment: "
+            f"{len(found)} segments end {100.0 * least:g} to {100.0 * GREATEST_GAP:g} cm before another segment: "
             "rays pass through the gaps. Extend the segments until they meet.",
             tuple(sorted(found)),
         )
@@ -192,10 +199,10 @@ def _alone(ends: Floats) -> Flags:
     return alone
 
 
-def _loose_ends(ends: Floats, chosen: Indices, deadline: Deadline) -> Iterator[tuple[int, float]]:
+def _loose_ends(ends: Floats, chosen: Indices, least: float, deadline: Deadline) -> Iterator[tuple[int, float]]:
     """Yield those of the chosen ends (k,) that touch no other, `MOST_ENDS` at most, and how far the nearest is, metres.
 
-    It is infinitely far where none is within `GREATEST_GAP`.
+    An end within `least` metres touches. It is infinitely far where none is within `GREATEST_GAP`.
     """
     from scipy.spatial import cKDTree  # takes a tenth of a second to load, and only this needs it
 
@@ -205,7 +212,7 @@ def _loose_ends(ends: Floats, chosen: Indices, deadline: Deadline) -> Iterator[t
         if left <= 0 or deadline.passed:
             return
         nearest = np.asarray(tree.query(ends[some], k=2, distance_upper_bound=GREATEST_GAP)[0])[:, 1]
-        free = np.flatnonzero(nearest > LEAST_GAP)[:left]  # after the end itself
+        free = np.flatnonzero(nearest > least)[:left]  # after the end itself
         left -= len(free)
         yield from zip(some[free].tolist(), nearest[free].tolist(), strict=True)
 

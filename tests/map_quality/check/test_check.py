@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from association import CancelledError, Deadline
+from association import CancelledError, Deadline, MapIndex
 from map_quality import MapCheck, check_map
 from map_quality.views import Robot, look
 from registration import RigidTransform, Segments
@@ -114,6 +114,15 @@ def test_gaps() -> None:
     assert found(walls)["gaps"] == (0, 1, 3, 10)
     walls[0, 2] = 7.0  # a door
     assert found(walls)["gaps"] == (3, 10)
+
+
+@pytest.mark.parametrize(("sigma", "gaps"), [(None, (0,)), (0.005, (0,)), (0.01, (0,)), (0.025, ())])
+def test_gaps_within_the_declared_error_of_a_map_are_none(sigma: float | None, gaps: tuple[int, ...]) -> None:
+    """As in the map of a grid: its walls end where their own cells do, and they declare half a cell."""
+    walls = ROOM.copy()
+    walls[0, 2] = 7.92  # ends before the corner
+    index = MapIndex.build(Segments.from_array(walls), sigma)
+    assert {one.code: one.segments for one in check_map(index).findings}.get("gaps", ())[:1] == gaps
 
 
 def test_overlaps() -> None:
