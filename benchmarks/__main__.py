@@ -14,6 +14,7 @@ from .drawn import SCANNER
 from .estimators import estimators
 from .figures import record
 from .floors import floors
+from .grids import grids
 from .growth import PAIRS, SIZES, growth
 from .imports import imports
 from .localization import localization
@@ -125,6 +126,7 @@ TABLES: dict[str, Callable[[int], list[Row]]] = {
     "parts": _parts,
     "mistakes": _mistakes,
     "floors": _floors,
+    "grids": grids,
     "peers": _peers,
     "request": request,
     "sums": _sums,
