@@ -4,9 +4,9 @@ Alternatives are compared three times.
 
 - As they were scored.
 - By what the scan shows. Suppose two rooms are equal but for a cupboard that the map shows in one of them. Today the
-  cupboard is gone: the scan fits the other room without a fault, and many beams contradict the right one. But one
-  thing that was moved away is enough for all of these beams. What the scan does not show counts little, therefore,
-  where another place explains all that it does show.
+  cupboard is gone: the scan fits the other room without a fault, and many beams contradict the right one. But a
+  single removed cupboard explains all of these beams. Beams and lines of sight therefore count little where another
+  place explains everything that the scan does show.
 - With walls taken to be off by more than the answer shows. Suppose a building repeats itself and its map is
   centimetres off. A wall at the right place may then lie beyond the gates, and a similar place may fit better by luck.
   The error of the walls is estimated from the place that fits best, and of many similar places one always fits well. A

@@ -9,9 +9,9 @@ LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 
 # --- Alternatives: compared again by what the scan shows --------------------------------------------------------------
 
-# What speaks against an alternative that explains all that the scan shows: that one thing of its map was moved away
-# has a probability of 1 in 20. Geometry and tables.
-ABSENCE = 3.0  # nats
+# The most that beams and lines of sight count against an alternative that explains all that the scan shows, tables. A
+# single removed object explains them; its probability is taken to be 1 in 55.
+ABSENCE = 4.0  # nats
 
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
 

@@ -123,7 +123,7 @@ def test_a_thing_that_is_where_the_map_shows_it_tells_two_rooms_apart() -> None:
 
 def test_what_the_scan_does_not_show_counts_up_to_a_limit() -> None:
     """Of two explanations with equal matches; any number of beams counts as one thing that may be gone."""
-    context, answer, rivals = explained(0)
+    _, answer, _ = explained(0)
     equal = replace(answer.best, score=answer.best.score - 40.0, posterior=answer.best.posterior - 40.0)
     limited = 1.0 / (1.0 + math.exp(-ABSENCE / ALTERNATIVE_TEMPERATURE))
     assert probability_by_shown(answer.best, [equal]) == pytest.approx(limited)
@@ -136,6 +136,6 @@ def test_what_the_scan_does_not_show_counts_up_to_a_limit() -> None:
 
 
 def test_a_prior_counts_in_full_next_to_what_the_scan_shows() -> None:
-    context, answer, rivals = explained(0)
+    _, answer, _ = explained(0)
     unlikely = replace(answer.best, posterior=answer.best.posterior - 30.0)
     assert probability_by_shown(answer.best, [unlikely]) > 0.999
