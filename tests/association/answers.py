@@ -75,6 +75,7 @@ def ranked(
     named: dict[str, Any] = {**usual, **scores}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
     matches = matches_of([k if k < matched else -1 for k in range(8)])
+    matches["score"] = np.where(matches["wall"] >= 0, max(2.0, score / max(1, matched)), 0.0)  # whole ones
     return ConsensusSet(estimate_of(found, covariance), score, score + prior, matches=matches, **named)
 
 
