@@ -45,6 +45,7 @@ def matches_of(walls: Sequence[int]) -> Records:
     """Return matches with these walls, or -1."""
     matches = np.zeros(len(walls), MATCH)
     matches["wall"] = walls
+    each = max(2.0, score / max(1, matched)) if score > 0.0 else 0.0  # less counts as a match in part
     matches["score"] = np.where(matches["wall"] >= 0, 10.0, 0.0)
     return matches
 
@@ -75,7 +76,8 @@ def ranked(
     named: dict[str, Any] = {**usual, **scores}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
     matches = matches_of([k if k < matched else -1 for k in range(8)])
-    matches["score"] = np.where(matches["wall"] >= 0, max(2.0, score / max(1, matched)), 0.0)  # whole ones
+    each = max(2.0, score / max(1, matched)) if score > 0.0 else 0.0  # less counts as a match in part
+    matches["score"] = np.where(matches["wall"] >= 0, each, 0.0)
     return ConsensusSet(estimate_of(found, covariance), score, score + prior, matches=matches, **named)
 
 
