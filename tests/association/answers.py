@@ -45,7 +45,6 @@ def matches_of(walls: Sequence[int]) -> Records:
     """Return matches with these walls, or -1."""
     matches = np.zeros(len(walls), MATCH)
     matches["wall"] = walls
-    each = max(2.0, score / max(1, matched)) if score > 0.0 else 0.0  # less counts as a match in part
     matches["score"] = np.where(matches["wall"] >= 0, 10.0, 0.0)
     return matches
 
