@@ -150,9 +150,10 @@ class VerdictExplanation:
     taken : mapping or None
         By reason the decrease of the cautious log odds by its features, nats.
     alternatives : tuple of WeighedAlternative
-    among_as_scored, among_with_loose_walls : float or None
-        Probability of the answer among its alternatives, as they were scored, and with walls that may be off by more.
-        The second is None where it was not needed. The lower one counts.
+    among_as_scored, among_by_shown, among_with_loose_walls : float or None
+        Probability of the answer among its alternatives: as they were scored, where what the scan does not show
+        counts little, and with walls that may be off by more. The last is None where it was not needed. The lowest
+        counts.
     null : ExplainedNull or None
         None where it was not needed.
     probability_of_pose, cautious : float or None
@@ -174,6 +175,7 @@ class VerdictExplanation:
     taken: Mapping[ReasonCode, float] | None = None
     alternatives: tuple[WeighedAlternative, ...] = ()
     among_as_scored: float | None = None
+    among_by_shown: float | None = None
     among_with_loose_walls: float | None = None
     null: ExplainedNull | None = None
     probability_of_pose: float | None = None
@@ -265,6 +267,7 @@ def _with_numbers(
         taken=taken_by_reason(found.features, found.model),
         alternatives=_weighed(context, description),
         among_as_scored=found.among_as_scored,
+        among_by_shown=found.among_by_shown,
         among_with_loose_walls=found.among_with_loose_walls,
         null=_null(description, found),
         probability_of_pose=found.right,

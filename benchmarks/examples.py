@@ -12,7 +12,7 @@ import numpy as np
 from association import Deadline, MapIndex, Scan
 from association.context import SearchContext
 from association.to_scale import search_to_scale
-from association.verdict.alternatives import probability_among, probability_with_loose_walls
+from association.verdict.alternatives import probability_among, probability_by_shown, probability_with_loose_walls
 from association.verdict.chance import find_null_score
 from association.verdict.features import Features, describe_answer, with_null_score
 from association.verdict.models import USUAL
@@ -61,8 +61,9 @@ class Example:
         True if the scan shows that the answer is not where it was taken, where the answer is wrong.
     before_null : Features
         The same with the least null score there is.
-    share, loose : float
-        Probability among the alternatives, as they were scored and with walls off by more, 0 to 1.
+    share, shown, loose : float
+        Probability among the alternatives: as they were scored, where what the scan does not show counts little, and
+        with walls off by more, 0 to 1.
     vetoes : tuple of str
         That apply, in the order of the table.
     """
@@ -79,6 +80,7 @@ class Example:
     told: bool
     before_null: Features = USUAL
     share: float = 1.0
+    shown: float = 1.0
     loose: float = 1.0
     vetoes: tuple[str, ...] = ()
 
@@ -144,6 +146,7 @@ class Case:
             told=not right and (self.told is None or pose is None or self.told(pose)),
             before_null=plain,
             share=probability_among(weighed),
+            shown=probability_by_shown(best, description.others),
             loose=probability_with_loose_walls(context, found.answer, description.others),
             vetoes=tuple(one.name for one in applied(replace(findings, mirrored_better=features.null_better))),
         )

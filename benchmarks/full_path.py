@@ -52,8 +52,10 @@ def answered(
     """
     settled = np.array([bool(SETTLING & set(e.vetoes)) for e in examples], bool)
     shares = np.array([e.share for e in examples])
+    shown = np.minimum(shares, np.array([e.shown for e in examples]))
+    likely, careful = likely * shown / shares, careful * shown / shares
     compared = (likely >= USABLE_PROBABILITY) & (careful >= threshold) & ~settled
-    factor = np.where(compared, np.minimum(1.0, np.array([e.loose for e in examples]) / shares), 1.0)
+    factor = np.where(compared, np.minimum(1.0, np.array([e.loose for e in examples]) / shown), 1.0)
     likely, careful = likely * factor, careful * factor
     found = likely.copy()
     if model is not None:

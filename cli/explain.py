@@ -78,7 +78,10 @@ def _print_alternatives(one: Json) -> None:
         print_table(("pose", "gap in nats", "weight"), rows)
     loose = among["with_loose_walls"]
     compared = "not compared" if loose is None else f"{loose:.4f}"
-    print(f"probability among them: {among['as_scored']:.4f}; with walls off by more: {compared}")
+    print(
+        f"probability among them: {among['as_scored']:.4f}; by what the scan shows: {among['by_shown']:.4f}; "
+        f"with walls off by more: {compared}"
+    )
 
 
 def _print_null(null: Json | None) -> None:

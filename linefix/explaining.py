@@ -88,7 +88,11 @@ def _verdict_json(one: VerdictExplanation) -> Json:
             {"pose": pose_json(other.pose), "gap": other.gap, "counted": other.counted, "weight": other.weight}
             for other in one.alternatives
         ],
-        "among_alternatives": {"as_scored": one.among_as_scored, "with_loose_walls": one.among_with_loose_walls},
+        "among_alternatives": {
+            "as_scored": one.among_as_scored,
+            "by_shown": one.among_by_shown,
+            "with_loose_walls": one.among_with_loose_walls,
+        },
         "null": None if one.null is None else asdict(one.null),
         "probability_of_pose": one.probability_of_pose,
         "cautious": one.cautious,

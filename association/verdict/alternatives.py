@@ -1,9 +1,16 @@
 """Estimate how probable the best explanation is among its alternatives: perceptual aliasing.
 
-Alternatives are compared twice: as they were scored, and with walls taken to be off by more than the answer shows.
-Suppose a building repeats itself and its map is centimetres off. A wall at the right place may then lie beyond the
-gates, and a similar place may fit better by luck. The error of the walls is estimated from the place that fits best,
-and of many similar places one always fits well. A misfit of centimetres is therefore no evidence against a place.
+Alternatives are compared three times.
+
+- As they were scored.
+- By what the scan shows. Suppose two rooms are equal but for a cupboard that the map shows in one of them. Today the
+  cupboard is gone: the scan fits the other room without a fault, and many beams contradict the right one. But a
+  single removed cupboard explains all of these beams. Beams and lines of sight therefore count little where another
+  place explains everything that the scan does show.
+- With walls taken to be off by more than the answer shows. Suppose a building repeats itself and its map is
+  centimetres off. A wall at the right place may then lie beyond the gates, and a similar place may fit better by luck.
+  The error of the walls is estimated from the place that fits best, and of many similar places one always fits well. A
+  misfit of centimetres is therefore no evidence against a place.
 """
 
 from __future__ import annotations
@@ -24,6 +31,7 @@ from ..scan.scan_lines import ScanLines
 from ..tuning import LEAST_OFF_WALLS, LOOSE_WALLS, MODEL_OFFSET
 from .kernels import alternatives as kernels
 from .tuning import (
+    ABSENCE,
     ALTERNATIVE_TEMPERATURE,
     LOOSE_ALTERNATIVES,
     LOOSE_BEAMS,
@@ -42,6 +50,26 @@ def compare_alternatives(best: ConsensusSet, others: Sequence[ConsensusSet]) -> 
 def probability_among(alternatives: Records) -> float:
     """Return the probability of the best explanation among those that are about as good, above 0 and up to 1."""
     return kernels.probability_among(alternatives)
+
+
+def probability_by_shown(best: ConsensusSet, others: Sequence[ConsensusSet]) -> float:
+    """Return the probability of the best explanation where what the scan does not show counts little, up to 1.
+
+    An alternative is behind by ``shown + min(rest, ABSENCE)`` nats. ``shown`` is the difference of the scores of all
+    matches and of the prior. The rest is what lines of sight, beams and the log-determinant make.
+    """
+    if not others:
+        return 1.0
+    shown = np.array([_shown(one) for one in (best, *others)])
+    behind = shown[0] - shown[1:]
+    rest = np.array([best.posterior - one.posterior for one in others]) - behind
+    behind += np.minimum(rest, ABSENCE)
+    return float(1.0 / (1.0 + np.exp(-np.maximum(0.0, behind) / ALTERNATIVE_TEMPERATURE).sum()))
+
+
+def _shown(one: ConsensusSet) -> float:
+    """Return the scores of the matches and of the prior of an explanation, nats."""
+    return float(np.maximum(0.0, one.matches["score"]).sum()) + one.posterior - one.score
 
 
 def probability_with_loose_walls(context: SearchContext, answer: Answer, others: Sequence[ConsensusSet]) -> float:

@@ -8,7 +8,7 @@ from registration.layout import Records
 from registration.values import value
 
 from ..context import SearchContext
-from .alternatives import probability_among, probability_with_loose_walls
+from .alternatives import probability_among, probability_by_shown, probability_with_loose_walls
 from .chance import NullScore, find_null_score
 from .features import Description, Features, add_null_score
 from .kernels.null_features import allowed_null
@@ -38,6 +38,8 @@ class Probabilities:
         By either model, before the alternatives.
     among_as_scored : float
         Of the answer among its alternatives, as these were scored.
+    among_by_shown : float
+        The same where what the scan does not show counts little.
     among_with_loose_walls : float or None
         The same where walls may be off by more; None where it was not compared.
     null : NullScore or None
@@ -55,6 +57,7 @@ class Probabilities:
     by_usual: float
     by_model: float
     among_as_scored: float
+    among_by_shown: float
     among_with_loose_walls: float | None
     null: NullScore | None
     null_above: float
@@ -63,8 +66,8 @@ class Probabilities:
     @property
     def among_alternatives(self) -> float:
         """Return the probability of the answer among the explanations that are about as good."""
-        loose = self.among_with_loose_walls
-        return self.among_as_scored if loose is None else min(self.among_as_scored, loose)
+        loose = 1.0 if self.among_with_loose_walls is None else self.among_with_loose_walls
+        return min(self.among_as_scored, self.among_by_shown, loose)
 
     @property
     def right(self) -> float:
@@ -125,6 +128,7 @@ def _at_first(context: SearchContext, description: Description) -> Probabilities
         by_usual=probability(usual.odds, described),
         by_model=probability(model.odds, described),
         among_as_scored=probability_among(description.alternatives),
+        among_by_shown=probability_by_shown(description.answer.best, description.others),
         among_with_loose_walls=None,
         null=None,
         null_above=0.0,

@@ -7,6 +7,12 @@ LOOSE_FACTOR = 2.0  # tables; and times as much as they seem to be,
 LOOSE_BEAMS = 0.5  # tables; and with that fraction of the beams' part, which depends on centimetres
 LOOSE_ALTERNATIVES = 8  # tables; the best and that many others
 
+# --- Alternatives: compared again by what the scan shows --------------------------------------------------------------
+
+# The most that beams and lines of sight count against an alternative that explains all that the scan shows, tables. A
+# single removed object explains them; its probability is taken to be 1 in 55.
+ABSENCE = 4.0  # nats
+
 # --- Null score: that of the mirrored scan ----------------------------------------------------------------------------
 
 SHORTEST_SHOWN = 0.2  # m, tables; less of a wall tells nothing of its symmetry

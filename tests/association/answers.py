@@ -75,6 +75,8 @@ def ranked(
     named: dict[str, Any] = {**usual, **scores}
     found = local(ROOM_INDEX, INSIDE) if at is None else at
     matches = matches_of([k if k < matched else -1 for k in range(8)])
+    each = max(2.0, score / max(1, matched)) if score > 0.0 else 0.0  # less counts as a match in part
+    matches["score"] = np.where(matches["wall"] >= 0, each, 0.0)
     return ConsensusSet(estimate_of(found, covariance), score, score + prior, matches=matches, **named)
 
 

@@ -50,6 +50,19 @@ def evidence(answer: Answer, rivals: list[ConsensusSet], temperature: float) -> 
     return total
 
 
+def shared(answer: Answer, rivals: list[ConsensusSet]) -> float:
+    """Return the probability of the answer among the others: as scored, or by what the scan shows if that is less."""
+    as_scored = 1.0 / (1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE))
+    total = 0.0
+    for rival in rivals:
+        by_matches = sum(max(0.0, float(a)) for a in answer.best.matches["score"])
+        by_matches -= sum(max(0.0, float(b)) for b in rival.matches["score"])
+        by_prior = (answer.best.posterior - answer.best.score) - (rival.posterior - rival.score)
+        rest = (answer.best.score - rival.score) - by_matches
+        total += math.exp(-max(0.0, by_matches + by_prior + min(tuning.ABSENCE, rest)) / tuning.ALTERNATIVE_TEMPERATURE)
+    return min(as_scored, 1.0 / (1.0 + total))
+
+
 def root(x: float) -> float:
     """Return the root of a number, with its sign."""
     return -math.sqrt(-x) if x < 0.0 else math.sqrt(x)
@@ -178,7 +191,7 @@ def judge(
     chances = _chances(context, explanations, models, usual_deviation)
     likely = chances.right >= tuning.USABLE_PROBABILITY and not elsewhere and not thin
     if likely and not free and chances.careful >= bar_of(context):
-        share = 1.0 / (1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE))
+        share = shared(answer, rivals)
         less = min(1.0, probability_with_loose_walls(context, answer, rivals) / share)
         chances = replace(chances, right=less * chances.right, careful=less * chances.careful)
         if chances.careful >= bar_of(context):
@@ -224,7 +237,7 @@ def _chances(
     rivals = [one for one in explanations.ranked if one is not answer.best and one.inside]
     numbers, cautious = features(context, answer, rivals), cautious_of(context, models)
     usual = models["probability" if context.scan.beams is None else "probability_with_beams"]
-    twins = 1.0 + evidence(answer, rivals, tuning.ALTERNATIVE_TEMPERATURE)
+    share = shared(answer, rivals)
     return Judged(
         Status.NO_MATCH,
         False,
@@ -232,7 +245,7 @@ def _chances(
         False,
         None,
         None,
-        right=logistic(logit(usual, numbers)) / twins,
-        careful=logistic(logit(cautious, numbers)) / twins,
+        right=logistic(logit(usual, numbers)) * share,
+        careful=logistic(logit(cautious, numbers)) * share,
         explained=logistic(logit(cautious, {**numbers, "deviation": usual_deviation})),
     )

@@ -8,16 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from association import AssociationResult
 from association.consensus.consensus_set import ConsensusSet
 from association.consensus.tuning import BEAMS_READ
 from association.context import SearchContext
 from association.explain import search_and_explain
 from association.explanations import Answer
-from association.verdict.alternatives import compare_alternatives, probability_among, probability_with_loose_walls
-from association.verdict.tuning import ALTERNATIVE_TEMPERATURE, LOOSE_BEAMS
+from association.verdict.alternatives import (
+    compare_alternatives,
+    probability_among,
+    probability_by_shown,
+    probability_with_loose_walls,
+)
+from association.verdict.tuning import ABSENCE, ALTERNATIVE_TEMPERATURE, LOOSE_BEAMS
 from registration import Segments
 
-from ..scenes import INSIDE, ROOM, context_of, equal_rooms, index_of, scan_of, seen
+from ..scenes import INSIDE, ROOM, answer_of, beams_of, context_of, equal_rooms, index_of, pose, scan_of, seen
 
 SCAN = scan_of(seen(ROOM, INSIDE)[0], viewpoint=(0.0, 0.0))
 
@@ -84,3 +90,52 @@ def test_what_a_prior_says_counts_whole() -> None:
     by_prior = probability_with_loose_walls(context, replace(answer, best=liked), rivals)
     odds = by_prior / (1.0 - by_prior) / (plain / (1.0 - plain))
     assert odds == pytest.approx(math.exp(1.0 / ALTERNATIVE_TEMPERATURE), rel=1e-6)
+
+
+CUPBOARD = np.array([[4.6, 0.6, 4.6, 2.6], [4.6, 2.6, 7.2, 2.6], [7.2, 2.6, 7.2, 0.6], [7.2, 0.6, 4.6, 0.6]])
+IN_SECOND = pose(INSIDE.x + 12.0, INSIDE.y, INSIDE.theta)
+
+
+def one_cupboard(*, there: bool) -> AssociationResult:
+    """Locate a scan of the second of two equal rooms, in which alone the map shows a cupboard."""
+    thing = CUPBOARD + np.tile([12.0, 0.0], 2)
+    rooms = equal_rooms(2)
+    place = index_of(np.vstack([rooms, thing]))
+    today = place if there else index_of(rooms)
+    pieces = np.vstack([ROOM + np.tile([12.0, 0.0], 2), thing[[0, 1]] if there else np.empty((0, 4))])
+    return answer_of(place, scan_of(seen(pieces, IN_SECOND)[0], 0.02, (0.0, 0.0), beams_of(today, IN_SECOND)))
+
+
+def test_a_thing_that_was_moved_away_does_not_tell_two_rooms_apart() -> None:
+    """The room that never had it fits without a fault; all that speaks for the right one is that it may be gone."""
+    result = one_cupboard(there=False)
+    assert not result.usable
+    assert "similar_place" in [reason.code for reason in result.reasons]
+    assert result.alternatives
+
+
+def test_a_thing_that_is_where_the_map_shows_it_tells_two_rooms_apart() -> None:
+    result = one_cupboard(there=True)
+    assert result.usable
+    assert result.pose is not None
+    assert math.hypot(result.pose.x - IN_SECOND.x, result.pose.y - IN_SECOND.y) < 0.05
+
+
+def test_what_the_scan_does_not_show_counts_up_to_a_limit() -> None:
+    """Of two explanations with equal matches; any number of beams counts as one thing that may be gone."""
+    _, answer, _ = explained(0)
+    equal = replace(answer.best, score=answer.best.score - 40.0, posterior=answer.best.posterior - 40.0)
+    limited = 1.0 / (1.0 + math.exp(-ABSENCE / ALTERNATIVE_TEMPERATURE))
+    assert probability_by_shown(answer.best, [equal]) == pytest.approx(limited)
+    fewer = equal.matches.copy()
+    fewer["score"][0] = 0.0
+    gap = float(answer.best.matches["score"][0]) + ABSENCE
+    expected = 1.0 / (1.0 + math.exp(-gap / ALTERNATIVE_TEMPERATURE))
+    assert probability_by_shown(answer.best, [replace(equal, matches=fewer)]) == pytest.approx(expected)
+    assert probability_by_shown(answer.best, []) == 1.0
+
+
+def test_a_prior_counts_in_full_next_to_what_the_scan_shows() -> None:
+    _, answer, _ = explained(0)
+    unlikely = replace(answer.best, posterior=answer.best.posterior - 30.0)
+    assert probability_by_shown(answer.best, [unlikely]) > 0.999
